@@ -1,4 +1,4 @@
-"""Chargers: a ChargerRequest commands a station, and the station's readings make a ChargerState."""
+"""Chargers: a ChargerRequest commands a station, and the station's readings become a ChargerState."""
 
 from bridges.kinds.charger import core, memory, messages, refusals, report, settings, signals
 from bridges.kinds.charger.memory import ChargerLimits, ChargerMemory

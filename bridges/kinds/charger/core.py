@@ -1,33 +1,34 @@
 """The charger's decision core: its request, its power, and its report to RMF.
 
 CHARGER-1. The states are IDLE → ASSIGNED → CHARGING → RELEASED → IDLE, and ERROR from any of them. A
-   request leads to ASSIGNED only; every other state comes from the station's readings. CHARGING lasts
-   as long as current flows, even while it ramps down. In RELEASED the station is disconnected from its
-   robot, and the pad is not clear yet.
-CHARGER-2. A request is granted while the state is IDLE. Its repeats change nothing, even after its end.
-   Other requests are refused until the station is IDLE. There is one exception: a request for the robot
-   on the pad, if the station can identify that robot (`pad.py`).
+   request can only bring the state ASSIGNED; the station's readings bring every other state. CHARGING
+   lasts as long as current flows, even if the current is already ramping down. In RELEASED the station
+   is disconnected from its robot, and the pad is not clear yet.
+CHARGER-2. A request is granted only in the state IDLE. A repeat of the request changes nothing, even
+   after the request has ended. Every other request is refused until the station is IDLE. One exception:
+   if the station can identify the robot on the pad, a request for that robot may be granted (`pad.py`).
 CHARGER-3. `start_timeout` counts from the grant. If no charge has started by then, the request ends,
-   and the state goes through RELEASED to IDLE. The reason is shown as a fault, because RMF's error
-   message is blank unless the state is ERROR.
-CHARGER-4. A cancel ends only the request that it names. If current flows, the power is switched
+   and the state goes through RELEASED to IDLE. A fault shows the reason, because RMF leaves the error
+   message blank in every state but ERROR.
+CHARGER-4. A cancel ends only the request that the cancel names. If current flows, the power is switched
    off, and the state stays CHARGING until the station has stopped. A full battery ends a request in the
    same way.
-CHARGER-5. The station is energised only for its assigned robot, once that robot is seen on the pad and
-   in range, and while a movable pad is at its height. Another robot gets no power: the state is ERROR
-   with that robot's name, and the request goes on waiting.
-CHARGER-6. At a fault the power is switched off before the fault is reported. Power returns only with a
-   new request. A station that is at fault, or that goes on charging when told to stop, is out of
-   service (PROTECTION): the state is ERROR until its errors have been cleared and a good reading
-   follows. A fault of the robot does not take the station out of service.
+CHARGER-5. The station is energised only for its assigned robot. That robot must be on the pad and in
+   range, and a movable pad must be at its height. If another robot is on the pad, it gets no power: the
+   state is ERROR, the error message names that robot, and the request goes on waiting.
+CHARGER-6. At a fault the core first switches the power off and then reports the fault. Only a new
+   request brings power back. A station is out of service (PROTECTION) if it reports a fault, or goes on
+   charging after an order to stop. The state is then ERROR until the errors have been cleared and a
+   good reading follows. A fault of the robot does not take the station out of service.
 CHARGER-7. Failed polls say nothing about the charge. After `misses` failed polls the state is ERROR,
-   and robot and request stay. Only a good reading ends a request or frees a station. An operator can
-   free a station that must have switched off by itself (`peer_internal_timeout_s`).
-CHARGER-8. If a charge is under way when the daemon starts, or when it reaches the station again, it is
-   shown and not stopped. The next request gets that charge only if its robot is seen on the pad.
-CHARGER-9. Errors are cleared by an operator's order, and by the daemon at most `clear_errors_per_h`
-   times an hour.
-CHARGER-10. While another node publishes states under this charger's name, the power is off, no error is
+   but the robot and the request stay. Only a good reading ends a request or frees a station. An
+   operator can free a station that must have switched itself off by now (`peer_internal_timeout_s`).
+CHARGER-8. A charge may be under way when the daemon starts, or when it reaches the station again. Such
+   a charge is shown and not stopped. The next request takes that charge over only if the request's
+   robot is seen on the pad.
+CHARGER-9. Errors are cleared when an operator orders it. The daemon itself clears errors at most
+   `clear_errors_per_h` times an hour.
+CHARGER-10. If another node publishes states under this charger's name, the power is off, no error is
    cleared, and the state is ERROR.
 """
 
@@ -64,7 +65,7 @@ from bridges.kinds.shared.decision import (
 from bridges.kinds.shared.durations import AGES_AGO, NEVER, RIVAL_QUIET_S
 
 REMEMBERED = 8
-"""The number of ended requests remembered, to refuse their late repeats."""
+"""The number of ended requests that a charger remembers, so that it refuses their late repeats."""
 CLEARED_WITHIN_S = 30.0
 """A good reading within this time after the errors were cleared proves that clearing succeeded."""
 
@@ -144,7 +145,7 @@ def _held(memory: ChargerMemory, holder: ChargeSession | None) -> ChargerMemory:
 
 
 def _watched(memory: ChargerMemory, now: float) -> ChargerMemory:
-    """Note since when the station has charged against our order to stop."""
+    """Note the time since which the station has charged although it was ordered to stop."""
     sample = memory.sample
     charges = sample and (sample.activity is Activity.CHARGING or sample.charges)
     if memory.power is not False or not charges:
@@ -154,8 +155,8 @@ def _watched(memory: ChargerMemory, now: float) -> ChargerMemory:
 
 
 def _protected(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
-    """Put the station out of service at its fault, and back into service at a good reading after its
-    errors were cleared."""
+    """Put the station out of service at a fault of the station. Put it back into service at a good
+    reading after its errors were cleared."""
     sample, since = memory.sample, memory.disobeyed_since
     assert sample
     if not limits.can_stop:
@@ -171,7 +172,8 @@ def _protected(memory: ChargerMemory, now: float, limits: ChargerLimits) -> Char
 
 
 def _served(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
-    """With `unrequested: serve_known`, serve a known robot on a free pad as if it had a request."""
+    """Serve a known robot on a free pad like a robot with a request, if `unrequested` is
+    `serve_known`."""
     who = pad.seen(memory.sample, limits).robot
     if limits.unrequested != "serve_known" or who is None or memory.holder:
         return memory
@@ -222,7 +224,8 @@ def _granted(
 
 
 def _in_the_way(memory: ChargerMemory, on_pad: bool, now: float, limits: ChargerLimits) -> bool:
-    """Is there an error that a grant of this request would not clear?"""
+    """Return whether an error forbids granting this request. A wrong robot on the pad does not, if that
+    robot is the one of this request (`on_pad`)."""
     found = report.errors(memory, now, limits)
     return any(not (on_pad and fault.code == pad.WRONG_DOCKING) for fault in found)
 
@@ -250,7 +253,8 @@ def _reset(memory: ChargerMemory, now: float, limits: ChargerLimits) -> tuple[Ch
 
 
 def _freed(memory: ChargerMemory, now: float, limits: ChargerLimits) -> tuple[ChargerMemory, str]:
-    """Free a silent station by an operator's order, if it must have switched off by itself."""
+    """Free a silent station at an operator's order, if the station must have switched itself off by
+    now."""
     after_s = limits.t.peer_internal_timeout_s
     silent_s = NEVER if memory.read_at is None else now - memory.read_at
     if memory.holder is None or after_s is None or silent_s < after_s:
@@ -278,7 +282,7 @@ def _clear(memory: ChargerMemory, now: float) -> ChargerMemory:
 
 
 def _power(memory: ChargerMemory, now: float, limits: ChargerLimits) -> bool | None:
-    """May the station energise? None: give no order."""
+    """Return whether the station may energise its pad; None: send the station no order."""
     holder = memory.holder
     if rivalled(memory, now) or memory.protection or (holder and holder.over):
         return False

@@ -19,8 +19,8 @@ from bridges.kinds.shared.durations import AGES_AGO, RIVAL_QUIET_S
 class ChargerLimits(msgspec.Struct, frozen=True):
     """The settings of a charger that its core needs. `t`: durations and counts.
 
-    `receivers`: receiver id -> robot; empty if robots are not verified. `can_stop`: the station obeys
-    `power`.
+    `receivers` maps a receiver's id to its robot, and is empty if robots are not verified. `can_stop`:
+    the station obeys `power`.
     """
 
     t: ChargerDurations = ChargerDurations()
@@ -40,10 +40,10 @@ class ChargerLimits(msgspec.Struct, frozen=True):
 class ChargeSession(msgspec.Struct, frozen=True):
     """The request that holds the station, and the progress of its charge.
 
-    `start_by`: the time limit for the start of charging (monotonic s). `paused_at`: the time since
-    which another robot on the pad prevents the start. `checked_at`: the time of its last range check.
-    `started`: current has flowed for this request. `failed`: the station was at fault, so this request
-    gets no more power. `ended`: the reason of its end. `released_at`: the time of the disconnection.
+    `start_by`: the charge must start by this time (monotonic s). `paused_at`: another robot on the pad
+    has prevented the start since this time. `checked_at`: the time of the last range check. `started`:
+    current has flowed for this request. `failed`: the station was at fault, so this request gets no
+    more power. `ended`: the reason why the request ended. `released_at`: the time of the disconnection.
     """
 
     request: ChargeRequested
@@ -64,12 +64,12 @@ class ChargeSession(msgspec.Struct, frozen=True):
 class ChargerMemory(msgspec.Struct, frozen=True):
     """The memory of one charger from scan to scan. `sample`: the last good reading, at `read_at`.
 
-    `misses`: failed polls in a row. `write_misses`: scans in a row with failed commands;
-    `write_failed`: this scan's commands failed. `power`: as last decided; `disobeyed_since`: the time
-    since which the station has charged although `power` is off. `adopted`: the station was charging
-    when we reached it, and that charge is left alone. `protection`: the reason why the station is out
-    of service, "" while in service; `clear_by`: a good reading until then proves that the errors were
-    cleared. `over`: the requests that ended last.
+    `misses`: the number of failed polls in a row. `write_misses`: the number of scans in a row with
+    failed commands. `write_failed`: a command failed in this scan. `power`: the last decision.
+    `disobeyed_since`: the station has charged since this time although `power` is off. `adopted`: the
+    station was charging when we reached it, and we leave that charge alone. `protection`: the reason
+    why the station is out of service, "" in service. `clear_by`: a good reading up to this time proves
+    that the errors were cleared. `over`: the requests that ended last.
     """
 
     sample: ChargerSample | None = None

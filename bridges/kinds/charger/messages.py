@@ -18,7 +18,7 @@ from bridges.messages.definitions import (
 from bridges.messages.stamps import duration, in_seconds
 
 LONGEST_TIMEOUT_S = 86400.0
-"""One day. A longer timeout must be in a wrong unit."""
+"""One day. A longer timeout was probably given in a wrong unit."""
 
 
 def accept_request(request: ChargerRequest, settings: ChargerSettings) -> ChargeRequested:
@@ -30,7 +30,9 @@ def accept_request(request: ChargerRequest, settings: ChargerSettings) -> Charge
     _check("fleet_name", request.fleet_name)
     _check("robot_name", request.robot_name)
     if request.request_id.startswith(UNREQUESTED):
-        raise RequestRefused("reserved request_id", f"{UNREQUESTED}… is what we publish ourselves")
+        raise RequestRefused(
+            "reserved request_id", f"{UNREQUESTED}… is reserved for the charger itself"
+        )
     return ChargeRequested(
         request.request_id,
         request.fleet_name,
@@ -42,7 +44,7 @@ def accept_request(request: ChargerRequest, settings: ChargerSettings) -> Charge
 def accept_cancel(cancel: ChargerCancel, settings: ChargerSettings) -> Cancelled:
     """Turn a ChargerCancel into an event. Raises RequestRefused if it is malformed.
 
-    A charge without a request is cancelled by the request id in its published state.
+    To cancel a charge that nobody requested, send the request id in the charger's published state.
     """
     _check("request_id", cancel.request_id)
     if cancel.request_id == UNREQUESTED + cancel.charger_name:
@@ -52,7 +54,7 @@ def accept_cancel(cancel: ChargerCancel, settings: ChargerSettings) -> Cancelled
 
 def _check(field: str, text: str) -> None:
     if not text:
-        raise RequestRefused(f"empty {field}", "ChargerState must show it")
+        raise RequestRefused(f"empty {field}", "ChargerState must show this field")
     check_length(**{field: text})
     if not text.isprintable():
         raise RequestRefused(f"impossible {field}", f"{text[:40]!r}, {len(text)} characters")
@@ -68,7 +70,7 @@ def _start_timeout_s(timeout: Duration) -> float:
 
 
 def device_name(message: ChargerRequest | ChargerCancel | ChargerState) -> str:
-    """Return the charger that a message is about."""
+    """Return the name of the charger in a message."""
     return message.charger_name
 
 
@@ -92,7 +94,7 @@ def state_message(
 
 
 def summary(report: ChargerReport) -> Mapping[str, str]:
-    """Summarise the report in one line, for a person. A robot is marked unverified unless the station
+    """Summarise the report in one line, for a person. A robot is marked as unverified until the station
     has seen its receiver."""
     measured = report.measured
     seen = "" if report.verified else " (unverified)"

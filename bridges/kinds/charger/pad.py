@@ -1,15 +1,15 @@
 """The robot on the pad, and the permission to energise the pad.
 
-Does the receiver that the station sees belong to the request's robot? Without `receivers` in the YAML
-no robot is verified: any robot counts as the request's robot. With `receivers`, a station charges
-nobody if it does not identify the receiver that it sees.
+The station sees a receiver on its pad: does the receiver belong to the request's robot? Without
+`receivers` in the YAML nobody can tell, so every robot counts as the request's robot. With `receivers`,
+a station that sees a receiver without its id charges nobody.
 
-A station that moves its pad, or checks the robot's range, gives no power unless the pad is at its
-height and the robot in range. No message announces that a robot leaves; only the readings of height and
-range show that. A pad that has left its height while current flows is a fault of the station.
+Some stations move their pad, or check the robot's range. Such a station gives power only if the pad is
+at its height and the robot in range. No message announces that a robot leaves; only the readings of
+height and range show it. If the pad leaves its height while current flows, the station is at fault.
 
-A wrong robot or receiver on the pad is named in ChargerState's error_message. `Misplaced.text` writes
-that text and `misplaced_in` reads it. An id that would make the text ambiguous is quoted as in JSON, so
+ChargerState's error_message names a wrong robot or receiver on the pad. `Misplaced.text` writes that
+text and `misplaced_in` reads it. An id that would make the text ambiguous is quoted as in JSON, so
 every id can be read back.
 """
 
@@ -43,9 +43,10 @@ _TEXT = re.compile(
 
 class PadOccupant(msgspec.Struct, frozen=True):
     """The occupant of the pad. `unverified`: the YAML has no receivers. `mute`: the station does not
-    identify the receiver. `stranger`: a receiver that the YAML does not list.
+    identify the receiver. `stranger`: the YAML does not list the receiver.
 
-    `receiver`: the id that the station sees. `robot`: the receiver's robot, None if not listed.
+    `receiver`: the id that the station sees. `robot`: the robot that carries the receiver, None if not
+    listed.
     """
 
     sort: Literal["unverified", "mute", "empty", "robot", "stranger"]
@@ -82,7 +83,8 @@ def not_ready(sample: ChargerSample) -> str:
 
 
 def judged(sample: ChargerSample) -> ChargerSample:
-    """Turn the reading into a fault of the station if the pad has left its height under power."""
+    """Return the reading. If the pad has left its height under power, return the reading as a fault of
+    the station."""
     if sample.activity is not Activity.CHARGING or sample.measured.at_height is not False:
         return sample
     return replace(
@@ -95,7 +97,7 @@ def judged(sample: ChargerSample) -> ChargerSample:
 
 
 class Misplaced(msgspec.Struct, frozen=True):
-    """A wrong occupant of the pad: a known `robot`, else an unknown `receiver`.
+    """A wrong occupant of the pad: a `robot` of the YAML, else an unknown `receiver`.
 
     `expected`: the robot for which the station waits, None if it waits for none.
     """
@@ -154,7 +156,7 @@ def misplaced(memory: ChargerMemory, limits: ChargerLimits) -> Fault | None:
 
 
 def left_alone(memory: ChargerMemory, limits: ChargerLimits) -> bool:
-    """Does current flow without a request, and do we leave it on?"""
+    """Return whether current flows without a request and is left on."""
     if memory.sample is None or memory.sample.activity not in CURRENT_FLOWS:
         return False
     return memory.adopted or not limits.can_stop or limits.unrequested == "serve_known"

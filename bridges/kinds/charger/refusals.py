@@ -1,8 +1,8 @@
-"""The published answer to a refused ChargerRequest, and the function that reads it.
+"""The published answer to a refused ChargerRequest, and the function that reads the answer.
 
-ChargerState shows only the station's true state, and RMF has no message for a refusal. So a refusal is
-published as a diagnostic_msgs/DiagnosticStatus on our own topic `charger_refusals`: every ROS machine
-has this type, and `ros2 topic echo` shows its fields by their names.
+ChargerState shows only the station's true state, and RMF has no message for a refusal. So the daemon
+publishes a refusal as a diagnostic_msgs/DiagnosticStatus on a topic of its own, `charger_refusals`.
+Every ROS machine has this type, and `ros2 topic echo` shows its fields by their names.
 """
 
 from collections.abc import Mapping
@@ -20,16 +20,16 @@ from bridges.messages.words import LONGEST_NAME
 
 NAME = "ChargerRequest refused"
 OCCUPIED = "charger occupied"
-"""The only reason for a refusal that passes when the charger is released."""
+"""The only reason for a refusal that a later release of the charger removes."""
 LONGEST_REASON = 500
 
 
 class ChargerRefusal(msgspec.Struct, frozen=True, kw_only=True):
-    """The reason of a refusal, and the charger's holder.
+    """The reason of a refusal, and the robot that has the charger.
 
-    `robot`: the request's FLEET/ROBOT. `state`: the charger's state, in RMF's word. `held_by`,
-    `held_request`: the robot that has the charger and the id of its request, "" for nobody. `error`:
-    the charger's error text, "" if it has none.
+    `robot`: the FLEET/ROBOT of the refused request. `state`: the charger's state, in RMF's word.
+    `held_by`: the robot that has the charger. `held_request`: the id of that robot's request. Both are
+    "" if no robot has the charger. `error`: the charger's error text, "" without an error.
     """
 
     request_id: str
@@ -67,7 +67,8 @@ def read(status: DiagnosticStatus) -> ChargerRefusal | None:
 
 
 def refused(request_id: str, charger: str, who: RobotName, reason: str) -> ChargerRefusal:
-    """Make the refusal of a request, which may be malformed and have names of any length."""
+    """Make the refusal of a request. The request may be malformed, and its names may have any
+    length."""
     return ChargerRefusal(
         request_id=_cut(request_id),
         charger=_cut(charger),
@@ -79,8 +80,8 @@ def refused(request_id: str, charger: str, who: RobotName, reason: str) -> Charg
 def answer(name: str, request: object, reason: str, report: ChargerReport) -> RefusalAnswer | None:
     """Make the published answer to a request that charger `name` refuses; None for other messages.
 
-    `request`: the message, if it is malformed, else the core's event. `report`: the charger's present
-    report.
+    `request`: the message itself if it is malformed, else the core's event. `report`: the charger's
+    present report.
     """
     match request:
         case ChargerRequest():

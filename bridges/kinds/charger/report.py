@@ -1,8 +1,8 @@
-"""A charger's report to RMF, the log and the status file; and the diagnosis of its error texts.
+"""A charger's report to RMF, the log and the status file, and the diagnosis of its error texts.
 
 RMF's ChargerState has one text for all errors. From that text the coordinator
-(`bridges/kinds/charger_coordinator/`) must find the side at fault: `error_message` writes
-the text and `diagnosis` reads it.
+(`bridges/kinds/charger_coordinator/`) must find out whether robot or station is at fault:
+`error_message` writes the text and `diagnosis` reads it.
 """
 
 from enum import StrEnum
@@ -25,24 +25,25 @@ RELEASED = ChargerStateValue.CHARGER_RELEASED
 ERROR = ChargerStateValue.CHARGER_ERROR
 
 UNREQUESTED = "unrequested/"
-"""ChargerState has a request id in every state but IDLE. Without a request (an error of a free
-station, an unrequested charge) the id is this prefix and the charger's name."""
+"""The beginning of a request id that we make up. ChargerState needs an id in every state but IDLE. If
+there is no request (at an error of a free station, or an unrequested charge), the id is this text
+and the charger's name."""
 
 LOST = {
     "TWO_NODES_FOR_ONE_DEVICE": "two nodes for one device",
     "CHARGER_UNREACHABLE": "Charger unreachable",
     "CHARGER_NOT_COMMANDED": "Charger takes no commands",
 }
-"""Fixed error messages of stations out of reach or control; the fault has the reason."""
+"""Fixed error messages of stations that cannot be reached or commanded. The fault gives the reason."""
 OUT_OF_SERVICE = "out of service after: "
 
 
 class FaultCause(StrEnum):
     """The side at fault.
 
-    PAD: a wrong robot or receiver is on the pad. LOST: the station cannot be reached or commanded,
-    which says nothing about station or robot. UNCLEAR: the text names no side. Then a second station
-    decides: a robot that fails there too is at fault.
+    PAD: a wrong robot or receiver is on the pad. LOST: the station cannot be reached or commanded; this
+    says nothing about station or robot. UNCLEAR: the text names no side. Then the robot tries a second
+    station: a robot that fails there too is at fault.
     """
 
     NONE = ""
@@ -70,17 +71,18 @@ def error_message(fault: Fault) -> str:
 
 
 def diagnosis(message: str) -> FaultCause:
-    """Find the side at fault in a ChargerState's error_message; another node's text is UNCLEAR."""
+    """Find the side at fault in a ChargerState's error_message. A text of another program is
+    UNCLEAR."""
     found = (whose for start, whose in _BEGINNINGS.items() if message.startswith(start))
     return next(found, FaultCause.UNCLEAR)
 
 
 class ChargerReport(msgspec.Struct, frozen=True):
-    """ChargerState without its name and stamp.
+    """The content of ChargerState, except its name and stamp.
 
-    `read_at`: monotonic seconds of the last good reading, None before the first. `error_message`:
-    blank unless `state` is CHARGER_ERROR. `request_id`: blank while no request holds the station.
-    `fleet`, `robot`: the request's robot; without a request, the robot on the pad of a station that is
+    `read_at`: monotonic seconds of the last good reading, None before the first. `error_message`: blank
+    unless `state` is CHARGER_ERROR. `request_id`: blank if no request holds the station. `fleet`,
+    `robot`: the request's robot. Without a request they name the robot on the pad, if the station is
     not idle. `verified`: the station sees that robot's receiver. `waits`: the reason why the robot is
     not charged yet; "" without a request, during and after the charge, and in ERROR.
     """
@@ -97,7 +99,8 @@ class ChargerReport(msgspec.Struct, frozen=True):
     waits: str = ""
 
     def news(self) -> object:
-        """Return everything except the age, the measurements and `waits`, which are no news for RMF."""
+        """Return everything except the age, the measurements and `waits`, because their changes alone
+        need no new message to RMF."""
         measured = Measured(receiver_id=self.measured.receiver_id)
         return replace(self, read_at=None, measured=measured, waits="")
 
@@ -130,13 +133,13 @@ def _waits(memory: ChargerMemory, shown: ChargerStateValue, limits: ChargerLimit
         return ""
     who, not_ready = holder.request.who, pad.not_ready(sample)
     if shown is CHARGING:
-        return f"as {not_ready}" if not_ready and not holder.over else ""
+        return f"because {not_ready}" if not_ready and not holder.over else ""
     if holder.over:
-        return "for the end of its handshake: it was at fault before"
+        return "for the end of the charger's handshake: the charger was at fault before"
     if not pad.seen(sample, limits).may_be(who):
         return f"for {who} on the pad"
     if not_ready:
-        return f"as {not_ready}"
+        return f"because {not_ready}"
     ready = holder.started or cleared_to_start(memory, limits)
     return f"for the station to charge {who}" if ready else f"for {who} in range"
 
@@ -176,7 +179,7 @@ def errors(memory: ChargerMemory, now: float, limits: ChargerLimits) -> list[Fau
 
 
 def error_text(sample: ChargerSample) -> str:
-    """Return the side at fault, and a station's own words about its error."""
+    """Return the station's own words about its error, with the side at fault in front."""
     text = sample.error_text or f"the charger reports an error (vendor state {sample.code})"
     if diagnosis(text) in (FaultCause.PAD, FaultCause.LOST):
         text = f"the charger says: {text}"
@@ -208,7 +211,8 @@ def _irregular(
 def _who(
     memory: ChargerMemory, shown: ChargerStateValue, limits: ChargerLimits
 ) -> RobotName | None:
-    """Return the request's robot; without a request, the robot on the pad or last seen charging."""
+    """Return the request's robot. Without a request, return the robot on the pad or the robot last seen
+    charging."""
     if memory.holder:
         return memory.holder.request.who
     if shown is IDLE or (unreachable(memory, limits) and not memory.adopted):

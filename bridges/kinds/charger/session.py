@@ -1,4 +1,4 @@
-"""A request from its grant to its end, reading by reading."""
+"""The session of one request, from its grant to its end. Each reading advances the session."""
 
 from msgspec.structs import replace
 
@@ -13,7 +13,7 @@ from bridges.kinds.charger.signals import (
 )
 
 RANGE_EVERY_S = 5.0
-"""The least time between two range checks (Xnergy RCU: wait 5 s between two checks)."""
+"""The least time (s) between two range checks (Xnergy RCU: wait 5 s between two checks)."""
 
 
 def granted(request: ChargeRequested, now: float, limits: ChargerLimits) -> ChargeSession:
@@ -24,7 +24,7 @@ def granted(request: ChargeRequested, now: float, limits: ChargerLimits) -> Char
 def taken_over(
     holder: ChargeSession, request: ChargeRequested, now: float, limits: ChargerLimits
 ) -> ChargeSession:
-    """Continue the session of a robot served without a request, now for the robot's new request."""
+    """Give a session that began without a request to the robot's new request, and continue it."""
     return replace(holder, request=request, start_by=now + _patience_s(request, limits))
 
 
@@ -35,7 +35,8 @@ def _patience_s(request: ChargeRequested, limits: ChargerLimits) -> float:
 def follow(
     holder: ChargeSession, sample: ChargerSample, now: float, limits: ChargerLimits
 ) -> ChargeSession | None:
-    """Advance the session by one reading; None when it is over and the station is free."""
+    """Advance the session by one reading. Return None when the session is over and the station is
+    free."""
     on_pad = pad.seen(sample, limits)
     another = on_pad.is_another(holder.request.who)
     if sample.activity in AT_FAULT and not (another and sample.side == "robot"):
@@ -62,8 +63,8 @@ def shown_released(holder: ChargeSession, now: float, limits: ChargerLimits) -> 
 def _beside_another(
     holder: ChargeSession, now: float, limits: ChargerLimits
 ) -> ChargeSession | None:
-    """Advance the session while another robot is on the pad: the request's robot still waits, or has
-    left after its charge."""
+    """Advance the session at a reading of another robot on the pad. The request's robot still waits, or
+    has left after its charge."""
     if shown_released(holder, now, limits):
         return None
     if holder.released_at is not None:
@@ -86,7 +87,8 @@ def _flowing(holder: ChargeSession, sample: ChargerSample, limits: ChargerLimits
 
 
 def _sought_again(holder: ChargeSession, now: float, limits: ChargerLimits) -> ChargeSession:
-    """Wait for the start again, because the station has lost the receiver and looks for it."""
+    """Let the session wait for the start again, because the station has lost the receiver and looks for
+    it."""
     by = now + _patience_s(holder.request, limits)
     return replace(holder, started=False, start_by=by, checked_at=None)
 
@@ -120,7 +122,8 @@ def cleared_to_start(memory: ChargerMemory, limits: ChargerLimits) -> bool:
 
 
 def range_checked(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
-    """Order a range check if nothing else is missing. Results from before the check do not count."""
+    """Order a range check if nothing else is missing for the start. A result from before the order does
+    not count."""
     holder, sample = memory.holder, memory.sample
     if holder is None or sample is None or holder.started or holder.over:
         return memory

@@ -46,15 +46,15 @@ class ChargerDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
 
     misses: Annotated[
         Misses,
-        tells("""after so many failed polls in a row the charger is shown as unreachable; after so
-        many failed commands in a row, as a charger that takes no commands."""),
+        tells("""the number of failed polls in a row after which the charger is shown as unreachable.
+        After as many failed commands in a row it is shown as a charger that takes no commands."""),
     ] = 3
     start_timeout_s: Annotated[
         StartTimeout, tells("how long charging may take to start, if the request gives no time.")
     ] = 300.0
     stop_timeout_s: Annotated[
         StopTimeout,
-        tells("""how long a station may go on charging after it was told to stop. Then it is taken
+        tells("""how long a station may go on charging after an order to stop. Then the station is
         out of service."""),
     ] = 30.0
     released_s: Annotated[
@@ -68,7 +68,7 @@ class ChargerDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
     ] = 0
     peer_internal_timeout_s: Annotated[
         Seconds | None,
-        tells("""after how long without the daemon the station has certainly switched off by itself.
+        tells("""the time without the daemon after which the station has certainly switched itself off.
         When absent, an operator cannot free a station that does not answer."""),
     ] = None
 
@@ -81,16 +81,16 @@ class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_
     )
     receivers: Annotated[
         dict[ReceiverId, Name],
-        tells("""receiver id -> FLEET/ROBOT, the robot that carries it. With this table a station
-        charges only its assigned robot."""),
+        tells("""receiver id -> FLEET/ROBOT of the robot that carries the receiver. With this table a
+        station charges only its assigned robot."""),
     ] = msgspec.field(default_factory=dict)
     unrequested: Annotated[
         Unrequested,
-        tells("""what happens to a robot of `receivers` on the pad without a request. `serve_known`
-        charges the robot; `refuse` only reports its name."""),
+        tells("""how the station treats a robot of `receivers` that stands on the pad without a
+        request. `serve_known` charges the robot; `refuse` only reports its name."""),
     ] = "refuse"
     on_death: Annotated[
-        Literal["stop", "keep"], tells("`stop` or `keep` a charge under way when the daemon ends.")
+        Literal["stop", "keep"], tells("`stop` or `keep` the present charge when the daemon ends.")
     ] = "stop"
 
     def can_stop(self) -> bool:
@@ -98,7 +98,8 @@ class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_
         return True
 
     def problems(self) -> Remarks:
-        """Yield names not of the form FLEET/ROBOT. A robot may have a second receiver as a spare."""
+        """Yield the names that do not have the form FLEET/ROBOT. A robot may have a second receiver as
+        a spare."""
         for receiver, text in self.receivers.items():
             try:
                 robot(text)

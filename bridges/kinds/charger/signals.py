@@ -1,7 +1,7 @@
 """A charger's sample, outputs and events: the interface of its core.
 
 The simplest stations on HTTP give only their activity and an error text. Other controllers (CANopen,
-Modbus, another make's JSON) also fill in `measured` and obey `power`.
+Modbus, another maker's JSON) also give measurements, which are in `measured`, and obey `power`.
 """
 
 from enum import StrEnum
@@ -14,10 +14,10 @@ from bridges.kinds.shared.decision import IoFailed, OperatorReset, RivalSeen, Sa
 
 
 class Activity(StrEnum):
-    """A station's activity, as reported by itself. All names but UNKNOWN are also used in the YAML.
+    """A station's activity, as the station reports it. The YAML uses all these names except UNKNOWN.
 
-    STOPPING: told to stop or ramping down, and current still flows. RELEASED: disconnected from the
-    robot, and not yet ready for another. UNKNOWN: a code that the YAML does not list.
+    STOPPING: current still flows after an order to stop, or ramps down. RELEASED: disconnected from the
+    robot, and not yet ready for another robot. UNKNOWN: a code that the YAML does not list.
     """
 
     IDLE = "idle"
@@ -33,16 +33,18 @@ CURRENT_FLOWS = frozenset({Activity.CHARGING, Activity.STOPPING})
 AT_FAULT = frozenset({Activity.ERROR, Activity.UNKNOWN})
 
 FaultSide = Literal["", "station", "robot"]
-"""The side at fault, as the controller itself diagnoses; "" if unknown."""
+"""The side at fault, as the controller itself diagnoses it; "" if the controller does not say."""
 
 
 class Measured(msgspec.Struct, frozen=True):
-    """A controller's reports beside its state. A value is None if the controller does not report it.
+    """The facts that a controller reports beside its state. A value is None if the controller does not
+    report it.
 
-    `receiver_id`: the receiver on the pad, "" for none. `in_range`: a range check has shown the robot's
-    coil in range for charging; False before the check. `range_ok`: the same for stations that report
-    the range all the time, without a check. `at_height`: a movable pad is at its height for charging.
-    `volts`, `amps`: at the battery. `battery_percent`: its charge. `temperatures`: name and °C.
+    `receiver_id`: the receiver on the pad, "" for none. `in_range`: a range check has found the robot's
+    coil in range for charging; False before the check. `range_ok`: the same fact from a station that
+    reports the range all the time, without a check. `at_height`: a movable pad is at its height for
+    charging. `volts`, `amps`: at the battery. `battery_percent`: the battery's charge. `temperatures`:
+    pairs of a name and °C.
     """
 
     receiver_id: str | None = None
@@ -75,12 +77,12 @@ class ChargerSample(msgspec.Struct, frozen=True):
 class ChargerOutputs(msgspec.Struct, frozen=True):
     """Every command to a station.
 
-    `power`: may it energise? None: the driver sends no order, because we did not start the charge under
-    way, or because the station does not answer.
-    `clear_errors`, `range_checks`: how often we have ordered the station to clear its errors, and to
-    check the range, since the daemon's start. These commands are not idempotent, so they are counts: a
-    driver sends one command when a count rises, and never repeats it, even if it failed. A station
-    that always knows the position ignores `range_checks`.
+    `power`: may the station energise its pad? With None the driver sends no order, because we did not
+    start the present charge, or because the station does not answer. `clear_errors`, `range_checks`:
+    the numbers of orders, since the daemon's start, to clear the errors and to check the range. Sending
+    such a command twice would do harm, so the outputs hold counts: a driver sends one command when a
+    count rises, and never repeats it, even if it failed. A station that always knows the robot's
+    position ignores `range_checks`.
     """
 
     power: bool | None = None
@@ -89,9 +91,11 @@ class ChargerOutputs(msgspec.Struct, frozen=True):
 
 
 class ChargeRequested(msgspec.Struct, frozen=True):
-    """A well-formed ChargerRequest for this charger; `start_timeout_s` 0 is the configured default.
+    """A well-formed ChargerRequest for this charger. If `start_timeout_s` is 0, the configured default
+    applies.
 
-    The session of a robot served without a request holds a ChargeRequested with an empty `request_id`.
+    A robot that is served without a request has a ChargeRequested with an empty `request_id` in its
+    session.
     """
 
     request_id: str

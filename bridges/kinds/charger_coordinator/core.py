@@ -4,18 +4,21 @@ Its inputs are FleetState, ChargerState and the requests of operators. It sends 
 ChargerCancel; no part of RMF sends these. A wish is a robot's need to be charged. Rules:
 COORDINATOR-1. `wishes.py` finds the robots with a wish. An operator's wish lasts until the operator's
    request is over or the robot is full.
-COORDINATOR-2. Wishes are served first come, first served, among the suitable stations (`queue.py`). A
-   station has one robot at a time. Another robot gets the station only after the station's state shows
-   the release of the first.
-COORDINATOR-3. A request is repeated until the station shows it. A station that does not show it within
-   TAKEN_S is passed over for SHUNNED_S, and the wish goes to the end of the queue.
-COORDINATOR-4. The end of a request, and the side at fault, are read from the stations' states
-   (`stations.py`).
-COORDINATOR-5. A robot on a wrong pad is told to leave the pad, or a person is alerted (`wrong_pad.py`).
-COORDINATOR-6. Another node's request for one of our robots counts as if we had made it.
-COORDINATOR-7. During the quiet start the coordinator only listens. Beside another publisher of charging
-   assignments (RMF's rmf_charging_schedule) the coordinator sends no assignments, and requests the
-   stations that this publisher dedicates to the robots.
+COORDINATOR-2. Wishes are served in the order of their arrival, each at one of the robot's suitable
+   stations (`queue.py`). A station has one robot at a time. The next robot gets the station only after
+   the station's state shows that the first robot was released.
+COORDINATOR-3. A request is repeated until the station shows the request. If a station does not show the
+   request within TAKEN_S, the coordinator passes the station over for SHUNNED_S, and the wish goes to
+   the end of the queue.
+COORDINATOR-4. The stations' states tell when a request has ended, and whether robot or station was at
+   fault (`stations.py`).
+COORDINATOR-5. The coordinator tells a robot on a wrong pad to leave the pad, or alerts a person
+   (`wrong_pad.py`).
+COORDINATOR-6. If another node requests a station for one of our robots, the coordinator treats that
+   request like its own.
+COORDINATOR-7. During the quiet start the coordinator only listens. If another node publishes charging
+   assignments (RMF's rmf_charging_schedule), the coordinator sends no assignments. It then requests the
+   stations that the other node has dedicated to the robots.
 """
 
 from msgspec.structs import replace
@@ -46,7 +49,7 @@ def initial(subject: str, started_at: float) -> SiteMemory:
 
 
 def idle(memory: SiteMemory, now: float) -> bool:
-    """Return False: the one subject, the site, is never forgotten."""
+    """Return False: there is only one subject, the site, and it is never forgotten."""
     return False
 
 
@@ -88,8 +91,8 @@ def _take(memory: SiteMemory, event: Event, now: float, site: SiteLimits) -> tup
 
 
 def _may_speak(memory: SiteMemory, yes: bool, alone: bool, now: float) -> SiteMemory:
-    """Start or stop publishing. The time of requests not shown yet restarts; assignments are sent
-    again."""
+    """Start or stop publishing. A station gets its full time again to show a request, and all
+    assignments are sent again."""
     grants = {
         name: grant if grant.shown else replace(grant, made_at=now)
         for name, grant in memory.grants.items()
@@ -98,8 +101,8 @@ def _may_speak(memory: SiteMemory, yes: bool, alone: bool, now: float) -> SiteMe
 
 
 def _as_dedicated(memory: SiteMemory, site: SiteLimits) -> SiteMemory:
-    """Give up stations to which RMF will not bring their robots, because another node's schedule
-    dedicates other stations."""
+    """Take stations back from robots that RMF will not bring there, because another node's schedule
+    dedicates other stations to these robots."""
     if memory.alone:
         return memory
     for name, grant in memory.grants.items():

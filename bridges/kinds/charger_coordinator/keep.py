@@ -1,7 +1,8 @@
-"""The memory on disk, for a restart: the queue, the stations' robots, and robots' failures.
+"""The memory on disk, for a restart: the queue, each station's robot, and the robots' failures.
 
-States of robots and stations are not saved, because they come again within a second. A request that was
-sent but not saved is recognised by its id in the station's state.
+States of robots and stations are not saved, because new states arrive within a second. If a request was
+sent but not saved, the station's state still shows the request's id, and the coordinator recognises
+that id.
 """
 
 from collections.abc import Mapping
@@ -33,7 +34,7 @@ class WishRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class GrantRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A Grant without the facts that the station's next state shows."""
+    """A Grant, without the facts that the station's next state shows."""
 
     robot: Text
     request_id: str
@@ -55,7 +56,7 @@ class KeptCoordinator(keep.Kept, frozen=True, forbid_unknown_fields=True):
 
 
 def persist(memories: Mapping[str, SiteMemory]) -> bytes:
-    """Encode the memory for the next start. The bytes stay the same until a kept part changes."""
+    """Encode the memory for the next start. The bytes change only when a kept part changes."""
     memory = memories.get(SITE, SiteMemory())
     record = KeptCoordinator(
         VERSION,

@@ -21,9 +21,10 @@ V = TypeVar("V")
 
 NODE: Final = "charger_coordinator"
 STATION_SILENT_S: Final = 5.0
-"""A station is silent after this long without a state. States come at 1 Hz."""
+"""The silence (s) after which a station counts as silent. States come at 1 Hz."""
 STRIKES: Final = 2
-"""A robot is not tried again after this many failures, which are at two stations if two suit it."""
+"""The number of failures after which a robot is not tried again. If two stations suit the robot, the
+failures are at both."""
 
 IDLE: Final = ChargerStateValue.CHARGER_IDLE
 ASSIGNED: Final = ChargerStateValue.CHARGER_ASSIGNED
@@ -36,8 +37,9 @@ ERROR: Final = ChargerStateValue.CHARGER_ERROR
 class SiteLimits:
     """The settings that the core needs.
 
-    `robots`: robot -> its suitable stations, best first. `waits_at`: robot -> its waypoint for
-    waiting. `places`: station -> fleet -> waypoint. `receivers`: receiver id -> robot.
+    `robots` maps a robot to its suitable stations, best first. `waits_at` maps a robot to its waypoint
+    for waiting. `places` maps a station, and then a fleet, to a waypoint. `receivers` maps a receiver's
+    id to its robot.
     """
 
     robots: Mapping[RobotName, tuple[str, ...]]
@@ -91,9 +93,9 @@ WHOSE: Final[Mapping[By, str]] = {
 class Wish(msgspec.Struct, frozen=True):
     """One robot's need to be charged. `by`: its origin (the fleet's state, the schedule, an operator).
 
-    `task_id`: the robot's task, unless an operator wants the charge. `called`: that task began after
-    a station was allotted to the robot, so the task is the drive to that station. `station`,
-    `request_id`, `start_timeout_s`: from the operator's request.
+    `task_id`: the robot's task; empty for an operator's wish. `called`: that task began after a station
+    was allotted to the robot, so the task is the drive to that station. `station`, `request_id`,
+    `start_timeout_s`: from the operator's request.
     """
 
     robot: RobotName
@@ -119,10 +121,10 @@ class Wish(msgspec.Struct, frozen=True):
 class Grant(msgspec.Struct, frozen=True):
     """A station that was allotted to a robot at `made_at`, by the request `request_id`.
 
-    `shown`: the station's state has shown the request. `started`: current has flowed. `over`: the
-    robot no longer has the station, but no other robot gets it until the station's release.
-    `sent_at`: the time of the last request or cancel. `forgotten_at`: the time when the station's
-    daemon last forgot the request, which was then sent again.
+    `shown`: the station's state has shown the request. `started`: current has flowed. `over`: the robot
+    has lost the station, but no other robot gets it until the station releases the first. `sent_at`:
+    the time of the last request or cancel. `forgotten_at`: the time when the station's daemon last
+    forgot the request; the coordinator then sent the request again.
     """
 
     robot: RobotName
@@ -137,8 +139,9 @@ class Grant(msgspec.Struct, frozen=True):
 
 
 class Standing(msgspec.Struct, frozen=True):
-    """A robot as its fleet showed it at `at`. `since`: the time of its last change of place, mode or
-    task. `here_since`: the time of its last change of place (-inf: no change since the first state)."""
+    """A robot as its fleet's state showed it at the time `at`. `since`: the robot's place, mode and
+    task have not changed since this time. `here_since`: its place has not changed since this time
+    (-inf: not since the first state)."""
 
     sighting: Sighting
     at: float
@@ -147,13 +150,13 @@ class Standing(msgspec.Struct, frozen=True):
 
     @property
     def works(self) -> bool:
-        """Does its fleet show it in a task other than charging?"""
+        """Return whether the fleet shows this robot in a task that is not for charging."""
         return bool(self.sighting.task_id) and not self.sighting.charges
 
 
 class StationSeen(msgspec.Struct, frozen=True):
-    """A station's last state, heard at `at`. `since`: the time of its last change of state or error.
-    `full_in_s`: the time until the robot is full (s), as the station reported it at `at`."""
+    """A station's last state, heard at `at`. `since`: state and error have not changed since this time.
+    `full_in_s`: the station's own estimate, at `at`, of the time until the robot is full (s)."""
 
     state: ChargerStateValue
     request_id: str
@@ -170,8 +173,9 @@ class StationSeen(msgspec.Struct, frozen=True):
 
 
 class Nudge(msgspec.Struct, frozen=True):
-    """Orders to a robot to leave a pad. `why`: the request of its own station, or the station that it
-    blocks. `count`: the number of orders. `at`: the time of the last order."""
+    """Orders to a robot to leave a pad. `why`: the reason, which is the request for the robot's own
+    station, or the name of the station that the robot blocks. `count`: the number of orders. `at`:
+    the time of the last order."""
 
     why: str
     count: int
@@ -181,19 +185,19 @@ class Nudge(msgspec.Struct, frozen=True):
 class SiteMemory(msgspec.Struct, frozen=True):
     """The memory of the site from event to event.
 
-    `may_speak`: the coordinator may publish. `passive`: the reason why requesters wait while it may
-    not. `alone`: no other node publishes charging assignments.
+    `may_speak`: the coordinator may publish. `passive`: if it may not, the reason why requesters must
+    wait. `alone`: no other node publishes charging assignments.
 
-    `wishes`: in the order of service. `grants`: by station. `strikes`: robot -> the stations where it
-    has failed. `served`: robot -> the task in which it was charged. `rested`: robots that the schedule
-    does not charge again in its present time. `absent`: robot -> the time when it may be called again,
-    after it did not leave its place when called. `over`: ids of the operators' requests that ended
-    last, to refuse late repeats. `count`: the number of requests made. `robots`, `stations`: their last
-    states. `shunned`: station -> the time until which it is passed over, because it took no request.
-    `preferred`: robot -> the station dedicated to it by another node.
-    `nudges`: robots told to leave a pad. `receivers`: robot -> the error of its own receiver.
-    `when`: the local time. `assigned`: the assignments published last, at `assigned_at`.
-    `alerts`: the faults already sent as alerts.
+    `wishes`: in the order of service. `grants`: by station. `strikes`: the stations where each robot
+    has failed. `served`: the task in which each robot was charged. `rested`: robots that the schedule
+    does not charge again in its present time. `absent`: a robot that did not leave its place when
+    called, and the time when it may be called again. `over`: the ids of the operators' requests that
+    ended last, whose late repeats are refused. `count`: the number of requests made. `robots`,
+    `stations`: their last states. `shunned`: a station that took no request, and the time until which
+    it is passed over. `preferred`: the station that another node has dedicated to each robot. `nudges`:
+    robots told to leave a pad. `receivers`: the error of each robot's own receiver. `when`: the local
+    time. `assigned`: the assignments published last, at `assigned_at`. `alerts`: the faults already
+    sent as alerts.
     """
 
     began_at: float = 0.0
@@ -220,20 +224,21 @@ class SiteMemory(msgspec.Struct, frozen=True):
     alerts: frozenset[str] = frozenset()
 
     def wish(self, robot: RobotName) -> Wish | None:
-        """Find this robot's wish; None without a wish."""
+        """Find this robot's wish; None if the robot has no wish."""
         return next((wish for wish in self.wishes if wish.robot == robot), None)
 
     def station_of(self, robot: RobotName) -> str | None:
-        """Find this robot's station; None without a station."""
+        """Find this robot's station; None if the robot has no station."""
         return next((s for s, g in self.grants.items() if g.robot == robot and not g.over), None)
 
     def place_of(self, robot: RobotName) -> str | None:
-        """Return the waypoint of our YAML at which the robot's fleet last saw it; None elsewhere."""
+        """Return the waypoint of our YAML where the fleet last saw the robot; None if the robot was at
+        none."""
         standing = self.robots.get(robot)
         return standing.sighting.place if standing else None
 
     def stands_at(self, robot: RobotName, site: SiteLimits) -> str | None:
-        """Return the station at which the robot's fleet last saw it; None elsewhere."""
+        """Return the station where the fleet last saw the robot; None if the robot was at none."""
         return site.station_at(robot.fleet, self.place_of(robot))
 
     @property
@@ -277,7 +282,8 @@ class SiteMemory(msgspec.Struct, frozen=True):
         return replace(self, wishes=(*(w for w in self.wishes if w is not wish), wish))
 
     def takes_back(self, robot: RobotName) -> "SiteMemory":
-        """Return the memory in which this robot's station must release the robot."""
+        """Return the memory after taking this robot's station back: the station must release the
+        robot."""
         station = self.station_of(robot)
         if station is None:
             return self

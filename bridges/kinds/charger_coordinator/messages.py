@@ -37,7 +37,7 @@ CHARGES = (d.RobotModeValue.MODE_CHARGING, d.RobotModeValue.MODE_DOCKING)
 
 
 def accept_fleet(state: d.FleetState, settings: CoordinatorSettings, wall: float) -> FleetSeen:
-    """Turn a FleetState into an event, without the robots that are not in the YAML."""
+    """Turn a FleetState into an event. Robots that are not in the YAML are left out."""
     fleet = settings.fleets.get(state.name)
     if fleet is None:
         raise RequestRefused("fleet not ours", f"{state.name!r}")
@@ -74,7 +74,7 @@ def _sighting(
 
 
 def _nearest(at: d.Location, fleet: FleetSettings, places: set[str], near_m: float) -> str | None:
-    """Find the nearest of these waypoints; None if it is farther away than `near_m`."""
+    """Find the nearest of these waypoints; None if the nearest is farther away than `near_m`."""
     away = {
         name: math.dist((at.x, at.y), (waypoint.x, waypoint.y))
         for name, waypoint in fleet.waypoints.items()
@@ -126,7 +126,7 @@ def accept_request(
 def accept_withdrawal(
     cancel: d.ChargerCancel, settings: CoordinatorSettings, wall: float
 ) -> ChargeUnwanted:
-    """Turn an operator's cancel into an event. Raises RequestRefused."""
+    """Turn an operator's withdrawal of a request into an event. Raises RequestRefused."""
     if not cancel.request_id:
         raise RequestRefused("empty request_id", "which request is withdrawn?")
     check_length(request_id=cancel.request_id)
@@ -136,7 +136,8 @@ def accept_withdrawal(
 def accept_assignments(
     message: d.ChargingAssignments, settings: CoordinatorSettings, wall: float
 ) -> Dedicated:
-    """Turn another node's charging assignments into an event: the station of each of our robots."""
+    """Turn another node's charging assignments into an event, which gives the station of each of our
+    robots."""
     fleet, known = message.fleet_name, settings.robots()
     stations = {places.get(fleet): name for name, places in settings.places().items()}
     return Dedicated(
@@ -149,7 +150,8 @@ def accept_assignments(
 
 
 def subject(message: object) -> str:
-    """Return the site for every message, because one queue spans all its stations."""
+    """Return the site, whatever the message is about, because one queue spans all stations of the
+    site."""
     return SITE
 
 
@@ -172,7 +174,7 @@ def summary(report: SiteReport, now: float) -> Mapping[str, str]:
 
 
 def answer(request: object, reason: str) -> RefusalAnswer | None:
-    """Make the published answer to a refused request for any charger; None for other messages."""
+    """Make the published answer to a refused ChargerRequest; None for other messages."""
     match request:
         case d.ChargerRequest():
             who, station, request_id = (

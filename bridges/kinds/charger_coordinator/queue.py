@@ -1,16 +1,17 @@
-"""The allotment of stations: first come, first served, among the suitable stations.
+"""The allotment of stations: the robot that came first gets the first suitable station.
 
-A station is free if its last state is IDLE and no older than STATION_SILENT_S, no robot has it, it has
-not just failed to take a request, and no other robot stands there. A robot on a station's pad without
-a request (the station shows an error or an unrequested charge) may have that very station. A released
-robot that still stands at a station may have that station too.
+A station is free under four conditions: its last state is IDLE and no older than STATION_SILENT_S, no
+robot has the station, the station has not lately failed to take a request, and no other robot stands
+there. A robot may stand on a station's pad without a request, so that the station shows an error or an
+unrequested charge. Such a robot may have that very station. A released robot that still stands at a
+station may have that station too.
 
-A station where a robot has failed is tried again only if no other station suits the robot, because a
-second station shows the side at fault.
+If a robot has failed at a station, the robot first tries every other suitable station, because a second
+station shows which side is at fault.
 
-Beside another node's charging schedule, a robot gets the station that the schedule has dedicated to it,
-because RMF drives it to no other station. A robot without a dedicated station may have the station
-where it stands.
+If another node publishes a charging schedule, a robot gets the station that the schedule has dedicated
+to it, because RMF drives the robot to no other station. A robot without a dedicated station may have
+the station where it stands.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,9 +34,9 @@ from bridges.kinds.charger_coordinator.memory import (
 )
 
 REMEMBERED_S: Final = 30.0
-"""A robot's place counts for this long after its fleet's last state."""
+"""The time (s) after its fleet's last state for which a robot's place still counts."""
 Here = Mapping[str, Sequence[RobotName]]
-"""Station -> the robots standing there."""
+"""The robots standing at each station."""
 
 
 def allot(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
@@ -91,8 +92,7 @@ def _free(memory: SiteMemory, station: str, robot: RobotName, now: float, here: 
 
 
 def standing(memory: SiteMemory, now: float, site: SiteLimits) -> Here:
-    """List the robots at each station, from the states that their fleets sent in the last
-    REMEMBERED_S."""
+    """List the robots at each station. Only fleet states of the last REMEMBERED_S count."""
     here: dict[str, list[RobotName]] = {}
     for who, seen in memory.robots.items():
         station = memory.stands_at(who, site)

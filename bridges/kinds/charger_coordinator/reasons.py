@@ -1,7 +1,9 @@
-"""The shown queue: each waiting robot with the origin of its wish, its obstacles and its waiting time.
+"""The queue, as shown to a person. Each waiting robot is shown with the origin of its wish, the
+obstacles to its charge, and its waiting time.
 
-A charge's end is known only if the station reports it. Each robot is shown with its probable station:
-the suitable station that is free first and goes to no robot ahead in the queue.
+The waiting time is known only if the station reports when its present charge ends. Each robot is shown
+with its probable station. This is the suitable station that is free first and that goes to no robot
+ahead in the queue.
 """
 
 from collections.abc import Iterator
@@ -20,7 +22,7 @@ from bridges.kinds.charger_coordinator.queue import Here, in_the_way, standing, 
 from bridges.kinds.shared.durations import NEVER
 
 MOST: Final = 4
-"""The most stations whose obstacles the queue shows for one robot."""
+"""The greatest number of stations that the queue shows for one robot."""
 
 
 def queued(memory: SiteMemory) -> list[Wish]:
@@ -29,8 +31,8 @@ def queued(memory: SiteMemory) -> list[Wish]:
 
 
 def reasons(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[str]:
-    """Yield for each waiting robot:
-    `tiny/AMR03 by the robot: charger_b charges tiny/AMR01, free in 12 min`."""
+    """Yield a text for each waiting robot, such as `tiny/AMR03 by the robot: charger_b charges
+    tiny/AMR01, free in 12 min`."""
     taken: set[str] = set()
     here = standing(memory, now, site)
     for wish in queued(memory):
@@ -49,7 +51,7 @@ def reasons(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[str]:
 
 
 def free_in_s(memory: SiteMemory, station: str, now: float) -> float:
-    """Return the rest of the charge (s), as the station reports it; NEVER: not known."""
+    """Return the remaining time of the charge (s), as the station reports it; NEVER if not known."""
     seen = memory.stations.get(station)
     if seen is None or seen.state is not CHARGING or not seen.full_in_s:
         return NEVER

@@ -3,10 +3,10 @@
 COORDINATOR-REPORT-1. A request is repeated each second until its station shows it. A cancel is repeated
    each second while the station still shows the request.
 COORDINATOR-REPORT-2. Every robot is assigned one place of its own: its station (MODE_CHARGE), else its
-   waypoint for waiting (MODE_WAIT). When a place changes, the assignments of all fleets are published,
-   and retained for fleet adapters that start later. RMF drives a robot with a charging task to its
-   place (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart).
-COORDINATOR-REPORT-3. Each fault is sent as an Alert once; rmf-web shows it to a person.
+   waypoint for waiting (MODE_WAIT). When a place changes, the assignments of all fleets are published.
+   They are retained for fleet adapters that start later. RMF drives a robot with a charging task to its
+   assigned place (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart).
+COORDINATOR-REPORT-3. Each fault is sent once as an Alert, which rmf-web shows to a person.
 """
 
 from collections.abc import Iterator
@@ -54,17 +54,18 @@ TITLES: Final = {
     "REQUEST_NOT_TAKEN": "A charger takes no request",
 }
 ASKS_S: Final = 5.0
-"""A few seconds after a robot has come to a pad unannounced, its fleet's state requests the pad."""
+"""The delay (s) after which a robot that came to a pad unannounced normally has a wish. Its fleet's
+state brings the wish, so a fault before this delay would be premature."""
 AGAIN_S: Final = 15.0
 ERRORS: Final = ("ROBOT_FAULTY", "STATION_OUT_OF_SERVICE")
 
 
 class SiteReport(msgspec.Struct, frozen=True):
-    """The shown site. `read_at`: the time of the last state of any station (monotonic s). `stations`:
-    (station, text of its state, its robot and the origin of the wish). `queue`: the waiting robots in
-    order, with their reasons. `waiting`: these robots without reasons. `assigns`: do we assign the
-    robots' places, or does another node? `schedule`: the times of the schedule. `absent`: robots that
-    did not come when called."""
+    """The site, as shown to a person. `read_at`: the time of the last state of any station (monotonic
+    s). `stations`: for each station its name, the text of its state, its robot, and the origin of
+    the robot's wish. `queue`: the waiting robots in order, with their reasons. `waiting`: the same
+    robots without reasons. `assigns`: do we assign the robots' places, or does another node?
+    `schedule`: the times of the schedule. `absent`: robots that did not come when called."""
 
     read_at: float | None
     stations: tuple[tuple[str, str], ...] = ()
@@ -76,7 +77,7 @@ class SiteReport(msgspec.Struct, frozen=True):
     faults: tuple[Fault, ...] = ()
 
     def news(self) -> object:
-        """Return the facts whose change is logged: everything except running times."""
+        """Return the facts whose change is logged: everything except times that run on."""
         return self.stations, self.waiting, self.assigns, self.schedule, self.absent
 
 
@@ -102,7 +103,8 @@ def _assigns(memory: SiteMemory) -> str:
 
 
 def _of(memory: SiteMemory, name: str, now: float) -> str:
-    """Describe a station: `CHARGING fleet/robot, by the schedule`, `IDLE`, or `?` before any state."""
+    """Describe a station: `CHARGING fleet/robot, by the schedule`, or `IDLE`. Before the first state
+    the text is `?`."""
     seen, grant = memory.stations.get(name), memory.grants.get(name)
     state = "?" if seen is None else seen.state.name.removeprefix("CHARGER_")
     if grant is None or grant.over:
@@ -152,7 +154,7 @@ def _misplaced(one: wrong_pad.OnWrongPad) -> Fault:
     if one.expected:
         text = f"{one.who} stands at {one.station}, but is expected at {one.expected}"
         return Fault("WRONG_STATION", text)
-    why = "RMF has no charging task that would send it away (finishing_request: charge has one)"
+    why = "RMF has no charging task to send it away with (finishing_request: charge gives it one)"
     return Fault(
         "PAD_BLOCKED", f"{one.who} stands at {one.station}, and {one.waiter} waits for it: {why}"
     )
@@ -169,7 +171,7 @@ def _stranger(error: str) -> str:
 def messages(
     memory: SiteMemory, faults: tuple[Fault, ...], now: float, site: SiteLimits
 ) -> tuple[SiteMemory, Messages]:
-    """List the messages that are due; none while the coordinator may not publish."""
+    """List the messages that are due. The list is empty if the coordinator may not publish."""
     if not memory.may_speak:
         return memory, ()
     found: list[tuple[AnyTopic, d.Message]] = []
@@ -191,9 +193,10 @@ def messages(
 def _again_at(memory: SiteMemory, site: SiteLimits) -> Iterator[float]:
     """Yield times to repeat the assignments of robots that stand elsewhere without a task.
 
-    An EasyFullControl adapter takes the retained assignment at its start, and a moment later replaces
-    it by the charger of the adapter's own file (seen in Jazzy). No message shows this moment, so the
-    assignment is published every AGAIN_S until the robot moves, or has lost the station.
+    An EasyFullControl adapter takes the retained assignment at its start. A moment later the adapter
+    replaces that assignment by the charger of its own file (seen in Jazzy). No message shows this
+    moment. Therefore the assignment is published every AGAIN_S until the robot moves, or has lost the
+    station.
     """
     for name, grant in memory.grants.items():
         standing = memory.robots.get(grant.robot)
@@ -232,8 +235,8 @@ def _to_station(name: str, grant: Grant) -> tuple[AnyTopic, d.Message]:
 def _assignments(
     memory: SiteMemory, now: float, site: SiteLimits
 ) -> Iterator[d.ChargingAssignments]:
-    """Assign every robot's place, fleet by fleet, in the order of names. A robot told to leave a pad
-    has another mode for a moment (`wrong_pad.py`)."""
+    """Assign every robot's place, fleet by fleet, in the order of names. A robot that is told to leave
+    a pad gets the other mode for TOLD_S (`wrong_pad.py`)."""
     fleets: dict[str, list[d.ChargingAssignment]] = {}
     for who in sorted(site.robots):
         station, told = memory.station_of(who), wrong_pad.is_nudged(memory, who, now)
@@ -246,8 +249,8 @@ def _assignments(
 
 
 def _alert(fault: Fault) -> d.Alert:
-    """Make the Alert of a fault. `stamped` appends the time to its id, because rmf-web drops known
-    ids."""
+    """Make the Alert of a fault. `stamped` appends the time to the alert's id, because rmf-web shows an
+    id only once."""
     tier = d.AlertTier.TIER_ERROR if fault.code in ERRORS else d.AlertTier.TIER_WARNING
     return d.Alert(
         id=f"{NODE}/{fault.code}/{fault.detail}",

@@ -1,7 +1,8 @@
 """The coordinator's own charging schedule: times of the week at which robots are charged to a target.
 
-The functions are pure: the local time of day and the day of the week are inputs. An end at or before
-the beginning is on the next day; the whole time belongs to the day on which it begins.
+The functions are pure: the local time of day and the day of the week are arguments. If the end is not
+later than the beginning, the end is on the next day. The whole time then belongs to the day on which it
+begins.
 """
 
 from collections.abc import Iterable
@@ -54,7 +55,7 @@ class Charging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = 100.0
 
     def concerns(self, who: RobotName) -> bool:
-        """Does this part of the schedule apply to the robot?"""
+        """Return whether this entry of the schedule applies to the robot."""
         everybody = not self.fleets and not self.robots
         return everybody or who.fleet in self.fleets or str(who) in self.robots
 
@@ -92,7 +93,8 @@ def problems(
     least: float,
     most: float,
 ) -> Remarks:
-    """Yield unknown names, and targets that are not between `again_percent` and `full_percent`."""
+    """Yield the unknown names, and the targets that are not between `again_percent` and
+    `full_percent`."""
     known = {"fleets": set(fleets), "robots": set(map(str, robots))}
     for i, one in enumerate(schedule):
         for key, named in (("fleets", one.fleets), ("robots", one.robots)):

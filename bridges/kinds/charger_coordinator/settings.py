@@ -27,7 +27,7 @@ Stations = Annotated[list[Name], Meta(min_length=1)]
 
 
 class Waypoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A named vertex of the fleet's navigation graph, with the graph's coordinates."""
+    """A named vertex of the fleet's navigation graph, with its coordinates in that graph."""
 
     level: Annotated[Name, tells("the name of the waypoint's level.")]
     x: Annotated[Metres, tells("the waypoint's x coordinate in the graph.")]
@@ -35,7 +35,7 @@ class Waypoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class StationSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A charger, under the name published by its own daemon."""
+    """A charger, under the name that its own daemon publishes."""
 
     waypoint: Annotated[
         Name | None,
@@ -65,15 +65,16 @@ class RobotSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
 
 class FleetSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A fleet by the name of its adapter."""
+    """A fleet, under the name of its adapter."""
 
     waypoints: Annotated[
         dict[Name, Waypoint],
         tells("""the places of stations and waiting robots in the fleet's navigation graph. RMF's
-        fleet adapter crashes on a name that its graph lacks, so only these names are sent to it."""),
+        fleet adapter crashes on a name that its graph lacks, so it is sent only these names."""),
     ]
     robots: Annotated[
-        dict[Name, RobotSettings], tells("the robots that charge, by the adapter's names.")
+        dict[Name, RobotSettings],
+        tells("the robots that charge, under the names that the fleet adapter uses."),
     ]
 
 
@@ -101,7 +102,9 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
     ] = 90.0
     leaves_s: Annotated[
         Timeout,
-        tells("how long a robot may stay on a pad without need while another robot waits for it."),
+        tells(
+            "how long a robot may stay on a pad without need if another robot waits for the pad."
+        ),
     ] = 60.0
     schedule: Annotated[
         list[Charging], tells("times of the week at which robots without a task are charged.")
@@ -112,7 +115,7 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
     ] = None
 
     def on_map(self) -> Iterator[Place]:
-        """Yield the stations' places and each fleet's waypoints, which must be on RMF's map too."""
+        """Yield the stations' places and each fleet's waypoints. RMF's map must have them all."""
         for name, station in self.stations.items():
             if set(self.fleets) - set(station.waypoints):
                 path = ("stations", name, *(["waypoint"] if station.waypoint else []))
@@ -153,7 +156,7 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
                 yield ("waypoints", fleet), f"'{places[fleet]}' is not in that fleet's waypoints"
 
     def _graphs_with(self, station: str) -> list[str]:
-        """List the fleets that know the station's place."""
+        """List the fleets whose waypoints include the station's place."""
         places = self.places()[station]
         return [name for name, fleet in self.fleets.items() if places[name] in fleet.waypoints]
 
@@ -177,8 +180,8 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
                     yield path, f"'{station}' is at '{place}', not in this fleet's list ({known})"
 
     def _doubles(self) -> Remarks:
-        """Yield each place or receiver with two robots, and each name with two stations or
-        receivers."""
+        """Yield each place or receiver that belongs to two robots, and each name that belongs to two
+        stations or receivers."""
         taken: dict[tuple[str, str], str] = {}
         for station, places in self.places().items():
             for fleet, place in places.items():
@@ -217,14 +220,14 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
         }
 
     def places(self) -> dict[str, dict[str, str]]:
-        """Map station -> fleet -> the station's waypoint."""
+        """Map each station, and then each fleet, to the station's waypoint."""
         return {
             name: {fleet: at.waypoints.get(fleet, at.waypoint or name) for fleet in self.fleets}
             for name, at in self.stations.items()
         }
 
     def rcus(self) -> dict[str, RobotName]:
-        """Map the name under which a robot's receiver publishes -> the robot."""
+        """Map the name under which a robot's receiver publishes to the robot."""
         return {robot.rcu: who for who, robot in self.robots().items() if robot.rcu}
 
 
@@ -249,7 +252,8 @@ def tables(settings: CoordinatorSettings) -> Iterator[Table]:
 
 
 def _named(places: dict[str, str]) -> str:
-    """Write `dock_b`, or `tiny: dock_b, big: station_2` if the fleets differ."""
+    """Write the place's name, such as `dock_b`. If the fleets' names differ, write `tiny: dock_b, big:
+    station_2`."""
     names = set(places.values())
     if len(names) == 1:
         return names.pop()
@@ -257,7 +261,7 @@ def _named(places: dict[str, str]) -> str:
 
 
 def speaks_of(settings: CoordinatorSettings) -> Iterator[Place]:
-    """Yield the stations: each must be a charger of some daemon."""
+    """Yield the stations. Some daemon must define each station as a charger."""
     for name in settings.stations:
         yield ("stations", name), CHARGER, name
 
@@ -280,7 +284,7 @@ def warnings(settings: CoordinatorSettings) -> Remarks:
 
 
 def _near(settings: CoordinatorSettings) -> Remarks:
-    """Yield places that are too close together to be told apart by a robot's position."""
+    """Yield places that are too close together for a robot's position to tell them apart."""
     for fleet_name, fleet in settings.fleets.items():
         names = list(fleet.waypoints)
         for i, name in enumerate(names):

@@ -12,18 +12,21 @@ from bridges.kinds.shared.graph_kind import MaySpeak, Woken
 from bridges.messages.definitions import ChargerStateValue
 
 _DISPATCHED: Final = re.compile(r"(?!charge)[^.]+\.dispatch-")
-"""RMF's dispatcher names a task CATEGORY.dispatch-NUMBER, and its adapters call their own charging task
-Charge and a UUID (rmf_ros2 jazzy 7eef65a, Dispatcher.cpp; rmf_task jazzy, ChargeBatteryFactory.cpp)."""
+"""The beginning of a task id that RMF's dispatcher gave, CATEGORY.dispatch-NUMBER. A fleet adapter
+calls its own charging task Charge and a UUID. (rmf_ros2 jazzy 7eef65a, Dispatcher.cpp; rmf_task
+jazzy, ChargeBatteryFactory.cpp.)"""
 
 
 def is_dispatched(task_id: str) -> bool:
-    """Did RMF's dispatcher give this task? Such a task is a patrol or a delivery, never a charge."""
+    """Return whether RMF's dispatcher gave this task. Such a task is a patrol or a delivery, never a
+    charge."""
     return _DISPATCHED.match(task_id) is not None
 
 
 class Sighting(msgspec.Struct, frozen=True):
-    """One robot of a FleetState. `charges`: its mode is CHARGING or DOCKING, and its task did not come
-    from RMF's dispatcher. `place`: the waypoint of our YAML where it stands; None elsewhere."""
+    """One robot of a FleetState. `charges`: the robot's mode is CHARGING or DOCKING, and its task did
+    not come from RMF's dispatcher. `place`: the waypoint of our YAML where the robot stands; None
+    elsewhere."""
 
     who: RobotName
     charges: bool
@@ -33,14 +36,15 @@ class Sighting(msgspec.Struct, frozen=True):
 
 
 class FleetSeen(msgspec.Struct, frozen=True):
-    """A FleetState, with the robots that the YAML names. `when`: the local time; None if not known."""
+    """A FleetState, reduced to the robots that the YAML names. `when`: the local time; None if not
+    known."""
 
     robots: tuple[Sighting, ...]
     when: LocalTime | None = None
 
 
 class ChargerStateHeard(msgspec.Struct, frozen=True):
-    """A ChargerState. `robot`: None if not named. `full_in_s`: 0 if not known."""
+    """A ChargerState. `robot`: None if the state names no robot. `full_in_s`: 0 if not known."""
 
     station: str
     state: ChargerStateValue
@@ -73,7 +77,8 @@ class ChargeUnwanted(msgspec.Struct, frozen=True):
 
 
 class Dedicated(msgspec.Struct, frozen=True):
-    """Another node's charging assignments: each robot and its station ("" without a station)."""
+    """Another node's charging assignments, as pairs of a robot and its station ("" without a
+    station)."""
 
     stations: tuple[tuple[RobotName, str], ...]
 

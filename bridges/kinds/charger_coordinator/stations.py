@@ -1,22 +1,25 @@
 """The stations' states: the fate of requests, and the side at fault.
 
-COORDINATOR-STATIONS-1. A station shows the end of a request. If it releases the robot after charging,
-   the wish is fulfilled. If it releases the robot without charging, the robot did not come. Then a
-   fleet's wish goes to the end of the queue if its robot stands at one of our waypoints, and any other
-   wish is over. A robot that stands at that very station has failed there. A station that stops showing
-   a request without a release has forgotten the request, because its daemon was restarted. The wish
-   stays, and the request is sent again (`_forgot`). The restart may have switched the power off, so a
-   charge that ends within PROVEN_S of the restart was cut short.
+COORDINATOR-STATIONS-1. A station's state shows that a request has ended.
+   - If the station releases the robot after charging, the wish is fulfilled.
+   - If the station releases the robot without charging, the robot did not come. A fleet's wish then
+     goes to the end of the queue if its robot stands at one of our waypoints. Any other wish is over. A
+     robot that stands at that very station has failed there.
+   - If the station stops showing a request without a release, the station's daemon was restarted and
+     has forgotten the request. The wish stays, and the request is sent again (`_forgot`). The restart
+     may have switched the power off. Therefore a charge that ends within PROVEN_S of the restart counts
+     as cut short.
 COORDINATOR-STATIONS-2. After an error of the station, the robot gets another station and keeps its
    place in the queue. If the robot is at fault, or the side at fault is unclear, the error also counts
-   as a failure of the robot. After the second failure (at a second station if two suit) the robot is
-   not tried again, and a technician is told.
-COORDINATOR-STATIONS-3. A failure is forgotten when the robot has been charged for PROVEN_S, or fully.
-   It is also forgotten when the station proves to be at fault, because its error names the station, or
-   still lasted when the robot had been gone for PROVEN_S.
+   as a failure of the robot. After a second failure the robot is not tried again, and a technician is
+   told. (If two stations suit the robot, the second failure is at the second station.)
+COORDINATOR-STATIONS-3. A failure of a robot is forgotten when the robot has been charged for PROVEN_S,
+   or fully. The failure is also forgotten when the station proves to be at fault. That is proven if the
+   station's error names the station, or if the error lasts for more than PROVEN_S after the robot has
+   left.
 COORDINATOR-STATIONS-4. If another robot is on the pad, the assigned robot keeps the station for its
-   start_timeout. A station out of reach says nothing about the charge. A robot that was charging there
-   keeps it; a robot on its way gets another station after LOST_S.
+   start_timeout. A station out of reach says nothing about the charge. If a robot was charging there,
+   the robot keeps the station. If the robot is still on its way, it gets another station after LOST_S.
 """
 
 from typing import Final
@@ -74,8 +77,8 @@ def heard(memory: SiteMemory, state: ChargerStateHeard, now: float, site: SiteLi
 
 
 def _forgot(memory: SiteMemory, name: str, grant: Grant, now: float, site: SiteLimits) -> bool:
-    """Has the station forgotten the request that it has shown? An IDLE station may instead have
-    released the robot without our notice; then the robot has left, or did not come in time."""
+    """Return whether the station has forgotten the request that it has shown. An IDLE station may also
+    have released the robot without our notice. Then the robot has left, or did not come in time."""
     seen = memory.stations[name]
     if seen.state is not IDLE:
         return seen.request_id.startswith(UNREQUESTED)
@@ -85,8 +88,8 @@ def _forgot(memory: SiteMemory, name: str, grant: Grant, now: float, site: SiteL
 
 
 def _repeated(grant: Grant, seen: StationSeen, now: float) -> Grant | None:
-    """Keep the grant while the station does not show its request yet; return None if the station will
-    not take the request."""
+    """Return the grant as long as the station may still come to show its request; None if the station
+    will not take the request."""
     before = seen.state is RELEASED or seen.request_id.startswith(UNREQUESTED)
     may_come = seen.state is IDLE or (before and seen.robot == grant.robot)
     if not may_come or not grant.request_id.startswith(f"{NODE}/"):
@@ -116,7 +119,7 @@ def _followed(
 
 
 def _ended(memory: SiteMemory, name: str, grant: Grant, now: float, site: SiteLimits) -> SiteMemory:
-    """Apply the end of a request that we did not cancel."""
+    """Apply the end of a request that the coordinator did not cancel."""
     who, wish = grant.robot, memory.wish(grant.robot)
     if grant.started and now < grant.forgotten_at + PROVEN_S:
         return memory
@@ -136,7 +139,8 @@ def _struck(memory: SiteMemory, name: str, who: RobotName) -> SiteMemory:
 
 
 def adopted(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
-    """Adopt other nodes' requests for our robots, and unrequested charges."""
+    """Adopt the charges that other nodes requested for our robots, and the charges that nobody
+    requested."""
     for name, seen in memory.stations.items():
         if name not in memory.grants and seen.state in (ASSIGNED, CHARGING):
             memory = _adopt(memory, name, seen, now, site)
@@ -163,7 +167,8 @@ def _adopt(
 
 
 def _waits_at(memory: SiteMemory, station: str, site: SiteLimits) -> RobotName | None:
-    """Find the robot of a charge without a robot's name: a robot with a wish that stands here."""
+    """Find the robot of a charge whose state names no robot: a robot with a wish that stands at this
+    station."""
     here = (w.robot for w in memory.wishes if memory.stands_at(w.robot, site) == station)
     return next((who for who in here if memory.station_of(who) is None), None)
 
@@ -188,13 +193,14 @@ def in_time(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
 
 
 def not_taken_at(grant: Grant) -> float:
-    """Return the time from which a station that does not show this request is passed over."""
+    """Return the time after which a station that does not show this request is passed over."""
     return max(grant.made_at, grant.forgotten_at) + TAKEN_S
 
 
 def hopeless_at(memory: SiteMemory, name: str, grant: Grant) -> float:
-    """Return the time when a robot on its way should get another station, because the station's daemon
-    is silent or does not reach the station, or because another robot does not leave the pad."""
+    """Return the time when a robot on its way should get another station. The reason is a silent daemon
+    of the station, a station out of the daemon's reach, or another robot that does not leave the
+    pad."""
     seen, at = memory.stations.get(name), memory.silent_since(name) + LOST_S
     if seen is not None and seen.diagnosis is FaultCause.LOST:
         at = min(at, seen.since + LOST_S)
@@ -232,7 +238,8 @@ def _was_the_stations(
     now: float,
     site: SiteLimits,
 ) -> bool:
-    """Does the error name the station, or did the error last on after the robot had left?"""
+    """Return whether the station was at fault: its error names the station, or lasted after the robot
+    had left."""
     seen, standing = memory.stations[name], memory.robots.get(who)
     if seen.state is ERROR:
         return diagnosis(seen.error.removeprefix(OUT_OF_SERVICE)) is FaultCause.STATION
@@ -251,7 +258,8 @@ def _proven(memory: SiteMemory, now: float) -> SiteMemory:
 
 
 def proven_at(memory: SiteMemory, who: RobotName) -> float:
-    """Return the time when a charge has lasted long enough to prove that the robot can be charged."""
+    """Return the time when the present charge has lasted long enough to prove that the robot can be
+    charged."""
     station = memory.station_of(who)
     seen = memory.stations.get(station or "")
     if station is None or seen is None or not memory.grants[station].started:

@@ -5,21 +5,22 @@ shows IDLE in a task (rmf_ros2 9dedd0f: TaskManager::robot_mode; RobotContext::c
 WaitForCharge and DockRobot set). The id of a task shows whether it came from RMF's dispatcher; such a
 task is no charge.
 For a robot that has stood at one of our waypoints for SETTLES_S:
-COORDINATOR-WISHES-1. Below `again_percent` the robot wants to be charged if it has no task, or shows
-   CHARGING or DOCKING.
-COORDINATOR-WISHES-2. Above that, and below `full_percent`, only a task that shows CHARGING or DOCKING
-   is believed. A robot that was charged in that task is not served again. A robot that has not left our
-   waypoints since its charge may be waiting for traffic on its pad, so it is believed after LINGERS_S.
-COORDINATOR-WISHES-3. A robot without a task wants to be charged when the schedule says so, but only
-   once in the same time of the schedule unless it has worked since.
-COORDINATOR-WISHES-4. A wish lasts while these rules hold, and while the robot drives to its station: in
-   the same task, or without a task while a station is assigned to it. A task that begins within COMES_S
-   of the call is that drive (RMF's automatic retreat, or its restarted ChargeBattery), unless the
-   dispatcher gave the task.
+COORDINATOR-WISHES-1. Below `again_percent` the robot wants to be charged if it has no task, or if its
+   mode is CHARGING or DOCKING.
+COORDINATOR-WISHES-2. Between `again_percent` and `full_percent` the robot wants to be charged only if
+   it shows CHARGING or DOCKING in its present task. A robot that was already charged in that task is
+   not charged again. A robot that has not left our waypoints since its charge may only be waiting for
+   traffic on its pad, so its wish counts after LINGERS_S.
+COORDINATOR-WISHES-3. A robot without a task wants to be charged when the schedule says so. The schedule
+   charges the robot only once in the same time of the schedule, unless the robot has worked in between.
+COORDINATOR-WISHES-4. A wish lasts as long as these rules hold, and also during the robot's drive to its
+   station. The robot drives there in the same task, or without a task after a station was assigned to
+   it. If a task begins within COMES_S of the assignment, that task is the drive (RMF's automatic
+   retreat, or its restarted ChargeBattery), unless RMF's dispatcher gave the task.
 COORDINATOR-WISHES-5. Under `finishing_request: nothing` RMF moves no robot without a task until its
-   battery is very low. The same holds under `park`, except in Jazzy, which drives to the assigned
-   place. Such a robot stays where it is when called. After COMES_S it loses the station, and ABSENT_S
-   later it is called again.
+   battery is very low. The same holds under `park`, but Jazzy's RMF does drive such a robot to its
+   assigned place. A robot that RMF does not move stays where it is when a station is assigned. After
+   COMES_S the robot loses the station, and ABSENT_S later it is called again.
 """
 
 from typing import Final
@@ -40,11 +41,13 @@ from bridges.kinds.charger_coordinator.memory import (
 from bridges.kinds.charger_coordinator.signals import ChargeWanted, Sighting, is_dispatched
 
 SETTLES_S: Final = 2.0
-"""A robot must stay for this long (s), as a passing robot may still show the mode CHARGING."""
+"""The time (s) for which a robot must stay, because a robot that only passes may also show the mode
+CHARGING."""
 LINGERS_S: Final = 300.0
-"""No traffic jam lasts this long: a robot that stays on its pad longer wants to be charged."""
+"""The time (s) after which a robot that stays on its pad wants to be charged: no traffic jam lasts as
+long."""
 COMES_S: Final = 60.0
-"""RMF acts on a charging assignment within this time, or not at all."""
+"""The time (s) within which RMF acts on a charging assignment, if it acts at all."""
 ABSENT_S: Final = 600.0
 
 
@@ -67,7 +70,7 @@ def sighted(memory: SiteMemory, sighting: Sighting, now: float, site: SiteLimits
 
 
 def wanted(memory: SiteMemory, event: ChargeWanted, site: SiteLimits) -> tuple[SiteMemory, str]:
-    """Apply an operator's request; also return the reason for a refusal, "" for none."""
+    """Apply an operator's request. Also return the reason for a refusal, "" if there is none."""
     who = event.robot
     if event.request_id in memory.over:
         return memory, "request is over"
@@ -107,7 +110,8 @@ def fulfilled(memory: SiteMemory, who: RobotName, site: SiteLimits) -> SiteMemor
 
 
 def stays_away(memory: SiteMemory, station: str, grant: Grant, site: SiteLimits) -> bool:
-    """Has the robot no task, and does it still stand where it stood when called?"""
+    """Return whether the robot has no task, and still stands at the place where it stood when
+    called."""
     standing, wish = memory.robots.get(grant.robot), memory.wish(grant.robot)
     if standing is None or wish is None or wish.by == "operator" or standing.sighting.task_id:
         return False
@@ -136,7 +140,8 @@ def _standing(before: Standing | None, sighting: Sighting, now: float) -> Standi
 
 
 def _served(memory: SiteMemory, sighting: Sighting) -> SiteMemory:
-    """Forget the task in which a robot was charged, after it has left in another task."""
+    """Forget the task in which a robot was charged, when the robot has left its place in another
+    task."""
     who, task = sighting.who, sighting.task_id
     if sighting.place is None and task and memory.served.get(who, task) != task:
         return replace(memory, served=without(memory.served, who))
@@ -144,8 +149,8 @@ def _served(memory: SiteMemory, sighting: Sighting) -> SiteMemory:
 
 
 def _rested(memory: SiteMemory, sighting: Sighting, site: SiteLimits) -> SiteMemory:
-    """Note a robot that is full enough for the schedule, and forget this note when the schedule's time
-    is over, or the robot has worked."""
+    """Note that a robot is full enough for the schedule. Forget this note when the schedule's time is
+    over, or when the robot has worked."""
     who = sighting.who
     aim = schedule.target(site.schedule, who, memory.when)
     worked = bool(sighting.task_id) and sighting.place is None
@@ -157,8 +162,8 @@ def _rested(memory: SiteMemory, sighting: Sighting, site: SiteLimits) -> SiteMem
 
 
 def _called(memory: SiteMemory, sighting: Sighting, now: float) -> SiteMemory:
-    """Note a task that begins after the call as the robot's drive to the station, unless the dispatcher
-    gave the task."""
+    """Note the task that begins after the call as the robot's drive to the station, unless RMF's
+    dispatcher gave that task."""
     who, task = sighting.who, sighting.task_id
     wish, station = memory.wish(who), memory.station_of(who)
     if wish is None or wish.by == "operator" or wish.task_id or not task or station is None:
@@ -181,7 +186,8 @@ def _begun(memory: SiteMemory, standing: Standing, now: float, site: SiteLimits)
 
 
 def _asks(memory: SiteMemory, standing: Standing, now: float, site: SiteLimits) -> By | None:
-    """Return the origin of this robot's wish, its fleet's state or the schedule; None for no wish."""
+    """Return the origin of this robot's wish: its fleet's state, or the schedule. Return None if the
+    robot has no wish."""
     s = standing.sighting
     if s.place is None or s.battery_percent >= site.full_percent:
         return None
@@ -199,7 +205,8 @@ def _asks(memory: SiteMemory, standing: Standing, now: float, site: SiteLimits) 
 
 
 def _believed(memory: SiteMemory, standing: Standing, now: float) -> bool:
-    """Does the shown mode belong to the robot's present task, and not to an earlier task?"""
+    """Return whether the mode that the fleet shows belongs to the robot's present task, and not to an
+    earlier task."""
     served = memory.served.get(standing.sighting.who)
     if served is None:
         return True
@@ -207,7 +214,8 @@ def _believed(memory: SiteMemory, standing: Standing, now: float) -> bool:
 
 
 def _lasts(memory: SiteMemory, wish: Wish, s: Sighting, site: SiteLimits) -> bool:
-    """Does the robot still want to be charged, and stand at one of our waypoints or drive there?"""
+    """Return whether the robot still wants to be charged, and stands at one of our waypoints or drives
+    to its station."""
     if s.battery_percent >= _goal(memory, wish, site):
         return False
     same = s.task_id == wish.task_id
@@ -225,7 +233,7 @@ def _goal(memory: SiteMemory, wish: Wish, site: SiteLimits) -> float:
 
 
 def _full(memory: SiteMemory, wish: Wish, site: SiteLimits) -> bool:
-    """Has the wish's robot been charged, and does its fleet show the goal as reached?"""
+    """Return whether the robot has been charged up to the goal, as its fleet shows the battery."""
     grant = memory.grants.get(memory.station_of(wish.robot) or "")
     percent = memory.robots[wish.robot].sighting.battery_percent
     return grant is not None and grant.started and percent >= _goal(memory, wish, site)

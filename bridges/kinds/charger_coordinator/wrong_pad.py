@@ -3,16 +3,16 @@
 RMF's fleet adapter starts a robot's ChargeBattery again when the waypoint or the mode of its charging
 assignment changes (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart). That moves a robot, but
 only while its ChargeBattery runs: as a task, or as `finishing_request: charge`. Rules:
-COORDINATOR-WRONG-PAD-1. A robot with a station that comes to another station, or stays at another for
-   LEAVES_S, is told to wait, and TOLD_S later to charge at its own station. This happens at most twice
-   for one request.
-COORDINATOR-WRONG-PAD-2. A robot without a station, on a pad for which another robot waits, is told
-   again to wait: its assignment shows the other mode for TOLD_S. This happens `leaves_s` after the
-   robot arrived or the station released it.
-COORDINATOR-WRONG-PAD-3. If we may not assign, or the robot is in another task, the robot is not told to
-   leave, because RMF would not move it.
-COORDINATOR-WRONG-PAD-4. If the robot still stands there OBEYS_S later, or cannot be told to leave, a
-   person is alerted.
+COORDINATOR-WRONG-PAD-1. A robot with a station may come to another station, or stay at another station
+   for LEAVES_S. The coordinator then tells the robot to wait, and TOLD_S later to charge at its own
+   station. The coordinator does so at most twice for one request.
+COORDINATOR-WRONG-PAD-2. A robot without a station may stand on a pad for which another robot waits. The
+   coordinator then tells the robot again to wait: for TOLD_S its assignment shows the other mode. The
+   order comes `leaves_s` after the robot arrived or the station released it.
+COORDINATOR-WRONG-PAD-3. The coordinator gives no such order if it may not assign places, or if the
+   robot is in another task, because RMF would not move the robot.
+COORDINATOR-WRONG-PAD-4. A person is alerted if the robot still stands there OBEYS_S after the last
+   order, or if the coordinator cannot order it to leave.
 A robot's place is known from its fleet (FleetState's position), or from a station that reads receivers.
 """
 
@@ -36,8 +36,9 @@ TRIES: Final = 2
 
 
 class OnWrongPad(NamedTuple):
-    """A robot `who` at `station` since `since`. `expected`: its own station; None for a robot without a
-    station, which is in the way of `waiter`. `tries`: the greatest number of orders to leave."""
+    """A robot `who` that has stood at a wrong `station` since `since`. `expected`: the robot's own
+    station; None if the robot has no station and is in the way of the robot `waiter`. `tries`: the
+    greatest number of orders to leave."""
 
     who: RobotName
     station: str
@@ -49,8 +50,8 @@ class OnWrongPad(NamedTuple):
 
 
 def found(memory: SiteMemory, now: float, site: SiteLimits) -> dict[RobotName, OnWrongPad]:
-    """Find every robot at the wrong station or in another robot's way. If `now` is NEVER, also find
-    the robots that would be there later if no robot moved."""
+    """Find every robot at the wrong station or in another robot's way. With `now` = NEVER, also find
+    the robots that would be found later if no robot moved."""
     astray: dict[RobotName, OnWrongPad] = {}
     for one in (*_strayed(memory, now, site), *_blocking(memory, now, site)):
         astray.setdefault(one.who, one)
@@ -70,12 +71,12 @@ def nudged(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
 
 
 def is_nudged(memory: SiteMemory, who: RobotName, now: float) -> bool:
-    """Does a changed assignment tell the robot to leave now?"""
+    """Return whether a changed assignment tells the robot to leave now."""
     return who in memory.nudges and now < memory.nudges[who].at + TOLD_S
 
 
 def alarming(memory: SiteMemory, one: OnWrongPad, now: float) -> bool:
-    """Should a person be alerted?"""
+    """Return whether a person should be alerted."""
     return now >= max(one.since, _alarm_at(memory, one))
 
 
@@ -93,7 +94,8 @@ def due(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[float]:
 
 
 def _strayed(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWrongPad]:
-    """Yield robots that have a station, were not charged there yet, and stand at another station."""
+    """Yield robots that stand at another station than their own, and were not charged at their own
+    yet."""
     for name, grant in memory.grants.items():
         if grant.over or grant.started:
             continue
@@ -117,7 +119,7 @@ def _stands(
 
 
 def _blocking(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWrongPad]:
-    """Yield robots without a station on a pad for which another robot waits."""
+    """Yield robots without a station that stand on a pad for which another robot waits."""
     here = standing(memory, AGES_AGO if now == NEVER else now, site)
     idle = {name: who for name in here if (who := _idle_at(memory, name, here)) is not None}
     for wish in memory.wishes if idle else ():
@@ -133,7 +135,7 @@ def _blocking(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWr
 
 
 def _idle_at(memory: SiteMemory, station: str, here: Here) -> RobotName | None:
-    """Find a robot that stands at this free station, but to which no station is allotted."""
+    """Find a robot that stands at this free station without being allotted any station."""
     grant, seen = memory.grants.get(station), memory.stations.get(station)
     if seen is None or seen.state is CHARGING or (grant is not None and not grant.over):
         return None
@@ -143,8 +145,8 @@ def _idle_at(memory: SiteMemory, station: str, here: Here) -> RobotName | None:
 def _matters(
     memory: SiteMemory, who: RobotName, nudge: Nudge, astray: Mapping[RobotName, OnWrongPad]
 ) -> bool:
-    """Do these orders still count? The orders to a robot with a station count until its next request,
-    even if the robot goes to a wrong pad twice."""
+    """Return whether these orders still count. For a robot with a station they count until the robot's
+    next request, even if the robot goes to a wrong pad twice."""
     station = memory.station_of(who)
     if station is not None:
         return memory.grants[station].request_id == nudge.why
@@ -157,8 +159,8 @@ def _can_be_nudged(memory: SiteMemory, who: RobotName) -> bool:
 
 
 def _next_at(memory: SiteMemory, one: OnWrongPad) -> float:
-    """Return the time of the next order to leave; NEVER if the robot was told often enough, or cannot
-    be told."""
+    """Return the time of the next order to leave. Return NEVER if the robot was told often enough, or
+    if the coordinator cannot order it to leave."""
     nudge = memory.nudges.get(one.who)
     if not _can_be_nudged(memory, one.who):
         return NEVER
@@ -177,7 +179,7 @@ def _alarm_at(memory: SiteMemory, one: OnWrongPad) -> float:
 
 
 def on_pad(error: str, site: SiteLimits) -> RobotName | None:
-    """Find our robot that the station's error names; None if it names no robot of ours."""
+    """Find the robot named in the station's error; None if the error names no robot of the YAML."""
     seen = misplaced_in(error)
     if seen is None:
         return None

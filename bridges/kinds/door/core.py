@@ -2,24 +2,24 @@
 
 Rules:
 DOOR-1. An OPEN from any requester latches the hold; a repeated OPEN is harmless. A CLOSE releases the
-   hold after `close_grace_s`. An OPEN in that time cancels the CLOSE; a repeated CLOSE does not prolong
-   that time. (The time is there because RMF's supervisor, restarted while a robot stands in the
-   doorway, first sends a CLOSE.)
-DOOR-2. Nothing ever drives the door shut. Silence never releases the hold: RMF is silent while a robot
-   passes. If the site has set `supervisor_lost_s`, the hold ends when door requests have had no
-   publisher for that time.
-DOOR-3. After the hold has ended, and until the door is seen closed, an obstruction switches the hold on
-   again.
+   hold after `close_grace_s`. An OPEN during that time cancels the CLOSE; a repeated CLOSE does not
+   prolong that time. The time is needed because RMF's supervisor first sends a CLOSE when it is
+   restarted, even if a robot stands in the doorway.
+DOOR-2. Nothing ever drives the door shut. Silence never releases the hold, because RMF is silent while
+   a robot passes. One exception: if the site has set `supervisor_lost_s`, the hold ends when no node
+   has published door requests for that time.
+DOOR-3. An obstruction switches the hold on again if the hold has ended and the door has not been seen
+   closed since.
 DOOR-4. In a fire alarm the site's `on_fire` decides. `open` holds the door open, and no CLOSE releases
-   it. `release` switches the hold off, clears the latch and refuses OPEN. The state is then UNKNOWN, so
-   that no robot enters a door about to close, and RMF's supervisor stops repeating its request.
+   the hold. `release` switches the hold off, clears the latch and refuses OPEN. The state is then
+   UNKNOWN, so that no robot enters a door that is about to close, and so that RMF's supervisor stops
+   repeating its request.
 DOOR-5. Without a fresh reading the state is OFFLINE and the hold is off. The latch is kept, and the
    hold comes on again with the first good reading.
-DOOR-6. The state is OPEN only if the limit contact of the open door is active. While both limit
-   contacts are active, the state is UNKNOWN. While no limit contact is active, the state is MOVING, and
-   UNKNOWN after `travel_s`. If the controller does not report the door's position, the state is
-   UNKNOWN.
-DOOR-7. While another node publishes states under this door's name, the state is OFFLINE and the hold is
+DOOR-6. The state is OPEN only if the limit contact of the open door is active. If both limit contacts
+   are active, the state is UNKNOWN. If no limit contact is active, the state is MOVING, and UNKNOWN
+   after `travel_s`. If the controller does not report the door's position, the state is UNKNOWN.
+DOOR-7. If another node publishes states under this door's name, the state is OFFLINE and the hold is
    off.
 
 A fault is only a description; it changes no output. It lasts as long as its cause, so there is nothing
@@ -133,7 +133,8 @@ def _look(memory: DoorMemory, now: float, limits: DoorLimits) -> BelievedDoor:
 
 
 def _hold(memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits) -> DoorMemory:
-    """Switch the hold on or off, and note since when the door has been in its present state."""
+    """Switch the hold on or off, and note the time since which the door has been in its present
+    state."""
     if released_by_fire(view, limits):
         memory = replace(memory, latched_at=None, close_at=None)
     able = view.fresh and not rivalled(memory, now)

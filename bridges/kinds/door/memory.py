@@ -11,9 +11,10 @@ from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
 
 
 class DoorLimits(msgspec.Struct, frozen=True):
-    """The settings of a door that its core needs. `t`: the durations. `debounce`: signal -> s.
+    """The settings of a door that its core needs. `t`: the durations. `debounce` maps a signal to its
+    debounce (s).
 
-    `estimated`: time replaces a missing limit contact.
+    `estimated`: the passing of time replaces a missing limit contact.
     """
 
     t: DoorDurations = DoorDurations()
@@ -35,14 +36,14 @@ class DoorLimits(msgspec.Struct, frozen=True):
 
 
 Contact = Settled[bool | None]
-"""One debounced input. If it is not wired, its value and its candidate are None."""
+"""One debounced input. An input that is not wired has the value None and the candidate None."""
 
 
 class DoorSenses(msgspec.Struct, frozen=True):
-    """The door's contacts, each None before its first reading.
+    """The door's contacts. Each is None before its first reading.
 
-    `read_at`: the time of the last reading. `linked_since`: the time since which no read or write has
-    failed; None after a failure. `lost`, `errors`: from the last `DoorSample`.
+    `read_at`: the time of the last reading. `linked_since`: every read and write has succeeded since
+    this time; None after a failure. `lost`, `errors`: from the last `DoorSample`.
     """
 
     opened: Contact | None = None
@@ -56,13 +57,13 @@ class DoorSenses(msgspec.Struct, frozen=True):
 
 
 class DoorMemory(msgspec.Struct, frozen=True):
-    """Everything that the next decision needs to know of the past. Times are monotonic seconds.
+    """The facts of the past that the next decision needs. Times are monotonic seconds.
 
-    `latched_at`: the time since which RMF wants the door open. `close_at`: the time when a CLOSE
+    `latched_at`: RMF has wanted the door open since this time. `close_at`: the time when a CLOSE
     releases the hold. `held`: the hold is on. `held_since`: the time when the hold was last switched.
-    `closing`: the hold has ended, and the door has not been seen closed since. `between_since`,
-    `shut_since`, `unattended_since`: the times since which the door has been between its end positions,
-    has not been fully open, and has had no publisher of requests.
+    `closing`: the hold has ended, and the door has not been seen closed since. `between_since`: the
+    door has been between its end positions since this time. `shut_since`: the door has not been fully
+    open since this time. `unattended_since`: no node has published requests since this time.
     """
 
     latched_at: float | None = None
@@ -84,7 +85,8 @@ def rivalled(memory: DoorMemory, now: float) -> bool:
 
 
 def travel_ends_at(memory: DoorMemory, limits: DoorLimits) -> float:
-    """Return the time by which a door between its end positions must have arrived; NEVER for another.
+    """Return the time by which a door between its end positions must have arrived; NEVER for a door at
+    an end position.
 
     Switching the hold restarts the allowed time, `travel_s`.
     """
@@ -94,21 +96,23 @@ def travel_ends_at(memory: DoorMemory, limits: DoorLimits) -> float:
 
 
 def opening_ends_at(memory: DoorMemory, limits: DoorLimits) -> float:
-    """Return the time by which a held door must be open; NEVER if the door is open or not held."""
+    """Return the time by which a held door must be open; NEVER if the door is open or nobody holds
+    it."""
     if memory.shut_since is None or not memory.held:
         return NEVER
     return max(memory.shut_since, memory.held_since) + limits.t.open_timeout_s
 
 
 def too_long_at(memory: DoorMemory, limits: DoorLimits) -> float:
-    """Return the time when RMF has held the door for `max_hold_s`; NEVER without a limit or a hold."""
+    """Return the time when RMF will have held the door for `max_hold_s`; NEVER if there is no limit or
+    no hold."""
     if memory.latched_at is None or limits.t.max_hold_s is None:
         return NEVER
     return memory.latched_at + limits.t.max_hold_s
 
 
 def lost_at(memory: DoorMemory, limits: DoorLimits) -> float:
-    """Return the time when a supervisor will have been absent for `supervisor_lost_s`; NEVER if a
+    """Return the time when the door will have had no supervisor for `supervisor_lost_s`; NEVER if a
     supervisor is present or the limit is not set."""
     if memory.unattended_since is None or limits.t.supervisor_lost_s is None:
         return NEVER

@@ -1,4 +1,4 @@
-"""Turns DoorRequests into events, refuses invalid requests, and makes DoorStates of reports."""
+"""Turns DoorRequests into events, refuses invalid requests, and turns reports into DoorStates."""
 
 from collections.abc import Mapping
 
@@ -13,8 +13,8 @@ from bridges.messages.definitions import DoorMode, DoorModeValue, DoorRequest, D
 def accept(message: DoorRequest, settings: DoorSettings) -> OpenRequested | CloseRequested:
     """Turn a request into an event. Raises RequestRefused if it is malformed.
 
-    A door obeys every requester, but a request without a requester_id is refused: its fields were not
-    filled in, and its default mode, 0, would mean CLOSE.
+    A door obeys every requester. But a request without a requester_id is refused, because nobody filled
+    in its fields, and its default mode, 0, would mean CLOSE.
     """
     if not message.requester_id:
         raise RequestRefused("no requester", "requester_id is empty")

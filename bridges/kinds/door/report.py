@@ -19,7 +19,8 @@ from bridges.messages.definitions import DoorModeValue
 
 
 class DoorReport(msgspec.Struct, frozen=True):
-    """The door's state for RMF and the status file. `hold`: we hold the door open, even between pulses.
+    """The door's state for RMF and the status file. `hold`: we hold the door open, even if the relay is
+    off between two pulses.
 
     `estimated`: no contact proves `mode`. `waits`: the reason why RMF's OPEN is not yet fulfilled; ""
     without an OPEN, or when the door is OPEN. `alarm`: the fire input, for the fleets.
@@ -89,8 +90,8 @@ def _mode(memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits
 def _faults(
     memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits
 ) -> Iterator[Fault]:
-    """Yield all present faults, most serious first. No text has a running number, because every change
-    of a text is published."""
+    """Yield all present faults, most serious first. No text contains a number that runs on, because
+    every change of a text is published."""
     if rivalled(memory, now):
         yield Fault("TWO_NODES_FOR_ONE_DEVICE", "another node publishes states of this door")
     if not view.fresh:
@@ -99,10 +100,15 @@ def _faults(
         yield from _hazards(memory, view, limits)
         yield from _contradictions(memory, view, now, limits)
     if now >= too_long_at(memory, limits):
-        yield Fault("DOOR_OPEN_TOO_LONG", f"held for RMF longer than {limits.t.max_hold_s} s")
+        yield Fault(
+            "DOOR_OPEN_TOO_LONG", f"RMF has held the door for more than {limits.t.max_hold_s} s"
+        )
     if now >= lost_at(memory, limits):
         lost_s = limits.t.supervisor_lost_s
-        yield Fault("SUPERVISOR_LOST", f"no node publishes door_requests for {lost_s} s: released")
+        yield Fault(
+            "SUPERVISOR_LOST",
+            f"no node has published door_requests for {lost_s} s, so the hold has ended",
+        )
 
 
 def _silence(memory: DoorMemory, limits: DoorLimits) -> Iterator[Fault]:
@@ -117,7 +123,7 @@ def _hazards(memory: DoorMemory, view: BelievedDoor, limits: DoorLimits) -> Iter
         done = "held open" if limits.on_fire == "open" else "released"
         yield Fault("FIRE_ALARM", f"the door is {done}")
     if memory.closing and memory.held and memory.latched_at is None and view.obstructed:
-        yield Fault("DOOR_OBSTRUCTED", "held open after CLOSE while the doorway is not clear")
+        yield Fault("DOOR_OBSTRUCTED", "held open after CLOSE, because the doorway is not clear")
     if view.errors:
         yield Fault("DOOR_CONTROLLER_FAULT", "; ".join(view.errors))
 
@@ -130,6 +136,6 @@ def _contradictions(
     if view.lost:
         yield Fault("DOOR_POSITION_UNKNOWN", view.lost)
     if now >= travel_ends_at(memory, limits):
-        yield Fault("DOOR_TRAVEL_TIMEOUT", f"at neither end position for {limits.t.travel_s} s")
+        yield Fault("DOOR_TRAVEL_TIMEOUT", f"between its end positions for {limits.t.travel_s} s")
     if now >= opening_ends_at(memory, limits):
         yield Fault("DOOR_OPENING_FAULT", f"held, but not open after {limits.t.open_timeout_s} s")

@@ -1,15 +1,15 @@
 """Judgement of a door's inputs: debounce, age, and estimates for contacts that are not wired.
 
 Rules:
-DOOR-SENSING-1. A change of an input counts once it has lasted for the signal's debounce; the end of a
-   fire alarm or an obstruction, once it has lasted for `hazard_clear_s`. Before the input of a hazard
-   has settled for the first time, a single reading of the hazard counts.
+DOOR-SENSING-1. A change of an input counts once it has lasted for the signal's debounce. The end of a
+   fire alarm or of an obstruction counts once it has lasted for `hazard_clear_s`. If the input of a
+   hazard has never settled yet, a single reading of the hazard counts.
 DOOR-SENSING-2. After `stale_after_s` without a reading all inputs are unknown again, because the door
    may have moved.
-DOOR-SENSING-3. If the YAML says so, a missing limit contact is estimated from the time for which the
-   relay has been on or off. A failed read or write restarts that time.
-DOOR-SENSING-4. A controller's report that the door's position is unknown (`lost`) counts at once,
-   without debounce.
+DOOR-SENSING-3. If the YAML sets `feedback: estimated`, the time for which the relay has been on or off
+   replaces a missing limit contact. A failed read or write restarts that time.
+DOOR-SENSING-4. If a controller reports that it does not know the door's position (`lost`), the report
+   counts at once, without debounce.
 """
 
 from collections.abc import Iterator
@@ -29,10 +29,10 @@ HAZARDS = ("obstruction", "fire")
 class BelievedDoor(msgspec.Struct, frozen=True):
     """The judged inputs at one instant.
 
-    `fresh`: the last reading is younger than `stale_after_s`. `seen`: `fresh`, and each input has
-    settled, so the door's position is known. `estimated`: the end positions that have no contact.
-    `changes_at`: the next time when the view may change without a reading (s). `lost`, `errors`: see
-    DoorSample.
+    `fresh`: the last reading is younger than `stale_after_s`. `seen`: the reading is fresh and each
+    input has settled, so the door's position is known. `estimated`: the end positions that have no
+    contact. `changes_at`: the next time (s) when these judgements may change without a reading. `lost`,
+    `errors`: see DoorSample.
     """
 
     fresh: bool
@@ -67,7 +67,7 @@ def take(senses: DoorSenses, sample: DoorSample, now: float, limits: DoorLimits)
 
 
 def miss(senses: DoorSenses) -> DoorSenses:
-    """Restart the debounce, and the time of the estimates, after a failed read."""
+    """Restart the debounce, and the time behind the estimates, after a failed read."""
     return replace(
         senses,
         opened=forget(senses.opened),
@@ -111,7 +111,8 @@ def released_by_fire(view: BelievedDoor, limits: DoorLimits) -> bool:
 
 
 def _hold_s(before: Contact | None, seen: bool | None, signal: str, limits: DoorLimits) -> float:
-    """Return the debounce of `seen` (s): longer for the end of a hazard than for its start."""
+    """Return the debounce (s) for the value `seen`. The end of a hazard has a longer debounce than its
+    start."""
     hold_s = limits.debounce.get(signal, 0.0)
     clearing = signal in HAZARDS and seen is False and before is not None and before.value
     return max(hold_s, limits.t.hazard_clear_s) if clearing else hold_s
@@ -130,7 +131,7 @@ def _believed(contact: Contact | None) -> bool:
 
 
 def _feared(contact: Contact | None) -> bool:
-    """Is the hazard present? Before its input has settled, a single reading counts."""
+    """Return whether the hazard is present. If its input has never settled, a single reading counts."""
     if contact is None:
         return False
     return bool(contact.value if _settled(contact) else contact.candidate)
@@ -139,7 +140,8 @@ def _feared(contact: Contact | None) -> bool:
 def _estimates(
     senses: DoorSenses, held: bool, held_since: float, limits: DoorLimits
 ) -> tuple[float, float]:
-    """Return the times when a door without contacts counts as open, and as closed (NEVER: does not)."""
+    """Return two times for a door without contacts: when it counts as open, and when it counts as
+    closed. NEVER: it does not."""
     if not limits.estimated or senses.linked_since is None:
         return NEVER, NEVER
     since = max(held_since, senses.linked_since)
@@ -150,7 +152,8 @@ def _estimates(
 def _changes(
     senses: DoorSenses, limits: DoorLimits, now: float, *estimates: float
 ) -> Iterator[float]:
-    """Yield the times when a reading goes stale, an estimate is due or a contact settles (s)."""
+    """Yield the times (s) when the reading goes stale, when an estimate is due, and when a contact
+    settles."""
     stale_at = NEVER if senses.read_at is None else senses.read_at + limits.t.stale_after_s
     due = [stale_at, *estimates]
     for signal in SIGNALS:

@@ -17,11 +17,15 @@ class DoorDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     """Durations of a door."""
 
     stale_after_s: Annotated[
-        StaleAfter, tells("after so long without a good reading: OFFLINE, and the hold is off.")
+        StaleAfter,
+        tells("""the time without a good reading after which the door is OFFLINE and the hold is
+        off."""),
     ] = 1.0
     close_grace_s: Annotated[
         Seconds,
-        tells("how long after a CLOSE the hold ends; an OPEN in that time cancels the CLOSE."),
+        tells(
+            "the time from a CLOSE to the end of the hold. An OPEN in that time cancels the CLOSE."
+        ),
     ] = 3.0
     travel_s: Annotated[
         Timeout,
@@ -34,7 +38,7 @@ class DoorDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         Seconds, tells("how long a fire alarm or obstruction must be clear to count as over.")
     ] = 1.0
     open_delay_s: Annotated[
-        Seconds | None, tells("with estimated feedback, how long the door takes to open.")
+        Seconds | None, tells("how long the door takes to open, for `feedback: estimated`.")
     ] = None
     max_hold_s: Annotated[
         Patience | None,
@@ -42,8 +46,8 @@ class DoorDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     ] = None
     supervisor_lost_s: Annotated[
         Patience | None,
-        tells("""how long door requests may have no publisher; after that the hold is released. When
-        absent, the door stays held, as a robot may stand in the doorway."""),
+        tells("""how long the door may be without a publisher of door requests; after that the hold
+        ends. When absent, the door stays held, because a robot may stand in the doorway."""),
     ] = None
 
 
@@ -62,8 +66,8 @@ class DoorSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
     )
     feedback: Annotated[
         Literal["sensors", "estimated"],
-        tells("""`estimated` if a limit contact is missing; the door's state is then estimated by
-        time. Logs and status mark an estimate; RMF cannot see the difference."""),
+        tells("""`estimated` if a limit contact is missing; the passing of time then replaces the
+        contact. Logs and status mark an estimate; RMF cannot see the difference."""),
     ] = "sensors"
     on_fire: Annotated[
         Literal["open", "release"] | None,
@@ -75,7 +79,7 @@ class DoorSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
     ] = None
 
     def stale_after(self) -> float:
-        """Return `stale_after_s` of the limits."""
+        """Return the limits' `stale_after_s`."""
         return self.limits.stale_after_s
 
     def problems(self) -> Remarks:

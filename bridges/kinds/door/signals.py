@@ -6,12 +6,13 @@ from bridges.kinds.shared.decision import Attended, IoFailed, OperatorReset, Riv
 
 
 class DoorSample(msgspec.Struct, frozen=True):
-    """Every input of one door, with its polarity resolved and not debounced; None if not wired.
+    """Every input of one door: active or not, in whichever way it is wired, and not debounced. None if
+    not wired.
 
-    `opened`, `closed`: the limit contacts of the fully open and the fully closed door.
-    `obstruction`: somebody or something is in the doorway. `fire`: the fire alarm's contact.
-    `lost`: the reason why the controller gave no position; "" if it gave a position.
-    `errors`: the faults that the controller itself reports.
+    `opened`, `closed`: the limit contacts of the fully open and the fully closed door. `obstruction`:
+    somebody or something is in the doorway. `fire`: the fire alarm's contact. `lost`: the reason why
+    the controller gave no position; "" if it gave one. `errors`: the faults that the controller itself
+    reports.
     """
 
     opened: bool | None = None
@@ -23,10 +24,10 @@ class DoorSample(msgspec.Struct, frozen=True):
 
 
 class DoorOutputs(msgspec.Struct, frozen=True):
-    """Every output of one door. There is no command to close: the door operator closes by itself.
+    """Every output of one door. No output closes the door: the door operator closes it by itself.
 
-    `hold_open`: the relay is on. `between_pulses`: the relay is off until the next pulse of a door that
-    is still held.
+    `hold_open`: the relay is on. `between_pulses`: the door is held, and the relay is off until the
+    next pulse.
     """
 
     hold_open: bool = False

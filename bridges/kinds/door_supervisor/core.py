@@ -5,21 +5,21 @@ their requests on `adapter_door_requests`; the supervisor sends requests on `doo
 requester_id "door_supervisor". Rules:
 DOOR-SUPERVISOR-1. OPEN adds its requester to the holders, or renews the holder's stamp. CLOSE removes
    the requester. A stale request (`bridges/kinds/shared/freshness.py`) has no effect.
-DOOR-SUPERVISOR-2. The first holder causes an OPEN to the door's node, and the departure of the last
-   holder causes a CLOSE.
-   - The request is repeated when a requester repeats OPEN, and when the door's state contradicts it: a
-     held door is CLOSED or MOVING, or a door without holders is OPEN or MOVING.
-   - For INSIST_S after a holder has come, OPEN is repeated at every state, because the first OPEN may
-     have been lost, and an earlier CLOSE may be about to close the door.
+DOOR-SUPERVISOR-2. The first holder causes an OPEN to the door's node. The departure of the last holder
+   causes a CLOSE.
+   - The request is repeated when a requester repeats OPEN. It is also repeated when the door's state
+     contradicts it: a held door is CLOSED or MOVING, or a door without holders is OPEN or MOVING.
+   - For INSIST_S after a holder has come, OPEN is repeated at every state of the door. The reason is
+     that the first OPEN may have been lost, and that an earlier CLOSE may be about to close the door.
    - The states OFFLINE and UNKNOWN cause no request.
-DOOR-SUPERVISOR-3. Silence ends no hold: a robot in the doorway is silent. After `open_alarm_s` a fault
-   is shown, and the door stays open.
-DOOR-SUPERVISOR-4. During the quiet start, and while another publishes, our supervisor only listens.
-   After that it sends OPEN at once for a door with holders, but CLOSE only when a new state of the door
-   contradicts CLOSE. A door that was held before the restart, and is not seen CLOSED, is held from the
-   start unless another supervisor is there: the door's node may have died too, with a robot in the
-   doorway.
-DOOR-SUPERVISOR-5. Two messages are at least GAP_S apart, and a message is repeated unchanged after
+DOOR-SUPERVISOR-3. Silence ends no hold, because a robot in the doorway is silent. After `open_alarm_s`
+   a fault is shown, and the door stays open.
+DOOR-SUPERVISOR-4. During the quiet start, and whenever another supervisor publishes, our supervisor
+   only listens. After that it sends OPEN at once to a door with holders. It sends CLOSE only when a new
+   state of the door contradicts CLOSE. One exception to the quiet start: a door that was held before
+   the restart, and is not seen CLOSED, is held from the start if no other supervisor is there. The
+   door's node may have died too, with a robot in the doorway.
+DOOR-SUPERVISOR-5. Two messages are at least GAP_S apart. An unchanged message is repeated after
    REPEAT_S at the earliest.
 The heartbeat (`report.py`) lists the holders of all doors, and `keep.py` saves them across a restart.
 """
@@ -57,13 +57,14 @@ def initial(door: str, started_at: float) -> SupervisedDoor:
 
 
 def idle(memory: SupervisedDoor, now: float) -> bool:
-    """May this door be forgotten? True without holders after FORGOTTEN_S without a message about it."""
+    """Return whether this door may be forgotten: it has no holders, and FORGOTTEN_S have passed without
+    a message about it."""
     heard = [memory.shown_at, *(who.heard_at for who in memory.requesters.values())]
     return not memory.holders and now >= max(heard) + FORGOTTEN_S
 
 
 def urgent(memory: SupervisedDoor) -> bool:
-    """Must a door be held before the quiet start is over?"""
+    """Return whether a door must be held before the quiet start is over."""
     return memory.holds_restored
 
 
@@ -128,7 +129,7 @@ def _enter(memory: SupervisedDoor, event: RequesterOpens, now: float) -> Supervi
 
 
 def _see(memory: SupervisedDoor, now: float) -> SupervisedDoor:
-    """Decide after a new state whether to repeat the last request."""
+    """Decide after a new state of the door whether the last request must be repeated."""
     insists = any(now < holder.since + INSIST_S for holder in memory.holders)
     return replace(memory, prompted=memory.disagrees or insists)
 

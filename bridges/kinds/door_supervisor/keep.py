@@ -1,6 +1,6 @@
 """The doors' holders, saved across a restart.
 
-A holder is saved before the heartbeat lists it, because a listed robot drives on at once.
+A holder is saved before the heartbeat lists it, because a robot drives on as soon as it is listed.
 """
 
 from collections.abc import Mapping
@@ -21,13 +21,14 @@ Stamp = Annotated[int, Meta(ge=0, lt=2**31 * SECOND_NS)]
 
 
 class KeptDoors(keep.Kept, frozen=True, forbid_unknown_fields=True):
-    """`doors`: door -> requester -> the stamp (ns) of the first OPEN of the requester's visit."""
+    """The saved holders. `doors` maps a door, and then a requester, to the stamp (ns) of the first OPEN
+    of the requester's visit."""
 
     doors: dict[Text, dict[Text, Stamp]]
 
 
 def persist(memories: Mapping[str, SupervisedDoor]) -> bytes:
-    """Encode the holders for the next start. The bytes stay the same until a holder comes or goes."""
+    """Encode the holders for the next start. The bytes change only when a holder comes or goes."""
     doors = {
         name: {holder.requester: holder.visit for holder in by_name(memory)}
         for name, memory in sorted(memories.items())
@@ -37,10 +38,11 @@ def persist(memories: Mapping[str, SupervisedDoor]) -> bytes:
 
 
 def restore(kept: bytes, settings: DoorSupervisorSettings, now: float) -> dict[str, SupervisedDoor]:
-    """Make the memories at start from the bytes of `persist`, for the doors still served.
+    """Make the memories at start from the bytes of `persist`, for the doors that the supervisor still
+    serves.
 
-    Raises ValueError for other bytes. All holds count from now: times on the monotonic clock from
-    before the restart are meaningless.
+    Raises ValueError for other bytes. All holds count from now, because times on the monotonic clock
+    from before the restart mean nothing.
     """
     found = keep.read(kept, KeptDoors, VERSION, "a table of doors and their holders")
     served = found.doors if settings.doors is None else set(settings.doors)

@@ -12,7 +12,8 @@ from bridges.kinds.shared.graph_kind import LISTENS
 from bridges.messages.definitions import DoorModeValue
 
 VISIT_S: Final = 2.5
-"""A waiting robot repeats OPEN at 1 Hz. An OPEN after a longer silence than this is a new visit."""
+"""The longest silence (s) within one visit. A waiting robot repeats OPEN at 1 Hz; an OPEN after a
+longer silence begins a new visit."""
 
 CLOSED: Final = DoorModeValue.MODE_CLOSED
 MOVING: Final = DoorModeValue.MODE_MOVING
@@ -34,7 +35,8 @@ class Holder(msgspec.Struct, frozen=True):
     """A requester that has held the door open since `since` (our clock).
 
     `stamp`: the stamp of its latest OPEN, which came at `asked_at`. `visit`: the stamp of the first
-    OPEN of its present visit, unchanged by repeats. `restored`: it was a holder before our restart.
+    OPEN of its present visit; repeats do not change it. `restored`: the requester held the door before
+    our restart.
     """
 
     requester: str
@@ -45,7 +47,7 @@ class Holder(msgspec.Struct, frozen=True):
     restored: bool = False
 
     def repeats(self, stamp: int, now: float) -> "Holder":
-        """Return the holder after another OPEN."""
+        """Return the holder after one more OPEN."""
         again = now > self.asked_at + VISIT_S
         return replace(self, asked_at=now, stamp=stamp, visit=stamp if again else self.visit)
 
@@ -53,10 +55,11 @@ class Holder(msgspec.Struct, frozen=True):
 class SupervisedDoor(msgspec.Struct, frozen=True):
     """The memory of one door from event to event.
 
-    `passive`: the reason why requesters wait while we may not publish. `holders`: in the order of
-    arrival. `requesters`: name -> record. `mode`: the door's last mode, heard at `shown_at`.
-    `at_once`: a restored hold may be sent before we may publish. `sent`: the last request to the door's
-    node, None since publishing was last allowed or forbidden; `prompted`: the request must be repeated.
+    `passive`: if we may not publish, the reason why requesters must wait. `holders`: in the order of
+    arrival. `requesters`: the record of each name. `mode`: the door's last mode, heard at `shown_at`.
+    `at_once`: we may hold a restored holder's door even before we may publish. `sent`: the last request
+    to the door's node; None after a change of the permission to publish. `prompted`: the request must
+    be repeated.
     """
 
     door: str
@@ -73,34 +76,36 @@ class SupervisedDoor(msgspec.Struct, frozen=True):
 
     @property
     def wanted(self) -> DoorModeValue:
-        """The mode to request of the door's node."""
+        """The mode that we request of the door's node."""
         return OPEN if self.holders else CLOSED
 
     @property
     def may_send(self) -> bool:
-        """May we send to the door's node now? During the quiet start only if restored holders hold a
-        door that is not closed, because a robot may stand in its doorway."""
+        """Return whether we may send to the door's node now. During the quiet start we may only if
+        restored holders hold a door that is not closed, because a robot may stand in its doorway."""
         stands_open = self.mode not in (None, CLOSED)
         return self.may_speak or (self.at_once and stands_open and self.holds_restored)
 
     @property
     def holds_restored(self) -> bool:
-        """Is there a holder from before our restart?"""
+        """Return whether a holder from before our restart holds the door."""
         return any(holder.restored for holder in self.holders)
 
     @property
     def owed(self) -> bool:
-        """Is a new request due? A CLOSE is due only if the last request was OPEN."""
+        """Return whether a new request is due. A CLOSE is due only if the last request was OPEN."""
         return self.wanted != self.sent and (self.wanted == OPEN or self.sent == OPEN)
 
     @property
     def disagrees(self) -> bool:
-        """Does the door's state contradict the wanted mode? OFFLINE and UNKNOWN do not."""
+        """Return whether the door's state contradicts the wanted mode. OFFLINE and UNKNOWN contradict
+        nothing."""
         return self.mode == MOVING or self.mode == (CLOSED if self.holders else OPEN)
 
     @property
     def silent_at(self) -> float:
-        """The time when a held door has been silent for too long; NEVER if nobody holds the door."""
+        """The time when a held door will have been silent for too long; NEVER if nobody holds the
+        door."""
         if not self.holders:
             return NEVER
         return max(self.shown_at, self.holders[0].since) + SILENT_S

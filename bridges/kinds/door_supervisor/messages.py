@@ -26,9 +26,9 @@ def accept_request(
     """Turn an adapter's request into an event. Raises RequestRefused. `wall` is not used, because
     stamps are compared only with stamps of the same requester.
 
-    A request without a requester_id is refused: its fields were not filled in, and its default mode,
-    0, would mean CLOSE. A request with our own requester_id is our own request to a door, which came
-    back through a renamed topic.
+    A request without a requester_id is refused, because nobody filled in its fields, and its default
+    mode, 0, would mean CLOSE. A request with our own requester_id is refused too: it is our own request
+    to a door, and a renamed topic has brought it back.
     """
     check_listed("door", request.door_name, settings.doors)
     who = request.requester_id
@@ -69,7 +69,8 @@ def requester(event: RequesterOpens | RequesterCloses | DoorStateHeard) -> str:
 def stamped(
     message: DoorRequest | SupervisorHeartbeat, time: Time
 ) -> DoorRequest | SupervisorHeartbeat:
-    """Add the time of sending to a message. A heartbeat has only its requesters' stamps."""
+    """Add the time of sending to a message. A heartbeat carries only its requesters' stamps, so it
+    stays unchanged."""
     if isinstance(message, SupervisorHeartbeat):
         return message
     return replace(message, request_time=time)

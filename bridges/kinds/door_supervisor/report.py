@@ -1,10 +1,11 @@
-"""Doors and their holders, as reported by the heartbeat, the log and the status file.
+"""Doors and their holders: in the heartbeat, in the log and in the status file.
 
 Fleet adapters rely on the heartbeat. Their phase DoorOpen ends only when the heartbeat lists the robot,
-and DoorClose when the heartbeat no longer lists it. A robot listed for a door that it does not hold
-sends CLOSE (rmf_ros2, RobotContext.cpp _check_door_supervisor). RMF's own supervisor sends the
-heartbeat only after adapter requests, so the sessions of a restarted fleet adapter stay for ever. Our
-supervisor also sends the heartbeat each second.
+and their phase DoorClose only when it no longer lists the robot. If the heartbeat lists a robot for a
+door that the robot does not hold, the adapter sends CLOSE (rmf_ros2, RobotContext.cpp
+_check_door_supervisor). RMF's own supervisor sends the heartbeat only after adapter requests. So the
+sessions of a restarted fleet adapter stay in it for ever. Our supervisor also sends the heartbeat each
+second.
 """
 
 from collections.abc import Iterator, Mapping
@@ -27,8 +28,8 @@ from bridges.messages.topics import DOOR_SUPERVISOR_HEARTBEAT, AnyTopic
 class DoorHoldReport(msgspec.Struct, frozen=True):
     """One door, for the log and the status file. Times are monotonic seconds.
 
-    `holders`: (requester, start of its hold). `mode`: the door's last mode, heard at `read_at`.
-    `waits`: the reason why nothing is sent to the door for the holders; "" otherwise.
+    `holders`: pairs of a requester and the start of its hold. `mode`: the door's last mode, heard at
+    `read_at`. `waits`: the reason why we send nothing to the door for the holders; else "".
     """
 
     read_at: float | None
@@ -62,7 +63,7 @@ def _faults(memory: SupervisedDoor, now: float, limits: DoorSupervisorLimits) ->
 
 
 def heartbeat(memories: Mapping[str, SupervisedDoor]) -> tuple[AnyTopic, SupervisorHeartbeat]:
-    """List all held doors with their holders, in the order of names."""
+    """List all held doors and their holders. Doors and holders are in the order of their names."""
     doors = tuple(
         DoorSessions(name, tuple(map(_session, by_name(memory))))
         for name, memory in sorted(memories.items())

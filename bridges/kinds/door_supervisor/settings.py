@@ -19,16 +19,16 @@ class DoorSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
     open_alarm_s: Annotated[
         Patience,
         tells("""how long one requester may hold a door open before a fault is shown. The door stays
-        open, as the robot may stand in the doorway."""),
+        open, because the robot may stand in the doorway."""),
     ] = 600.0
 
     def problems(self) -> Remarks:
-        """Yield an empty list of doors."""
+        """Yield a problem if the list of doors is empty."""
         if self.doors == []:
             yield ("doors",), "is empty: name the doors, or leave it out to serve every door"
 
 
 def speaks_of(settings: DoorSupervisorSettings) -> Iterable[Place]:
-    """Yield the doors to be served."""
+    """Yield the doors that the supervisor serves."""
     for i, name in enumerate(settings.doors or ()):
         yield ("doors", str(i)), "door", name

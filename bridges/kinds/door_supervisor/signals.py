@@ -8,14 +8,14 @@ from bridges.messages.definitions import DoorModeValue
 
 
 class RequesterOpens(msgspec.Struct, frozen=True):
-    """A requester's OPEN; `stamp` is by the requester's clock (ns)."""
+    """A requester's OPEN. `stamp`: its time (ns) by the requester's clock."""
 
     requester: str
     stamp: int
 
 
 class RequesterCloses(msgspec.Struct, frozen=True):
-    """A requester's CLOSE; `stamp` is by the requester's clock (ns)."""
+    """A requester's CLOSE. `stamp`: its time (ns) by the requester's clock."""
 
     requester: str
     stamp: int

@@ -1,4 +1,4 @@
-"""Lifts: a LiftRequest switches outputs, and the lift's inputs make a LiftState."""
+"""Lifts: a LiftRequest switches outputs, and the lift's inputs become a LiftState."""
 
 from bridges.kinds.lift import core, memory, messages, relays, report, signals
 from bridges.kinds.lift.memory import LiftLimits, LiftMemory

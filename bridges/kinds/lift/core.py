@@ -1,36 +1,37 @@
 """The lift's decision core: its session, its outputs, and its report to RMF.
 
 Rules, in the order in which they are applied:
-LIFT-1. While the lift is free, the first request gets a session, unless an obstacle (LIFT-4) is
-   present. Requests of the same session refresh it; requests of other sessions are refused. Only its
-   own END ends a session; a hazard, fault or timeout does not. A session in HUMAN mode has no outputs.
+LIFT-1. If the lift is free, the first request gets a session, unless an obstacle (LIFT-4) is present.
+   Requests of the same session refresh it; requests of other sessions are refused. Only the session's
+   own END ends it; a hazard, a fault or a timeout does not. A session in HUMAN mode has no outputs.
 LIFT-2. END ends the session at once, unless the END is older than the session. AGV mode and the door's
    hold may stay on for `release_grace_s`. During that time only the same session is granted, even in a
-   fire, because a restarted supervisor sends END for a robot that is still inside and must get out. For
-   the same reason (`bridges/kinds/lift/forgotten.py`):
-   - An END on `lift_requests` does not end a session if the robot may be inside and its own requests
-     go on. The robot's own END, a person's END or the robot's silence ends the session.
-   - If RMF's supervisor asks for another session than the holder's, or has ended the holder's session,
-     the requests and the END that the holder's robot itself sends count too.
-   - After an END in mid-ride, as sent by a new fleet adapter, the lift waits longer for that robot:
-     until IN_CAR_S after its last message. Nothing is energised after `release_grace_s`.
-LIFT-3. A request sets the destination and the mode. While the door is held, another destination may
-   have to wait (`bridges/kinds/lift/replayed.py`). `bridges/kinds/lift/drive.py` has the rules for the
-   outputs.
+   fire. The reason is that a restarted supervisor sends END for a robot that is still inside and must
+   get out. For the same reason (`bridges/kinds/lift/forgotten.py`):
+   - An END on `lift_requests` does not end a session if the robot may be inside and its own requests go
+     on. The session ends at the robot's own END, at a person's END, or after the robot's silence.
+   - If RMF's supervisor asks for another session, or has ended the holder's session, the holder's robot
+     is heard directly: the requests and the END that this robot itself sends count too.
+   - A new fleet adapter sends END in mid-ride. The lift then waits longer for that robot: until
+     IN_CAR_S after its last message. Nothing is energised after `release_grace_s`.
+LIFT-3. A request sets the destination and the mode. If the door is held, a request for another
+   destination may have to wait (`bridges/kinds/lift/replayed.py`). `bridges/kinds/lift/drive.py` has
+   the rules for the outputs.
 LIFT-4. An obstacle switches every output off and never changes the session. Obstacles are: fire (and
    its latch, if an operator must reset it), code blue, earthquake, emergency, out of service, manual
    mode, a second node for this lift, inputs that cannot be believed, outputs that cannot be written. A
-   gap in reading or writing shorter than `stale_after_s` is no obstacle. Overload only delays.
+   gap in reading or writing that is shorter than `stale_after_s` is no obstacle. Overload is no
+   obstacle: it only delays the ride.
 LIFT-5. RMF is told OPEN when fresh inputs show that the car stands at a known floor with its door open.
    - Until OPEN has been published at a session's destination, its robot is outside. During that time
-     OPEN also needs AGV mode and no fault: a robot looks only at session, floor and door, and must not
+     OPEN also needs AGV mode and no fault. A robot looks only at session, floor and door, and must not
      board a lift in a fire.
-   - After that a robot may be inside. It must see the door's true state in any mode, to get out.
-   - A door is not shown OPEN while its hold is wanted but the relay must rest first: such a door may
-     close by itself while a robot drives through.
-   - A door that nobody holds is not shown OPEN at the floor for which the robot itself asks, if the
-     session is about to send the car elsewhere: RMF's supervisor may be passing on an earlier ride, and
-     the robot would drive in.
+   - After that a robot may be inside. To get out, the robot must see the door's true state in any mode.
+   - A door is not shown OPEN if its hold is wanted but the relay must rest first. Such a door may close
+     by itself while a robot drives through.
+   - A door that nobody holds may be open at the floor for which the robot itself asks, while the
+     session is about to send the car elsewhere. Such a door is not shown OPEN, because RMF's supervisor
+     may be passing on an earlier ride, and the robot would drive in.
 """
 
 from msgspec.structs import replace
@@ -70,7 +71,8 @@ NOT_RMFS = frozenset(
         Hazard.MANUAL,
     }
 )
-"""Hazards that take the lift away from RMF. An overload only delays the ride."""
+"""Hazards that take the lift away from RMF. Overload is not among them, because it only delays the
+ride."""
 
 
 def initial(limits: LiftLimits, now: float) -> LiftMemory:
@@ -113,7 +115,7 @@ def obstacles(
     """List the present obstacles to all outputs, most serious first."""
     found = []
     if memory.fire_latched and Hazard.FIRE not in view.hazards:
-        found.append(Fault("FIRE_LATCHED", "rmf-bridge reset when it is safe"))
+        found.append(Fault("FIRE_LATCHED", "run rmf-bridge reset when the lift is safe"))
     found += [Fault(h.name) for h in HAZARDS if h in NOT_RMFS and h in view.hazards]
     if memory.rival_at is not None:
         found.append(Fault("TWO_NODES_FOR_ONE_DEVICE", "another node publishes this lift's states"))
@@ -125,7 +127,7 @@ def obstacles(
 
 
 def _unwritten_at(memory: LiftMemory, limits: LiftLimits) -> float:
-    """Return the time when failed writes become an obstacle; NEVER if the last write succeeded."""
+    """Return the time when failed writes become an obstacle; NEVER after a successful write."""
     since = memory.unwritten_since
     return NEVER if since is None else since + limits.t.stale_after_s
 
@@ -133,7 +135,7 @@ def _unwritten_at(memory: LiftMemory, limits: LiftLimits) -> float:
 def _drive(
     memory: LiftMemory, view: BelievedLift, allowed: bool, now: float, limits: LiftLimits
 ) -> tuple[LiftMemory, LiftOutputs]:
-    """Move the relays to their next state; also return the wanted outputs."""
+    """Move the relays to their next state. Also return the wanted outputs."""
     session, grace, relays = memory.session, memory.grace, memory.relays
     outputs = LiftOutputs()
     if session and drive.serves(session, allowed, now, limits):
@@ -176,7 +178,8 @@ def _take(
 
 
 def _read(memory: LiftMemory, sample: LiftSample, now: float, limits: LiftLimits) -> LiftMemory:
-    """Add a reading. If no write has failed since the last reading, the outputs were written."""
+    """Add a reading. If no write has failed since the last reading, note that the outputs were
+    written."""
     return replace(
         memory,
         senses=take(memory.senses, sample, now, limits),
@@ -187,7 +190,7 @@ def _read(memory: LiftMemory, sample: LiftSample, now: float, limits: LiftLimits
 
 
 def _why_not(memory: LiftMemory, now: float, limits: LiftLimits) -> str:
-    """Return the reason why a free lift must not be granted; "" if it may be granted."""
+    """Return the reason why a free lift must not be granted to a session; "" if there is none."""
     view = look(memory.senses, now, limits)
     why_not = obstacles(memory, view, now, limits)
     if not why_not:
@@ -197,11 +200,11 @@ def _why_not(memory: LiftMemory, now: float, limits: LiftLimits) -> str:
 
 
 def _reset(memory: LiftMemory, now: float, limits: LiftLimits) -> LiftMemory:
-    """Clear the latches by an operator's order, unless their cause may still be present."""
+    """Clear the latches at an operator's order. A latch stays if its cause may still be present."""
     session = memory.session
     if session and session.fault:
         session = replace(drive.paused(session), tries=0, retry_at=None, fault=None)
-    # With fresh inputs a latch may clear: a fire that is still there latches again in this
+    # With fresh inputs a latch may clear, because a fire that is still present latches again in this
     # decision. With stale inputs the latch stays, because they may hide a fire.
     unseen = not look(memory.senses, now, limits).fresh
     return replace(
@@ -243,7 +246,8 @@ def _faults(
 
 
 def _faults_of_rmf(session: LiftSession, now: float, limits: LiftLimits) -> list[Fault]:
-    """List faults of RMF. If its supervisor asks for another session, that explains the silence."""
+    """List the faults on RMF's side. If RMF's supervisor asks for another session, that fault explains
+    the silence."""
     if session.forgotten:
         fault = forgotten.fault(session, now)
         return [fault] if fault else []

@@ -2,25 +2,26 @@
 
 Rules:
 LIFT-DRIVE-1. Without a session no output is switched on. All outputs are off under an obstacle
-   (`core.py`), for a session in HUMAN mode, while RMF is silent and the robot is outside, and between
-   the tries after a fault. For `release_grace_s` after END, AGV mode and the door's hold stay on
-   if they were on; the hold ends `dead_time_s` before AGV mode.
-LIFT-DRIVE-2. The order is: AGV mode, then the call to the destination, then, once the car stands there,
-   the door's hold. With `by_call` a call brings AGV mode, so the call comes first, even if the car
-   stands there.
+   (`core.py`), for a session in HUMAN mode, and between the tries after a fault. They are also off if
+   RMF is silent and the robot is outside. For `release_grace_s` after END, AGV mode and the door's hold
+   stay on if they were on; the hold ends `dead_time_s` before AGV mode.
+LIFT-DRIVE-2. The order is: AGV mode, then the call to the destination, then the door's hold, when the
+   car stands at the destination. With `by_call` a call switches AGV mode on. The call then comes first,
+   even if the car already stands at the destination.
 LIFT-DRIVE-3. A call is given only in AGV mode (except with `by_call`), away from the destination, and
-   without overload. A door command is given only in AGV mode, while the car stands at the destination's
-   landing. Calls and door commands are never on together, and a call or door command comes on only
-   after all calls and door commands have been off for `dead_time_s`.
-LIFT-DRIVE-4. A call is held until the car stands at its destination, or is a pulse. It is given again
-   after every interruption, and when the car had arrived but is then seen at another floor. While the
-   floor code is changing no new call is given, because the car may just be arriving.
-LIFT-DRIVE-5. AGV mode, the arrival and the open door each have a timeout. At its end the outputs go
-   off and a fault is shown. Three more tries follow, 10, 30 and 60 s later; then the fault latches.
-   Losing AGV mode during the ride is such a fault too. With `by_call` AGV mode may end between two
-   destinations, while the call and the hold are off. During an overload no timeout runs.
-LIFT-DRIVE-6. Switching off is immediate. Switching on waits until the relay has been off for
-   `min_off_s`, and is limited to `max_cycles_per_min` (`Channel` in `relays.py`).
+   without overload. A door command is given only in AGV mode, when the car stands at the destination's
+   landing. A call and a door command are never on together. Either comes on only after all calls and
+   door commands have been off for `dead_time_s`.
+LIFT-DRIVE-4. A call is held until the car stands at its destination, or is a pulse. The call is given
+   again after every interruption. It is also given again if the car had arrived and is then seen at
+   another floor. No new call is given during a change of the floor code, because the car may be
+   arriving at that moment.
+LIFT-DRIVE-5. AGV mode, the arrival and the open door each have a timeout. When a timeout ends, the
+   outputs go off and a fault is shown. Three more tries follow, 10, 30 and 60 s later; then the fault
+   latches. The end of AGV mode during the ride is such a fault too. With `by_call` AGV mode may end
+   between two destinations, when the call and the hold are off. During an overload no timeout runs.
+LIFT-DRIVE-6. Switching off is immediate. A relay is switched on only after it has been off for
+   `min_off_s`, and at most `max_cycles_per_min` times a minute (`Channel` in `relays.py`).
 """
 
 from msgspec.structs import replace
@@ -41,7 +42,8 @@ def at_destination(session: LiftSession, view: BelievedLift, limits: LiftLimits)
 
 
 def agv_ok(view: BelievedLift) -> bool:
-    """Is AGV mode on, as far as the wiring can tell? True if no status line is wired."""
+    """Return whether AGV mode is on, as far as the wiring can tell. Without a wired status line the
+    answer is True."""
     return view.agv is not False
 
 
@@ -51,20 +53,20 @@ def silent(session: LiftSession, now: float, limits: LiftLimits) -> bool:
 
 
 def serves(session: LiftSession, allowed: bool, now: float, limits: LiftLimits) -> bool:
-    """May anything be energised for this session? `allowed`: there is no obstacle."""
+    """Return whether any output may be energised for this session. `allowed`: there is no obstacle."""
     outside_and_gone = silent(session, now, limits) and not session.boarded
     return allowed and session.agv and not outside_and_gone
 
 
 def paused(session: LiftSession) -> LiftSession:
-    """Interrupt the session's ride: it starts anew when outputs are allowed again."""
+    """Interrupt the session's ride. The ride starts anew when outputs are allowed again."""
     return replace(session, agv_seen=False, arrived=False, call_at=None, waiting=None)
 
 
 def advance(
     session: LiftSession, view: BelievedLift, relays: Relays, now: float, limits: LiftLimits
 ) -> LiftSession:
-    """Advance the session by this scan's inputs: arrivals, timeouts and retries.
+    """Advance the session by this scan's inputs: note arrivals, timeouts and retries.
 
     `relays`: the state of the relays before this scan.
     """
@@ -90,7 +92,7 @@ def advance(
 
 
 def wanted(session: LiftSession, view: BelievedLift, now: float, limits: LiftLimits) -> LiftOutputs:
-    """Choose the outputs for a served session."""
+    """Choose the outputs for a session that is served."""
     if session.retry_at is not None:
         return LiftOutputs()
     if not (agv_ok(view) or limits.by_call):
@@ -108,7 +110,7 @@ def wanted(session: LiftSession, view: BelievedLift, now: float, limits: LiftLim
 def stays_on(
     grace: Grace, relays: Relays, view: BelievedLift, now: float, limits: LiftLimits
 ) -> LiftOutputs:
-    """Choose the outputs during the grace after END."""
+    """Choose the outputs for the time after END (the grace)."""
     if now >= grace.off_at:
         return LiftOutputs()
     standing = agv_ok(view) and at_destination(grace.session, view, limits)
@@ -117,7 +119,7 @@ def stays_on(
 
 
 def let_go_at(grace: Grace, limits: LiftLimits) -> float:
-    """Return the time when the door's hold ends during the grace."""
+    """Return the time after END when the door's hold ends."""
     return min(grace.off_at, grace.until) - limits.t.dead_time_s
 
 
@@ -133,16 +135,18 @@ def next_at(session: LiftSession, limits: LiftLimits) -> tuple[float, ...]:
 
 
 def _requested(session: LiftSession, relays: Relays, limits: LiftLimits) -> bool:
-    """Has one of our outputs requested AGV mode until now?"""
+    """Return whether one of our outputs has requested AGV mode until now."""
     if limits.by_call:
         return session.call_at is not None or relays.hold.on is not None
     return bool(relays.agv.on)
 
 
 def _arrive(session: LiftSession, view: BelievedLift, limits: LiftLimits) -> LiftSession:
-    """End the call when the car stands at the destination; call again if it is then seen elsewhere.
+    """End the call when the car stands at the destination. Call again if the car is then seen
+    elsewhere.
 
-    With `by_call`, a car already at the destination does not end the call before AGV mode is on.
+    With `by_call`, a call is not ended before AGV mode is on, even if the car already stands at the
+    destination.
     """
     if limits.by_call and not agv_ok(view):
         return replace(session, arrived=False)
@@ -184,7 +188,7 @@ def _trip(session: LiftSession, fault: Fault, now: float) -> LiftSession:
 
 
 def _pulse_ends_at(session: LiftSession, limits: LiftLimits) -> float:
-    """Return the end of a pulsed call; NEVER for a held call."""
+    """Return the end of a call that is a pulse; NEVER for a held call."""
     if session.call_at is None or limits.t.call_pulse_s is None:
         return NEVER
     return session.call_at + limits.t.call_pulse_s

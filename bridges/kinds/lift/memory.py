@@ -45,7 +45,7 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
         )
 
     def debounce_s(self, signal: str) -> float:
-        """Return the time for which a change of this signal must last."""
+        """Return the time (s) for which a change of this signal must last."""
         return self.debounce.get(signal, 0.0)
 
     @cached_property
@@ -59,7 +59,8 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
         return abs(self.levels[level] - self.levels[other]) - 1
 
     def floor_name(self, level: str, preferred: str) -> str:
-        """Return RMF's name for a landing: `preferred` if that is one of its names, else the first."""
+        """Return RMF's name for a landing: `preferred` if the landing has that name, else its first
+        name."""
         if preferred in self.stops and self.stops[preferred].level == level:
             return preferred
         return next(name for name, stop in self.stops.items() if stop.level == level)
@@ -70,8 +71,8 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
 
 
 class CarPosition(msgspec.Struct, frozen=True):
-    """The car's position. `trusted`: the landing last believed, last seen at `seen_at`. `suspect`: a
-    landing in the floor code that the car cannot have reached.
+    """The car's position. `trusted`: the landing that was last believed, and last seen at `seen_at`.
+    `suspect`: a landing in the floor code that the car cannot have reached.
 
     `moved_at`: the time of the last reading in which the car did not stand.
     """
@@ -98,10 +99,12 @@ class LiftSenses(msgspec.Struct, frozen=True):
 
 
 class ForgottenSession(msgspec.Struct, frozen=True):
-    """A forgotten or disowned session (`bridges/kinds/lift/forgotten.py`), `since` a time.
+    """The mark of a forgotten or disowned session (`bridges/kinds/lift/forgotten.py`), present since
+    the time `since`.
 
     `by`: the session for which the supervisor asks instead, "" for none. `disowned`: the supervisor has
-    ended this session while the robot goes on asking. `ended`: the robot's own END was heard once."""
+    ended this session, but its robot goes on asking. `ended`: the robot's own END was heard once.
+    """
 
     by: str
     since: float
@@ -113,8 +116,9 @@ class OwnWords(msgspec.Struct, frozen=True):
     """The messages of a robot's own adapter. `stamp`: the newest stamp (ns), by the adapter's clock.
 
     `asked_at`: the time of its last request for the lift. `ended_at`: the time of its first END after
-    that. `floor`: its destination. `opened`: OPEN has been published there since. `told`: the adapter
-    has asked again after OPEN."""
+    that request. `floor`: the requested destination. `opened`: OPEN has been published at that floor
+    since. `told`: the adapter has requested again after that OPEN.
+    """
 
     stamp: int = 0
     asked_at: float = AGES_AGO
@@ -125,7 +129,7 @@ class OwnWords(msgspec.Struct, frozen=True):
 
 
 class Doubted(msgspec.Struct, frozen=True):
-    """A destination, requested at `since`, that may belong to an earlier ride
+    """A destination, requested since `since`, that may belong to an earlier ride
     (`bridges/kinds/lift/replayed.py`)."""
 
     destination: str
@@ -133,14 +137,15 @@ class Doubted(msgspec.Struct, frozen=True):
 
 
 class LiftSession(msgspec.Struct, frozen=True):
-    """The lift's holder, its request, and the progress of its ride.
+    """The session that has the lift: its request, and the progress of its ride.
 
     `boarded`: OPEN at the destination has been published for this session, so a robot may be inside.
-    `agv_seen`: AGV mode has come on for our request. `arrived`: the car has stood at the destination.
-    `call_at`: the start of the present call. `waiting`, `since`: the step for which we wait, and its
-    start. `tries`: the failures of that step. `retry_at`: outputs stay off until then (inf: latched).
-    `forgotten`: RMF's supervisor does not ask for this session. `robot`: its own adapter's messages.
-    `doubted`: a destination that does not count yet. `ends`: the stamps that its END may have.
+    `agv_seen`: AGV mode has come on at our request. `arrived`: the car has stood at the destination.
+    `call_at`: the start of the present call. `waiting`: the step for which we wait, begun at `since`.
+    `tries`: how often that step has failed. `retry_at`: outputs stay off until this time (inf: the
+    fault has latched). `forgotten`: RMF's supervisor does not ask for this session. `robot`: the
+    messages of its own adapter. `doubted`: a destination that does not count yet. `ends`: the stamps
+    that the session's END may have.
     """
 
     id: str
@@ -163,8 +168,9 @@ class LiftSession(msgspec.Struct, frozen=True):
 
 
 class Grace(msgspec.Struct, frozen=True):
-    """The time after END. Until `until` only the ended session can be granted. Its outputs go off at
-    `off_at`. `in_car`: its robot may still be inside, and its own requests restore the session too."""
+    """The time after END, until `until`. During the grace only the ended session can be granted. Its
+    outputs go off at `off_at`. `in_car`: the session's robot may still be inside, and this robot's
+    own requests restore the session too."""
 
     session: LiftSession
     until: float
@@ -175,9 +181,9 @@ class Grace(msgspec.Struct, frozen=True):
 class LiftMemory(msgspec.Struct, frozen=True):
     """The memory of one lift from scan to scan.
 
-    `io_fault`: the error of the last read or write; "" if both succeeded. `unwritten_since`: the time
-    since which no write has succeeded. `write_failed`: the last scan's write failed. `own`: session ->
-    the destination last requested by the robot itself.
+    `io_fault`: the error of the last read or write; "" if both succeeded. `unwritten_since`: no write
+    has succeeded since this time. `write_failed`: the last scan's write failed. `own`: the destination
+    that each session's robot itself last requested.
     """
 
     senses: LiftSenses = LiftSenses()

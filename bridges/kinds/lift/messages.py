@@ -1,4 +1,4 @@
-"""Turns LiftRequests into events, refuses invalid requests, and makes LiftStates of reports."""
+"""Turns LiftRequests into events, refuses invalid requests, and turns reports into LiftStates."""
 
 from collections.abc import Mapping
 
@@ -19,17 +19,19 @@ from bridges.messages.definitions import (
 from bridges.messages.topics import ADAPTER_LIFT_REQUESTS
 
 OWN_REQUESTS = ADAPTER_LIFT_REQUESTS.live()
-"""Fleet adapters' requests to RMF's supervisor. We listen there to the robot that has the lift."""
+"""The topic of fleet adapters' requests to RMF's supervisor. On it we hear the robot that has the
+lift."""
 AVAILABLE_MODES = (int(LiftMode.MODE_HUMAN), int(LiftMode.MODE_AGV))
 
 
 def accept(request: LiftRequest, settings: LiftSettings) -> LiftRequested | EndRequested:
     """Turn a request into an event. Raises RequestRefused if it is malformed or impossible.
 
-    An END_SESSION counts with any floor and door: fleet adapters send "" and 0 (rmf_fleet_adapter
-    RobotContext.cpp). Jazzy's supervisor sends an END_SESSION without a session at each state of a free
-    lift (lift_supervisor/Node.cpp); it ends nothing. An END_SESSION with DOOR_OPEN comes from a person
-    (`rmf-bridge send`, rmf-web): no node of RMF sends that.
+    An END_SESSION counts with any floor and door, because fleet adapters send "" and 0
+    (rmf_fleet_adapter RobotContext.cpp). Jazzy's supervisor sends an END_SESSION without a session at
+    each state of a free lift (lift_supervisor/Node.cpp); this message ends nothing. An END_SESSION with
+    DOOR_OPEN comes from a person (`rmf-bridge send`, rmf-web), because no node of RMF sends both
+    together.
     """
     check_length(session_id=request.session_id)
     stamp = _stamp(request)
@@ -57,7 +59,8 @@ def accept_adapters(request: LiftRequest, settings: LiftSettings) -> FromAdapter
 
 
 def _stamp(request: LiftRequest) -> int:
-    """Return the request_time (ns); 0 for an impossible time, as an END counts all the same."""
+    """Return the request_time (ns); 0 for an impossible time, because an END counts even without a
+    time."""
     try:
         return in_ns(request.request_time)
     except RequestRefused:

@@ -1,5 +1,5 @@
-"""The lift's relays from scan to scan: their rest, their cycles per minute, and their exclusions.
-Switching off never waits."""
+"""The lift's relays from scan to scan: their rest, their cycles per minute, and the outputs that
+exclude each other. Switching off never waits."""
 
 import math
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ T = TypeVar("T")
 
 
 class Channel(msgspec.Struct, Generic[T], frozen=True):
-    """One output, or a group of outputs with at most one on.
+    """One output, or a group of outputs of which at most one is on.
 
     `on`: the output that is on now. `off_at`: the time of the last switching off. `ons`: the latest
     times of switching on.
@@ -27,8 +27,8 @@ class Channel(msgspec.Struct, Generic[T], frozen=True):
     ons: tuple[float, ...] = ()
 
     def step(self, wanted: T | None, now: float, ready_at: float, t: LiftDurations) -> "Channel[T]":
-        """Return the next state. Switching off is immediate; switching on, or to another output of the
-        group, waits for the rest and for `ready_at`."""
+        """Return the next state. Switching off is immediate. Switching on waits for the relay's rest
+        and for `ready_at`; so does the change to another output of the group."""
         if self.on is not None:
             return self if wanted == self.on else replace(self, on=None, off_at=now)
         if wanted is None or now < self.may_switch_on_at(now, ready_at, t):
@@ -48,7 +48,7 @@ class Channel(msgspec.Struct, Generic[T], frozen=True):
 
 
 class Relays(msgspec.Struct, frozen=True):
-    """Every output with its history. A call and a door command are never on together."""
+    """Every output, with its past. A call and a door command are never on together."""
 
     agv: Channel[bool] = Channel()
     call: Channel[str] = Channel()
@@ -59,7 +59,7 @@ class Relays(msgspec.Struct, frozen=True):
         return LiftOutputs(bool(self.agv.on), self.call.on, self.hold.on)
 
     def step(self, wanted: LiftOutputs, now: float, t: LiftDurations) -> "Relays":
-        """Move every output towards the wanted state, as far as is allowed now."""
+        """Move every output towards the wanted state, as far as the limits allow now."""
         agv = self.agv.step(wanted.agv_request or None, now, AGES_AGO, t)
         rested_at = self._rested_at(t) if agv.on else NEVER
         call_ready_at = NEVER if self.hold.on else rested_at
@@ -75,7 +75,7 @@ class Relays(msgspec.Struct, frozen=True):
         return max(min(due, default=NEVER), math.nextafter(now, NEVER))
 
     def resting(self, wanted: LiftOutputs, now: float, t: LiftDurations) -> tuple[str, bool]:
-        """Return the first wanted output that must rest ("" for none), and True if
+        """Return the first wanted output that must rest, "" for none. Also return whether
         `max_cycles_per_min` is the reason."""
         for name, channel, ready_at in self._still_off(wanted, now, t):
             unused = replace(channel, ons=())
@@ -86,7 +86,7 @@ class Relays(msgspec.Struct, frozen=True):
     def _still_off(
         self, wanted: LiftOutputs, now: float, t: LiftDurations
     ) -> Iterator[tuple[str, Channel[Any], float]]:
-        """Yield the name and the channel of each wanted output that is off, and the time when the other
+        """Yield each wanted output that is off: its name, its channel, and the time when the other
         outputs allow it."""
         agv_at = now if self.agv.on else self.agv.may_switch_on_at(now, AGES_AGO, t)
         ready_at = max(agv_at, self._rested_at(t))
@@ -98,5 +98,5 @@ class Relays(msgspec.Struct, frozen=True):
             yield "the door", self.hold, ready_at
 
     def _rested_at(self, t: LiftDurations) -> float:
-        """Return the time at which call and door command have both been off for `dead_time_s`."""
+        """Return the time when the call and the door command have both been off for `dead_time_s`."""
         return max(self.call.off_at, self.hold.off_at) + t.dead_time_s

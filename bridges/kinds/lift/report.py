@@ -13,11 +13,12 @@ from bridges.messages.definitions import LiftDoor, LiftMode, LiftMotion
 
 NOT_FRESH = "INPUTS_NOT_FRESH"
 OFFLINE = frozenset({"OUTPUTS_NOT_WRITTEN", "TWO_NODES_FOR_ONE_DEVICE"})
-"""With one of these faults, or without fresh inputs, the lift is shown OFFLINE."""
+"""Faults that show the lift as OFFLINE. Without fresh inputs the lift is OFFLINE too."""
 
 
 class LiftReport(msgspec.Struct, frozen=True):
-    """LiftState without its name, floors and stamp, and the extra facts of the status file.
+    """The content of LiftState except its name, floors and stamp, and further facts for the status
+    file.
 
     `floor`: RMF's name, "" when unknown. `read_at`: monotonic seconds, None before the first reading.
     `estimated`: no contact proves `door`. `boarded`: a robot may be inside. `waits`: the reason why the
@@ -40,11 +41,12 @@ class LiftReport(msgspec.Struct, frozen=True):
 
     @property
     def open_at(self) -> str:
-        """The floor at which the door is shown open; "" for a door not shown open."""
+        """The floor at which the door is shown OPEN; "" if no door is shown OPEN."""
         return self.floor if self.door is LiftDoor.DOOR_OPEN else ""
 
     def news(self) -> object:
-        """Return everything except the age and the faults' details, which each reading may change."""
+        """Return everything except the age and the faults' details, because both may change at each
+        reading."""
         shown = (self.floor, self.destination, self.door, self.motion, self.mode, self.session)
         return *shown, self.estimated, tuple(fault.code for fault in self.faults)
 
@@ -101,9 +103,10 @@ def _waits(
 ) -> str:
     """Explain why a request is not fulfilled yet."""
     if session.doubted:
-        return f"for the robot to ask for {session.doubted.destination} itself: it may have ridden"
+        floor = session.doubted.destination
+        return f"for the robot itself to ask for {floor}: the request may be from an earlier ride"
     if not session.agv:
-        return "for END: a lift in HUMAN mode is called by people"
+        return "for END: in HUMAN mode people call the lift"
     if not view.fresh:
         return f"for its inputs: {view.blind}"
     if wanted == LiftOutputs() and drive.silent(session, now, limits):
@@ -115,7 +118,7 @@ def _waits(
         return {"agv": "for AGV mode", "floor": f"for the car{at}", "door": f"for the door{at}"}[
             session.waiting
         ]
-    return f"until this is over: {', '.join(f.code for f in faults if f.code != forgotten.CODE)}"
+    return f"for the end of {', '.join(f.code for f in faults if f.code != forgotten.CODE)}"
 
 
 def _may_enter(
@@ -125,13 +128,14 @@ def _may_enter(
     wanted: LiftOutputs,
     faults: tuple[Fault, ...],
 ) -> bool:
-    """May an open door be shown as OPEN? A robot that sees OPEN drives through.
+    """Return whether an open door may be shown as OPEN. A robot that sees OPEN drives through.
 
-    It may not while the hold is wanted and its relay must rest, because the door stands open only for
-    its own dwell time and would then close on the robot. It may not, for a served session, at the floor
-    for which the robot itself asks if the car is about to leave, because RMF's supervisor may be
-    passing on an earlier ride. Before a robot has boarded, its session must also be served, in AGV
-    mode, and without a fault; that RMF's supervisor has forgotten the session does not matter.
+    - The door is not shown OPEN if the hold is wanted and its relay must rest. Such a door stands open
+      only for its own dwell time, and would then close on the robot.
+    - The door is not shown OPEN for a served session at the floor for which the robot itself asks, if
+      the car is about to leave. RMF's supervisor may then be passing on an earlier ride.
+    - Before a robot has boarded, its session must also be served, in AGV mode, and without a fault. The
+      fault that RMF's supervisor has forgotten the session does not matter.
     """
     session, held = memory.session, memory.relays.hold.on is not None
     if wanted.hold_door is not None and not held:
@@ -146,7 +150,8 @@ def _may_enter(
 
 
 def _mode(view: BelievedLift, faults: tuple[Fault, ...], relays: Relays) -> LiftMode:
-    """Return RMF's mode. If no AGV mode status is wired, our own request counts as the status."""
+    """Return RMF's mode. If no status line for AGV mode is wired, our own request counts as the
+    status."""
     codes = {fault.code for fault in faults}
     if codes & {"FIRE", "FIRE_LATCHED"}:
         return LiftMode.MODE_FIRE
@@ -183,7 +188,8 @@ def _door(
 
 
 def _motion(view: BelievedLift, door: LiftDoor) -> LiftMotion:
-    """Read the motion from its lines. Without lines, a car with an open door at a floor is stopped."""
+    """Return the motion from its lines. Without lines, a car with an open door at a floor counts as
+    stopped."""
     if not view.fresh:
         return LiftMotion.MOTION_UNKNOWN
     if view.motion is None:

@@ -1,20 +1,20 @@
 """Judgement of a lift's inputs: debounce, age, and contradictions.
 
 Rules:
-LIFT-SENSING-1. A change of an input counts once it has lasted for the signal's debounce; the end of a
-   hazard, once it has lasted for `hazard_clear_s`. All inputs are unknown until every input has settled
-   once, and while any input has been changing for longer than `RESTLESS_S`. Settling after the start is
-   no fault.
-LIFT-SENSING-2. After `stale_after_s` without a reading all inputs are unknown: the car may be anywhere.
-   After a shorter gap the values stay, and a running debounce starts again.
-LIFT-SENSING-3. A floor code is believed only if the car can have reached that floor. It is rejected if
-   it skips floors faster than a car travels, or (with motion lines) changes while the car stands.
-   Then the position is unknown until the code shows the last trusted floor or another reachable floor,
-   or until an operator resets.
-LIFT-SENSING-4. While the floor code is invalid (`valid_when`) for longer than its debounce, the car
-   may go anywhere unseen. Therefore the next valid floor code is believed.
-LIFT-SENSING-5. A door is open when the contact for the open door says so. With only one contact the
-   other end position is estimated from the door's travel time, and marked as an estimate.
+LIFT-SENSING-1. A change of an input counts once it has lasted for the signal's debounce. The end of a
+   hazard counts once it has lasted for `hazard_clear_s`. All inputs are unknown until every input has
+   settled once. They are unknown again if any input has been changing for longer than `RESTLESS_S`.
+   Settling after the start is no fault.
+LIFT-SENSING-2. After `stale_after_s` without a reading all inputs are unknown, because the car may be
+   anywhere. After a shorter gap the values stay, and a running debounce starts again.
+LIFT-SENSING-3. A floor code is believed only if the car can have reached that floor. The code is
+   rejected if it skips floors faster than a car travels, or (with motion lines) if it changes while the
+   car stands. Then the position is unknown until the code shows the last trusted floor or another
+   reachable floor, or until an operator resets.
+LIFT-SENSING-4. If the floor code is invalid (`valid_when`) for longer than its debounce, the car may go
+   anywhere unseen. Therefore the next valid floor code is believed.
+LIFT-SENSING-5. The contact for the open door decides that a door is open. If a door has only one
+   contact, its other end position is estimated from the door's travel time, and marked as an estimate.
 LIFT-SENSING-6. A car stands when the motion lines say so. Without motion lines the car always counts as
    standing.
 """
@@ -33,15 +33,16 @@ from bridges.kinds.shared.durations import AGES_AGO, NEVER
 HAZARDS = tuple(Hazard)
 
 MOTION_MEMORY_S = 2.0
-"""A new floor code is believed until this long after the car was last seen moving."""
+"""The time (s) after the car was last seen moving in which a new floor code is believed."""
 
 RESTLESS_S = 2.0
-"""An input that takes longer (s) to settle is restless, by a loose wire or by interference."""
+"""The longest time (s) that an input may take to settle. An input that takes longer is restless; the
+cause is a loose wire or interference."""
 
 
 class DoorSeen(msgspec.Struct, frozen=True):
-    """One door: open, closed, or moving (not `open` and not `closed`). `settles_at`: the time of the
-    next estimate (s)."""
+    """One door: open, closed, or moving (neither `open` nor `closed`). `settles_at`: the time (s) of
+    the next estimate."""
 
     open: bool
     closed: bool
@@ -52,10 +53,10 @@ class DoorSeen(msgspec.Struct, frozen=True):
 class BelievedLift(msgspec.Struct, frozen=True):
     """The judged inputs at one instant.
 
-    `blind`: the reason why no input is believed, "" if all are. `settling`: the only reason is that
-    inputs still settle after the start. `level`: the landing, None when unknown. `level_settles`: the
-    floor code is changing. `agv`: None if not wired. `changes_at`: the next time when the view may
-    change without a reading (s).
+    `blind`: the reason why no input is believed, "" if all inputs are believed. `settling`: the only
+    reason is that inputs still settle after the start. `level`: the landing, None when unknown.
+    `level_settles`: the floor code is changing. `agv`: None if not wired. `changes_at`: the next time
+    (s) when these judgements may change without a reading.
     """
 
     blind: str
@@ -77,7 +78,7 @@ class BelievedLift(msgspec.Struct, frozen=True):
         return not self.blind
 
     def door(self, side: Side) -> DoorSeen:
-        """Return the door on that side; a side without wires is never open."""
+        """Return the door on that side. A side without wires is never open."""
         if side is Side.FRONT:
             return self.front
         return self.rear or DoorSeen(open=False, closed=False)
@@ -107,7 +108,7 @@ def take(senses: LiftSenses, sample: LiftSample, now: float, limits: LiftLimits)
 
 
 def gap(senses: LiftSenses, now: float) -> LiftSenses:
-    """Restart the debounce after a failed read; the car may have moved."""
+    """Restart the debounce after a failed read, because the car may have moved."""
     return LiftSenses(
         senses.read_at,
         forget(senses.code),
@@ -175,7 +176,8 @@ def _settle_hazard(
 def _hazard_hold_s(
     before: Settled[bool] | None, hazard: Hazard, seen: bool, limits: LiftLimits
 ) -> float:
-    """Return the debounce of a hazard input (s): longer for the end of a hazard than for its start."""
+    """Return the debounce (s) of a hazard input for the value `seen`. The end of a hazard has a longer
+    debounce than its start."""
     hold_s = limits.debounce_s(hazard)
     clearing = before is not None and bool(before.value) and not seen
     return max(hold_s, limits.t.hazard_clear_s) if clearing else hold_s
@@ -188,7 +190,8 @@ def _locate(
     now: float,
     limits: LiftLimits,
 ) -> CarPosition:
-    """Follow the car from floor to floor. An unreachable floor is only suspected."""
+    """Follow the car from floor to floor. A floor that the car cannot have reached is only
+    suspected."""
     if sample.motion is not Motion.STOPPED:
         before = replace(before, moved_at=now)
     level = code.value[0] if code.value else None
@@ -212,7 +215,8 @@ def _can_have_come(before: CarPosition, level: str, now: float, limits: LiftLimi
 
 
 def _stands(motion: Settled[Motion | None] | None) -> bool:
-    """Does the car stand? Until the motion lines have settled, the first reading decides."""
+    """Return whether the car stands. If the motion lines have not settled yet, the first reading
+    decides."""
     if motion is None:
         return False
     return (motion.candidate if motion.value is None else motion.value) in (None, Motion.STOPPED)
@@ -239,8 +243,8 @@ def _door(seen: Settled[DoorReading | None] | None, now: float, limits: LiftLimi
 class Unsettled(msgspec.Struct, frozen=True):
     """An input that is changing, or has never settled (`new`).
 
-    `due_at`: the time (s) when it settles if it does not change again. `torn_at`: the time (s) when it
-    counts as restless.
+    `due_at`: the time (s) when the input settles if it does not change again. `torn_at`: the time (s)
+    when the input counts as restless.
     """
 
     name: str
@@ -287,7 +291,7 @@ def _blind(
 
 
 def _settling(unsettled: Sequence[Unsettled], now: float) -> bool:
-    """Is an input still settling after the start, and is no input restless?"""
+    """Return whether an input still settles after the start, and no input is restless."""
     first = any(wait.new for wait in unsettled)
     return first and not any(now >= wait.torn_at for wait in unsettled)
 
@@ -299,13 +303,16 @@ def _faults(senses: LiftSenses) -> tuple[Fault, ...]:
         found.append(Fault("FLOOR_CODE_ILLEGAL", code[1]))
     if code and code[0] is not None and code[0] == senses.position.suspect:
         found.append(
-            Fault("POSITION_LOST", f"{code[0]} cannot follow {senses.position.trusted} like this")
+            Fault(
+                "POSITION_LOST",
+                f"the car cannot have reached {code[0]} from {senses.position.trusted}",
+            )
         )
     for name, seen in zip(("door", "rear door"), senses.doors, strict=True):
         if seen and seen.value is DoorReading.BOTH:
             found.append(Fault("DOOR_CONTACTS_CONTRADICT", f"{name} reads open and closed"))
         if seen and seen.value is DoorReading.UNKNOWN:
-            found.append(Fault("DOOR_CODE_ILLEGAL", f"the {name}'s number means nothing"))
+            found.append(Fault("DOOR_CODE_ILLEGAL", f"the YAML does not list the {name}'s number"))
     if senses.motion and senses.motion.value is Motion.CONTRADICTORY:
         found.append(Fault("MOTION_CONTRADICTORY", "the motion lines cannot all be true"))
     return tuple(found)

@@ -1,7 +1,7 @@
-"""The lift's sessions: grants, refusals, END, and the grace after END.
+"""The lift's sessions: grants, refusals, END, and the time after END (the grace).
 
-The rules are LIFT-1 and LIFT-2 of `core.py`, the rules of `forgotten.py` for robots that RMF's
-supervisor forgets, and the rules of `replayed.py` for replayed requests.
+Three files have the rules: LIFT-1 and LIFT-2 in `core.py`, `forgotten.py` for robots that RMF's
+supervisor forgets, and `replayed.py` for replayed requests.
 """
 
 from collections.abc import Callable
@@ -21,8 +21,8 @@ LEFT_IN_CAR: Final = "released in mid-ride"
 def ask(
     memory: LiftMemory, request: LiftRequested, now: float, why_not: Callable[[], str]
 ) -> tuple[LiftMemory, str]:
-    """Apply a request from `lift_requests`; also return the reason for a refusal, "" for none.
-    `why_not`: returns the reason why a free lift must not be granted now."""
+    """Apply a request from `lift_requests`. Also return the reason for a refusal, "" if there is none.
+    `why_not` returns the reason why a free lift must not be granted now."""
     held, grace = memory.session, memory.grace
     if held and held.id != request.session_id:
         session = forgotten.overruled(held, request.session_id, now)
@@ -44,7 +44,7 @@ def ask(
 def _heed(
     memory: LiftMemory, session: LiftSession, request: LiftRequested, now: float
 ) -> LiftSession:
-    """Apply a request from `lift_requests` to its session."""
+    """Apply a request from `lift_requests` to the session that has the lift."""
     own = memory.own.get(session.id, "")
     held_open = memory.relays.hold.on is not None
     doubted = replayed.doubt(session, request, own, held_open, now)
@@ -55,8 +55,9 @@ def _heed(
 def hear_adapter(
     memory: LiftMemory, asked: LiftRequested | EndRequested, now: float, limits: LiftLimits
 ) -> LiftMemory:
-    """Apply a robot's own request. It counts if the robot has the lift and its session is forgotten or
-    disowned, if it settles a doubt about that session, or if the robot was left in the car."""
+    """Apply a robot's own request. The request counts in three cases: the robot has the lift and its
+    session is forgotten or disowned; the request settles a doubt about that session; the robot was
+    left in the car."""
     held = memory.session
     memory = replace(memory, own=replayed.noted(memory.own, asked))
     if held is None:
@@ -72,7 +73,8 @@ def hear_adapter(
 
 
 def _come_back(memory: LiftMemory, asked: LiftRequested | EndRequested, now: float) -> LiftMemory:
-    """Restore the session of a robot that may have been left in the car and asks within the grace."""
+    """Restore the session of a robot that may have been left in the car, if the robot asks within the
+    grace."""
     grace = memory.grace
     if grace is None or not grace.in_car or now >= grace.until:
         return memory
@@ -86,7 +88,8 @@ def _come_back(memory: LiftMemory, asked: LiftRequested | EndRequested, now: flo
 
 
 def _refresh(session: LiftSession, request: LiftRequested, now: float) -> LiftSession:
-    """Refresh the session if the request repeats; start anew for another destination or mode."""
+    """Refresh the session at a repeated request. Start the ride anew at a request for another
+    destination or mode."""
     if (request.agv, request.destination) == (session.agv, session.destination):
         return replace(session, asked_at=now)
     fresh = replace(_anew(session, now), agv=request.agv, destination=request.destination)
@@ -94,7 +97,7 @@ def _refresh(session: LiftSession, request: LiftRequested, now: float) -> LiftSe
 
 
 def _anew(session: LiftSession, now: float) -> LiftSession:
-    """Return the session as if granted now; only the facts about its robot stay."""
+    """Return the session as if it was granted now. Only the facts about its robot stay."""
     return LiftSession(
         session.id,
         session.agv,
@@ -109,7 +112,7 @@ def _anew(session: LiftSession, now: float) -> LiftSession:
 def end(
     memory: LiftMemory, ended: EndRequested, now: float, limits: LiftLimits
 ) -> tuple[LiftMemory, str]:
-    """Apply an END from `lift_requests`; also return the reason for a refusal, "" for none."""
+    """Apply an END from `lift_requests`. Also return the reason for a refusal, "" if there is none."""
     held, grace = memory.session, memory.grace
     if held is None and grace and ended.by_person and ended.session_id == grace.session.id:
         return replace(memory, grace=replace(grace, until=grace.off_at, in_car=False)), ""

@@ -28,7 +28,7 @@ Pulse = Annotated[float, Meta(ge=0.05, le=60, extra={"unit": "s"})]
 
 
 class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A floor that is served by the rear door, or whose landing has another name."""
+    """A floor whose landing has another name, or that the rear door serves."""
 
     level: Annotated[
         Name | None, tells("the landing's name in the floor code; when absent, the floor's name.")
@@ -43,8 +43,8 @@ class LiftDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     stale_after_s: Annotated[
         Period,
-        tells("""after so long without a good reading, or without a good write, the lift is OFFLINE
-        and its outputs are off."""),
+        tells("""the time without a good reading, or without a good write, after which the lift is
+        OFFLINE and its outputs are off."""),
     ] = 1.0
     release_grace_s: Annotated[
         Seconds, tells("how long AGV mode and the hold stay on after END, for the same session.")
@@ -55,21 +55,25 @@ class LiftDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         Retries follow after 10, 30 and 60 s; then the fault latches."""),
     ] = 600.0
     floor_timeout_s: Annotated[
-        Timeout, tells("how long the ride to a floor may take; then as with `agv_timeout_s`.")
+        Timeout,
+        tells("""how long the ride to a floor may take. The end of this time has the same effects
+        as the end of `agv_timeout_s`."""),
     ] = 120.0
     door_timeout_s: Annotated[
-        Timeout, tells("how long the door may take to open; then as with `agv_timeout_s`.")
+        Timeout,
+        tells("""how long the door may take to open. The end of this time has the same effects as
+        the end of `agv_timeout_s`."""),
     ] = 10.0
     request_timeout_s: Annotated[
         Patience,
-        tells("""how long RMF may be silent. RMF repeats its request each second. Then a fault is shown,
-        and the outputs go off unless a robot may be inside."""),
+        tells("""how long RMF may be silent; RMF repeats its request each second. After that a fault is
+        shown, and the outputs go off unless a robot may be inside."""),
     ] = 30.0
     hazard_clear_s: Annotated[
         Seconds, tells("how long a hazard input must be clear before RMF may use the lift again.")
     ] = 1.0
     door_travel_s: Annotated[
-        Seconds, tells("with one door contact, how long the door takes to its other end position.")
+        Seconds, tells("how long a door with one contact takes to move to its other end position.")
     ] = 5.0
     floor_travel_min_s: Annotated[
         Brief, tells("the least time from floor to floor. A faster change is not believed.")
@@ -85,7 +89,9 @@ class LiftDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     ] = 0.3
     min_off_s: Annotated[
         Brief,
-        tells("the least time for which a relay stays off, to spare it. Off is never delayed."),
+        tells(
+            "the least time for which a relay stays off, to spare the relay. Off is never delayed."
+        ),
     ] = 0.5
     max_cycles_per_min: Annotated[
         int,
@@ -94,7 +100,7 @@ class LiftDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     ] = 20
 
     def problems(self) -> Remarks:
-        """Yield limits that no ride can keep."""
+        """Yield the limits that no ride can keep."""
         least_s = self.floor_travel_min_s
         if self.floor_timeout_s <= least_s:
             text = (
@@ -114,7 +120,7 @@ class LiftSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
     agv_mode: Annotated[
         Literal["requested", "by_call"],
         tells("""how AGV mode is switched on. `requested`: by an output that is held. `by_call`: by
-        a call; AGV mode stays on while the call is served and the door is held."""),
+        a call; AGV mode stays on as long as the call is served and the door is held."""),
     ] = "requested"
     limits: Annotated[LiftDurations, tells("the limits that differ from their defaults.")] = (
         LiftDurations()
@@ -131,17 +137,17 @@ class LiftSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
     ] = msgspec.field(default_factory=lambda: ["fire_alarm"])
 
     def stale_after(self) -> float:
-        """Return `stale_after_s` of the limits."""
+        """Return the limits' `stale_after_s`."""
         return self.limits.stale_after_s
 
     def on_map(self) -> list[Place]:
-        """List the floors, which must be on RMF's map too."""
+        """List the floors. RMF's map must have them too."""
         if isinstance(self.floors, list):
             return [(("floors", str(i)), FLOOR, name) for i, name in enumerate(self.floors)]
         return [(("floors", name), FLOOR, name) for name in self.floors]
 
     def stops(self) -> Mapping[str, Stop]:
-        """Map RMF's floor name -> landing and door, from the lowest up."""
+        """Map RMF's floor name to landing and door, from the lowest up."""
         if isinstance(self.floors, list):
             return {name: Stop(name) for name in self.floors}
         return {name: Stop(f.level or name, f.side) for name, f in self.floors.items()}

@@ -10,9 +10,9 @@ from bridges.kinds.shared.decision import IoFailed, OperatorReset, RivalSeen, Sa
 class DoorReading(Enum):
     """The reading of the door contacts at one instant.
 
-    With two contacts: OPEN, CLOSED, BETWEEN or BOTH (a fault). With a contact for open only:
-    OPEN or NOT_OPEN. With a contact for closed only: CLOSED or NOT_CLOSED. For a door read as a number:
-    UNKNOWN (a fault) if the YAML does not list the number.
+    With two contacts: OPEN, CLOSED, BETWEEN or BOTH (a fault). With only the contact for open: OPEN or
+    NOT_OPEN. With only the contact for closed: CLOSED or NOT_CLOSED. A door may also be read as a
+    number; UNKNOWN (a fault) means that the YAML does not list the number.
     """
 
     OPEN = "open"
@@ -25,7 +25,8 @@ class DoorReading(Enum):
 
 
 class Motion(Enum):
-    """The reading of the motion lines. CONTRADICTORY: they cannot all be true (up and down at once)."""
+    """The reading of the motion lines. CONTRADICTORY: the lines cannot all be true (up and down at
+    once)."""
 
     STOPPED = "stopped"
     UP = "up"
@@ -49,10 +50,10 @@ class Hazard(StrEnum):
 class LiftSample(msgspec.Struct, frozen=True):
     """Every input of one lift, decoded but not debounced.
 
-    `level`: the landing that the floor code names, None for no code (between floors).
+    `level`: the landing that the floor code names, None if there is no code (between floors).
     `code_fault`: the reason why the code is illegal (not listed, two of one-hot, parity), "" if legal.
-    `floor_valid`: the code is valid now; while it is not, the car may go anywhere unseen.
-    `motion`, `agv`, `rear_door`: None if not wired. `agv` is also None while its line is not valid.
+    `floor_valid`: the code is valid now. If it is not, the car may go anywhere unseen. `motion`, `agv`,
+    `rear_door`: None if not wired. `agv` is also None when its line is not valid.
     """
 
     level: str | None
@@ -80,7 +81,7 @@ class Stop(msgspec.Struct, frozen=True):
 
 
 class LiftOutputs(msgspec.Struct, frozen=True):
-    """Every output of one lift. The default is all off.
+    """Every output of one lift. By default all outputs are off.
 
     `call`: the landing whose call is energised. `hold_door`: the door whose open command is energised.
     """
@@ -93,7 +94,7 @@ class LiftOutputs(msgspec.Struct, frozen=True):
 class LiftRequested(msgspec.Struct, frozen=True):
     """A well-formed LiftRequest for AGV or HUMAN mode, for this lift and one of its floors.
 
-    `stamp`: its request_time (ns), by its sender's clock; 0 without a time.
+    `stamp`: its request_time (ns) by the sender's clock; 0 without a time.
     """
 
     session_id: str
@@ -103,7 +104,7 @@ class LiftRequested(msgspec.Struct, frozen=True):
 
 
 class EndRequested(msgspec.Struct, frozen=True):
-    """A LiftRequest for END_SESSION, with any floor. `by_person`: a person sent it, with
+    """A LiftRequest for END_SESSION, with any floor. `by_person`: a person sent this END, with
     `rmf-bridge send` or `release`."""
 
     session_id: str
@@ -118,6 +119,6 @@ class FromAdapter(msgspec.Struct, frozen=True):
 
 
 Asked = LiftRequested | EndRequested | FromAdapter
-"""The events made from requests."""
+"""The events that requests become."""
 
 Event = Sampled[LiftSample] | IoFailed | RivalSeen | OperatorReset | Asked

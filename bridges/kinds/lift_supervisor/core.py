@@ -5,25 +5,26 @@ It replaces RMF's supervisor (rmf_ros2, lift_supervisor/Node.cpp). Fleet adapter
 node, on `lift_requests`, until the lift's states show that they were obeyed.
 `bridges/kinds/shared/freshness.py` rejects stale requests. Rules:
 LIFT-SUPERVISOR-1. Sessions are served in the order of their first requests. A session leaves the queue
-   at its END, or after `silent_after_s` without a request. This time does not run while the lift is
+   at its END, or after `silent_after_s` without a request. This time does not run if the lift is
    silent, because adapters repeat their requests only when the lift's states come.
-LIFT-SUPERVISOR-2. The lift's states name the session that has the lift. This session goes before the
-   queue if its robot still requests it. After `orphan_after_s` without a request for this session the
-   supervisor ends it.
+LIFT-SUPERVISOR-2. The lift's states name the session that has the lift. This session is served before
+   the queue if its robot still requests it. If nobody has requested the session for `orphan_after_s`,
+   the supervisor ends it.
 LIFT-SUPERVISOR-3. One session at a time has its turn. Its request is sent when it is new or has
-   changed. The request is repeated when the lift's state does not fulfil it, and when the adapter has
-   repeated it (else the lift's node would consider RMF silent). The request is never sent while the
-   lift shows another session.
+   changed. The request is repeated when the lift's state does not fulfil it. The request is also
+   repeated when the adapter has repeated it, because the lift's node would otherwise consider RMF
+   silent. The request is never sent if the lift shows another session.
 LIFT-SUPERVISOR-4. Only END ends a turn. Usually the holder sends END, wherever the lift is and in any
    mode. For a silent holder the supervisor sends END: after `silent_after_s` if the lift never showed
    the holder's session, else after `holder_ttl_s`, if the site has set that time. END is repeated until
-   a later state shows another session or none. Only after that is the next session served.
-LIFT-SUPERVISOR-5. While the lift is in fire, emergency or offline mode, no robot is sent to it and the
-   queue waits. END is passed on, and so are requests for HUMAN mode, as they call no robot to the lift.
-LIFT-SUPERVISOR-6. During the quiet start, and while another publishes, our supervisor only listens.
-   After that it begins with the lift's states and the requests that it has heard, so that a restart
-   ends no ride.
-LIFT-SUPERVISOR-7. Two messages are at least GAP_S apart, and a message is repeated unchanged after
+   a later state shows another session or none. Only then is the next session served.
+LIFT-SUPERVISOR-5. If the lift is in fire, emergency or offline mode, no robot is sent to it and the
+   queue waits. The supervisor still passes on END, and also requests for HUMAN mode, because they call
+   no robot to the lift.
+LIFT-SUPERVISOR-6. During the quiet start, and whenever another supervisor publishes, our supervisor
+   only listens. After that it begins with the states and requests that it has heard in the meantime, so
+   that a restart ends no ride.
+LIFT-SUPERVISOR-7. Two messages are at least GAP_S apart. An unchanged message is repeated after
    REPEAT_S at the earliest.
 """
 
@@ -61,11 +62,11 @@ def initial(lift: str, started_at: float) -> SupervisedLift:
 
 
 def idle(memory: SupervisedLift, now: float) -> bool:
-    """May this lift be forgotten? True after a long silence.
+    """Return whether this lift may be forgotten, after a long silence.
 
-    Without claims FORGOTTEN_S is enough: the states of a lift that comes back show any session that
-    must still end. Robots that only wait are forgotten after 10 times as long; they request again when
-    the lift is back. A lift with claims that shows a session is never forgotten.
+    A lift without claims is forgotten after FORGOTTEN_S: if it comes back, its states show any session
+    that must still end. If robots only wait for the lift, it is forgotten after 10 times as long; they
+    request again when the lift is back. A lift that has claims and shows a session is never forgotten.
     """
     heard_at = max(memory.heard_at, memory.shown_at)
     has_it = memory.session_shown or (memory.turn and memory.turn.seen)
@@ -123,7 +124,7 @@ def _listen(
     now: float,
     limits: LiftSupervisorLimits,
 ) -> tuple[SupervisedLift, str]:
-    """Note the request's stamp; also return the reason for a refusal, "" if the request counts."""
+    """Note the request's stamp. Also return the reason for a refusal, "" if the request counts."""
     requesters, refused = hear(
         memory.requesters,
         event.session,
@@ -138,7 +139,7 @@ def _listen(
 
 
 def _ask(memory: SupervisedLift, request: RideRequested, now: float) -> tuple[SupervisedLift, str]:
-    """Enter the session into the queue; a repeated or changed request keeps its place."""
+    """Enter the session into the queue. A repeated or changed request keeps its session's place."""
     before = memory.claim(request.session)
     served = memory.shown.floors if memory.shown else ()
     if served and request.target.request_type == AGV and request.target.floor not in served:
@@ -180,7 +181,8 @@ def _without(memory: SupervisedLift, session: str) -> SupervisedLift:
 
 
 def _see(memory: SupervisedLift, shown: LiftStateHeard, now: float) -> SupervisedLift:
-    """Apply a state, which may confirm an END, call for a repeat, or show another session."""
+    """Apply a state of the lift. The state may confirm an END, call for a repeat, or show another
+    session."""
     flowed = now <= memory.shown_at + SILENT_S
     same = flowed and shown.session == memory.session_shown
     turn, prompted = memory.turn, memory.prompted
@@ -204,7 +206,7 @@ def _see(memory: SupervisedLift, shown: LiftStateHeard, now: float) -> Supervise
 
 
 def _speak(memory: SupervisedLift, yes: bool, passive: str) -> SupervisedLift:
-    """Forget the turn while we may not publish; later the lift's states show the holder again."""
+    """Forget the turn if we may not publish. Later the lift's states show the holder again."""
     turn = memory.turn if yes else None
     return replace(memory, may_speak=yes, passive=passive, turn=turn)
 
@@ -215,7 +217,8 @@ def _speak(memory: SupervisedLift, yes: bool, passive: str) -> SupervisedLift:
 def _forget_silent(
     memory: SupervisedLift, now: float, limits: LiftSupervisorLimits
 ) -> SupervisedLift:
-    """Drop the claims of silent waiting sessions. A holder's claim is dropped only at its END."""
+    """Drop the claims of waiting sessions that are silent. A holder's claim is dropped only at its
+    END."""
     holder = memory.turn.session if memory.turn and not memory.turn.ends else ""
     staying = tuple(
         claim
@@ -245,7 +248,8 @@ def _take_turns(memory: SupervisedLift, now: float, limits: LiftSupervisorLimits
 def _obey_the_lift(
     memory: SupervisedLift, shown: str, now: float, limits: LiftSupervisorLimits
 ) -> SupervisedLift:
-    """Serve or end a session that the lift shows, from before our restart or of another node."""
+    """Serve or end a session that the lift shows although we did not begin it. The session is from
+    before our restart, or of another node."""
     if memory.claim(shown):
         return _begin(memory, Turn(shown, now, seen=True))
     if memory.shown_at >= memory.session_since + limits.orphan_after_s:
@@ -256,8 +260,8 @@ def _obey_the_lift(
 def _let_go(
     memory: SupervisedLift, turn: Turn, now: float, limits: LiftSupervisorLimits
 ) -> SupervisedLift:
-    """End a silent holder's turn: after `silent_after_s` if the lift never took it, else after
-    `holder_ttl_s`."""
+    """End a silent holder's turn: after `silent_after_s` if the lift never showed the session, else
+    after `holder_ttl_s`."""
     claim = memory.claim(turn.session)
     assert claim is not None
     after_s = limits.holder_ttl_s if turn.seen else limits.silent_after_s
@@ -270,7 +274,8 @@ def _let_go(
 
 
 def wanted(memory: SupervisedLift) -> LiftRequest | None:
-    """Make the present request to the lift's node, without its stamp; None for no request."""
+    """Make the present request to the lift's node, without its stamp; None if there is nothing to
+    request."""
     turn = memory.turn
     if turn is None:
         return None
@@ -294,7 +299,8 @@ def wanted(memory: SupervisedLift) -> LiftRequest | None:
 
 
 def _due_at(memory: SupervisedLift, message: LiftRequest | None) -> float:
-    """Return the time to send this request. An END with another floor is only a repeat."""
+    """Return the time to send this request. If the last END had another floor, this END counts as its
+    repeat."""
     if message is None:
         return NEVER
     new = memory.sent is None or (message != memory.sent and message.request_type != END)

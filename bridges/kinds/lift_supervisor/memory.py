@@ -12,11 +12,12 @@ from bridges.kinds.shared.graph_kind import LISTENS
 from bridges.messages.definitions import LiftMode, LiftRequest
 
 NOBODY_IS_SENT: Final = (LiftMode.MODE_FIRE, LiftMode.MODE_EMERGENCY, LiftMode.MODE_OFFLINE)
-"""In these modes no robot is sent to a lift."""
+"""The modes of a lift in which no robot is sent to it."""
 
 
 class LiftSupervisorLimits(msgspec.Struct, frozen=True):
-    """The durations (s) set by the site. `clock_synchronised`: the site's clocks agree."""
+    """The durations (s) that the site has set. `clock_synchronised`: the clocks of all machines of the
+    site agree."""
 
     silent_after_s: float = 10.0
     orphan_after_s: float = 3.0
@@ -49,8 +50,8 @@ class SessionClaim(msgspec.Struct, frozen=True):
 
 
 class Turn(msgspec.Struct, frozen=True):
-    """The session whose requests we pass on. `ends`: we send the session's END. `by_person`: this END
-    came from a person. `seen`: the lift's states have shown this session."""
+    """The session whose requests we pass on. `ends`: we now send the session's END. `by_person`: a
+    person sent this END. `seen`: the lift's states have shown this session."""
 
     session: str
     since: float
@@ -62,12 +63,12 @@ class Turn(msgspec.Struct, frozen=True):
 class SupervisedLift(msgspec.Struct, frozen=True):
     """The memory of one lift from event to event.
 
-    `passive`: the reason why requesters wait while we may not publish. `claims`: in the order of first
-    requests, including the holder's claim. `heard_at`: the time of the last adapter request.
-    `requesters`: name -> record. `shown`: the latest state, which came at `shown_at`;
-    `session_since`: the time since which states show this session. `flowing_since`: the time since
-    which states have come without a gap. `sent`: the last request of this turn; `last_sent`: the last
-    request of any turn, at `sent_at`. `prompted`: the request must be repeated.
+    `passive`: if we may not publish, the reason why requesters must wait. `claims`: in the order of
+    first requests, including the holder's claim. `heard_at`: the time of the last adapter request.
+    `requesters`: the record of each name. `shown`: the latest state, which came at `shown_at`.
+    `session_since`: states have shown this session since this time. `flowing_since`: states have come
+    without a gap since this time. `sent`: the last request of this turn. `last_sent`: the last request
+    of any turn, sent at `sent_at`. `prompted`: the request must be repeated.
     """
 
     lift: str
@@ -88,7 +89,7 @@ class SupervisedLift(msgspec.Struct, frozen=True):
     prompted: bool = False
 
     def claim(self, session: str) -> SessionClaim | None:
-        """Find the claim of this session; None without a claim."""
+        """Find the claim of this session; None if it has no claim."""
         return next((claim for claim in self.claims if claim.session == session), None)
 
     @property
@@ -102,18 +103,18 @@ class SupervisedLift(msgspec.Struct, frozen=True):
         return self.shown is not None and self.shown.mode in NOBODY_IS_SENT
 
     def flows(self, now: float) -> bool:
-        """Do the lift's states arrive? True before the first state."""
+        """Return whether the lift's states keep arriving. Before the first state the answer is True."""
         return self.shown is None or now <= self.shown_at + SILENT_S
 
     def gone_at(self, claim: SessionClaim, now: float, after_s: float) -> float:
-        """Return the time when this requester has been silent for `after_s`; NEVER while the lift is
-        silent."""
+        """Return the time when this requester will have been silent for `after_s`; NEVER if the lift
+        itself is silent."""
         if not self.flows(now):
             return NEVER
         return max(claim.heard_at, self.flowing_since) + after_s
 
     def rules(self, now: float, limits: LiftSupervisorLimits) -> Rules:
-        """Return the present rules for the stamps of adapters' requests."""
+        """Return the rules that now apply to the stamps of adapters' requests."""
         if limits.clock_synchronised:
             return Rules(limits.max_request_age_s, known_clocks=False)
         return Rules(now - self.started_at, future_s=NEVER if self.may_speak else FUTURE_S)

@@ -28,7 +28,7 @@ def accept_request(
     """Turn an adapter's request into an event. Raises RequestRefused. `wall`: our clock (s since the
     epoch).
 
-    In an END_SESSION only the session counts: fleet adapters send no floor with it
+    Of an END_SESSION only the session counts, because fleet adapters send no floor with it
     (rmf_fleet_adapter RobotContext.cpp).
     """
     check_listed("lift", request.lift_name, settings.lifts)

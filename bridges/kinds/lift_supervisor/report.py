@@ -12,15 +12,16 @@ from bridges.messages.definitions import LiftMode
 
 SILENT: Final = "LIFT_SILENT"
 OVERDUE_S: Final = 30.0
-"""A lift that has not obeyed for this long is at fault."""
+"""The time (s) after which a lift that has not obeyed is at fault."""
 
 
 class SupervisorReport(msgspec.Struct, frozen=True):
     """One lift, for the log and the status file. Times are monotonic seconds.
 
-    `shown`: the session in the lift's state. `holder`: the session with the turn, begun at `since`.
-    `ending`: we send the holder's END. `waiting`: the queue, as (session, time of its first request).
-    `read_at`: the time of the lift's last state. `waits`: the reason why the requesters still wait.
+    `shown`: the session in the lift's state. `holder`: the session whose turn began at `since`.
+    `ending`: we send the holder's END. `waiting`: the queue, as pairs of a session and the time of its
+    first request. `read_at`: the time of the lift's last state. `waits`: the reason why the requesters
+    still wait.
     """
 
     read_at: float | None
@@ -58,7 +59,8 @@ def report(memory: SupervisedLift, faults: Iterable[Fault]) -> SupervisorReport:
 
 
 def _waits(memory: SupervisedLift, faults: tuple[Fault, ...], *, queued: bool) -> str:
-    """Say what the first session in the queue waits for; without a queue, the session with the turn."""
+    """Return the reason why the first session in the queue waits. Without a queue, return the reason of
+    the session with the turn."""
     turn, shown = memory.turn, memory.session_shown
     if not memory.claims:
         return ""
@@ -81,7 +83,7 @@ def _waits(memory: SupervisedLift, faults: tuple[Fault, ...], *, queued: bool) -
 def alarms(
     memory: SupervisedLift, now: float, limits: LiftSupervisorLimits
 ) -> Iterator[tuple[float, Fault]]:
-    """Yield each possible fault, with the time when it comes if nothing changes."""
+    """Yield each possible fault, with the time when the fault comes if nothing changes."""
     turn = memory.turn
     if not memory.flows(now):
         if turn or memory.claims:

@@ -19,13 +19,13 @@ class LiftSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
     quiet_start_s: Annotated[
         QuietStart,
         tells("""how long the supervisor only listens after its start, so that a restart ends no
-        ride. This is also how long a lift may show a session that no robot requests, before that
-        session is ended."""),
+        ride. The supervisor also waits this long before it ends a session that a lift shows and no
+        robot requests."""),
     ] = 3.0
     silent_after_s: Annotated[
         Patience,
-        tells("""after so long without a request a waiting session leaves the queue. Fleet adapters
-        repeat their requests at every LiftState."""),
+        tells("""the time without a request after which a waiting session leaves the queue. Fleet
+        adapters repeat their requests at every LiftState."""),
     ] = 10.0
     holder_alarm_s: Annotated[
         Patience, tells("how long the holder may be silent before a fault is shown.")
@@ -33,7 +33,7 @@ class LiftSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
     holder_ttl_s: Annotated[
         Patience | None,
         tells("""how long the holder may be silent before its session is ended. When absent, the
-        session is never ended, as its robot may be in the car."""),
+        session is never ended, because its robot may be in the car."""),
     ] = None
     clock_synchronised: Annotated[
         bool,
@@ -48,15 +48,17 @@ class LiftSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
     ] = 10.0
 
     def problems(self) -> Remarks:
-        """Yield an alarm that would come after the end of its session, or an empty list of lifts."""
+        """Yield a problem if an alarm would come after the end of its session, or if the list of lifts
+        is empty."""
         if self.holder_ttl_s is not None and self.holder_ttl_s <= self.holder_alarm_s:
-            text = f"must be more than 'holder_alarm_s' ({self.holder_alarm_s:g} s): alarm first"
+            least = f"{self.holder_alarm_s:g} s"
+            text = f"must be more than holder_alarm_s ({least}), so that the alarm comes first"
             yield ("holder_ttl_s",), text
         if self.lifts == []:
             yield ("lifts",), "is empty: name the lifts, or leave it out to serve every lift"
 
 
 def speaks_of(settings: LiftSupervisorSettings) -> Iterable[Place]:
-    """Yield the lifts to be served."""
+    """Yield the lifts that the supervisor serves."""
     for i, name in enumerate(settings.lifts or ()):
         yield ("lifts", str(i)), "lift", name

@@ -7,7 +7,7 @@ from bridges.kinds.shared.graph_kind import MaySpeak, Woken
 
 
 class Target(msgspec.Struct, frozen=True):
-    """A session's destination, in the terms of LiftRequest."""
+    """A session's destination, in the fields and values of LiftRequest."""
 
     request_type: int
     floor: str
@@ -25,8 +25,8 @@ class RideRequested(msgspec.Struct, frozen=True):
 
 
 class RideEnded(msgspec.Struct, frozen=True):
-    """An END_SESSION of an adapter or an operator, with any floor. `by_person`: it has DOOR_OPEN, which
-    the lift's node understands as a person's END."""
+    """An END_SESSION of an adapter or an operator, with any floor. `by_person`: the message has
+    DOOR_OPEN, by which the lift's node recognises a person's END."""
 
     session: str
     stamp: float
@@ -45,7 +45,7 @@ class LiftStateHeard(msgspec.Struct, frozen=True):
     floors: tuple[str, ...] = ()
 
     def satisfies(self, session: str, target: Target) -> bool:
-        """Does the state fulfil the request? The rule is that of rmf_lift_supervisor."""
+        """Return whether the state fulfils the request. The rule is that of rmf_lift_supervisor."""
         there = target.floor == self.floor and not self.destination
         return (
             (target.floor == self.destination or there)

@@ -1,7 +1,7 @@
 """Debounce: a value counts after it has stayed unchanged for long enough.
 
-The rule is pure and works on samples, so it serves GPIO pins and polled Modbus inputs. gpiozero's own
-debounce is not used, because it drops edges and its mock pins lack it.
+The rule is pure and works on samples, so GPIO pins and polled Modbus inputs share it. gpiozero's own
+debounce is not used, because it drops edges and gpiozero's mock pins lack it.
 """
 
 from typing import Generic, TypeVar, cast
@@ -16,10 +16,11 @@ T_co = TypeVar("T_co", covariant=True)
 
 
 class Settled(msgspec.Struct, Generic[T_co], frozen=True):
-    """A debounced input. `value` counts, and `candidate` has been seen since `since` (s).
+    """A debounced input. `value` counts. `candidate` has been read since `since` (s), and may become
+    the value.
 
-    `steady_at`: the time when `value` was last confirmed; None before that. `torn_since`: the start of
-    unsteady readings; None while they are steady.
+    `steady_at`: the time when `value` was last confirmed; None before the first. `torn_since`: the time
+    since which readings have been unsteady; None if they are steady.
     """
 
     value: T_co | None
@@ -34,7 +35,7 @@ class Settled(msgspec.Struct, Generic[T_co], frozen=True):
 
 
 def settle(before: "Settled[T] | None", seen: T, now: float, hold_s: float) -> "Settled[T]":
-    """Add one sample. A value counts after it was seen for `hold_s` seconds; 0: at once."""
+    """Add one sample. A value counts after it was seen for `hold_s` seconds, and at once with 0."""
     if before is None:
         before = Settled(None, seen, now, torn_since=now)
     elif seen != before.candidate:
@@ -46,7 +47,7 @@ def settle(before: "Settled[T] | None", seen: T, now: float, hold_s: float) -> "
 
 
 def forget(before: "Settled[T] | None") -> "Settled[T] | None":
-    """Keep the value after a gap in the readings, and restart a candidate's debounce."""
+    """Keep the value after a gap in the readings, and restart the candidate's debounce."""
     if before is None or before.steady_at is None:
         return None
     return replace(before, candidate=cast(T, before.value), torn_since=None)

@@ -17,13 +17,13 @@ X = TypeVar("X")
 M = TypeVar("M")
 """A core's memory."""
 O = TypeVar("O")  # noqa: E741
-"""A core's outputs; None for a core without hardware."""
+"""A core's outputs; None if the core has no hardware."""
 R = TypeVar("R", bound="Report")
 """A core's report."""
 
 
 Said = tuple[Topic[Message], Message]
-"""(topic, message to be published on it)."""
+"""A message, after the topic on which it must be published."""
 
 
 class Fault(msgspec.Struct, frozen=True):
@@ -43,7 +43,7 @@ class Sampled(msgspec.Struct, Generic[X], frozen=True):
 
 
 class IoFailed(msgspec.Struct, frozen=True):
-    """A read or a write failed: the state of the outputs is unknown, and the inputs were not read."""
+    """A read or a write failed. The state of the outputs is unknown, and the inputs were not read."""
 
     reason: str
 
@@ -61,13 +61,13 @@ class RivalSeen(msgspec.Struct, frozen=True):
 
 
 class Attended(msgspec.Struct, frozen=True):
-    """Does any node publish the requests that this device obeys?"""
+    """The answer to a question: does any node publish the requests that this device obeys?"""
 
     yes: bool
 
 
 class OperatorReset(msgspec.Struct, frozen=True):
-    """An operator has run `rmf-bridge reset`: a latched fault may clear if its cause is gone."""
+    """An operator has run `rmf-bridge reset`. A latched fault may now clear if its cause is gone."""
 
 
 class AlarmInputs(msgspec.Struct, frozen=True):
@@ -120,10 +120,10 @@ class Report(Protocol):
 class Decision(msgspec.Struct, Generic[M, O, R], frozen=True):
     """The result of one scan.
 
-    `outputs`: the levels of all outputs. `wake_at`: the latest time of the next decision (monotonic
-    seconds; `inf` when only an event can change anything). `refused`: the reason for a refusal, as
-    `kind` or `kind: detail`; `kind` is a short fixed name, by which refusals are counted; "" for an
-    obeyed event. `publish`: further messages beside the state, each sent once.
+    `outputs`: the wanted levels of all outputs. `wake_at`: the latest time of the next decision
+    (monotonic seconds; `inf` if only an event can change anything). `refused`: the reason for a
+    refusal, as `kind` or `kind: detail`; "" if the event was obeyed. `kind` is a short fixed name, by
+    which refusals are counted. `publish`: further messages beside the state, each sent once.
     """
 
     memory: M
@@ -137,16 +137,17 @@ class Decision(msgspec.Struct, Generic[M, O, R], frozen=True):
 RELEASED_LATELY = "released a moment ago"
 STARTING = "inputs settle after the start"
 EXPECTED = frozenset({RELEASED_LATELY, STARTING})
-"""Refusals that every normal handover or start causes: they are counted without a warning."""
+"""Refusals that every normal handover or start causes. They are counted, but cause no warning."""
 
 LONGEST_DETAIL = 300
 
 
 class RequestRefused(Exception):
-    """A message is not obeyed. `kind`: a short fixed name; refusals are counted by kind, and each kind
+    """A message is not obeyed. `kind`: a short fixed name. Refusals are counted by kind, and each kind
     is logged once.
 
-    `detail` may quote the message, which anybody can send: it is cut to LONGEST_DETAIL characters.
+    `detail` may quote the message. Anybody can send a message, so the detail is cut to LONGEST_DETAIL
+    characters.
     """
 
     def __init__(self, kind: str, detail: str) -> None:

@@ -7,20 +7,22 @@ NEVER: Final = math.inf
 AGES_AGO: Final = -math.inf
 
 RIVAL_QUIET_S: Final = 5.0
-"""Another node that has published no state for this long is no rival any more. States come at 1 Hz."""
+"""The silence (s) after which another node that published states is no rival any more. States come at 1
+Hz."""
 SILENT_S: Final = 3.0
-"""A lift or door is silent after this long without a state. States come at 1 Hz."""
+"""The time (s) without a state after which a lift or door counts as silent. States come at 1 Hz."""
 FORGOTTEN_S: Final = 60.0
-"""A device or requester without a message for this long is forgotten, unless it belongs to a
+"""The time (s) without a message after which a device or requester is forgotten, unless it belongs to a
 session."""
 GAP_S: Final = 0.1
-"""The least time between two requests that a supervisor sends for one device."""
+"""The least time (s) between two requests that a supervisor sends for one device."""
 REPEAT_S: Final = 1.0
-"""The time between repeats of a request that is not obeyed yet."""
+"""The time (s) between repeats of a request that is not obeyed yet."""
 
 
 def due_at(sent_at: float, *, new: bool, again: bool) -> float:
-    """Return the time of the next request: GAP_S after the last if `new`, REPEAT_S if `again`.
+    """Return the time of the next request. A `new` request is due GAP_S after the last request. A
+    repeat (`again`) is due after REPEAT_S.
 
     `sent_at`: the time of the last request (s; AGES_AGO: never).
     """

@@ -1,9 +1,9 @@
 """The building blocks of every device YAML: numbers with units, names, common structs.
 
-`bridges/settings/load.py` reads a file into these; the kinds and drivers derive their own structs.
-A struct may have `problems() -> Remarks`. It checks several fields together, and yields (path below the
-struct, text with the fix). It is called when every field is present and of the right type, even if a
-struct below has problems of its own.
+`bridges/settings/load.py` reads a file into these types; the kinds and drivers derive their own structs
+from them. A struct may have a method `problems() -> Remarks` that checks several fields together. It
+yields pairs: a path below the struct, and a text with the remedy. The loader calls `problems` when
+every field is present and has the right type, even if a struct below has problems of its own.
 """
 
 from typing import Annotated
@@ -20,7 +20,8 @@ Name = Annotated[
         extra={"pattern": "text without control characters, or spaces at its ends"},
     ),
 ]
-"""A name in RMF: any text. A text that YAML would read as a number or another type needs quotes."""
+"""A name in RMF, which may be any text. Put a text in quotes if YAML would read it as a number or
+another type."""
 AbsolutePath = Annotated[
     str,
     Meta(
@@ -29,11 +30,11 @@ AbsolutePath = Annotated[
         extra={"pattern": "a file's whole path (/opt/ros/jazzy/setup.bash)"},
     ),
 ]
-"""The path of a file from the root."""
+"""An absolute path of a file."""
 Seconds = Annotated[float, Meta(ge=0, le=86400, extra={"unit": "s"})]
 """A duration that may be zero."""
 Timeout = Annotated[float, Meta(ge=1, le=86400, extra={"unit": "s"})]
-"""A time limit for an attempt. Zero is not allowed, because every attempt would fail at once."""
+"""A time limit for an attempt. Zero is not allowed, because then every attempt would fail at once."""
 Period = Annotated[float, Meta(ge=0.01, le=60, extra={"unit": "s"})]
 """A repetition period."""
 Brief = Annotated[float, Meta(ge=0, le=60, extra={"unit": "s"})]
@@ -55,7 +56,8 @@ Patience = Annotated[
 
 
 def tells(text: str) -> Meta:
-    """Describe a key, for the schema, the reference and an editor; line breaks count as spaces."""
+    """Describe a key of the YAML. The schema, the reference and an editor show this text; its line
+    breaks count as spaces."""
     return Meta(description=" ".join(text.split()))
 
 
@@ -74,13 +76,13 @@ class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     ] = {}
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
-        """Return the time (s) after which outputs without a new command switch themselves off, and the
-        path of that setting; None for outputs that stay on."""
+        """Return the time (s) without a new command after which the outputs switch themselves off, and
+        the path of that setting. Return None for outputs that stay on."""
         return None
 
     def stale_after(self) -> float | None:
-        """Return the time (s) after which a device without a reading is out of service; None without
-        such a limit."""
+        """Return the time (s) without a reading after which the device is out of service; None if it
+        has no such limit."""
         return None
 
 
@@ -89,10 +91,12 @@ class GraphSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     quiet_start_s: Annotated[
         QuietStart,
-        tells("how long the node only listens at first, so that a restart interrupts nothing."),
+        tells(
+            "how long the node only listens after its start, so that a restart interrupts nothing."
+        ),
     ] = 3.0
 
 
 def quiet_s(settings: GraphSettings) -> float:
-    """Return the time (s) in which the node only listens, before its first message."""
+    """Return the time (s) after its start in which the node only listens."""
     return settings.quiet_start_s

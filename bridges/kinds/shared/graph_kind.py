@@ -1,8 +1,8 @@
 """The record of a kind without hardware: the topics that it hears and publishes, and its core.
 
-A supervisor or coordinator has no driver and no bus. It learns its subjects (lifts, doors) from
-messages, and keeps one core memory for each. `bridges/kinds/<kind>/__init__.py` holds the
-`KIND`; `bridges/runtime/graph_node.py` serves it.
+A supervisor or coordinator has no driver and no bus. It learns of its subjects (lifts, doors) from
+messages, and keeps one core memory for each subject. `bridges/kinds/<kind>/__init__.py` holds the
+`KIND`; `bridges/runtime/graph_node.py` runs it.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -21,11 +21,12 @@ LISTENS: Final = "for the end of the quiet start"
 
 
 class MaySpeak(Struct, frozen=True):
-    """The core may publish now, or may not: during the quiet start, and while a rival publishes.
+    """The permission to publish. `yes` is False during the quiet start, and while another node
+    publishes.
 
-    `waits`: the reason why requesters wait while the core may not publish.
-    `at_once`: no rival is there, so messages that a restart must not interrupt may be sent even during
-    the quiet start. `alone`: no other node publishes on a topic of `yields`.
+    `waits`: if the core may not publish, the reason why requesters must wait. `at_once`: no other node
+    publishes. Messages that a restart must not interrupt may then be sent even during the quiet start.
+    `alone`: no other node publishes on a topic of `yields`.
     """
 
     yes: bool
@@ -46,36 +47,35 @@ class GraphKind(Struct, Generic[S, L, M, E, R], frozen=True):
     """One kind without hardware: its settings, limits, memory, events and report.
 
     `devices_key`: the section of its settings in the YAML. `settings`: the struct for this section.
-    `requests`: each topic heard, with `accept(message, settings, wall) -> event`, which raises
-    RequestRefused; `wall` is our clock (s since the epoch).
-    `publishes`: the topics on which the node publishes. `sole`: topics with only one publisher; while
-    another node publishes there, our node only listens. `yields`: topics on which our node is silent
-    while another node publishes there; on its other topics our node continues.
-    `device_name`: a message's subject. `shown_by`: the topic on which a subject publishes
-    its own states (they prove that the subject exists, while a request may name anything); None if
-    there is only one subject. `reserved(settings)`: the subjects that the YAML names.
-    `requester(event)`: the sender of a request; "" for a state. `requesters(memory)`: the requesters
-    that the subject remembers. Anybody can invent them, so all subjects together have a bound.
-    `quiet_s(settings)`: the time after the start in which the node only listens.
-    `limits(settings)`: the settings that the core needs.
-    `initial(subject, started_at)`: a subject's memory; `started_at` is the daemon's start.
-    `decide`: the core. Its messages have no stamps: `stamped(message, time)` adds them when they are
-    sent. `summary(report, now)`: key -> value for the status file and `watch`. `idle(memory, now)`:
-    may this subject be forgotten?
-    `answer(request, reason)`: the published answer to a refused request; None for no answer.
-    `request`: the message if `accept` refused it, the event if the core did.
-    `on_map(settings)`: settings that name a place on RMF's map (`bridges/kinds/shared/kind.py`).
+    `requests`: each topic that the node hears, with its function `accept(message, settings, wall) ->
+    event`. `accept` raises RequestRefused; `wall` is our clock (s since the epoch). `publishes`: the
+    topics on which the node publishes. `sole`: topics that may have only one publisher; if another node
+    publishes there, our node only listens. `yields`: topics on which our node is silent if another node
+    publishes there; on its other topics our node continues. `device_name`: a function that returns the
+    subject of a message. `shown_by`: the topic on which a subject publishes its own states. Such states
+    prove that the subject exists, while a request may name anything. None: there is only one subject.
+    `reserved(settings)`: the subjects that the YAML names. `requester(event)`: the sender of a request;
+    "" for a state. `requesters(memory)`: the requesters that the subject remembers. Anybody can invent
+    requesters, so their number over all subjects has a bound. `quiet_s(settings)`: the time (s) after
+    the start in which the node only listens. `limits(settings)`: the settings that the core needs.
+    `initial(subject, started_at)`: a subject's memory; `started_at` is the daemon's start. `decide`:
+    the core. Its messages have no stamps: `stamped(message, time)` adds them when the node sends them.
+    `summary(report, now)`: keys and values for the status file and `watch`. `idle(memory, now)`: may
+    this subject be forgotten? `answer(request, reason)`: the published answer to a refused request;
+    None for no answer. `request` is the message if `accept` refused it, and the event if the core
+    refused it. `on_map(settings)`: settings that name a place on RMF's map
+    (`bridges/kinds/shared/kind.py`).
 
-    `together(memories)`: one message about all subjects, sent each second and at every change, for a
-    kind with such a message. A kind whose memory must survive a restart has `persist(memories)`, which
-    returns other bytes only when something worth keeping has changed, and `restore(kept, settings,
-    now)`, which raises ValueError for bytes that `persist` did not make. The memory is saved before
-    `together` is sent. `urgent(memory)`: does the subject hold something that a restart must not
-    interrupt (`MaySpeak.at_once`)?
+    `together(memories)`: one message about all subjects, sent each second and at every change. Only
+    some kinds have such a message. A kind whose memory must survive a restart has two functions.
+    `persist(memories)` returns the bytes to save, which change only when something worth keeping has
+    changed. `restore(kept, settings, now)` reads them, and raises ValueError for bytes that `persist`
+    did not make. The memory is saved before `together` is sent. `urgent(memory)`: does the subject hold
+    something that a restart must not interrupt (`MaySpeak.at_once`)?
 
     `tables(settings)`: tables for `check`. `warnings(settings)`: legal settings that may be mistakes,
-    as (path, text). `speaks_of(settings)`: the devices that the settings name, as (path, kind, name);
-    some file of the site must define each device.
+    each as its path and a text. `speaks_of(settings)`: the devices that the settings name, each as
+    path, kind and name. Some file of the site must define each of these devices.
     """
 
     name: str
@@ -110,4 +110,4 @@ class GraphKind(Struct, Generic[S, L, M, E, R], frozen=True):
 
 AnyGraphKind = GraphKind[Any, Any, Any, Any, Any]
 AnyKind = AnyDeviceKind | AnyGraphKind
-"""A kind that was found by its name; its types are unknown."""
+"""A kind that was found by its name, so its types are unknown."""

@@ -1,4 +1,5 @@
-"""A kind's memory on disk, for a restart: JSON with a version. A damaged file is refused as a whole."""
+"""A kind's memory on disk, for a restart. The file is JSON with a version. A damaged file is refused as
+a whole."""
 
 from typing import Annotated, TypeVar
 
@@ -18,8 +19,8 @@ R = TypeVar("R", bound=Kept)
 
 
 def read(kept: bytes, record: type[R], version: int, what: str) -> R:
-    """Decode the record. Raises ValueError for other bytes or another version; its text names `what`,
-    the expected content."""
+    """Decode the record. Raises ValueError for other bytes or another version. The error's text names
+    `what`, the expected content."""
     try:
         found = msgspec.json.decode(kept, type=record)
     except msgspec.MsgspecError as error:

@@ -1,7 +1,7 @@
 """The record of a kind of device: its topics, and the pure functions of its folder.
 
-`bridges/kinds/<kind>/__init__.py` holds one `KIND`; the loop knows nothing else about lifts or
-doors. Each `KIND` states its types, so mypy proves that its functions fit together.
+`bridges/kinds/<kind>/__init__.py` holds one `KIND`. The loop knows nothing else about lifts or doors.
+Each `KIND` states its types, so mypy proves that its functions fit together.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -39,7 +39,8 @@ FLOOR, LIFT, DOOR, CHARGER, WAYPOINT = "floor", "lift", "door", "charger", "wayp
 """Kinds of names on RMF's map."""
 
 Place = tuple[tuple[str, ...], str, str]
-"""A setting with a name on RMF's map: the setting's path, the kind of name (`FLOOR`, …), the name."""
+"""A setting with a name on RMF's map: the setting's path, the kind of the name (`FLOOR`, …), the
+name."""
 
 
 class RefusalAnswer(NamedTuple):
@@ -129,4 +130,4 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
 
 
 AnyDeviceKind = Kind[Any, Any, Any, Any, Any, Any, Any]
-"""A kind that was found by its name; its types are unknown."""
+"""A kind that was found by its name, so its types are unknown."""

@@ -1,4 +1,5 @@
-"""Checks of names and texts from the graph. The daemon stores them, and anybody can send them."""
+"""Checks of names and texts in messages from the graph. They limit the lengths, because the daemon
+stores these texts and anybody can send them."""
 
 from collections.abc import Collection
 from typing import Final
@@ -7,7 +8,7 @@ from bridges.kinds.shared.decision import RequestRefused
 from bridges.messages.words import LONGEST_NAME
 
 LONGEST_TEXT: Final = 10_000
-"""The longest error_message of a ChargerState."""
+"""The greatest length of a ChargerState's error_message (characters)."""
 
 
 def check_length(longest: int = LONGEST_NAME, /, **fields: str) -> None:
@@ -20,7 +21,8 @@ def check_length(longest: int = LONGEST_NAME, /, **fields: str) -> None:
 def check_listed(what: str, name: str, listed: Collection[str] | None) -> None:
     """Raise RequestRefused for a name that is empty, too long or not listed in the YAML.
 
-    `what`: `lift` or `door`. `listed`: None if the YAML has no list and so accepts every name.
+    `what`: `lift` or `door`. `listed`: the names in the YAML's list; None if the YAML has no list, so
+    that every name is accepted.
     """
     if not name:
         raise RequestRefused(f"empty {what}_name", f"a {what} needs a name")

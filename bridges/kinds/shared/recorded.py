@@ -1,7 +1,7 @@
 """The names of values in rings and recordings. A recorded name never changes, even if its class moves
-or is renamed. So every version reads the files of all earlier versions.
+or is renamed. So every version of the daemon reads the files of all earlier versions.
 
-The values of a kind are in `RECORDED` of its folder. The values here are shared by all kinds.
+Each kind's folder has the values of that kind in `RECORDED`. All kinds share the values here.
 """
 
 from collections.abc import Mapping
@@ -12,7 +12,8 @@ from bridges.messages import constants
 from bridges.messages.definitions import PACKAGES
 
 Recorded = Mapping[str, type[Any]]
-"""Recorded name -> type. Each type has one name, which begins with the name of its kind."""
+"""A table that maps a recorded name to its type. Each type has one name, which begins with the name of
+its kind."""
 
 SHARED: Final[Recorded] = {
     "core.debounce.Settled": debounce.Settled,

@@ -1,4 +1,5 @@
-"""The `recording:` section of a YAML: the extent of recordings, and their limits on disk."""
+"""The `recording:` section of a YAML: how much is recorded, and how much room it may take on the
+disk."""
 
 from typing import Annotated, Literal
 
@@ -14,7 +15,7 @@ Patience = Annotated[float, Meta(ge=10, le=86400, extra={"unit": "s"})]
 
 
 class RecordingSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Recording of the daemon's work. Nothing is written to a disk while all is well."""
+    """The recording of the daemon's work. If all is well, nothing is written to a disk."""
 
     keep: Annotated[
         Literal["nothing", "ring", "continuous"],
@@ -32,7 +33,7 @@ class RecordingSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
     ] = 400
     files_mb: Annotated[
         Space,
-        tells("how large these files may be together. Here too the largest number counts."),
+        tells("how large these files may be together. The largest number of all YAMLs counts."),
     ] = 200.0
     waiting_s: Annotated[
         Patience, tells("a file is made when a requester has waited this long.")

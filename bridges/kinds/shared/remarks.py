@@ -1,4 +1,4 @@
-"""Remarks of a struct, kind or driver on its settings in the YAML."""
+"""Remarks that a struct, kind or driver makes on its settings in the YAML."""
 
 from collections.abc import Iterable
 

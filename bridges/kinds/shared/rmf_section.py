@@ -1,4 +1,4 @@
-"""The `rmf:` section of a YAML: the transport to Open-RMF and its settings."""
+"""The `rmf:` section of a YAML: the transport to Open-RMF, and the settings of that transport."""
 
 import argparse
 import re
@@ -19,16 +19,16 @@ Endpoint = Annotated[
         extra={"pattern": "protocol/host:port (tcp/192.168.1.5:7447, tls/rmf.local:7447)"},
     ),
 ]
-"""The address of a zenoh program."""
+"""The address of a zenoh router or peer."""
 
 
 class ZenohTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Encryption of `tls/…` and `quic/…` endpoints, with certificates and keys in PEM files."""
+    """The encryption of `tls/…` and `quic/…` endpoints. Certificates and keys are PEM files."""
 
     ca: Annotated[
         AbsolutePath | None,
-        tells("""the authority that signed the router's certificate; when absent, the public
-        authorities count."""),
+        tells("""a file with the certificate of the authority that signed the router's certificate.
+        When absent, the public authorities count."""),
     ] = None
     certificate: Annotated[
         AbsolutePath | None,
@@ -39,7 +39,7 @@ class ZenohTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = None
 
     def problems(self) -> Remarks:
-        """Yield a certificate without its key, or a key without its certificate."""
+        """Yield a problem if only one of certificate and key is given."""
         if (self.certificate is None) != (self.private_key is None):
             yield (), "certificate and private_key go together: give both, or none"
 
@@ -50,24 +50,24 @@ class Zenoh(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     keys: Annotated[
         Literal["rmw_zenoh", "ros2dds"],
         tells("""`rmw_zenoh` for sites whose RMF runs on rmw_zenoh, `ros2dds` for sites with a
-        zenoh-bridge-ros2dds beside RMF; the two do not understand each other."""),
+        zenoh-bridge-ros2dds beside RMF. These two dialects do not understand each other."""),
     ] = "rmw_zenoh"
     connect: Annotated[
         tuple[Endpoint, ...],
         Meta(min_length=1),
-        tells("""the router (or the bridge). If there are several, the daemon uses one, and the others
+        tells("""the router (or the bridge). If several are listed, the daemon uses one, and the others
         stand by."""),
     ] = ("tcp/localhost:7447",)
     mode: Annotated[
         Literal["auto", "peer", "client"],
-        tells("""`peer` also speaks to other nodes directly, `client` to a router alone. `auto` is
-        `peer` if there is one router, and it is on this machine or `listen` is open to other
-        machines; else `client`."""),
+        tells("""`client` speaks to a router only, `peer` also to other nodes directly. `auto` is `peer`
+        if there is one router, and this router is on this machine or `listen` is open to other
+        machines. Else `auto` is `client`."""),
     ] = "auto"
     listen: Annotated[
         tuple[Endpoint, ...],
-        tells("""where other nodes reach this node as a peer; when absent, only nodes of this machine
-        can."""),
+        tells("""the addresses at which other nodes reach this node as a peer. When absent, only nodes
+        of this machine reach it."""),
     ] = ("tcp/127.0.0.1:0",)
     tls: Annotated[ZenohTls | None, tells("certificates, for `tls/…` and `quic/…`.")] = None
     user: Annotated[Name | None, tells("the daemon's user name at the routers.")] = None
@@ -100,7 +100,7 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     ] = "auto"
     domain_id: Annotated[
         Annotated[int, Meta(ge=0, le=232)] | None,
-        tells("the ROS domain; ROS_DOMAIN_ID, or 0, when absent."),
+        tells("the ROS domain. When absent, the environment's ROS_DOMAIN_ID counts, or else 0."),
     ] = None
     network: Annotated[
         Literal["subnet", "localhost"],
@@ -108,9 +108,9 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     ] = "subnet"
     ros_setup: Annotated[
         AbsolutePath | None,
-        tells("""ROS's setup file, which is sourced before the daemon starts, because a service has no
-        shell that would source it. Not for `dds` and `zenoh`. `auto` logs a missing file and
-        continues."""),
+        tells("""ROS's setup file. The daemon sources the file before it starts, because no shell does
+        so for a service. The key has no use with `dds` and `zenoh`. If the file is missing,
+        `auto` logs this and continues."""),
     ] = None
     diagnostics: Annotated[
         bool,
@@ -126,7 +126,7 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     ] = "auto"
 
     def problems(self) -> Remarks:
-        """Yield settings without effect."""
+        """Yield settings that have no effect."""
         if self.release != "auto" and self.transport == "ros2":
             yield (
                 ("release",),
@@ -153,12 +153,12 @@ def warnings(rmf: Rmf) -> Remarks:
 
 
 ROS_RELEASES: Final = ("humble", "iron", "jazzy", "kilted", "lyrical", "rolling")
-"""RMF's messages are installed for these releases."""
+"""The ROS releases for which RMF's messages can be installed."""
 TRANSPORTS = ("auto", "ros2", "dds", "zenoh")
 
 
 def overridden(rmf: Rmf, args: argparse.Namespace) -> Rmf:
-    """Return a YAML's `rmf:` section with the command line's options applied."""
+    """Return the YAML's `rmf:` section after applying the command line's options."""
     if args.domain_id is not None:
         rmf = msgspec.structs.replace(rmf, domain_id=args.domain_id)
     if args.transport is not None:

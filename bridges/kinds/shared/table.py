@@ -1,10 +1,11 @@
-"""A table to compare with a controller. `check` prints it, and its sheet adds boxes to tick."""
+"""A table that a person compares with a controller. `check` prints the table; the printed sheet has
+boxes to tick."""
 
 from msgspec import Struct
 
 
 class Table(Struct, frozen=True):
-    """Each row has as many cells as there are headings."""
+    """A table. Each row has as many cells as there are headings."""
 
     title: str
     headings: tuple[str, ...]

@@ -143,7 +143,7 @@ def test_an_obstruction_holds_the_door_again_until_it_has_been_away_for_a_second
     core.sees(clear, until=2.5)
     core.sees(replace(BETWEEN, obstruction=True), until=4.0)
     assert core.faults() == (
-        "DOOR_OBSTRUCTED: held open after CLOSE while the doorway is not clear",
+        "DOOR_OBSTRUCTED: held open after CLOSE, because the doorway is not clear",
     )
     core.sees(clear, until=6.0)
     core.sees(replace(BETWEEN, obstruction=False), until=7.0)
@@ -204,7 +204,7 @@ def test_a_door_between_its_limits_for_too_long_is_unknown() -> None:
         (1.0625, "MOVING", False),
         (6.0625, "UNKNOWN", False),
     ]
-    assert core.faults() == ("DOOR_TRAVEL_TIMEOUT: at neither end position for 5.0 s",)
+    assert core.faults() == ("DOOR_TRAVEL_TIMEOUT: between its end positions for 5.0 s",)
     core.sees(OPEN, until=11.0)
     assert (core.told[-1], core.faults()) == ((10.0625, "OPEN", False), ())
 
@@ -654,7 +654,7 @@ def test_a_door_held_for_very_long_is_reported_and_stays_held() -> None:
     core.sees(OPEN, until=59.0)
     assert core.faults() == ()
     core.sees(OPEN, until=61.0)
-    assert core.faults() == ("DOOR_OPEN_TOO_LONG: held for RMF longer than 60.0 s",)
+    assert core.faults() == ("DOOR_OPEN_TOO_LONG: RMF has held the door for more than 60.0 s",)
     assert core.told[-1] == (0.0625, "OPEN", True)
 
 
@@ -673,7 +673,7 @@ def test_a_repeated_open_does_not_put_off_the_fault_of_a_door_held_too_long() ->
     for second in range(61):
         core.hears(OPENS)
         core.sees(OPEN, until=float(second))
-    assert core.faults() == ("DOOR_OPEN_TOO_LONG: held for RMF longer than 60.0 s",)
+    assert core.faults() == ("DOOR_OPEN_TOO_LONG: RMF has held the door for more than 60.0 s",)
 
 
 def test_a_door_counts_as_held_too_long_at_the_very_instant_for_which_the_core_wakes() -> None:
@@ -683,7 +683,7 @@ def test_a_door_counts_as_held_too_long_at_the_very_instant_for_which_the_core_w
     core.hears(OPENS)
     assert (core.now, core.faults()) == (
         0.5,
-        ("DOOR_OPEN_TOO_LONG: held for RMF longer than 0.5 s",),
+        ("DOOR_OPEN_TOO_LONG: RMF has held the door for more than 0.5 s",),
     )
     assert core.hears(OPENS).wake_at < math.inf
 

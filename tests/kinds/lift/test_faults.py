@@ -20,7 +20,7 @@ from tests.kinds.lift.alone import ASKED, AT_L1, CLOSED, Alone
 FAULTS: dict[str, tuple[list[tuple[float, Any]], Fault]] = {
     "a fire that was": (
         [(0.0, replace(AT_L1, hazards=frozenset({Hazard.FIRE}))), (0.5, AT_L1), (1.6, AT_L1)],
-        Fault("FIRE_LATCHED", "rmf-bridge reset when it is safe"),
+        Fault("FIRE_LATCHED", "run rmf-bridge reset when the lift is safe"),
     ),
     "another node": (
         [(0.0, AT_L1), (0.1, RivalSeen())],
@@ -28,7 +28,7 @@ FAULTS: dict[str, tuple[list[tuple[float, Any]], Fault]] = {
     ),
     "a floor too far": (
         [(0.0, AT_L1), (0.1, replace(AT_L1, level="L3"))],
-        Fault("POSITION_LOST", "L3 cannot follow L1 like this"),
+        Fault("POSITION_LOST", "the car cannot have reached L3 from L1"),
     ),
     "a floor code that cannot be": (
         [(0.0, replace(AT_L1, level=None, code_fault="two lines at once"))],
@@ -44,11 +44,11 @@ FAULTS: dict[str, tuple[list[tuple[float, Any]], Fault]] = {
     ),
     "a door whose number means nothing": (
         [(0.0, replace(AT_L1, door=DoorReading.UNKNOWN))],
-        Fault("DOOR_CODE_ILLEGAL", "the door's number means nothing"),
+        Fault("DOOR_CODE_ILLEGAL", "the YAML does not list the door's number"),
     ),
     "a rear door whose number means nothing": (
         [(0.0, replace(AT_L1, rear_door=DoorReading.UNKNOWN))],
-        Fault("DOOR_CODE_ILLEGAL", "the rear door's number means nothing"),
+        Fault("DOOR_CODE_ILLEGAL", "the YAML does not list the rear door's number"),
     ),
     "up and down at once": (
         [(0.0, replace(AT_L1, motion=Motion.CONTRADICTORY))],

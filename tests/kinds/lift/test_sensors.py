@@ -152,7 +152,7 @@ def test_a_floor_code_that_jumps_over_a_floor_is_not_believed_until_it_comes_bac
     story.run(5.0)
     assert story.state == "AGV, moving at ?, A to L1"
     assert story.node.status()["faults"] == [
-        {"code": "POSITION_LOST", "detail": "L3 cannot follow L1 like this"}
+        {"code": "POSITION_LOST", "detail": "the car cannot have reached L3 from L1"}
     ]
     assert story.outputs == LiftOutputs(agv_request=True)
     story.building.set(level="L1")
