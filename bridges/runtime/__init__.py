@@ -1,1 +1,1 @@
-"""Serves one YAML: the daemon, its loops, and the devices and subjects on these loops."""
+"""The daemon that serves one YAML: its loops, and the devices and subjects on these loops."""

@@ -1,9 +1,10 @@
-"""`outputs-off --all-records`: switches off all outputs in the services' records, before daemons start.
+"""`outputs-off --all-records`: switches off all outputs that the services' records name, before daemons
+start.
 
-It runs at boot, after a power cut. One process loads the program and forks for each service, so a wire
-that hangs delays no other service, and each record has its own profiles. This machine's pins come
-first, because they depend on no other device. The time is bounded, because every daemon waits for this
-command; a daemon switches off the remaining outputs when it starts.
+The command runs at boot, after a power cut. One process loads the program and then forks a child for
+each service. So a wire that hangs delays no other service, and each record uses its own profiles. This
+machine's pins come first, because they depend on no other device. The command's time is bounded,
+because every daemon waits for the command. A daemon that starts switches off the outputs that remain.
 """
 
 import argparse
@@ -25,11 +26,12 @@ from bridges.yaml.problems import SettingsError
 from drivers.profiles import texts
 
 OWN_S, OTHERS_S = 4.0, 2.0
-"""The time limits (s) for this machine's own pins, then for all other outputs, while every daemon
-waits."""
+"""The time limits (s), first for this machine's own pins, then for all other outputs. Every daemon
+waits during these times."""
 LOOK_EVERY_S = 0.01
 OWN_PINS = re.compile(rb"\btype: *[\"']?gpio\b")
-"""Matches a YAML whose outputs are this machine's pins. It decides only the order."""
+"""A pattern that finds a YAML whose outputs are this machine's pins. The pattern decides only the
+order."""
 
 
 def switch_off_all(
@@ -52,8 +54,8 @@ def switch_off_all(
 
 
 def _off(files: Collection[Path], within_s: float) -> set[Path]:
-    """Switch these services' outputs off in parallel; return the files whose outputs stayed
-    unverified."""
+    """Switch these services' outputs off in parallel. Return the files whose outputs are not verified
+    off."""
     give_up_at = time.monotonic() + within_s
     running = {_forked(file): file for file in dict.fromkeys(files)}
     left = set(running.values())
@@ -70,7 +72,8 @@ def _off(files: Collection[Path], within_s: float) -> set[Path]:
 
 
 def _forked(file: Path) -> int:
-    """Switch a service's outputs off in a child, which exits with 0 on success; return its pid."""
+    """Switch a service's outputs off in a child process, which exits with 0 on success. Return the
+    child's pid."""
     if pid := os.fork():
         return pid
     code = 1

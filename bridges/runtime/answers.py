@@ -1,5 +1,5 @@
-"""Refused requests that wait for an answer. Their number is bounded, so that a flood of requests causes
-no flood of answers."""
+"""Refused requests that wait for an answer. Their number is bounded, so a flood of requests causes no
+flood of answers."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -11,7 +11,8 @@ from bridges.runtime.clock import TELL_GAP_S
 from bridges.runtime.subject import Publish
 
 MOST: Final = 10
-"""At most this many requests, the latest, are answered every TELL_GAP_S."""
+"""The greatest number of requests that are answered every TELL_GAP_S. The latest requests are
+answered."""
 
 
 class RefusalAnswers:
@@ -23,7 +24,7 @@ class RefusalAnswers:
         self._said_at = AGES_AGO
 
     def add(self, request: object, reason: str) -> None:
-        """Note a refused request (its message or event) and the reason; from any thread."""
+        """Note a refused request (its message or event) and the reason. Any thread may call this."""
         self._waiting.append((request, reason))
 
     @property

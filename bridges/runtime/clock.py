@@ -11,7 +11,8 @@ from bridges.messages.definitions import Time
 
 TELL_EVERY_S = 1.0
 TELL_GAP_S = 0.1
-"""States go out at 1 Hz, and at once when they change, but never faster than 10 Hz."""
+"""The least time (s) between two states. A state is published each second, and at once when it
+changes."""
 
 
 class Clock(Struct, frozen=True):
@@ -21,10 +22,12 @@ class Clock(Struct, frozen=True):
     wall: Callable[[], float]
 
     def stamp(self, read_at: float | None) -> Time:
-        """Return the stamp of a reading taken at `read_at` (monotonic s); 0 for None, no reading.
+        """Return the stamp of a reading taken at `read_at` (monotonic s); 0 if `read_at` is None, which
+        means no reading.
 
-        The stamp is the current wall clock minus the reading's monotonic age, so a step of the wall
-        clock distorts neither age nor order. Raises ClockError for a clock past 2038.
+        The stamp is the wall clock's present time minus the reading's age by the monotonic clock. So a
+        step of the wall clock distorts neither age nor order. Raises ClockError if the wall clock is
+        past 2038.
         """
         if read_at is None:
             return Time()
@@ -32,7 +35,7 @@ class Clock(Struct, frozen=True):
 
 
 def machine_s() -> float:
-    """Return the seconds since the machine's start, its sleep included."""
+    """Return the seconds since the machine's start. The time that the machine slept is included."""
     return time.clock_gettime(time.CLOCK_BOOTTIME)
 
 

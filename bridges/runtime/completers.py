@@ -1,4 +1,4 @@
-"""Completes the names of devices and services in a shell."""
+"""The completion of device names and service names in a shell."""
 
 import argparse
 from collections.abc import Callable
@@ -15,7 +15,7 @@ def completed_by(argument: argparse.Action, completer: Completer) -> None:
 
 
 def device_names(prefix: str, parsed_args: argparse.Namespace, **_: object) -> list[str]:
-    """Return the devices of FILE; an empty list if FILE is not a valid device YAML."""
+    """Return the names of the devices in FILE; an empty list if FILE is not a valid device YAML."""
     from bridges.settings.load import SettingsError, load
 
     with suppress(SettingsError, OSError, TypeError):

@@ -1,8 +1,8 @@
 """Contains a driver's unexpected exceptions, so that they affect no other device.
 
-The device's outputs are switched off, the traceback is logged once, and the device is opened again
-after a pause that grows from 0.5 to 30 s. If its outputs are not verified off within OFF_WITHIN_S, the
-daemon ends, and `outputs-off` tries to switch them off from a new process.
+After such an exception the device's outputs are switched off, and the traceback is logged once. After a
+pause the device is opened again; the pause grows from 0.5 to 30 s. If the outputs are not verified off
+within OFF_WITHIN_S, the daemon ends. Then `outputs-off` tries to switch them off from a new process.
 """
 
 import logging
@@ -29,13 +29,14 @@ class LeftOn(Exception):
 
 
 class Contained(Generic[X, O]):
-    """A device (`drivers.Driver`) that raises only DriverError and LeftOn."""
+    """A device (`drivers.Driver`) that raises only DriverError and LeftOn, whatever its driver
+    raises."""
 
     def __init__(self, name: str, driver: Driver[X, O], clock: Clock) -> None:
         self._name = name
         self._driver = driver
         self.contacts: Callable[[], Mapping[str, bool]] = dict
-        """`OnContacts.contacts`; empty for a driver without contacts."""
+        """The driver's `OnContacts.contacts`; empty for a driver without contacts."""
         if isinstance(driver, OnContacts):
             self.contacts = driver.contacts
         self._clock = clock
@@ -51,11 +52,11 @@ class Contained(Generic[X, O]):
         self._call(self._driver.open)
 
     def read(self) -> X:
-        """Read every input. After a defect, claim the device before reading."""
+        """Read every input. After a defect of the driver, claim the device before reading."""
         return self._call(self._read)
 
     def write(self, outputs: O) -> None:
-        """Set every output to its level; success ends a pause."""
+        """Set every output to its level. A success ends the pause after a defect."""
         self._call(lambda: self._write(outputs))
         self._pause_s = 0.0
 
@@ -101,7 +102,8 @@ class Contained(Generic[X, O]):
         raise failure
 
     def _broke(self, error: Exception) -> DriverError:
-        """Return a defect as a DriverError; log the first defect since the device last worked."""
+        """Return a driver's defect as a DriverError. Log a defect only if it is the first since the
+        device last worked."""
         self._failure = f"a defect of the driver: {type(error).__name__}: {error}"
         if not self._pause_s:
             log.error(pairs("defect", device=self._name, reason=self._failure), exc_info=error)
@@ -116,8 +118,8 @@ class Contained(Generic[X, O]):
             self._unsafe_since = now
 
     def _insist_on_off(self) -> None:
-        """Switch off outputs that may be on. Raises DriverError if that fails, and LeftOn if it still
-        fails after OFF_WITHIN_S."""
+        """Switch off the outputs that may be on. Raises DriverError if switching off fails, and LeftOn
+        if it still fails after OFF_WITHIN_S."""
         if self._unsafe_since is None:
             return
         since = self._unsafe_since

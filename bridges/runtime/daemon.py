@@ -1,6 +1,7 @@
-"""The daemon that serves one YAML: opens the transport, starts the loops and feeds systemd's watchdog.
+"""The daemon that serves one YAML. It opens the transport, starts the loops and feeds systemd's
+watchdog.
 
-On SIGTERM, or any other signal that would end a process, the daemon switches every output off and
+On SIGTERM, or on any other signal that would end a process, the daemon switches every output off and
 leaves RMF's graph.
 """
 
@@ -42,11 +43,13 @@ STOP_WITHIN_S = 5.0
 STATUS_EVERY_S = 1.0
 ALIVE = "WATCHDOG=1"
 STARTING = "WATCHDOG=1\nEXTEND_TIMEOUT_USEC=30000000"
-"""A start with many silent devices takes long, so it asks systemd for 30 more seconds."""
+"""A message to systemd that asks for 30 more seconds, because a start with many silent devices takes
+long."""
 
 
 class Daemon:
-    """One `rmf-bridge run`. `simulated`: the status and the diagnostics show that no hardware moves."""
+    """One `rmf-bridge run`. `simulated`: status and diagnostics tell the reader that no hardware
+    moves."""
 
     def __init__(
         self,
@@ -61,8 +64,8 @@ class Daemon:
         outputs_off: Sequence[str] = (),
         rmf: Any = None,
     ) -> None:
-        """`outputs_off`: the command to switch the outputs off after the death of this process. `rmf`:
-        the stand-in of RMF's fleet adapter.
+        """Prepare the daemon. `outputs_off`: the command that switches the outputs off after the death
+        of this process. `rmf`: the stand-in of RMF's fleet adapter.
 
         Raises TransportError or HalError if a transport or bus cannot be opened.
         """
@@ -105,7 +108,7 @@ class Daemon:
             self._diagnostics = self._transport.publisher(self._health_topic)
 
     def _writer_of(self, record: ClaimRecord) -> NoWriter:
-        """Return the writer of the ring recording; NOBODY if the YAML keeps nothing."""
+        """Return the writer of the ring recording; NOBODY if the YAML wants no recording."""
         keep = self._config.recording
         if keep.keep == "nothing":
             return NOBODY
@@ -150,7 +153,7 @@ class Daemon:
             self._service.decided(decided.verdict, decided.device)
 
     def _watch(self) -> None:
-        """Tell systemd when the daemon is ready, and feed systemd's watchdog while every loop makes
+        """Tell systemd when the daemon is ready. Feed systemd's watchdog as long as every loop makes
         progress."""
         period_s = min(STATUS_EVERY_S, (watchdog_s() or 10.0) / 6)
         told_ready, tell_at = False, 0.0
@@ -206,7 +209,7 @@ class Daemon:
         return self._predecessor.left() if self._predecessor else []
 
     def _convenience(self, what: str, do: Callable[[], None]) -> None:
-        """Call `do`; log a failure once and continue. The next call tries again."""
+        """Call `do`. Log a failure once and continue; the next call of this method tries again."""
         try:
             do()
         except Exception as error:  # noqa: BLE001 - logged by Once
@@ -219,7 +222,7 @@ class Daemon:
         return about | ({"SIMULATED": "no hardware moves"} if self._simulated else {})
 
     def _apart(self) -> list[dict[str, str]]:
-        """Return the faults that keep this node and others from hearing each other."""
+        """Return the faults that keep this node and other nodes from hearing each other."""
         return [{"code": code, "detail": detail} for code, detail in self._transport.faults()]
 
     def _slack(self) -> dict[str, float]:
@@ -254,10 +257,12 @@ class Daemon:
             found = diagnosis(self._transport.name, self._config.kind, daemon, devices, at)
             self._diagnostics.publish(found)
             self._told += 1
-            if self._told % max(1, len(devices)) == 0:  # a message grows with the devices
+            if (
+                self._told % max(1, len(devices)) == 0
+            ):  # each message grows with the number of devices
                 self._writer.spoken(self._health_topic.name, found, sent=True)
         except (
             TransportError,
             ClockError,
-        ) as error:  # only debug, because the outlet logs unpublished states as errors
+        ) as error:  # only debug: the outlet already logs unpublished states as errors
             log.debug(pairs("not_published", topic=DIAGNOSTICS.name, reason=error))

@@ -1,4 +1,5 @@
-"""The daemons on this machine, found by their folders and units, with their status files."""
+"""The daemons on this machine, found by their folders and their systemd units, with their status
+files."""
 
 import json
 import shutil
@@ -19,12 +20,12 @@ from bridges.system.directories import SERVICE_RUN, SERVICE_STATE, Directories, 
 UNIT: Final = "rmf-bridge@"
 
 RUNS: Final = ("active (running)", "activating (start)", "deactivating (stop-sigterm)")
-"""systemd's states of a unit with a running process."""
+"""The states in which systemd shows a unit whose process runs."""
 
 ASK_SYSTEMD_S: Final = 3.0
 
 WELL, FAULTY, DOWN, NONE = 0, 1, 2, 3
-"""Exit codes of monitoring plugins: OK, WARNING, CRITICAL, UNKNOWN."""
+"""The exit codes of monitoring plugins: OK, WARNING, CRITICAL, UNKNOWN."""
 
 LEVEL_OF: Final = {
     "serving": WELL,
@@ -45,7 +46,7 @@ class FaultStatus(msgspec.Struct):
 
 
 class DeviceStatus(msgspec.Struct):
-    """The keys of every device's status; further keys depend on the kind."""
+    """The keys that every device's status has. Further keys depend on the kind."""
 
     faults: list[FaultStatus] = []
     input_age_s: float | None = None
@@ -61,11 +62,12 @@ class StatusFile(msgspec.Struct):
 
 
 class DaemonStatus(msgspec.Struct, kw_only=True):
-    """One daemon, or a unit of systemd without a daemon.
+    """One daemon, or a systemd unit whose daemon does not run.
 
-    `state`: `serving`; `old`: it runs, but its status is not fresh; `died`: it left a status file
-    behind; `left on`: it died, and its outputs are not verified off; `failed`: systemd has given up;
-    `stopped`; `unknown`: this user may not see the daemon. `unit`: the unit's state in systemd.
+    `state`: `serving`; `old` if the daemon runs but its status is not fresh; `died` if it left a status
+    file behind; `left on` if it died and its outputs are not verified off; `failed` if systemd has
+    given up; `stopped`; `unknown` if this user may not see the daemon. `unit`: the unit's state in
+    systemd.
     """
 
     name: str
@@ -83,7 +85,7 @@ class DaemonStatus(msgspec.Struct, kw_only=True):
 
     @property
     def level(self) -> int:
-        """The exit code for this daemon."""
+        """The exit code of a monitoring plugin for this daemon."""
         level = LEVEL_OF[self.state]
         parts = (self.status, *self.devices.values())
         return max(level, FAULTY) if any(part.get("faults") for part in parts) else level
@@ -92,8 +94,8 @@ class DaemonStatus(msgspec.Struct, kw_only=True):
 def daemons(
     folders: Iterable[Path], found_units: Mapping[str, str], wall: float
 ) -> Iterator[DaemonStatus]:
-    """Yield the daemon of each runtime directory, then systemd's units without a directory. `wall`:
-    now."""
+    """Yield the daemon of each runtime directory, then the systemd units without a directory. `wall`:
+    the present time."""
     rest = dict(found_units)
     for folder in folders:
         service = folder.parent == SERVICE_RUN
@@ -127,7 +129,7 @@ def _daemon(folder: Path, by: str, unit: str, wall: float) -> DaemonStatus:
 
 
 def _unreleased(folder: Path) -> str:
-    """Return the remedy for the outputs that a dead daemon may have left on; "" without a record."""
+    """Return the remedy for outputs that a dead daemon may have left on; "" if it left no record."""
     state = SERVICE_STATE if folder.parent == SERVICE_RUN else state_base()
     for path in paths(Directories(folder, state / folder.name)):
         if record := read(path):
@@ -157,7 +159,7 @@ def _read(path: Path, wall: float) -> tuple[dict[str, Any], float | None]:
 
 
 def units() -> dict[str, str]:
-    """Return our units' states by instance, such as `active (running)`; empty without systemd."""
+    """Return our units' states, such as `active (running)`, by instance; empty without systemd."""
     if shutil.which("systemctl") is None:
         return {}
     ask = ("systemctl", "list-units", "--all", "--plain", "--output=json", f"{UNIT}*")

@@ -1,7 +1,8 @@
 """Switches off a dead daemon's outputs from a new process, for `rmf-bridge outputs-off`.
 
-The record that the daemon wrote before it claimed outputs takes precedence over the YAML, which may
-have been edited since. A directory that is full, missing or read-only does not delay switching off.
+The dead daemon wrote a record before it claimed outputs. The record takes precedence over the YAML,
+because somebody may have edited the YAML since. Switching off does not wait for a directory that is
+full, missing or read-only.
 """
 
 import argparse
@@ -28,7 +29,7 @@ TIMEOUT_S = 5.0
 
 
 def switch_off(args: argparse.Namespace) -> int:
-    """Return 0 if every output is verified off, 1 if not, 69 while the daemon lives or may live."""
+    """Return 0 if every output is verified off, 1 if not, and 69 if the daemon lives or may live."""
     log.start()
     signals.ignore()
     file = args.file.absolute()
@@ -51,7 +52,10 @@ def switch_off(args: argparse.Namespace) -> int:
         )
     except runtime.AlreadyRunning as error:
         if claimed:
-            logging.warning("%s. But the outputs of the run that ended are not off yet", error)
+            logging.warning(
+                "%s. The outputs of the run before are not off yet, so they are switched off now",
+                error,
+            )
             return _off_by_records(records, answered)
         logging.error("%s. The running program switches the outputs off", error)
         return os.EX_UNAVAILABLE
@@ -64,8 +68,8 @@ def switch_off(args: argparse.Namespace) -> int:
 
 
 def _places(file: Path, given: str | None) -> Directories | None:
-    """Return the daemon's directories; None if they are not trusted and systemd reports that the daemon
-    is dead.
+    """Return the daemon's directories. Return None if the directories are not trusted and systemd
+    reports that the daemon is dead.
 
     Raises PermissionError if the directories may hide a running daemon.
     """
@@ -73,7 +77,7 @@ def _places(file: Path, given: str | None) -> Directories | None:
         places = runtime.find(file, given)
         act_as_owner(places)
     except PermissionError as error:
-        if "SERVICE_RESULT" not in os.environ:  # systemd sets it for ExecStopPost
+        if "SERVICE_RESULT" not in os.environ:  # systemd sets this variable for ExecStopPost
             raise
         logging.error("%s; switching off the outputs of %s", error, file)
         return None
@@ -97,7 +101,8 @@ def _off_by_yaml(file: Path, answered: Mapping[str, float]) -> int:
 def _off_by_records(
     records: Records, answered: Mapping[str, float], names: list[str] | None = None
 ) -> int:
-    """Switch off the outputs of the records in `names`; of all records by default."""
+    """Switch off the outputs of the records in `names`. By default switch off the outputs of all
+    records."""
     found = [r for r in records.unreleased() if names is None or r.name in names]
     each_s = TIMEOUT_S / max(
         1, len(found)
@@ -111,7 +116,7 @@ def _off_by_record(
     try:
         config = record.config()
     except SettingsError as error:
-        _say(error)  # another version wrote the record, so only the current YAML is left to use
+        _say(error)  # another version wrote the record: only the current YAML can be used
         _off_by_yaml(Path(record.file), answered)
         return False
     unsafe = _unsafe(config, record.safe, answered, within_s)
@@ -140,8 +145,8 @@ class _StatusFile(msgspec.Struct):
 
 
 def ages(places: Directories) -> Mapping[str, float]:
-    """Return device -> age (s) of its last answer, from the dead daemon's last status; empty without a
-    status. Devices without an answer are left out."""
+    """Return the age (s) of each device's last answer, from the dead daemon's last status. Devices that
+    never answered are left out. Without a status the result is empty."""
     try:
         shown = msgspec.json.decode(read(places.runtime / STATUS, STATUS_MAX), type=_StatusFile)
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):

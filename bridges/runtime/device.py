@@ -1,7 +1,7 @@
-"""One device in service: its node scans the driver, and decides with its subject.
+"""One device in service. Its node scans the driver, and lets the device's subject decide.
 
-A scan is like a PLC's: read the inputs, decide, write every output, publish if due. The loop of the
-device's bus calls `scan`. No function in this file waits or has a thread.
+A scan is like a PLC's: read the inputs, decide, write every output, publish if a state is due. The loop
+of the device's bus calls `scan`. No function in this file waits or has a thread.
 """
 
 import logging
@@ -103,21 +103,22 @@ class Node(Generic[S, L, M, X, E, O, R]):
 
     @property
     def ready(self) -> bool:
-        """Has each input been read or timed out once, and is the first state published?"""
+        """Return whether each input has been read or has timed out once, and the first state is
+        published."""
         return self._pace.told_at > AGES_AGO
 
     @property
     def answers(self) -> bool:
-        """Did the last scan read every input and write every output?"""
+        """Return whether the last scan read every input and wrote every output."""
         return self._has_read and not self._io_fault
 
     def refuse(self, message: Message, refusal: RequestRefused) -> None:
-        """Count a refused message, and answer it. Called from any thread."""
+        """Count a refused message, and answer it. Any thread may call this."""
         self._refusals.add(refusal.kind, refusal.detail, device=self.name)
         self._answers.add(message, str(refusal))
 
     def was_suspended(self, for_s: float) -> None:
-        """Note that nothing was scanned for `for_s` (s), so earlier readings may be outdated."""
+        """Note that nothing was scanned for `for_s` (s), so that earlier readings may be outdated."""
         self._decide(Suspended(f"nothing was read for {for_s:.1f} s"))
 
     def scan(self, events: Iterable[DeviceEvent[X, E]] = ()) -> None:
@@ -140,7 +141,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._log()
 
     def make_safe(self) -> bool:
-        """Switch every output off; log and return False if they are not verified off."""
+        """Switch every output off. If the outputs are not verified off, log this and return False."""
         try:
             self._driver.make_safe()
         except DriverError as error:
@@ -187,7 +188,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
                 self._decide(kept)
 
     def _write(self) -> None:
-        """Write all outputs, as levels, in each scan, but write nothing before the first reading."""
+        """Write the levels of all outputs in each scan. Before the first reading write nothing."""
         if not self._has_read or self.subject.decision is None:
             return
         try:
@@ -232,7 +233,8 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self.wake_at = min(subject.wake_at, self._pace.due_at(news, at_once=bool(results)))
 
     def _answer(self) -> None:
-        """Publish the answers to refused requests, which give the reason and the device's holder."""
+        """Publish the answers to refused requests. An answer gives the reason and names the device's
+        holder."""
         self._answers.say(self._clock.monotonic(), self._answered, self._publish)
         self.wake_at = min(self.wake_at, self._answers.due_at)
 
@@ -267,7 +269,8 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return self._publish(topic, state) is not False
 
     def _log(self) -> None:
-        """Log changes. This is the last step of a scan, because a log line takes as long as a scan."""
+        """Log the changes. This is the last step of a scan, because writing a log line takes as long as
+        a scan."""
         decision = self.subject.decision
         assert decision is not None
         if decision.outputs != self._logged_outputs:
@@ -279,7 +282,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
             self._io_fault = ""
 
     def _failed(self, error: DriverError) -> str:
-        """Note a failed scan and log the loss of the device once; return the error's text."""
+        """Note a failed scan, and log the loss of the device once. Return the error's text."""
         if not self._io_fault:
             log.error(pairs("device_lost", device=self.name, reason=error))
         self._failing = True
@@ -288,9 +291,10 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return self._io_fault
 
     def _identity(self, fault: Fault) -> object:
-        """Return the fault, or only its code if the detail is a bus's error text, which varies."""
+        """Return the fault. If its detail is a bus's error text, which varies, return only the fault's
+        code."""
         return fault.code if fault.detail in ("", *self._bus_words) else fault
 
 
 AnyNode = Node[Any, Any, Any, Any, Any, Any, Any]
-"""A node whose kind was found by its name; its types are unknown."""
+"""A node whose kind was found by its name, so its types are unknown."""

@@ -1,13 +1,13 @@
 """A daemon's diagnostics for ROS's `/diagnostics`, made from its status file.
 
-There is one status for the daemon and one for each device (for a supervisor: each lift or door).
-`name` is `<node>: <device>`, as ROS's aggregator expects; `hardware_id` is the device's name; `message`
+There is one status for the daemon and one for each device (for a supervisor: for each lift or door).
+`name` is `<node>: <device>`, as ROS's aggregator expects. `hardware_id` is the device's name. `message`
 names the faults. The values come from the status file; the detail of a fault is under the fault's code.
-LiftState, DoorState and ChargerState have no fields for faults.
+Faults go out here because LiftState, DoorState and ChargerState have no fields for them.
 
     OK      the input is read, and there is no fault
     WARN    the daemon is a simulation, or still only listens in its quiet start
-    ERROR   the device or the daemon has faults; it is a fault of the daemon if it cannot publish, or if
+    ERROR   the device or the daemon has faults; the daemon has a fault if it cannot publish, or if
             another node does its work
     STALE   the device's input has not been read yet
 """
@@ -30,9 +30,10 @@ from bridges.runtime.subject import Status
 from bridges.system.log import plain
 
 MOST: Final = 100
-"""The most devices in a message, because the network may flood a supervisor with names."""
+"""The greatest number of devices in a message. The network may flood a supervisor with names."""
 CONTACTS: Final = "contacts"
-"""This key is only in the status file, because contacts would be most of the traffic on the graph."""
+"""A key that stays in the status file and is not sent, because contacts would be most of the traffic on
+the graph."""
 
 
 def diagnosis(
@@ -72,8 +73,8 @@ def _values(status: Status) -> tuple[KeyValue, ...]:
 
 
 def _pairs(status: Status) -> Iterator[tuple[str, str]]:
-    """Yield the status as (key, value), with a pair for each fault (code, detail) and each table
-    entry."""
+    """Yield the status as pairs of key and value. Each fault gives a pair of code and detail, and each
+    entry of a table gives a pair."""
     for key, value in status.items():
         if key in (CONTACTS, COUNTS):
             continue

@@ -1,7 +1,9 @@
-"""A service's drop-in: the systemd settings for its YAML, beside the unit common to all services.
+"""A service's drop-in. All services share one systemd unit, and the drop-in adds the settings for one
+service's YAML.
 
-`rmf-bridge enable` writes it. The unit alone permits no device. `run` refuses a drop-in for other
-needs, because a daemon that may not open its relay could only report this each second.
+`rmf-bridge enable` writes the drop-in. The unit alone permits access to no device. `run` refuses to
+start if the drop-in was written for other needs than the YAML's: a daemon that may not open its relay
+could only report this each second.
 """
 
 import hashlib
@@ -16,7 +18,7 @@ from bridges.transports.zenoh.config import mode
 from drivers.hal import Needs
 
 FITS: Final = "RMF_BRIDGE_FITS"
-"""The environment variable with the result of `fits` from the drop-in; the unit sets it to
+"""The environment variable in which the drop-in gives the result of `fits`. The unit itself sets it to
 `nothing`."""
 ROUND_S: Final = 1.25
 LEAST_S: Final = 3.0
@@ -25,8 +27,8 @@ LOCAL: Final = ("localhost", "multicast")
 
 
 def text(config: Config, groups: Collection[str]) -> str:
-    """Return the drop-in's text. `groups`: the machine's groups; a unit with an unknown group does not
-    start."""
+    """Return the drop-in's text. `groups`: the machine's groups. The text names no other group, because
+    a unit with an unknown group does not start."""
     head = (
         f"# Written by `rmf-bridge enable` for {config.path.name}. After a change enable it again."
     )
@@ -35,13 +37,13 @@ def text(config: Config, groups: Collection[str]) -> str:
 
 
 def fits(config: Config) -> str:
-    """Return a hash of this file's needs; equal needs have equal hashes."""
+    """Return a hash of this file's needs. Equal needs have equal hashes."""
     needs = "\n".join([*_unit(config), *_service(config, GROUPS)])
     return hashlib.sha256(needs.encode()).hexdigest()[:16]
 
 
 def misfit(config: Config, environ: Mapping[str, str]) -> str:
-    """Return the error if our unit has no drop-in for this file's needs; "" if it fits."""
+    """Return the error if our unit has no drop-in for this file's needs; "" if the drop-in fits."""
     met = environ.get(FITS, "")
     if met in ("", fits(config)):  # "": no unit of ours started this process
         return ""
@@ -50,18 +52,19 @@ def misfit(config: Config, environ: Mapping[str, str]) -> str:
 
 
 def watchdog_s(config: Config) -> float:
-    """Return the longest time (s) for which a hung daemon keeps its relays on.
+    """Return the longest time (s) for which a daemon that hangs keeps its relays on.
 
-    A loop finishes a step each second, when its states are due, or one bus call later. A call may take
-    at most half of this time. Without outputs the time is longer, because a slow disk may delay a step.
+    A loop finishes a step each second, when its states are due, or one bus call later. A bus call may
+    take at most half of this time. For a daemon without outputs the time is longer, because a slow disk
+    may delay a step.
     """
     slowest = max((getattr(bus, "timeout_s", 0.0) for bus in config.buses.values()), default=0.0)
     return max(LEAST_S, 1.75 * slowest + ROUND_S) if config.buses else WITHOUT_OUTPUTS_S
 
 
 def _unit(config: Config) -> list[str]:
-    """Return the lines that load kernel modules before the unit starts, because DeviceAllow needs known
-    device classes."""
+    """Return the lines that load kernel modules before the unit starts. DeviceAllow permits a device
+    class only after its module is loaded."""
     units = " ".join(
         f"modprobe@{name}.service" for name in _each(n.modules for n in _needs(config))
     )
@@ -93,17 +96,17 @@ def _each(found: Iterable[Iterable[str]]) -> list[str]:
 
 
 def _hosts(rmf: Rmf, needs: Iterable[Needs]) -> list[str] | None:
-    """Return the addresses that the daemon talks to; None if an address is unknown before the daemon
-    runs.
+    """Return the addresses that the daemon talks to. Return None if an address is unknown before the
+    daemon runs.
 
-    The nodes of a DDS site, the peers of a zenoh peer, and the addresses of host names are unknown.
+    Unknown are the nodes of a DDS site, the peers of a zenoh peer, and the addresses of host names.
     """
     hosts = [*_graph_hosts(rmf), *_each([n.host] for n in needs)]
     return None if not all(map(_is_address, hosts)) else _each([LOCAL, hosts])
 
 
 def _graph_hosts(rmf: Rmf) -> list[str]:
-    """Return the hosts of the other nodes. A host name or "*" stands for any address."""
+    """Return the hosts of the other nodes. A host name or "*" means any address."""
     if rmf.network == "localhost":
         return []
     zenoh = rmf.zenoh or Zenoh()

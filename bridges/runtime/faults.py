@@ -1,4 +1,4 @@
-"""Causes and remedies of faults, from faults.yaml, for `status` and docs/reference/faults.md.
+"""The causes and remedies of faults, from faults.yaml, for `status` and docs/reference/faults.md.
 
 `python -m bridges.runtime.faults > docs/reference/faults.md` writes the page.
 """
@@ -34,14 +34,14 @@ class Remedy(msgspec.Struct, frozen=True):
 
 
 def remedies() -> dict[str, Remedy]:
-    """Return fault code -> remedy."""
+    """Return the remedy for each fault code."""
     text = Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
     return msgspec.convert(yaml.safe_load(text), dict[str, Remedy])
 
 
 def values(file: str, device: str) -> dict[str, str]:
-    """Return a device's settings, key -> value, from the daemon's YAML; empty if the YAML is
-    invalid."""
+    """Return the values of a device's settings, by key, from the daemon's YAML. Return an empty table
+    if the YAML is invalid."""
     from bridges.settings.load import SettingsError, load
 
     try:
@@ -58,7 +58,8 @@ def values(file: str, device: str) -> dict[str, str]:
 
 
 def here(remedy: Remedy, file: str, device: str, known: Mapping[str, str]) -> Remedy:
-    """Return the remedy with this device's name, file and settings in place of FILE, NAME and keys."""
+    """Return the remedy with the words FILE and NAME and the names of settings replaced by this
+    device's own file, name and values."""
     names = {"FILE": shlex.quote(file)} if file else {}
     names |= (
         dict.fromkeys(("NAME", "LIFT", "DOOR", "CHARGER"), shlex.quote(device)) if device else {}
@@ -73,7 +74,7 @@ def here(remedy: Remedy, file: str, device: str, known: Mapping[str, str]) -> Re
 
 @cache
 def for_explain() -> dict[str, tuple[str, str]]:
-    """Return fault code -> (cause, remedy), for `workbench/explain/`."""
+    """Return the cause and the remedy for each fault code, for `workbench/explain/`."""
     return {code: (one.cause, one.do) for code, one in remedies().items()}
 
 

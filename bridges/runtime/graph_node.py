@@ -1,7 +1,9 @@
-"""Serves a kind without hardware, with a core memory for each subject and publishers on RMF's graph.
+"""Serves a kind without hardware. The node keeps a core memory for each subject, and publishes on RMF's
+graph.
 
-A round takes the arrived messages, wakes the subjects that are due and publishes their messages.
-Tests call rounds in virtual time; the daemon has a thread for them (`bridges/runtime/serving.py`).
+A round takes the messages that have arrived, wakes the subjects that are due, and publishes their
+messages. Tests call rounds in virtual time; the daemon calls them in a thread
+(`bridges/runtime/serving.py`).
 """
 
 import logging
@@ -31,19 +33,20 @@ from bridges.transports.transport import Subscription, Transport
 log = logging.getLogger(__name__)
 
 MAX_SUBJECTS = 1000
-"""No site has more lifts or doors, so further names must be invented."""
+"""The greatest number of subjects. No site has more lifts or doors, so further names must be
+invented."""
 MAX_UNSHOWN = 100
-"""The most lifts or doors that are known only from requests, without a published state."""
+"""The greatest number of lifts or doors that only requests name and that publish no state."""
 MAX_REQUESTERS = 10_000
-"""The most requesters of all lifts or doors that are not in the YAML: more than any site has robots.
-A holder is never forgotten, so invented requesters would accumulate.
-"""
+"""The greatest number of requesters of all lifts or doors that the YAML does not name. No site has as
+many robots. The number is bounded because a holder is never forgotten, so invented requesters would
+accumulate."""
 DEFECT = "a defect"
 
 
 def _core(kind: GraphKind[S, L, M, E, R], limits: L) -> SubjectCore[M, GraphEvent[E], None, R]:
-    """Return the kind's core. Code and detail identify a fault, because the detail names the
-    subject."""
+    """Return the kind's core. Two faults are the same if their code and detail are equal, because the
+    detail names the subject."""
 
     def itself(fault: Fault) -> Fault:
         return fault
@@ -61,7 +64,8 @@ def _same(topic: Topic[Message]) -> Topic[Message]:
 
 
 class GraphNode(Generic[S, L, M, E, R]):
-    """Serves one GraphKind. `named(topic)`: the topic under its name in the site's YAML."""
+    """The node that serves one GraphKind. `named(topic)`: the topic under its name in the site's
+    YAML."""
 
     def __init__(
         self,
@@ -102,7 +106,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._add(name, memory)
 
     def subscribe(self) -> None:
-        """Subscribe to every topic; retained messages arrive at once."""
+        """Subscribe to every topic. Retained messages arrive at once."""
         self.presence.listen(self._transport, map(self._named, self._kind.sole))
         if self.alone:
             self.alone.listen(self._transport, map(self._named, self._kind.yields))
@@ -114,18 +118,19 @@ class GraphNode(Generic[S, L, M, E, R]):
             )
 
     def reset(self) -> None:
-        """Clear latched faults on an operator's order; from any thread."""
+        """Clear latched faults at an operator's order. Any thread may call this."""
         self._reset = True
         self.inbox.wake()
 
     @property
     def finished(self) -> int:
-        """Always 0, because steps within a round are not counted."""
+        """The number 0, always, because steps within a round are not counted."""
         return 0
 
     @property
     def ready(self) -> bool:
-        """Always true: a passive node is ready too, because another node does its work."""
+        """True, always. A node that must not publish is ready too, because another node does its
+        work."""
         return True
 
     @property
@@ -137,7 +142,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         return min(*looks, self._keeper.wake_at, answers_at, *due)
 
     def round(self) -> None:
-        """Take the arrived messages, wake the subjects that are due, publish."""
+        """Take the messages that have arrived, wake the subjects that are due, and publish."""
         self._look_around()
         for name, events in self.inbox.take().items():
             for topic, event in events:
@@ -180,11 +185,12 @@ class GraphNode(Generic[S, L, M, E, R]):
         return *self.presence.faults, *self._outlet.faults, *self._keeper.faults
 
     def devices(self) -> Mapping[str, Status]:
-        """Return each subject's status by name, for the status file; from any thread."""
+        """Return each subject's status by name, for the status file. Any thread may call this."""
         return {subject.name: subject.status() for subject in list(self.subjects.values())}
 
     def _to_inbox(self, topic: Topic[Message]) -> Callable[[Message], None]:
-        """Return a callback for the transport's thread, which puts accepted messages into the inbox."""
+        """Return a callback for the transport's thread. The callback puts accepted messages into the
+        inbox."""
 
         heard_on = self._named(topic).name
 
@@ -199,8 +205,8 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     @contextmanager
     def _counting(self, about: str, message: object = None) -> Iterator[None]:
-        """Count refusals, and failures that a defect of ours causes. A core that fails has changed
-        nothing."""
+        """Count refusals, and also failures that a defect of ours causes. The memory of a core that
+        fails stays unchanged."""
         try:
             yield
         except RequestRefused as refusal:
@@ -213,7 +219,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._refusals.add(DEFECT, f"{type(error).__name__} about {about}")
 
     def _look_around(self) -> None:
-        """Declare our publishers while we may speak; else withdraw them."""
+        """Declare our publishers if we may publish; else withdraw them."""
         for look in filter(None, (self.presence, self.alone)):
             look.look(self._clock.monotonic())
         may = self._may_speak()
@@ -235,13 +241,14 @@ class GraphNode(Generic[S, L, M, E, R]):
         return MaySpeak(presence.may_speak, self._must_at_once(), alone, presence.waits)
 
     def _must_at_once(self) -> bool:
-        """Is there no rival, and a subject too urgent to wait for the end of the quiet start?"""
+        """Return whether a subject is too urgent to wait for the end of the quiet start, and no rival
+        is present."""
         if self.presence.may_speak or self.presence.rivals:
             return False
         return any(self._kind.urgent(subject.memory) for subject in self.subjects.values())
 
     def _heard_by(self) -> dict[str, int]:
-        """Return topic's name -> number of subscriptions that receive it."""
+        """Return, by the topic's name, the number of subscriptions that receive each topic."""
         names = {topic.name for topic in self._kind.publishes}
         return {name: n for name, n in self._outlet.heard_by().items() if name in names}
 
@@ -263,8 +270,8 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._decide(subject, event)
 
     def _subject(self, name: str, shows_itself: bool) -> Subject[M, GraphEvent[E], None, R]:
-        """Return the subject with this name; make it if it is new. Raises RequestRefused for too many
-        names."""
+        """Return the subject with this name, and make it if it is new. Raises RequestRefused if there
+        are too many names."""
         if name not in self.subjects and not self._has_room(name, shows_itself):
             raise RequestRefused("too many names", name)
         if shows_itself:
@@ -273,8 +280,8 @@ class GraphNode(Generic[S, L, M, E, R]):
         return found or self._add(name, self._kind.initial(name, self._started_at))
 
     def _has_room(self, name: str, shows_itself: bool) -> bool:
-        """Is there room for this name? Invented names must not displace names that the YAML or a state
-        proves."""
+        """Return whether there is room for this name. Invented names must not displace names that the YAML
+        lists or that publish states."""
         if name in self._reserved:
             return True
         if shows_itself:
@@ -282,21 +289,21 @@ class GraphNode(Generic[S, L, M, E, R]):
         return len(self.subjects) - len(self._shown) < MAX_UNSHOWN
 
     def _require_room(self, subject: Subject[M, GraphEvent[E], None, R], who: str) -> None:
-        """Raise RequestRefused for a new requester beyond MAX_REQUESTERS."""
+        """Raise RequestRefused for a new requester if MAX_REQUESTERS are already remembered."""
         full = who and self._requesters >= MAX_REQUESTERS and subject.name not in self._reserved
         if full and who not in self._kind.requesters(subject.memory):
             raise RequestRefused("too many requesters", f"{who} at {subject.name}")
 
     def _remembered(self, subject: Subject[M, GraphEvent[E], None, R]) -> int:
-        """Return the number of remembered requesters; 0 for a subject in the YAML, whose core bounds
-        the number."""
+        """Return the number of remembered requesters. For a subject in the YAML the number counts as 0,
+        because its core bounds the number."""
         if subject.name in self._reserved:
             return 0
         return len(self._kind.requesters(subject.memory))
 
     def _real(self, memories: Mapping[str, M]) -> Mapping[str, M]:
-        """Leave out names without a published state if they are a flood, so that the flood does not
-        return at the next start."""
+        """Leave out names without a published state if they are a flood, so that the next start does
+        not restore the flood."""
         if len(memories) - len(self._shown) < MAX_UNSHOWN:
             return memories
         real = self._shown | self._reserved
@@ -324,7 +331,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._decide(subject, event)
 
     def _will_say(self, topic: Topic[Message], message: Message) -> None:
-        """Defer the message until the round has written the memories to disk."""
+        """Keep the message back until the round has written the memories to disk."""
         self._unsaid.append((topic, message))
 
     def _say(self) -> None:
@@ -333,7 +340,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._publish(topic, message)
 
     def _publish(self, topic: Topic[Message], message: Message) -> None:
-        """Publish a message, stamped now."""
+        """Publish a message with the present time as its stamp."""
         try:
             stamped = self._kind.stamped(message, stamp(self._clock.wall()))
         except ClockError as error:
@@ -343,4 +350,4 @@ class GraphNode(Generic[S, L, M, E, R]):
 
 
 AnyGraphNode = GraphNode[Any, Any, Any, Any, Any]
-"""A node whose kind was found by its name; its types are unknown."""
+"""A node whose kind was found by its name, so its types are unknown."""

@@ -1,9 +1,9 @@
-"""The guard of a daemon started by hand: switches off the outputs that a kill -9 leaves on.
+"""The guard of a daemon started by hand. It switches off the outputs that a kill -9 leaves on.
 
-The guard is a shell, because it only waits. It has its own session, which neither Ctrl-C nor a closed
-terminal reaches. It reads a pipe whose other end only the daemon has open. A word from the pipe means
-that the outputs are off; the end of the pipe without a word means that the daemon is dead. Under
-systemd, ExecStopPost takes the guard's place.
+The guard is a shell, because it only waits. It has a session of its own, which neither Ctrl-C nor a
+closed terminal reaches. It reads a pipe whose other end only the daemon has open. A word from the pipe
+means that the outputs are off. If the pipe ends without a word, the daemon is dead. Under systemd,
+ExecStopPost takes the guard's place.
 """
 
 import logging
@@ -33,9 +33,10 @@ while [ $pause -le 60 ]; do
     esac
 done
 """
-"""After exit code 1 (hardware does not answer) `outputs-off` is repeated for minutes with growing
-pauses, because nobody restarts this daemon. After EX_UNAVAILABLE it is repeated once: either the dead
-daemon's lock was not free yet, or another daemon serves now and switches the outputs off."""
+"""The shell's program. After exit code 1 (hardware does not answer) it repeats `outputs-off` for
+minutes with growing pauses, because nobody restarts this daemon. After EX_UNAVAILABLE it repeats
+`outputs-off` once: either the dead daemon's lock was not free yet, or another daemon serves now and
+switches the outputs off."""
 
 
 def command(file: Path, runtime_dir: str | None) -> list[str]:
@@ -45,7 +46,7 @@ def command(file: Path, runtime_dir: str | None) -> list[str]:
 
 
 class Guard:
-    """The running guard. `command`: the command that switches every output off."""
+    """The guard, while it runs. `command`: the command that switches every output off."""
 
     def __init__(self, command: Sequence[str]) -> None:
         self._shell: subprocess.Popen[bytes] | None = None
@@ -59,7 +60,7 @@ class Guard:
             log.warning(pairs("no_guard", reason=error))
 
     def dismiss(self) -> None:
-        """End the guard, as the outputs are off."""
+        """End the guard, because the outputs are off."""
         if self._shell is None or self._shell.stdin is None:
             return
         with suppress(OSError):
@@ -69,10 +70,10 @@ class Guard:
 
 
 UNIT = ("NOTIFY_SOCKET", "RUNTIME_DIRECTORY", "RMF_BRIDGE_SERVICE")
-"""Variables that only a unit sets. (INVOCATION_ID is missing here: a desktop's terminals have it
+"""Variables that only a unit sets. (INVOCATION_ID is left out, because a desktop's terminals have it
 too.)"""
 
 
 def needed(environ: Mapping[str, str] = os.environ) -> bool:
-    """Does this daemon need a guard, because no unit runs `outputs-off` for it?"""
+    """Return whether this daemon needs a guard. It does if no unit runs `outputs-off` for it."""
     return not any(environ.get(name) for name in UNIT)

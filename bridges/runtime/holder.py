@@ -1,6 +1,6 @@
-"""The holder of a daemon's directory: the process named in `holder.json`, while that process lives.
+"""The holder of a daemon's directory: the process that `holder.json` names, if that process lives.
 
-To look for the holder takes no lock and hinders no process, but gives no right to the directory; only
+Looking for the holder takes no lock and hinders no process, but gives no right to the directory. Only
 the lock gives that right (`runtime_directory.py`).
 """
 
@@ -18,17 +18,17 @@ from bridges.system.files import read
 HOLDER: Final = "holder.json"
 STATUS: Final = "status.json"
 FRESH_S: Final = 5.0
-"""A status file is fresh for this long. It is written each second."""
+"""The age (s) up to which a status file is fresh. The file is written each second."""
 LONGEST: Final = 65536
 STATUS_MAX: Final = 4 << 20
 BOOT: Final = Path("/proc/sys/kernel/random/boot_id")
 
 
 class LockHolder(msgspec.Struct, frozen=True):
-    """A process and its YAML's path. `serves`: it is a daemon that serves this YAML.
+    """A process and the path of its YAML. `serves`: the process is a daemon that serves this YAML.
 
-    `boot`: the id of the boot in which `pid` is valid; `started`: the process's start in ticks since
-    boot, 0 if unknown. Both show whether the kernel has given `pid` to another process.
+    `boot`: the id of the boot in which `pid` is valid. `started`: the start of the process, in ticks
+    since boot, 0 if unknown. Both show whether the kernel has given `pid` to another process since.
     """
 
     pid: int
@@ -42,8 +42,9 @@ class LockHolder(msgspec.Struct, frozen=True):
 
     @property
     def lives(self) -> bool:
-        """Is the process still there? Its start must be the same, unless /proc hides it because the
-        process is another user's."""
+        """Return whether the process is still alive. A process with another start time is another
+        process. If /proc hides the start time, because the process belongs to another user, it is
+        not compared."""
         if self.boot != _boot() or not _is_there(self.pid):
             return False
         return _started(self.pid) in (self.started, 0)
@@ -62,17 +63,16 @@ def ourselves(file: Path, *, serves: bool) -> LockHolder:
 
 
 def look(places: Directories) -> LockHolder | None:
-    """Return the living holder of these directories, or None without a holder. Raises PermissionError.
+    """Return the living holder of these directories, or None if there is none. Raises PermissionError.
 
-    The runtime directory comes first, because on a read-only root the state directory names an old
-    holder.
+    The runtime directory comes first. On a read-only root the state directory names an old holder.
     """
     found = (written(folder) for folder in reversed(places.folders))
     return next((one for one in found if one and one.lives), None) or shown(places)
 
 
 def written(folder: Path) -> LockHolder | None:
-    """Return the last holder written in a directory, living or not. Raises PermissionError."""
+    """Return the last holder that a directory names, living or not. Raises PermissionError."""
     try:
         with opened(folder):
             return msgspec.json.decode(read(folder / HOLDER, LONGEST), type=LockHolder)
@@ -85,8 +85,8 @@ def written(folder: Path) -> LockHolder | None:
 
 
 def shown(places: Directories) -> LockHolder | None:
-    """Return the living daemon that a fresh status file names, or None. A daemon has no `holder.json`
-    if it could not write the file or is of an older version."""
+    """Return the living daemon that a fresh status file names, or None. This finds a daemon without a
+    `holder.json`: it could not write the file, or is of an older version."""
     path = places.runtime / STATUS
     with suppress(OSError, msgspec.MsgspecError, UnicodeDecodeError), opened(places.runtime):
         fresh = abs(time.time() - path.lstat().st_mtime) < FRESH_S
@@ -107,7 +107,8 @@ def _is_there(pid: int) -> bool:
 
 
 def _started(pid: int) -> int:
-    """Return a process's start (ticks since boot); 0 if hidden from this user, -1 for a zombie."""
+    """Return a process's start (ticks since boot). Return 0 if this user may not see it, and -1 for a
+    zombie."""
     try:
         told = Path(f"/proc/{pid}/stat").read_text("utf-8", "replace").rpartition(")")[2].split()
     except OSError:

@@ -1,4 +1,5 @@
-"""The inbox of one thread: waiting events for its devices or subjects, and a bell that wakes it."""
+"""The inbox of one thread. It holds the events that wait for the thread's devices or subjects, and a
+bell that wakes the thread."""
 
 import queue
 import threading
@@ -6,19 +7,21 @@ from collections.abc import Hashable
 from typing import Generic, TypeVar
 
 INBOX_SIZE = 512
-"""The most events for one device between two scans. In a flood the oldest are dropped and counted."""
+"""The greatest number of events for one device between two scans. In a flood the oldest events are
+dropped and counted."""
 
 MOST_NAMES = 2000
-"""No site has more devices, so events for further names are dropped: such names must be invented."""
+"""The greatest number of names with events. No site has more devices, so further names must be
+invented, and their events are dropped."""
 
 T = TypeVar("T")
 
 
 class Inbox(Generic[T]):
-    """An inbox: any thread puts events, and the serving thread takes them.
+    """An inbox. Any thread puts events into it, and the serving thread takes them out.
 
-    A new event replaces a waiting event with the same `key`, because a request is a level, not a pulse.
-    So a flood of repeats costs a scan no more than one event. Events stay in order of arrival.
+    A new event replaces a waiting event with the same `key`, because a request states a level, not a
+    pulse. So a flood of repeats costs a scan no more than one event. Events stay in order of arrival.
     """
 
     def __init__(self) -> None:
@@ -44,13 +47,13 @@ class Inbox(Generic[T]):
         self.wake()
 
     def wake(self) -> None:
-        """Wake the thread without an event; do nothing if the bell already rings."""
+        """Wake the thread without an event. Do nothing if the bell already rings."""
         if not self._rung:
             self._rung = True
             self._bell.put(None)
 
     def close(self) -> None:
-        """Ask the thread to end; the current round ends early if it can."""
+        """Ask the thread to end. The current round ends early if it can."""
         self.closed = True
         self.wake()
 

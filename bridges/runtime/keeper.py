@@ -1,7 +1,7 @@
 """The memory on disk of a kind without hardware, and the message about all its subjects.
 
 The memory is written before messages are published, because other nodes act on these messages. If
-writing fails, the kind continues to serve with the fault NOT_KEPT, and writing is retried each second.
+writing fails, the kind goes on serving with the fault NOT_KEPT, and tries to write again each second.
 """
 
 import logging
@@ -23,7 +23,7 @@ NOT_KEPT: Final = "NOT_KEPT"
 
 
 class MemoryStore(Protocol):
-    """A file that outlives the daemon. `read` returns None before the first `write`; `write` replaces
+    """A file that outlives the daemon. `read` returns None before the first `write`. `write` replaces
     the whole file. Both may raise OSError."""
 
     def read(self) -> bytes | None: ...
@@ -32,7 +32,8 @@ class MemoryStore(Protocol):
 
 
 class Keeper(Generic[S, L, M, E, R]):
-    """The keeper of one node. `kept`: the store, or None. `tell_at`: the next time to publish."""
+    """The keeper of one node's memory. `kept`: the store, or None. `tell_at`: the next time to
+    publish."""
 
     def __init__(
         self, kind: GraphKind[S, L, M, E, R], kept: MemoryStore | None, publish: Publish
@@ -47,7 +48,7 @@ class Keeper(Generic[S, L, M, E, R]):
         self._pace = PublishPace()
 
     def restore(self, settings: S, now: float) -> Mapping[str, M]:
-        """Return subject -> memory, from disk; log and ignore an invalid file."""
+        """Return the memory of each subject from disk. An invalid file is logged and ignored."""
         if self._kept is None or self._kind.restore is None:
             return {}
         try:
@@ -66,7 +67,7 @@ class Keeper(Generic[S, L, M, E, R]):
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """NOT_KEPT while the latest memories are not on disk."""
+        """The fault NOT_KEPT if the latest memories are not on disk."""
         return (self._fault,) if self._fault else ()
 
     def keep(self, memories: Mapping[str, M], now: float) -> None:
@@ -101,7 +102,7 @@ class Keeper(Generic[S, L, M, E, R]):
         self._fault = None
 
     def tell(self, memories: Mapping[str, M], now: float, may_speak: bool) -> None:
-        """Publish the message about all subjects if it is due."""
+        """Publish the message about all subjects, if the message is due."""
         if self._kind.together is None or not may_speak:
             self.tell_at = NEVER
             return

@@ -1,9 +1,9 @@
 """Two marks that a run of a service leaves for the `outputs-off` that follows the run.
 
-The mark `claimed` says that the run was about to claim outputs; `outputs-off` switches these off
-whichever process has the lock. The last mark, `all-off`, says that every output was verified off, so
-`outputs-off` has nothing to do. A mark holds its run's INVOCATION_ID (systemd.exec(5)); marks of older
-runs and unreadable marks are ignored.
+The mark `claimed` says that the run was about to claim outputs. `outputs-off` then switches these
+outputs off, whichever process has the lock. The mark `all-off` says that every output was verified off,
+so that `outputs-off` has nothing to do. A mark holds the INVOCATION_ID of its run (systemd.exec(5)).
+Marks of older runs and unreadable marks are ignored.
 """
 
 import os
@@ -16,7 +16,7 @@ LONGEST: Final = 64
 
 
 def leave(environ: Mapping[str, str] = os.environ, name: str = MARK) -> None:
-    """Leave a mark, if a unit of systemd started us. Raises OSError."""
+    """Leave a mark, if a systemd unit started us. Raises OSError."""
     if path := _path(environ, name):
         mark = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o640)
         try:
@@ -26,12 +26,12 @@ def leave(environ: Mapping[str, str] = os.environ, name: str = MARK) -> None:
 
 
 def says_off(environ: Mapping[str, str]) -> bool:
-    """Did the service before this process stop well and leave the mark `all-off`?"""
+    """Return whether the service's last run stopped well and left the mark `all-off`."""
     return environ.get("SERVICE_RESULT") == "success" and _is_left(environ, MARK)
 
 
 def says_claimed(environ: Mapping[str, str]) -> bool:
-    """Did the service before this process leave the mark `claimed`?"""
+    """Return whether the service's last run left the mark `claimed`."""
     return bool(environ.get("SERVICE_RESULT")) and _is_left(environ, CLAIMED)
 
 

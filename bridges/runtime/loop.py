@@ -1,11 +1,11 @@
 """The loop: one bus and the devices on it.
 
-RMF callbacks put events into the inbox, and GPIO edges wake the loop. A round scans each device that is
-due, has events, or may have changed: first the devices that answered last time, then the other devices,
-the longest overdue first. A round ends after one silent device, so a live device's reading is never
-older than its period plus one silent device's timeout, even in the first rounds. A device that falls
-silent also costs its retries, once. When the loop ends, for any cause, it switches every output off,
-beginning with the devices that answer.
+RMF's callbacks put events into the inbox, and GPIO edges wake the loop. A round scans each device that
+is due, has events, or may have changed. First come the devices that answered last time, then the other
+devices, the longest overdue first. A round ends after one silent device. So a live device's reading is
+never older than its period plus one silent device's timeout, even in the first rounds. When a device
+falls silent, the loop also loses the time of the device's retries, once. When the loop ends, for any
+cause, it switches every output off, beginning with the devices that answer.
 """
 
 import logging
@@ -23,11 +23,11 @@ from drivers.hal import Bus
 log = logging.getLogger(__name__)
 
 SUSPENDED_S = 0.5
-"""A loop that wakes this late (s) without waiting for its bus was suspended."""
+"""The delay (s) after which a loop was suspended, if it woke so late without waiting for its bus."""
 
 
 class Loop:
-    """Scans each node of one bus every `scan_s` (s), and at the node's `wake_at`."""
+    """The loop of one bus. It scans each node every `scan_s` (s), and at the node's `wake_at`."""
 
     def __init__(
         self,
@@ -59,12 +59,12 @@ class Loop:
 
     @property
     def finished(self) -> int:
-        """The number of finished scans and bus calls so far, failed calls included."""
+        """The number of finished scans and bus calls. Failed calls count too."""
         return self._scans + self._bus.calls
 
     @property
     def ready(self) -> bool:
-        """Has every device been tried once and published its first state?"""
+        """Return whether every device has been tried once and has published its first state."""
         return all(node.ready for node in self.nodes)
 
     def round(self) -> None:
@@ -79,7 +79,7 @@ class Loop:
         self._ran_at = self._clock.monotonic()
 
     def end(self) -> bool:
-        """Switch every output off and release the bus; return False if an output is not verified
+        """Switch every output off and release the bus. Return False if an output is not verified
         off."""
         self._bus.insist()
         safe = [node.make_safe() for node in self._in_turn()]
@@ -90,7 +90,8 @@ class Loop:
         return all(safe)
 
     def _notice_suspension(self) -> None:
-        """Tell every node if the process was stopped or the machine slept while the loop was idle."""
+        """Tell every node if the process was stopped or the machine slept during the loop's idle
+        time."""
         late_s = self._clock.monotonic() - max(self.wake_at, self._ran_at)
         if late_s > SUSPENDED_S:
             log.warning(pairs("suspended", bus=self._bus_name, for_s=f"{late_s:.1f}"))
@@ -98,7 +99,7 @@ class Loop:
                 node.was_suspended(late_s)
 
     def _scan_in_turn(self, asked: Collection[str]) -> None:
-        """Scan the devices that are due or in `asked`, up to the first silent device."""
+        """Scan the devices that are due or in `asked`. Stop after the first silent device."""
         for node in self._in_turn():
             if self.inbox.closed:
                 return
@@ -109,8 +110,8 @@ class Loop:
                     return
 
     def _in_turn(self) -> list[AnyNode]:
-        """Return first the nodes that answer, in the YAML's order, then the other nodes, longest
-        overdue first."""
+        """Return the nodes in their order: first the nodes that answer, in the YAML's order, then the
+        other nodes, the longest overdue first."""
         others = [node for node in self.nodes if not node.answers]
         others.sort(key=lambda node: self._due[node.name])
         return [node for node in self.nodes if node.answers] + others
@@ -130,7 +131,8 @@ class Loop:
         self.inbox.wake()
 
     def _take_edge(self) -> None:
-        """Make every device due after an edge. An edge during a round causes the next round."""
+        """Make every device due after an edge. If the edge comes during a round, the next round scans
+        the devices."""
         if self._edge:
             self._edge = False
             self._due = dict.fromkeys(self._due, AGES_AGO)

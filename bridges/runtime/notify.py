@@ -23,8 +23,8 @@ def notify(state: str, environ: Mapping[str, str] = os.environ) -> None:
 
 
 def watchdog_s(environ: Mapping[str, str] = os.environ) -> float | None:
-    """Return the longest time (s) that systemd allows between two WATCHDOG=1; None without a
-    watchdog."""
+    """Return the longest time (s) that systemd allows between two WATCHDOG=1; None if systemd has no
+    watchdog for this process."""
     usec = environ.get("WATCHDOG_USEC", "")
     ours = environ.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
     return int(usec) / 1e6 if usec.isdigit() and ours else None

@@ -21,7 +21,7 @@ Named = Callable[[Topic[Message]], Topic[Message]]
 
 
 class Outlet:
-    """Publishers that are declared while their node may speak.
+    """A node's publishers. They are declared as long as their node may publish.
 
     `bridges/messages/fallbacks.py` has substitutes for messages that RMF's release lacks. An alarm and
     its end go out on the same topic, even if the release changes in between.
@@ -44,7 +44,7 @@ class Outlet:
                 self._end(topic)
 
     def publish(self, topic: Topic[Message], message: Message) -> bool:
-        """Publish a message; return False if it was not sent, which is a fault until the next
+        """Publish a message. Return False if it was not sent; this is a fault until the next
         success."""
         way, wanted = self._way(topic, message)
         if wanted is None:
@@ -61,12 +61,13 @@ class Outlet:
         return True
 
     def failed(self, topic: Topic[Message], error: Exception) -> None:
-        """Note that a message was not published, and log the first such message."""
+        """Note that a message was not published. Log only the first such message."""
         self._once.failed(topic.name, error)
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """A fault NOT_PUBLISHED for each topic whose last message was not sent; from any thread."""
+        """The faults NOT_PUBLISHED, one for each topic whose last message was not sent. Any thread may
+        read this."""
         failing = sorted(self._once.wrong.copy().items())
         return tuple(Fault("NOT_PUBLISHED", f"{topic}: {why}") for topic, why in failing)
 
@@ -87,11 +88,11 @@ class Outlet:
             return self._ends[topic.name]
 
     def heard_by(self) -> dict[str, int]:
-        """Return topic's name -> number of subscriptions that receive it."""
+        """Return, by the topic's name, the number of subscriptions that receive each topic."""
         return {name: end.matched() for name, end in self._ends.copy().items()}
 
     def close(self, topics: Iterable[Topic[Message]] | None = None) -> None:
-        """Withdraw the publishers of these topics; all by default."""
+        """Withdraw the publishers of these topics. By default withdraw all publishers."""
         names = list(self._ends) if topics is None else [topic.name for topic in topics]
         for end in [self._ends.pop(name, None) for name in names]:
             if end is not None:

@@ -1,10 +1,10 @@
 """Switches off the outputs that a dead daemon left on, before this daemon claims outputs.
 
-A separate `outputs-off` process does that, as after every death: it can hang without hanging this
-daemon, and it uses the dead daemon's profiles. Devices that do not answer are reported, and retried
-while we serve. Devices in our own record are not retried, because `SafeFirst` switches each off as soon
-as it answers. If another process has just tried these devices, after the death or at boot, the start
-does not try them.
+A separate process, `outputs-off`, does the work, as after every death of a daemon. That process can
+hang without hanging this daemon, and it uses the dead daemon's profiles. Devices that do not answer are
+reported, and tried again later while this daemon serves. Devices in our own record are not tried again,
+because `SafeFirst` switches each off as soon as it answers. If another process has already tried these
+devices, after the death or at boot, this daemon's start does not try them.
 """
 
 import logging
@@ -21,8 +21,7 @@ from drivers import Driver
 log = logging.getLogger(__name__)
 
 PATIENCE_S = 15.0
-"""The longest wait (s) for `outputs-off`, which gives up after 5 s but starts late on a slow
-machine."""
+"""The longest wait (s) for `outputs-off`. It gives up after 5 s, but starts late on a slow machine."""
 PAUSE_FIRST_S, PAUSE_MOST_S = 5.0, 60.0
 
 
@@ -30,8 +29,8 @@ LOOK_EVERY_S = 0.02
 
 
 class Predecessor:
-    """Handles the records of dead daemons. `ours`: this daemon's own record. `command`: `outputs-off`
-    for this daemon's file."""
+    """The records of dead daemons, and the tries to switch their outputs off. `ours`: this daemon's own
+    record. `command`: `outputs-off` for this daemon's file."""
 
     def __init__(self, records: Records, ours: ClaimRecord, command: Sequence[str]) -> None:
         self._records = records
@@ -44,8 +43,9 @@ class Predecessor:
     def make_safe(self, wait: Callable[[float], bool]) -> frozenset[str]:
         """Switch off the outputs that dead daemons left on, before this daemon claims outputs.
 
-        Waits until `outputs-off` has ended, but at most PATIENCE_S, and only until `wait(s)` returns
-        True because the daemon must end. Returns the devices of our own record not verified off.
+        This waits until `outputs-off` has ended, but at most PATIENCE_S. The wait ends early if
+        `wait(s)` returns True, which means that the daemon must end. Returns the devices of our own
+        record that are not verified off.
         """
         found = self._records.unreleased()
         if found:
@@ -60,18 +60,19 @@ class Predecessor:
         return self._own_unsafe()
 
     def left(self) -> list[str]:
-        """Return the names of other records whose outputs are not verified off."""
+        """Return the names of other daemons' records whose outputs are not verified off."""
         return [r.name for r in self._records.unreleased() if r.name != self._ours.name]
 
     def tick(self, now: float) -> None:
-        """Retry, after a pause, the records not verified off; called about once a second."""
+        """Try again, after a pause, to switch off the records that are not verified off. The daemon
+        calls this about once a second."""
         if self._child is not None and not self._running():
             self._judge(now)
         elif self._child is None and now >= self._next_at:
             self._start(self.left())
 
     def close(self) -> None:
-        """Stop trying; the `outputs-off` that follows this daemon handles the rest."""
+        """Stop trying. The `outputs-off` that follows this daemon handles the remaining records."""
         if self._child is not None:
             self._child.kill()
             self._child.wait()
@@ -94,7 +95,8 @@ class Predecessor:
         return self._child is not None and self._child.poll() is None
 
     def _judge(self, now: float, unsafe: Collection[str] = ()) -> None:
-        """Note the result of a try. `unsafe`: devices of our own record, not retried here."""
+        """Note the result of a try. `unsafe`: devices of our own record that are not verified off; they
+        are not tried again here."""
         self.close()
         if left := self.left():
             if self._next_at == math.inf:
@@ -108,9 +110,8 @@ class Predecessor:
 
 
 class SafeFirst:
-    """Wraps the driver of a silent device that a dead daemon may have left on: as soon as the device
-    answers, its outputs are switched off, before anything else.
-    """
+    """A wrapper of the driver of a silent device that a dead daemon may have left on. As soon as the
+    device answers, the wrapper switches its outputs off, before anything else."""
 
     def __init__(self, name: str, driver: Driver[Any, Any]) -> None:
         self._name = name
@@ -122,7 +123,7 @@ class SafeFirst:
         self.close = driver.close
 
     def open(self) -> None:
-        """Claim the device, and make it safe the first time."""
+        """Claim the device. The first time, also make it safe."""
         self._driver.open()
         if not self._safe:
             self._driver.make_safe()

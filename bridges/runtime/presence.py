@@ -1,7 +1,7 @@
 """Decides whether a node without hardware may publish, because only one node may serve a graph.
 
-A node may publish once it was alone on its topics for the kind's quiet time. Its publishers are
-declared only then, so a waiting node does not count as a rival.
+A node may publish after it was alone on its topics for the kind's quiet time. Only then are its
+publishers declared, so a waiting node does not count as a rival.
 """
 
 import logging
@@ -21,18 +21,17 @@ from bridges.transports.transport import Subscription, Transport
 log = logging.getLogger(__name__)
 
 LOOK_EVERY_S = 0.25
-"""The pause between two looks for other nodes on the graph."""
+"""The pause (s) between two looks for other nodes on the graph."""
 MOST_NAMED: Final = 3
 SPREAD_LEAST_S, SPREAD_MOST_S = 0.5, 3.0
-"""The bounds (s) of the random time for which a node listens longer after it has met a rival; discovery
+"""The bounds (s) of a random time. A node that has met a rival listens longer by this time. Discovery
 takes less."""
 
 
 class Presence:
-    """Looks for rivals. `kind`: for the log. `rivals`: the number of other nodes' publishers on our
-    topics.
-    `rivals_do`: the rivals and their topics, as in `/desk publishes lift_requests`; "" without
-    rivals."""
+    """The lookout for rivals. `kind`: for the log. `rivals`: the number of other nodes' publishers on
+    our topics. `rivals_do`: the rivals and their topics, as in `/desk publishes lift_requests`; ""
+    without rivals."""
 
     def __init__(self, kind: str, quiet_s: float) -> None:
         self.may_speak = False
@@ -46,24 +45,25 @@ class Presence:
         self._ends: dict[str, Subscription] = {}
 
     def listen(self, transport: Transport, sole: Iterable[Topic[Message]]) -> None:
-        """Count the publishers of these topics from now on."""
+        """Begin to count the publishers of these topics."""
         for topic in sole:
             self._ends[topic.name] = transport.subscribe(topic, _ignore, others_only=True)
 
     @property
     def waits(self) -> str:
-        """The reason for our silence, shown to the requesters that wait for us."""
+        """The reason for our silence. The requesters that wait for us are shown this reason."""
         return f"while {self.rivals_do}" if self.rivals else LISTENS
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """The fault PASSIVE while a rival keeps us silent, because the rival may not do our work."""
+        """The fault PASSIVE if a rival keeps us silent. It is a fault because the rival may not do our
+        work."""
         if not self.rivals:
             return ()
         return (Fault("PASSIVE", f"{self.rivals_do}, so this node only listens"),)
 
     def look(self, now: float) -> None:
-        """Look for rivals if it is due."""
+        """Look for rivals, if a look is due."""
         if now < self.look_at:
             return
         self._count(now)
@@ -92,7 +92,8 @@ class Presence:
         return f"{who or 'another node'} publishes {' and '.join(heard)}"
 
     def _set(self, yes: bool) -> None:
-        """Start or stop publishing. Two nodes that began together both stop, each for a random time."""
+        """Start or stop publishing. If two nodes began at the same time, both stop, each for a random
+        time."""
         if yes == self.may_speak:
             return
         self.may_speak = yes

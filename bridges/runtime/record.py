@@ -1,13 +1,14 @@
-"""The record of a daemon, written before it claims outputs: all data needed to switch the outputs off.
+"""The record of a daemon. It is written before the daemon claims outputs, and holds all data needed to
+switch the outputs off.
 
-It holds the YAML and the validated settings. `outputs-off` uses the settings. Only if the settings do
-not decode, because another version wrote them, does `outputs-off` load and check the YAML. Keys that
+The record holds the YAML and the validated settings. `outputs-off` uses the settings. If another
+version wrote them, they may not decode; only then does `outputs-off` load and check the YAML. Keys that
 another version has added are ignored.
 
-A record is a file named by a hash of its content, in the daemon's state directory, or in its runtime
-directory if the state directory cannot be written. So a daemon restarted on the same YAML finds its
-record, and a daemon on another YAML overwrites no record. Records hold no tokens, which are read from
-their files.
+A record is a file whose name is a hash of its content. The file is in the daemon's state directory, or
+in its runtime directory if the state directory cannot be written. So a daemon that restarts on the same
+YAML finds its record, and a daemon on another YAML overwrites no record. Records hold no tokens,
+because tokens are read from files of their own.
 """
 
 import hashlib
@@ -31,7 +32,7 @@ log = logging.getLogger(__name__)
 
 PATTERN = "claimed-*.json"
 SIZE_MAX = 64 << 20
-"""The largest record (bytes). No YAML with its profiles and DBC files is as large."""
+"""The largest size of a record (bytes). No YAML with its profiles and DBC files is as large."""
 
 
 class ClaimedSettings(msgspec.Struct, frozen=True):
@@ -45,11 +46,11 @@ class ClaimedSettings(msgspec.Struct, frozen=True):
 
 
 class Claimed(msgspec.Struct, frozen=True):
-    """A record without settings. `file`: the YAML's path. `yaml`: its text. `texts`: name -> profile or
-    DBC file.
+    """A record without settings. `file`: the YAML's path. `yaml`: its text. `texts`: each profile or
+    DBC file, by name.
 
-    `safe`: the devices verified off so far. Every version can read the fields `file` to `safe`.
-    `tried`: True when a process has tried once to switch off all other devices.
+    `safe`: the devices verified off so far. Every version can read the fields from `file` to `safe`.
+    `tried`: a process has tried once to switch off all other devices.
     """
 
     file: str
@@ -60,7 +61,7 @@ class Claimed(msgspec.Struct, frozen=True):
 
 
 class ClaimRecord(Claimed, frozen=True):
-    """A record. `claim`: the settings that the YAML gave."""
+    """A record with settings. `claim`: the settings that the YAML gave."""
 
     claim: ClaimedSettings | None = None
 
@@ -68,7 +69,7 @@ class ClaimRecord(Claimed, frozen=True):
     def name(self) -> str:
         """The name of the record's file, a hash of the claim."""
         claimed = msgspec.structs.asdict(self) | {"safe": ()}
-        del claimed["tried"]  # a later field: every version must give a record the same name
+        del claimed["tried"]  # older versions lack this field, and must compute the same name
         return f"claimed-{hashlib.sha256(msgspec.json.encode(claimed)).hexdigest()[:16]}.json"
 
     def config(self) -> Config:
@@ -108,7 +109,7 @@ def _claimed(record: ClaimRecord, claim: ClaimedSettings) -> Config:
         text=record.yaml,
         kind=claim.kind,
         driver=claim.driver,
-        rmf=Rmf(),  # switching off needs no RMF
+        rmf=Rmf(),  # RMF is not needed to switch outputs off
         buses={
             name: msgspec.json.decode(text, type=names.bus_called(kind).settings)
             for name, (kind, text) in claim.buses.items()
@@ -119,7 +120,8 @@ def _claimed(record: ClaimRecord, claim: ClaimedSettings) -> Config:
 
 
 def _device(claim: ClaimedSettings, text: bytes) -> msgspec.Struct:
-    """Return a device's settings, decoded for the device's driver, or else for the file's driver."""
+    """Return a device's settings. They are decoded for the device's own driver, or else for the file's
+    driver."""
     own = msgspec.json.decode(text, type=_OwnDriver).driver or claim.driver
     device: msgspec.Struct = msgspec.json.decode(
         text, type=names.driver_called(claim.kind, own).settings
@@ -139,7 +141,8 @@ class Records:
         self._file = named(file)
 
     def unreleased(self) -> list[ClaimRecord]:
-        """Return this file's records not yet released; log and leave out unreadable records."""
+        """Return the records of this file whose outputs are not all off yet. Unreadable records are
+        logged and left out."""
         by_name = dict[str, ClaimRecord]()
         for path in paths(self._places):
             if (record := read(path)) is None:
@@ -149,7 +152,7 @@ class Records:
         return list(by_name.values())
 
     def write(self, record: ClaimRecord) -> Path:
-        """Write a record; return its path. Raises OSError if neither directory can be written."""
+        """Write a record and return its path. Raises OSError if neither directory can be written."""
         content = msgspec.json.encode(record)
         refused: OSError | None = None
         for folder in self._places.folders:
@@ -173,7 +176,7 @@ class Records:
     def release(self, record: ClaimRecord) -> None:
         """Remove a record whose outputs are all off. Raises OSError.
 
-        The file's name may differ from the record's if another version wrote it.
+        The file's name may differ from the record's `name` if another version wrote the file.
         """
         for path in list(paths(self._places)):
             if path.name == record.name or ((found := read(path)) and found.name == record.name):
@@ -199,5 +202,5 @@ def _decoded(content: bytes) -> ClaimRecord:
     """Decode a record. Raises MsgspecError or UnicodeDecodeError."""
     try:
         return msgspec.json.decode(content, type=ClaimRecord)
-    except msgspec.ValidationError:  # another version's settings; the YAML in the record is enough
+    except msgspec.ValidationError:  # another version's settings: the YAML in the record is enough
         return ClaimRecord(**msgspec.structs.asdict(msgspec.json.decode(content, type=Claimed)))

@@ -1,4 +1,4 @@
-"""Counts refused requests by reason, and logs the first of each reason."""
+"""Counts refused requests by reason. The first refusal for each reason is logged."""
 
 import logging
 import threading
@@ -18,7 +18,7 @@ class Refusals:
         self._lock = threading.Lock()
 
     def add(self, kind: str, detail: object, **whose: str) -> None:
-        """Count one refusal; from any thread."""
+        """Count one refusal. Any thread may call this."""
         with self._lock:
             self._counts[kind] += 1
             first = self._counts[kind] == 1

@@ -1,8 +1,8 @@
 """Records a daemon's readings, decisions and messages in its ring.
 
-A scan only puts events into a queue, which takes less than a microsecond. After the outputs are written
-and the states published, `flush` encodes the queue and appends it to the ring. A failing writer loses
-entries; it never raises, and it delays no scan.
+A scan only puts events into a queue, which takes less than a microsecond. Later, when the outputs are
+written and the states published, `flush` encodes the queue and appends it to the ring. A writer that
+fails loses entries. It never raises, and it delays no scan.
 """
 
 import struct
@@ -28,21 +28,24 @@ from bridges.runtime.clock import Clock
 from bridges.runtime.runtime_directory import Once
 
 KNOWN_EVERY_S: Final = 60.0
-"""All known state is written again after this time (s), so that a recording can begin there."""
+"""The time (s) after which all known state is written again, so that a recording can begin at that
+entry."""
 MOST_WAITING: Final = 20_000
 SAME_AT_ONCE: Final = 20
-"""The number of unchanged readings in one entry, which is also the most that a kill loses."""
+"""The number of unchanged readings in one entry. A kill of the daemon loses at most as many
+readings."""
 LONGEST_SAME: Final = 400
 """The largest size (bytes) of an entry of unchanged readings."""
 MOST_SPOKEN_PER_S: Final = 200.0
-"""Messages beyond this rate are only counted, because a flood must not delay a scan."""
+"""The rate (messages per second) above which messages are only counted, because a flood must not delay
+a scan."""
 STEP_S: Final = 0.05
 AGAIN_S: Final = 10.0
-"""The pause (s) between a ring's failure and the next attempt to make a ring."""
+"""The pause (s) between the failure of a ring and the next attempt to make one."""
 
 
 class NoWriter:
-    """The writer of a daemon without a recording; the interface of `RingWriter`."""
+    """The writer of a daemon without a recording. It has the same interface as `RingWriter`."""
 
     def decided(
         self, subject: str, before: object, event: object, now: float, decision: AnyDecision
@@ -53,7 +56,7 @@ class NoWriter:
         """Note a published report. `memory`: the core's memory afterwards."""
 
     def forgotten(self, subject: str, now: float) -> None:
-        """Note that the daemon no longer remembers a subject."""
+        """Note that the daemon has forgotten a subject."""
 
     def spoken(
         self, topic: str, message: Message, *, sent: bool, sender: Sender | None = None
@@ -61,10 +64,10 @@ class NoWriter:
         """Note a message that was heard or sent on this topic. `sender`: its publisher, if known."""
 
     def flush(self) -> None:
-        """Write the noted events; called when nothing is urgent."""
+        """Write the noted events. The daemon calls this when nothing is urgent."""
 
     def look(self) -> None:
-        """Make a new ring if needed; called each second from the daemon's main thread."""
+        """Make a new ring if needed. The daemon's main thread calls this each second."""
 
     def died(self, reason: str) -> None:
         """Note that a defect ends the daemon."""
@@ -126,7 +129,7 @@ class RingWriter(NoWriter):
                 ring.close(ended=safe and not self._dead)
 
     def flush(self) -> None:
-        if self._lock.acquire(blocking=False):  # else another thread flushes
+        if self._lock.acquire(blocking=False):  # else another thread is flushing
             try:
                 self._drain()
             except Exception as error:  # noqa: BLE001 - logged by _failed
@@ -159,7 +162,7 @@ class RingWriter(NoWriter):
         self._fresh()
         if ring is not None:
             with suppress(OSError):
-                ring.close(ended=True)  # only this ring ends; the daemon continues
+                ring.close(ended=True)  # only this ring ends: the daemon continues
 
     def _fresh(self) -> None:
         """Reset the writer's state for an empty ring."""
@@ -182,7 +185,7 @@ class RingWriter(NoWriter):
         self._write()
 
     def _tell_time(self) -> None:
-        """Write the wall clock's time if that clock has stepped, and all known state after each
+        """Write the wall clock's time if that clock has stepped. Write all known state again after each
         KNOWN_EVERY_S."""
         now = self._clock.monotonic()
         offset_s = self._clock.wall() - now
@@ -226,7 +229,8 @@ class RingWriter(NoWriter):
             self._say_same(name)
 
     def _say_same(self, name: str) -> None:
-        """Write the times at which the last reading was repeated. The segment has reserved room."""
+        """Write the times at which the last reading was repeated. The segment has reserved room for
+        them."""
         subject = self._same.pop(name, None)
         if subject is not None:
             times, subject.times = subject.times, []
@@ -255,7 +259,7 @@ class RingWriter(NoWriter):
         self._put(Spoken(now, sent, topic, type_name(kind), release.name, sample, node))
 
     def _may_keep(self, now: float) -> bool:
-        """Is the rate of messages low enough to record another message?"""
+        """Return whether the rate of messages is low enough to record one more."""
         gained = MOST_SPOKEN_PER_S * (now - self._spoken_at)
         self._may_speak = min(MOST_SPOKEN_PER_S, self._may_speak + gained)
         self._spoken_at = now
@@ -268,7 +272,7 @@ class RingWriter(NoWriter):
         return True
 
     def _last(self, entry: AnyEntry) -> None:
-        """Append the last entry, after the entries of repeated readings."""
+        """Append the last entry of the ring, after the entries of repeated readings."""
         self._say_all_same()
         self._put(entry)
 
@@ -277,7 +281,7 @@ class RingWriter(NoWriter):
             self._say_same(name)
 
     def _put(self, entry: AnyEntry) -> None:
-        """Append an entry. If the segment is full, begin the next segment before that."""
+        """Append an entry. If the entry does not fit into the segment, first begin the next segment."""
         assert self._ring is not None
         content = entries.encode(entry)
         if len(content) > self._ring.room // 2:
@@ -300,7 +304,7 @@ class RingWriter(NoWriter):
         return self._ring.fits(len(self._out) + length + FRAME.size + reserved)
 
     def _know(self, now: float) -> None:
-        """Write all known state, in this segment if there is room, else in the next segment."""
+        """Write all known state. Use this segment if it has room, else the next segment."""
         self._say_all_same()
         known = self._all_known(now)
         if not self._fits(sum(len(content) + FRAME.size for content in known)):
@@ -311,8 +315,8 @@ class RingWriter(NoWriter):
             self._frame(content)
 
     def _next_segment(self, now: float) -> None:
-        """Begin the next segment with the known state, which may fill half of it; leave out further
-        subjects."""
+        """Begin the next segment with the known state. The known state may fill half of the segment;
+        further subjects are left out."""
         assert self._ring is not None
         self._say_all_same()
         self._write()

@@ -1,8 +1,9 @@
 """Starts the daemon as a ROS node: `ros2 launch rmf_bridges <kind>.launch.py config:=FILE`.
 
 After any death of the daemon its guard runs `rmf-bridge outputs-off` (`bridges/runtime/guard.py`). Only
-the launch files in `ros/launch/`, one for each kind, import this module. `ros2` runs it with ROS's own
-Python, which has `launch` and `yaml`, but no other package that the project needs.
+the launch files in `ros/launch/` import this module; each kind has one such file. `ros2` runs this
+module with ROS's own Python, which has `launch` and `yaml`, but no other package that the project
+needs.
 """
 
 from pathlib import Path
@@ -40,7 +41,7 @@ def _actions(kind: str, context: LaunchContext) -> list[Node]:
 
 
 def _check(kind: str, file: str) -> None:
-    """Raise RuntimeError for a file of another kind; the daemon finds every other error."""
+    """Raise RuntimeError for a file of another kind. The daemon itself finds every other error."""
     try:
         settings = yaml.safe_load(Path(file).read_bytes())
     except (OSError, yaml.YAMLError) as error:

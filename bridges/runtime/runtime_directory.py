@@ -43,7 +43,7 @@ KEPT = "kept.json"
 KEPT_MAX = 64 << 20
 LOCK = "holder.lock"
 WAIT_S = 7.0
-"""The time (s) that a starting daemon waits for `outputs-off`, which takes less."""
+"""The time (s) for which a starting daemon waits for `outputs-off`. `outputs-off` takes less."""
 LOOK_EVERY_S = 0.05
 
 
@@ -85,8 +85,8 @@ def _in_use(folder: Path, found: LockHolder | None) -> str:
 
 
 def state_file(file: Path) -> Path:
-    """Return the path of the file that outlives a daemon and a reboot, in systemd's state directory or
-    else in the user's state directory."""
+    """Return the path of the file that outlives a daemon and a reboot. The file is in systemd's state
+    directory, or else in the user's state directory."""
     given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
     return Path(given or state_base() / file.stem).absolute() / KEPT
 
@@ -94,7 +94,7 @@ def state_file(file: Path) -> Path:
 class MemoryFile:
     """A file that is replaced as a whole and is on disk when `write` returns.
 
-    `instead`: the path used while `path` cannot be written; if files exist at both paths, the file at
+    `instead`: the path used if `path` cannot be written. If files exist at both paths, the file at
     `instead` is newer.
     """
 
@@ -111,7 +111,7 @@ class MemoryFile:
         return None
 
     def write(self, kept: bytes) -> None:
-        """Replace the file. Raises OSError, with the old file kept, if neither path can be written."""
+        """Replace the file. Raises OSError if neither path can be written; the old file then stays."""
         try:
             _replace(self._path, kept)
             if self._instead is not None:
@@ -131,10 +131,12 @@ def _replace(path: Path, content: bytes) -> None:
 
 
 class Once:
-    """Logs the first of repeated failures, and the first success after them; the daemon continues.
+    """A log filter for an action that is repeated. It logs the first of several failures, and the first
+    success after them; the daemon continues.
 
-    `fails`, `again`: the names of the two events in the log. `key`: the log's key for the failing
-    thing. `level`: the level of the first event. `wrong`: failing thing -> error."""
+    `fails`, `again`: the names of these two log events. `key`: the log's key for the failing thing.
+    `level`: the level of the first event. `wrong`: the error of each failing thing.
+    """
 
     def __init__(
         self,
@@ -159,17 +161,17 @@ class Once:
 
 
 class RuntimeDirectory:
-    """The lock, status and record of one process.
+    """The lock, the status and the record of one process.
 
-    `serves`: True if the process is a daemon, which accepts a reset.
+    `serves`: the process is a daemon, which accepts a reset.
     """
 
     def __init__(
         self, places: Directories, file: Path, *, serves: bool, wait_s: float = WAIT_S
     ) -> None:
-        """Take the locks; wait for an `outputs-off` that holds them.
+        """Take the locks. If an `outputs-off` holds them, wait for its end.
 
-        Raises AlreadyRunning, and PermissionError if a directory cannot be trusted.
+        Raises AlreadyRunning. Raises PermissionError if a directory cannot be trusted.
         """
         self.places = places
         self.path = places.runtime
@@ -184,12 +186,13 @@ class RuntimeDirectory:
         self._sign(self._holder)
 
     def claim(self, record: ClaimRecord) -> None:
-        """Write the record before this daemon claims outputs; `write_status` repeats a failed write."""
+        """Write the record before this daemon claims outputs. If that fails, `write_status` tries
+        again."""
         self._record = record
         self._write_record()
 
     def released(self) -> None:
-        """Remove the record, as every output is off and released."""
+        """Remove the record, because every output is off and released."""
         record, self._record = self._record, None
         if record is not None:
             try:
@@ -198,7 +201,7 @@ class RuntimeDirectory:
                 self._once.failed("record", error)
 
     def write_status(self, json: bytes) -> None:
-        """Replace the status file; also restore the other files if missing."""
+        """Replace the status file. Also write the other files again if they are missing."""
         for folder in self.places.folders:
             self._lock(folder)
         self._sign(self._holder)
@@ -219,12 +222,12 @@ class RuntimeDirectory:
 
     def _unlock(self) -> None:
         for lock in self._locks.values():
-            fcntl.flock(lock, fcntl.LOCK_UN)  # closing is not enough: a forked process has a copy
+            fcntl.flock(lock, fcntl.LOCK_UN)  # closing is not enough: a child has a copy
             os.close(lock)
         self._locks.clear()
 
     def _lock_by(self, folder: Path, deadline: float) -> None:
-        """Take the lock; wait while `outputs-off` has it. A daemon of an older version has another
+        """Take the lock. If `outputs-off` has the lock, wait. A daemon of an older version has another
         lock, so its fresh status counts as a lock."""
         while holder.shown(self.places) or not self._lock(folder):
             found = holder.look(self.places)
@@ -234,7 +237,7 @@ class RuntimeDirectory:
             time.sleep(LOOK_EVERY_S)
 
     def _lock(self, folder: Path) -> bool:
-        """Take the folder's lock; return False only if another process has the lock. Raises
+        """Take the folder's lock. Return False only if another process has the lock. Raises
         Distrusted."""
         try:
             return self._has(folder) or self._take(folder)
@@ -245,7 +248,7 @@ class RuntimeDirectory:
             return True
 
     def _has(self, folder: Path) -> bool:
-        """Do we have the lock on the lock file that is in the folder now?"""
+        """Return whether we have the lock on the lock file that is in the folder now."""
         lock = self._locks.get(folder)
         try:
             return lock is not None and os.path.samestat(os.fstat(lock), os.lstat(folder / LOCK))
@@ -289,7 +292,8 @@ class RuntimeDirectory:
 
 
 def _lock_in(directory: int) -> int:
-    """Open the lock file for writing, else for reading, which is enough to lock it."""
+    """Open the lock file for writing. If that is not permitted, open it for reading, which is enough to
+    lock it."""
     flags = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
     try:
         return os.open(LOCK, flags | os.O_RDWR | os.O_CREAT, 0o600, dir_fd=directory)

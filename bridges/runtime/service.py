@@ -1,6 +1,6 @@
-"""The service of a daemon: devices on buses, or a kind without hardware.
+"""The service of a daemon: either devices on buses, or a kind without hardware.
 
-Both sorts of service have threads, subscribe to RMF's topics, and report a status.
+A service of either sort has threads, subscribes to RMF's topics, and reports a status.
 """
 
 import logging
@@ -56,13 +56,13 @@ class Service(Protocol):
         """Subscribe to RMF's topics."""
 
     def reset(self) -> None:
-        """Clear latched faults on an operator's order."""
+        """Clear latched faults at an operator's order."""
 
     def decided(self, verdict: DecidedByPerson, device: str) -> None:
         """Pass on a person's decision about one device, or about every device ("")."""
 
     def look(self) -> None:
-        """Look for other nodes on the graph; called each second."""
+        """Look for other nodes on the graph. The daemon calls this each second."""
 
     def status(self) -> Status:
         """Return the status of the whole service, for the status file."""
@@ -72,7 +72,7 @@ class Service(Protocol):
 
 
 def named_by(config: Config, topic: Topic[M_co]) -> Topic[M_co]:
-    """Return the topic, under its name in the YAML if the YAML renames it."""
+    """Return the topic, under the name that the YAML gives it."""
     return topic.named(config.rmf.topics.get(topic.name, topic.name))
 
 
@@ -172,8 +172,8 @@ class Devices:
         self._placed = {node.name: (node, loop) for loop in self._loops for node in loop.nodes}
 
     def subscribe(self) -> None:
-        """Subscribe to requests, to topics that are only recorded, and to states of our devices that
-        other nodes publish."""
+        """Subscribe to requests, to topics that are only recorded, and to states that other nodes
+        publish of our devices."""
         for topic, accept in self._kind.requests.items():
             hear = self._to_inbox(topic, accept)
             self._hears[topic.name] = self._transport.subscribe(self._named(topic), hear)
@@ -199,7 +199,7 @@ class Devices:
                 loop.inbox.put(name, verdict)
 
     def look(self) -> None:
-        """Tell each device when a first node that may send requests appears, and when the last such
+        """Tell each device when the first node appears that may send requests, and when the last such
         node disappears."""
         if self._alarm:
             self._alarm.look()
@@ -255,8 +255,8 @@ class Devices:
     def _to_inbox(
         self, topic: Topic[Message], accept: Callable[[Any, Any], object]
     ) -> Callable[[Message], None]:
-        """Return a callback for the transport's thread, which puts messages about our devices into the
-        inbox and counts requests for other devices."""
+        """Return a callback for the transport's thread. The callback puts messages about our devices
+        into the inbox, and counts requests for other devices."""
         states = topic == self._kind.states
         heard_on = self._named(topic)
 
@@ -278,7 +278,7 @@ class Devices:
         return put
 
     def _record(self, topic: Topic[Message], message: Message) -> None:
-        """Note a message about one of our devices; only in the transport's callback."""
+        """Note a message about one of our devices. Only the transport's callback may call this."""
         if self._kind.device_name(message) in self._placed:
             sender = self._transport.sender()
             self._writer.spoken(topic.name, message, sent=False, sender=sender)

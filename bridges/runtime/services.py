@@ -17,7 +17,7 @@ from bridges.system.files import replace
 
 CONFIG: Final = Path("etc/rmf-bridges")
 INSTANCE: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
-"""Names of services that need no escapes as a unit's instance."""
+"""The pattern of service names that a unit's instance can have without escapes."""
 NO_INSTANCE: Final = "{!r} is not a service name: use only letters, digits and _ . -"
 LEFT_ON: Final = (
     "the outputs of {} are not verified off, and a new drop-in may block access to them: mend the"
@@ -45,7 +45,7 @@ def drop_in_file(name: str) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A command. `running_only`: True if it applies only to a running system."""
+    """A step that runs a command. `running_only`: the command makes sense only on a running system."""
 
     words: tuple[str, ...]
     running_only: bool = False
@@ -53,7 +53,8 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class SwitchOff:
-    """`outputs-off` for a service, if a dead daemon has left a record in its directory."""
+    """A step that runs `outputs-off` for a service, if a dead daemon has left a record in its
+    directory."""
 
     words: tuple[str, ...]
     state: Path
@@ -61,7 +62,8 @@ class SwitchOff:
 
 @dataclass(frozen=True, slots=True)
 class WriteFile:
-    """A file with this content, readable for everybody; a copy of `source` if given."""
+    """A step that writes a file with this content, readable for everybody. With `source` the step
+    copies that file."""
 
     path: Path
     content: bytes
@@ -70,7 +72,7 @@ class WriteFile:
 
 @dataclass(frozen=True, slots=True)
 class Remove:
-    """A file to remove, with its directory if that becomes empty."""
+    """A step that removes a file, and its directory if that becomes empty."""
 
     path: Path
 
@@ -85,9 +87,9 @@ def switch_off(name: str) -> SwitchOff:
 
 
 def carry_out(steps: Iterable[Step], args: argparse.Namespace, keeps: str = "") -> int:
-    """Carry out or print the steps in turn, up to the first failure; return the exit code.
+    """Carry out or print the steps in turn, up to the first failure. Return the exit code.
 
-    `keeps`: a unit to start again after a failed step, if it was running before.
+    `keeps`: a unit that is started again after a failed step, if it was running before.
     """
     live = args.root == Path("/")
     if live and not args.dry_run and os.geteuid() != 0:
@@ -105,7 +107,7 @@ def carry_out(steps: Iterable[Step], args: argparse.Namespace, keeps: str = "") 
         if args.dry_run:
             _show(step)
         elif code := _take(step, args.root):
-            print("the steps after that were not taken", file=sys.stderr)
+            print("the steps after the failed step were not taken", file=sys.stderr)
             if ran:
                 _did(("systemctl", "start", keeps))
             return code
@@ -135,7 +137,7 @@ def _take(step: Step, root: Path) -> int:
     """Carry out one step; return its exit code, 0 for success."""
     try:
         return _taken(step, root)
-    except OSError as error:  # a full disk
+    except OSError as error:  # for example a full disk
         print(error, file=sys.stderr)
         return os.EX_IOERR
 

@@ -14,13 +14,13 @@ from bridges.system.log import pairs
 log = logging.getLogger(__name__)
 
 LEAST_GAP_S = 0.001
-"""The shortest pause before a round without an event."""
+"""The shortest pause (s) before a round without an event."""
 
 
 class Rounds(Protocol):
-    """A bus's devices, or a kind without hardware, served in rounds.
+    """Work that is done in rounds: a bus's devices, or a kind without hardware.
 
-    Only its own thread calls it; tests call it without a thread, in virtual time.
+    Only its own thread calls its methods. Tests call them without a thread, in virtual time.
     """
 
     @property
@@ -47,12 +47,13 @@ class Rounds(Protocol):
         """Take the waiting events and do the due work."""
 
     def end(self) -> bool:
-        """Switch the outputs off and release everything; return False if the outputs are not verified
+        """Switch the outputs off and release everything. Return False if the outputs are not verified
         off."""
 
 
 def stop(loops: Sequence["Serving"], within_s: float) -> bool:
-    """End all loops at the same time; return False if a loop does not end, or leaves outputs on."""
+    """End all loops at the same time. Return False if a loop does not end within `within_s` (s), or
+    leaves outputs on."""
     for loop in loops:
         loop.close()
     deadline = time.monotonic() + within_s
@@ -80,20 +81,21 @@ class Serving:
         self._serves.inbox.close()
 
     def ended(self, timeout_s: float) -> bool:
-        """Wait for the thread's end; return False if it does not end, or leaves outputs on."""
+        """Wait for the thread's end. Return False if it does not end within `timeout_s` (s), or leaves
+        outputs on."""
         if self._thread.ident is not None:  # the thread was started
             self._thread.join(timeout_s)
         return not self._thread.is_alive() and self._safe
 
     @property
     def alive(self) -> bool:
-        """Does the thread serve? False once it was stopped, and after a defect even while the thread
-        still switches outputs off."""
+        """Return whether the thread serves. The answer is False after a stop. It is also False after a
+        defect, even if the thread is still switching outputs off."""
         return self._thread.is_alive() and not self.died
 
     @property
     def finished(self) -> int:
-        """A count that grows while the thread makes progress."""
+        """A count that grows as long as the thread makes progress."""
         return self._rounds + self._serves.finished
 
     @property
@@ -112,7 +114,7 @@ class Serving:
         except LeftOn as error:
             self.died = f"{serves.name}: {error}"
             log.critical(pairs("died", thread=serves.name, reason=error))
-        except Exception as error:  # a defect of ours: the daemon ends and is restarted
+        except Exception as error:  # a defect of ours: the daemon ends, and systemd restarts it
             self.died = f"{serves.name}: {type(error).__name__}: {error}"
             log.critical(pairs("died", thread=serves.name, reason=error), exc_info=True)
         finally:

@@ -1,7 +1,8 @@
-"""Signals: a daemon shuts down, outputs off, at each signal that by default ends or suspends a process.
+"""Signals. At each signal that by default ends or suspends a process, a daemon switches its outputs off
+and ends.
 
 Crashes, and SIGABRT from the watchdog, are not caught, because such a process cannot be trusted any
-more; `outputs-off` follows it. SIGPIPE and SIGXFSZ stay ignored, as Python has set them, because an
+more; `outputs-off` runs after it. SIGPIPE and SIGXFSZ stay ignored, as Python has set them, because an
 unread log or a full disk must not end a daemon. SIGKILL and SIGSTOP cannot be caught.
 """
 
@@ -39,12 +40,12 @@ ENDING: Final = frozenset(signal.valid_signals()) - {
 
 
 class End:
-    """A flag that the first signal of ENDING sets for ever. (A threading.Event would wait for ever if a
-    signal arrived while the event's lock is taken.)
-    """
+    """A flag that the first signal of ENDING sets for ever. (A threading.Event would hang if a signal
+    arrived at a moment when the event's lock is taken.)"""
 
     def __init__(self) -> None:
-        """Catch the signals from now on. If the parent ignores SIGHUP (nohup), it stays ignored."""
+        """Begin to catch the signals. If the parent process ignores SIGHUP (nohup), the daemon also
+        ignores it."""
         self._read, self._write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         for number in ENDING:
             if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
@@ -67,11 +68,11 @@ def on_reset(reset: Callable[[], None]) -> None:
 
 
 def ignore() -> None:
-    """Let only SIGKILL end this short-lived process, which switches outputs off."""
+    """Ignore every signal but SIGKILL in this short-lived process, which switches outputs off."""
     for number in ENDING | {RESET}:
         signal.signal(number, signal.SIG_IGN)
 
 
 def ignore_reset() -> None:
-    """Ignore a reset until the daemon serves; by default the signal would end the process."""
+    """Ignore a reset until the daemon serves. By default the signal would end the process."""
     signal.signal(RESET, signal.SIG_IGN)

@@ -31,11 +31,11 @@ V = TypeVar("V")
 
 
 class SubjectCore(Struct, Generic[M, V, O, R], frozen=True):
-    """A kind's core as the daemon calls it; its limits are already bound.
+    """A kind's core, as the daemon calls it. Its limits are already bound.
 
-    `word`: the key of a subject's name in the log. `decide(memory, event, now)`: one step.
-    `summary(report, now)`: key -> value for the log and the status file. `identity(fault)`: the same
-    value for every report of the same fault, so that the fault is logged once.
+    `word`: the key of a subject's name in the log. `decide(memory, event, now)`: one step of the core.
+    `summary(report, now)`: keys and values for the log and the status file. `identity(fault)`: a value
+    that is equal in all reports of the same fault, so that the fault is logged once.
     """
 
     word: str
@@ -45,7 +45,7 @@ class SubjectCore(Struct, Generic[M, V, O, R], frozen=True):
 
 
 class Subject(Generic[M, V, O, R]):
-    """One subject of a core."""
+    """One subject of a core, with its memory."""
 
     def __init__(
         self,
@@ -101,7 +101,7 @@ class Subject(Generic[M, V, O, R]):
             self._log_faults({self._core.identity(fault): fault for fault in report.faults})
 
     def status(self) -> Status:
-        """Return the subject's status for the status file; from any thread."""
+        """Return the subject's status for the status file. Any thread may call this."""
         decision = self.decision
         if decision is None:
             return {}

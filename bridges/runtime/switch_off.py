@@ -1,7 +1,7 @@
 """Switches off every output of a YAML or record, from a new process, with as few imports as possible.
 
 On each bus the devices that answered the dead daemon most recently come first, because silent devices
-would use up the time. After a short try for each device, the failed devices are tried again.
+would use up the time. Each device first gets one short try; then the failed devices are tried again.
 """
 
 import logging
@@ -24,10 +24,11 @@ def outputs_off(
     but: Collection[str] = (),
     ages: Mapping[str, float] | None = None,
 ) -> set[str]:
-    """Switch off every output of a file, except the outputs of the devices in `but`.
+    """Switch off every output of a file, except the outputs of the devices in `but`. Return the devices
+    verified off. Give up after `timeout_s` (s) in total.
 
-    `ages`: the age (s) of each device's last answer to the dead daemon; missing without an answer.
-    Return the devices verified off. Give up after `timeout_s` in total.
+    `ages`: the age (s) of each device's last answer to the dead daemon. A device that never answered is
+    missing.
     """
     results: dict[str, bool] = {}
     left = [name for name in config.devices if name not in but]
@@ -75,7 +76,7 @@ def _bus_off(
 def _device_off(
     config: Config, name: str, bus: Bus, results: dict[str, bool], last: bool = False
 ) -> bool:
-    """Try to switch one device off; only a failure of the `last` try counts and is logged."""
+    """Try to switch one device off. Only a failure of the `last` try counts and is logged."""
     driver = config.driver_type(name).create(name, config.devices[name], bus)
     try:
         driver.open()
@@ -93,7 +94,8 @@ def _device_off(
 
 
 def _failed(name: str, error: Exception) -> None:
-    """Log the failure, even a defect of ours, which must not stop the other devices."""
+    """Log the failure. Even a defect of ours is only logged, because it must not stop the other
+    devices."""
     if isinstance(error, DriverError):
         log.error(pairs("outputs_not_off", device=name, reason=error))
     else:

@@ -210,4 +210,4 @@ def test_a_step_that_fails_after_the_stop_ends_with_the_service_started_again(
     )  # no such folder: OSError, as on a full disk
     assert carry_out([full, Remove(tmp_path / "never")], live, keeps=UNIT) == os.EX_IOERR
     assert calls == [["systemctl", "--quiet", "is-active", UNIT], ["systemctl", "start", UNIT]]
-    assert "the steps after that were not taken" in capsys.readouterr().err
+    assert "the steps after the failed step were not taken" in capsys.readouterr().err
