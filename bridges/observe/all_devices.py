@@ -1,4 +1,4 @@
-"""All devices heard, in bounds even if names are invented."""
+"""All devices that were heard. Their number is bounded, even if the network invents names."""
 
 from collections import OrderedDict, deque
 from collections.abc import Callable, Iterator, Mapping
@@ -31,14 +31,15 @@ Key = tuple[words.Kind, str]
 
 
 class ObservedGraph(Generic[D]):
-    """`known`: every device, by kind and name; at most `most` of each kind.
+    """All observed devices of a graph. `known`: every device, by kind and name; at most `most` of each
+    kind.
 
-    In a full table a device without states is replaced by one with states, and a device whose states
-    stopped FORGOTTEN_S ago by a new one; otherwise the devices heard first stay. `crowded`: kinds with
-    devices left out. `steps`: the times of steps of the listener's clock, and their size (s).
-    `nodes`: reports of our daemons and coordinators on themselves, by `<node>: <device>`.
-    `spoke`: the last words of fleet adapters: for a robot that asks (`FLEET/ROBOT`), for one that ends
-    (`FLEET`), and for the fleet itself (`FLEET/`).
+    In a full table a device with states replaces a device without states. A new device also replaces a
+    device whose states stopped FORGOTTEN_S ago. Otherwise the devices heard first stay. `crowded`: the
+    kinds of which devices were left out. `steps`: the times of steps of the listener's clock, and their
+    size (s). `nodes`: the reports of our daemons and coordinators on themselves, by `<node>: <device>`.
+    `spoke`: the time when each fleet adapter last spoke. The key is `FLEET/ROBOT` for a request of a
+    robot, `FLEET` for an END of a robot, and `FLEET/` for the fleet's own state.
     """
 
     makes: ClassVar[Mapping[words.Kind, Callable[[str, Moment], Any]]]
@@ -57,7 +58,7 @@ class ObservedGraph(Generic[D]):
         self._full_until: dict[tuple[words.Kind, bool], float] = {}
 
     def hear(self, heard: Heard) -> list[tuple[D, list[News]]]:
-        """Take a message. Return its devices, and the news of each."""
+        """Take a message. Return the devices that it concerns, and the news of each."""
         moment, message = self.moment(heard), heard.message
         topic = heard.topic.rpartition("/")[2]
         if isinstance(message, d.SupervisorHeartbeat):
@@ -90,7 +91,8 @@ class ObservedGraph(Generic[D]):
             self.spoke.popitem(last=False)
 
     def moment(self, heard: Heard | Own) -> Moment:
-        """Return the message's time; a message out of order in a recording counts as of now."""
+        """Return the message's time. If a recording has the message out of order, return the present
+        time."""
         at = heard.at if self.began is None else max(heard.at, self.now.at)
         offset = heard.wall - heard.at
         if self.began is None:
@@ -113,7 +115,7 @@ class ObservedGraph(Generic[D]):
         return [one for one in every if kind in (None, one.kind) and one.state is not None]
 
     def make(self, kind: words.Kind, name: str) -> D:
-        """Make a device without any message yet."""
+        """Make a device of which no message has been taken yet."""
         made: D = self.makes[kind](name, self.began or self.now)
         return made
 
@@ -147,7 +149,7 @@ class ObservedGraph(Generic[D]):
             self.crowded |= {kind} if stated else set()
             return None
         made = self.known[kind, name] = self.make(kind, name)
-        if self._heartbeat is not None:  # RMF's own supervisor sends one after requests only
+        if self._heartbeat is not None:  # RMF's supervisor sends it only after requests
             at, wall = self._heartbeat.at, self._heartbeat.wall
             made.hear(Moment(at, wall, seen=False), "", self._heartbeat.message)
         return made
@@ -168,12 +170,12 @@ class ObservedGraph(Generic[D]):
 
 
 def _heard_at(device: AnyDevice) -> float:
-    """Return the time of its last state (s)."""
+    """Return the time (s) of the device's last state."""
     return device.last_state.at if device.last_state else float("-inf")
 
 
 class PlainGraph(ObservedGraph[AnyDevice]):
-    """Every device, with observed facts only."""
+    """Every device, with nothing but the observed facts."""
 
     makes: ClassVar = {
         "lift": ObservedLift,

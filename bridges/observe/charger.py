@@ -15,9 +15,9 @@ CHARGING: Final = "charging"
 
 
 class ObservedCharger(ObservedDevice[d.ChargerState]):
-    """`condition`: RMF's word for its state. `robot`: the robot that has it, unknown before the first
-    state and in a silence. `request`: the id of the present request. Its requesters are known by
-    the ids of their requests, and want a robot charged."""
+    """A charger as observed. `condition`: RMF's word for its state. `robot`: the robot that has the
+    charger; unknown before the first state and in a silence. `request`: the id of the present
+    request. A requester of a charger is known by the id of its request, and wants a robot charged."""
 
     kind = "charger"
 
@@ -39,7 +39,8 @@ class ObservedCharger(ObservedDevice[d.ChargerState]):
         }
 
     def waits(self, now: Moment) -> Iterator[Wait]:
-        """Yield the wait of an assigned charger's request, which comes only once."""
+        """Yield the wait for an assigned charger. Its request is sent only once, so no repeats show the
+        wait."""
         if self.condition.value == "assigned":
             since = max(self.condition.since, self.request.since, key=lambda one: one.at)
             yield Wait(self.request.value, "CHARGING", since)

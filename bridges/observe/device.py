@@ -18,7 +18,7 @@ T = TypeVar("T", d.LiftState, d.DoorState, d.ChargerState, d.DispenserState)
 
 
 class Check(NamedTuple):
-    """One condition of a phase of RMF: the shown and the wanted value."""
+    """One condition of a phase of RMF: the value that is shown, and the value that RMF wants."""
 
     name: str
     shown: str
@@ -27,7 +27,7 @@ class Check(NamedTuple):
 
 
 class Wait(NamedTuple):
-    """A requester's wait for a floor, OPEN or CHARGING."""
+    """A requester's wait for a floor, for OPEN or for CHARGING."""
 
     who: str
     wants: str
@@ -35,7 +35,7 @@ class Wait(NamedTuple):
 
 
 def reading_age(stamped_at: float, wall: float) -> str:
-    """Return the fault of a reading's age, such as `is old`; "" for none."""
+    """Return the fault in a reading's age, such as `is old`; "" if there is none."""
     if stamped_at <= 0.0:
         return "was never read"
     if wall - stamped_at > OLD_S:
@@ -44,11 +44,12 @@ def reading_age(stamped_at: float, wall: float) -> str:
 
 
 class ObservedDevice(ABC, Generic[T]):
-    """One device as heard. `id`: its name on the graph. `began`: the time of its first message.
+    """One device, as we heard it. `id`: its name on the graph. `began`: the time of its first message.
 
-    `state`, `before`: the two latest states, `gap_s` apart. `first_state`, `last_state`: the times of
-    the first and the latest state. `changed`: fact -> its value before the latest state.
-    `diagnoses`: reports of our nodes on the device, by `<node>: <device>`.
+    `state`, `before`: the two latest states; `gap_s` is the time between them. `first_state`,
+    `last_state`: the times of the first and the latest state. `changed`: the facts that the latest
+    state changed, with their earlier values. `diagnoses`: the reports of our nodes on the device, by
+    `<node>: <device>`.
     """
 
     kind: ClassVar[words.Kind]
@@ -71,22 +72,23 @@ class ObservedDevice(ABC, Generic[T]):
         self._flips: deque[tuple[float, float]] = deque(maxlen=100)
 
     def published_by(self, sender: Sender | None, now: Moment) -> None:
-        """Take the publisher of a state."""
+        """Note the publisher of a state."""
         self._publishers.hear(sender, now.at)
 
     def publishers(self, now: Moment) -> tuple[Sender, ...]:
-        """Return the publishers of its states in the last 5 s; several only if they take turns, as two
-        nodes under one name do. Empty if unknown, as in recordings and on `ros2`: then `steps_back`."""
+        """Return the publishers of the device's states in the last 5 s. There are several only if they
+        take turns, which two nodes under one name do. The result is empty if the publisher is
+        unknown, as in recordings and on `ros2`; then use `steps_back`."""
         return self._publishers.at(now.at)
 
     def hear(self, moment: Moment, topic: str, message: d.Message) -> list[News]:
-        """Take a message about the device. `topic`: the last part of its name."""
+        """Take a message about the device. `topic`: the last part of the topic's name."""
         if isinstance(message, words.Stated):
             return [*self._hear_state(moment, message)]  # type: ignore[arg-type]
         return [*self._hear_other(moment, topic, message)]
 
     def diagnose(self, moment: Moment, status: d.DiagnosticStatus) -> list[News]:
-        """Take a status about the device from one of our nodes."""
+        """Take a diagnostic status about the device from one of our nodes."""
         seen = status.name in self.diagnoses or moment.at - self.began.at > SILENT_S
         moment = Moment(moment.at, moment.wall, seen)
         said = report(self.diagnoses, MOST_NODES, status, moment)
@@ -95,48 +97,55 @@ class ObservedDevice(ABC, Generic[T]):
         return list(said.take(moment, status, self.text, self.sentence))
 
     def text(self, name: str) -> str:
-        """Return the remembered form of a name from the network; in `explain` the printable form."""
+        """Return a name from the network in the form in which we remember it. `explain` remembers a
+        printable form."""
         return name
 
     def sentence(self, text: str) -> str:
-        """Return the remembered form of a sentence from the network; in `explain` a bounded one."""
+        """Return a sentence from the network in the form in which we remember it. `explain` remembers a
+        bounded form."""
         return text
 
     def is_silent(self, now: Moment, after_s: float = SILENT_S) -> bool:
-        """Have its states stopped? False before the first state."""
+        """Return whether the device's states have stopped. Before the first state the answer is
+        False."""
         return self.silent_s(now) > after_s
 
     def silent_s(self, now: Moment) -> float:
-        """Return the age of its last state (s)."""
+        """Return the age (s) of the device's last state."""
         return 0.0 if self.last_state is None else now.at - self.last_state.at
 
     def steps_back(self, now: float, by_s: float, within_s: float) -> int:
-        """Count recent steps back of the stamps by more than `by_s`, as with two nodes."""
+        """Count how often the stamps lately stepped back by more than `by_s`. Two nodes under one name
+        cause such steps."""
         return sum(by > by_s and now - at < within_s for at, by in self._back)
 
     def flaps(self, now: Moment) -> list[float]:
-        """Return the age of the reading (s) at each recent change to OFFLINE or back."""
+        """Return, for each recent change to OFFLINE or back, the age (s) of the reading at that
+        time."""
         return [age_s for at, age_s in self._flips if now.at - at < FLAPS_WITHIN_S]
 
     def checks(self, one: DeviceRequester) -> tuple[Check, ...]:
-        """List the conditions of RMF's phase of this requester; empty if RMF has no such phase."""
+        """List the conditions of the RMF phase in which this requester is; empty if RMF has no such
+        phase."""
         return ()
 
     def matches(self, one: DeviceRequester) -> bool:
-        """Does RMF see this requester's wish fulfilled?"""
+        """Return whether RMF sees this requester's wish fulfilled."""
         return all(check.met for check in self.checks(one))
 
     @abstractmethod
     def waits(self, now: Moment) -> Iterator[Wait]:
-        """Yield each requester that waits, its wish, and the start of its wait."""
+        """Yield each requester that waits, with its wish and the start of its wait."""
 
     @abstractmethod
     def facts(self, state: T) -> dict[str, str]:
-        """Return the facts of a state, by the names of our `Fact`s."""
+        """Return the facts in a state, by the names of this object's `Fact`s."""
 
     @abstractmethod
     def _settle(self, moment: Moment) -> Iterator[News]:
-        """Yield the news of a new state. `changed` is up to date; at a first state `before` is None."""
+        """Yield the news of a new state. `changed` is already up to date. At the first state `before`
+        is None."""
 
     @abstractmethod
     def _hear_other(self, moment: Moment, topic: str, message: d.Message) -> Iterator[News]:

@@ -1,4 +1,4 @@
-"""The latest reports of our nodes on `/diagnostics`, about a device or themselves."""
+"""The latest reports of our nodes on `/diagnostics`, about a device or about the node itself."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -25,12 +25,13 @@ def faults(status: DiagnosticStatus) -> tuple[str, ...]:
 
 
 def kind_in(status: DiagnosticStatus) -> str:
-    """Return the kind of our daemon that sent the status; "" for other senders."""
+    """Return the kind of our daemon that sent the status; "" for every other sender."""
     return next((pair.value for pair in status.values if pair.key == "kind"), "")
 
 
 def about(status: DiagnosticStatus) -> tuple[Kind, str] | None:
-    """Return the device of a status of ours; for a supervisor its lift or door."""
+    """Return the device that a status of our daemons is about. For a supervisor this is its lift or
+    door."""
     kind = kind_in(status).removesuffix("_supervisor")
     found = next((known for known in KINDS if known == kind), None)
     return (found, status.hardware_id) if found else None
@@ -45,8 +46,9 @@ def of_node(status: DiagnosticStatus) -> bool:
 
 @dataclass(slots=True)
 class Diagnosis:
-    """One node's report. `kind`: its daemon's kind. `name`: `<node>: <device>`. `last`: the time of its
-    last status. `faults`: code -> (detail, start). `refused`: reason -> (count, last time)."""
+    """One node's report. `kind`: the kind of its daemon. `name`: `<node>: <device>`. `last`: the time
+    of its last status. `faults`: the detail and the start of each fault, by code. `refused`: the
+    count and the last time of each refusal, by reason."""
 
     kind: str
     last: Moment
@@ -57,7 +59,7 @@ class Diagnosis:
     refused: dict[str, tuple[int, Moment]] = field(default_factory=dict)
 
     def is_current(self, now: float) -> bool:
-        """Is the report recent enough to count?"""
+        """Return whether the report is recent enough to count."""
         return now - self.last.at <= SILENT_S
 
     def value(self, key: str) -> str:
@@ -72,8 +74,8 @@ class Diagnosis:
         text: Callable[[str], str] = str,
         sentence: Callable[[str], str] = str,
     ) -> Iterator[News]:
-        """Take the next status. `text`, `sentence`: convert a name and a fault's detail from the
-        network to their remembered form."""
+        """Take the next status. `text` converts a name from the network, and `sentence` a fault's
+        detail, to the form in which we remember them."""
         self.kind, self.last, self.message = kind_in(status), moment, status.message
         self.values = {pair.key: pair.value for pair in status.values[:MOST_VALUES]}
         codes = faults(status)[:MOST_CODES]
@@ -83,7 +85,7 @@ class Diagnosis:
                 yield from self.refuses(moment, text(key.removeprefix(REFUSED)), int(value))
 
     def has(self, moment: Moment, codes: Mapping[str, str]) -> Iterator[News]:
-        """Take the present faults, with their details."""
+        """Take the faults that are present now, with their details."""
         over, new = self.faults.keys() - codes.keys(), codes.keys() - self.faults.keys()
         gone = [code for code in self.faults if code in over]
         self.faults = {
@@ -94,7 +96,7 @@ class Diagnosis:
         yield from (News("fault", moment, self.name, code) for code in codes if code in new)
 
     def refuses(self, moment: Moment, reason: str, count: int | None = None) -> Iterator[News]:
-        """Note refusals for this reason, `count` in all, or one more."""
+        """Note refusals for this reason. `count`: their number in all; None for one more refusal."""
         before, last = self.refused.get(reason, (0, None))
         if (last is None and len(self.refused) >= MOST_CODES) or (last and before == count):
             return
@@ -106,7 +108,8 @@ class Diagnosis:
 def report(
     known: dict[str, Diagnosis], most: int, status: DiagnosticStatus, moment: Moment
 ) -> Diagnosis | None:
-    """Find or make the status's diagnosis; in a full table it replaces a silent one, or is None."""
+    """Find the diagnosis of this status, or make it. In a full table a new diagnosis replaces a silent
+    one; if none is silent, return None."""
     if status.name not in known:
         silent = (name for name, one in known.items() if not one.is_current(moment.at))
         if len(known) >= most and known.pop(next(silent, ""), None) is None:

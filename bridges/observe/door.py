@@ -1,5 +1,5 @@
-"""Observation of a door: its requesters, its holders by the supervisor's heartbeat, its last request,
-and the unmet conditions of RMF's DoorOpen and DoorClose."""
+"""Observation of a door: its requesters, its last request, its holders in the supervisor's heartbeat,
+and the conditions of RMF's DoorOpen and DoorClose that are not met."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -20,7 +20,7 @@ SUPERVISOR: Final = "door_supervisor"
 
 
 def listed(heartbeat: d.SupervisorHeartbeat, door: str) -> list[str]:
-    """List the door's holders, by the supervisor's heartbeat (rmf_ros2, SupervisorHasSession.cpp)."""
+    """List the door's holders in the supervisor's heartbeat (rmf_ros2, SupervisorHasSession.cpp)."""
     return [
         session.requester_id
         for sessions in heartbeat.all_sessions
@@ -38,13 +38,15 @@ def door_open(mode: str, heartbeat: str) -> tuple[Check, ...]:
 
 
 def door_close(heartbeat: str) -> tuple[Check, ...]:
-    """List the conditions of DoorClose (rmf_ros2, DoorClose.cpp): none on the door itself."""
+    """List the conditions of DoorClose (rmf_ros2, DoorClose.cpp). None of them concerns the door
+    itself."""
     return (Check("heartbeat", heartbeat, LISTS_NOT, heartbeat != LISTS),)
 
 
 class ObservedDoor(ObservedDevice[d.DoorState]):
-    """`holders`: the requesters in the heartbeat, and the start of their holds. `asked`: the last mode
-    requested on `door_requests`, by `sender`; `asked_last`: the time of its latest repeat."""
+    """A door as observed. `holders`: the requesters in the heartbeat, and the start of each hold.
+    `asked`: the mode last requested on `door_requests`, by `sender`. `asked_last`: the time of the
+    latest repeat of that request."""
 
     kind = "door"
 
@@ -69,17 +71,17 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
         return door_open(self.mode.value, heartbeat) if one.wants == OPEN else door_close(heartbeat)
 
     def asking(self, now: Moment) -> list[DeviceRequester]:
-        """List requesters that repeat their request now and still wait, the earliest first."""
+        """List the requesters that now repeat their request and still wait, the earliest first."""
         asks = [one for one in self.requesters if one.asks(now) and not self.matches(one)]
         return sorted(asks, key=lambda one: one.since.at)
 
     def asks_now(self, now: Moment) -> bool:
-        """Does somebody still ask on `door_requests`?"""
+        """Return whether somebody still sends requests on `door_requests`."""
         return self.asked is not None and now.at - self.asked_last.at <= REQUESTER_SILENT_S
 
     def waits(self, now: Moment) -> Iterator[Wait]:
-        """Yield each wait for OPEN, even the supervisor's. Without a heartbeat only the door's state
-        counts."""
+        """Yield each wait for OPEN, also the supervisor's own. If no heartbeat was heard, only the
+        door's state counts."""
         opened = self.mode.value == OPEN
         for one in self.asking(now):
             if one.wants == OPEN and not (opened and self.last_heartbeat is None):

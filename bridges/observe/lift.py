@@ -1,5 +1,5 @@
-"""Observation of a lift: its requesters, its session, the supervisor's request, and the unmet
-conditions of RMF's RequestLift."""
+"""Observation of a lift: its requesters, its session, the supervisor's request, and the conditions of
+RMF's RequestLift that are not met."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -16,21 +16,22 @@ NOBODY: Final = "nobody"
 NO_FLOOR: Final = "no known floor"
 OPEN: Final = "open"
 HAZARDS: Final = (d.LiftMode.MODE_FIRE, d.LiftMode.MODE_OFFLINE, d.LiftMode.MODE_EMERGENCY)
-"""In these modes no robot is let in."""
+"""The modes of a lift in which no robot is let in."""
 
 
 def request_lift(session: str, floor: str, door: str, who: str, wants: str) -> tuple[Check, ...]:
-    """List all conditions of RequestLift to let `who` drive at the floor that it `wants` (rmf_ros2,
-    RequestLift.cpp:322-326), except the lift's name, which always matches here."""
+    """List all conditions under which RequestLift lets `who` drive at the floor `wants` (rmf_ros2,
+    RequestLift.cpp:322-326). The lift's name is left out, because it always matches here."""
     fields = (("session", session, who), ("floor", floor, wants), ("door", door, OPEN))
     return tuple(Check(*field, field[1] == field[2]) for field in fields)
 
 
 class ObservedLift(ObservedDevice[d.LiftState]):
-    """`adapters_heard`: a fleet adapter was heard. `supervisor`: the session in the supervisor's last
-    request on `lift_requests` ("" after an END), heard last at `supervisor_last`. `idle_ends`: the
-    number of ENDs in a row for a session that the lift did not show, that session, and the last time.
-    `taken_from`: the last session that the lift replaced by another one without END."""
+    """A lift as observed. `adapters_heard`: a fleet adapter was heard. `supervisor`: the session in the
+    supervisor's last request on `lift_requests` ("" after an END), last heard at `supervisor_last`.
+    `idle_ends`: the number of ENDs in a row for a session that the lift did not show, that session,
+    and the time of the last such END. `taken_from`: the last session that the lift replaced by
+    another session without an END."""
 
     kind = "lift"
 
@@ -65,8 +66,8 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         return request_lift(self.session.value, self.floor.value, self.door.value, one.who, wants)
 
     def asking(self, now: Moment) -> list[DeviceRequester]:
-        """List requesters that ask now, the earliest first. Without states nobody repeats a request, so
-        all of them wait."""
+        """List the requesters that ask now, the earliest first. If no states come, nobody repeats a
+        request, so all requesters wait."""
         stands = self.last_state is None or self.is_silent(now)
         asks = [
             one
@@ -82,11 +83,12 @@ class ObservedLift(ObservedDevice[d.LiftState]):
                 yield Wait(one.who, one.wants, one.lacks)
 
     def not_passed_on(self, now: Moment) -> DeviceRequester | None:
-        """Return a robot that repeats a request or END while nothing comes on `lift_requests`.
+        """Return a robot that repeats a request or END although nothing comes on `lift_requests`.
 
-        Only the holder counts, or any robot while the lift is free: RMF's supervisor drops the requests
-        of others (lift_supervisor/Node.cpp). If a robot was given the lift although nothing ever came
-        there, that topic was not recorded.
+        If a robot has the lift, only this robot counts, because RMF's supervisor drops the requests of
+        all others (lift_supervisor/Node.cpp). If the lift is free, any robot counts. If a robot was
+        given the lift although no message ever came on `lift_requests`, that topic was not recorded,
+        and no robot is returned.
         """
         silent_at, holder = now.at - REQUESTER_SILENT_S, self.session.value
         last = self.supervisor_last
@@ -142,7 +144,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         if not holds and not passed_on and self.state is not None:
             count = self.idle_ends[0] if self.idle_ends[1] == who else 0
             self.idle_ends = count + 1, who, moment
-        if one is None and who and (holds or self.state is None):  # its request was not heard
+        if one is None and who and (holds or self.state is None):  # its own request was not heard
             one, _ = self.requesters.ask(who, "", moment)
             one.granted, one.ended, one.own = self.session.since, moment, not passed_on
             one.end_last, one.end_passed_on = None if passed_on else moment, passed_on
@@ -156,7 +158,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
             return
         yield News("ends", moment, who, requester=one, passed_on=passed_on)
         if passed_on and one.own and not holds:
-            return  # only its fleet adapter knows whether it still waits
+            return  # only the robot's fleet adapter knows whether it still waits
         one.ended = moment
         if not holds:
             yield self._over(moment, one)

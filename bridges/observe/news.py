@@ -1,4 +1,4 @@
-"""News of a device: the changes by one message."""
+"""News of a device: the changes that one message makes."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -6,19 +6,19 @@ from typing import Literal
 from bridges.observe.requesters import DeviceRequester, Moment
 
 What = Literal[
-    "first state",  # of a device without states before
-    "states again",  # `gap_s` after the state before
-    "read",  # the judgement of its readings' age is now `text`
-    "changed",  # the facts in `changed` differ from the state before
-    "asks",  # a requester asks for something new; of a lift: in the mode `text`
-    "passed on",  # the supervisor asks for something new
-    "ends",  # a requester sends END; `passed_on`: the supervisor does
+    "first state",  # the device had no states before
+    "states again",  # the first state after a gap of `gap_s`
+    "read",  # the readings' age is now judged as `text`
+    "changed",  # this state changes the facts in `changed`
+    "asks",  # a requester has a new wish; for a lift in the mode `text`
+    "passed on",  # the supervisor has a new wish
+    "ends",  # a requester sends END; with `passed_on` the supervisor sends it
     "has",  # a requester has the device now
     "lost",  # `text` had the device until now
     "result",  # a workcell gives the requester's request another result: `text`
     "met",  # RMF sees a requester's wish fulfilled
     "gone",  # a requester has stopped asking, without END
-    "over",  # a requester's visit is over
+    "over",  # a requester's visit has ended
     "fault",  # the diagnosis `who` reports a new fault with the code `text`
     "fault over",
     "refused",  # the node of the diagnosis `who` has refused a request, for the reason `text`
@@ -27,8 +27,9 @@ What = Literal[
 
 @dataclass(frozen=True, slots=True)
 class News:
-    """One change by a message. `who`: the requester, as a text; `requester`: its memory, if it has
-    asked. `text`: as `What` says; `gap_s`: the length of the silence or hold that ended."""
+    """One change that a message makes. `who`: the requester, as a text. `requester`: its memory, if it
+    has sent a request. `text`: its meaning depends on `what` (see `What`). `gap_s`: the length (s)
+    of the silence or hold that has ended."""
 
     what: What
     at: Moment

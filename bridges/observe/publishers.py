@@ -1,4 +1,4 @@
-"""The publishers of one device's states: two at once are two nodes under one name."""
+"""The publishers of one device's states. If two publish at the same time, two nodes have one name."""
 
 from bridges.messages.heard import Sender
 from bridges.observe.limits import MOST_SENDERS, SLOWEST_S
@@ -7,8 +7,8 @@ from bridges.observe.limits import MOST_SENDERS, SLOWEST_S
 class StatePublishers:
     """The publishers of the states in the last SLOWEST_S, the latest last; at most MOST_SENDERS.
 
-    A restarted node is a new publisher, and a listener that joins again may see new ones. Neither is
-    two at once: the old publisher never comes back after the new one.
+    A restarted node is a new publisher, and a listener that joins again may see new publishers. In both
+    cases only one publishes at a time, because the old publisher never comes back after the new one.
     """
 
     def __init__(self) -> None:
@@ -16,7 +16,7 @@ class StatePublishers:
         self._back_at = float("-inf")
 
     def hear(self, sender: Sender | None, now: float) -> None:
-        """Take a state of this publisher."""
+        """Note that this publisher sent a state."""
         if sender is None:
             return
         newest = next(reversed(self._last), sender)
@@ -31,6 +31,6 @@ class StatePublishers:
         self._last[sender] = now
 
     def at(self, now: float) -> tuple[Sender, ...]:
-        """Return the publishers of this moment: one, several at once, or none if unknown."""
+        """Return the publishers at this time: one, several if two nodes publish, or none if unknown."""
         lately = tuple(one for one, last in self._last.items() if now - last <= SLOWEST_S)
         return lately if now - self._back_at <= SLOWEST_S else lately[-1:]

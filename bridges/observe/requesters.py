@@ -1,4 +1,5 @@
-"""The requesters of a device: their wishes, the start of each, and their present activity."""
+"""The requesters of a device: their wishes, the start of each wish, and what each requester does
+now."""
 
 from collections import OrderedDict
 from collections.abc import Iterator
@@ -11,9 +12,8 @@ from bridges.observe.limits import GIVEN_UP_S, MOST_REQUESTERS, REPEATS_S, REQUE
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """The beginning of something. `at`: s on `Heard.at`'s clock. `wall`: s since the epoch. `seen`:
-    False if it was before the first message.
-    """
+    """The time at which something begins. `at`: s on `Heard.at`'s clock. `wall`: s since the epoch.
+    `seen`: False if it began before the first message."""
 
     at: float
     wall: float
@@ -22,13 +22,13 @@ class Moment:
 
 @dataclass(slots=True)
 class Fact:
-    """A present value and its beginning."""
+    """A present value, and the time since which it has been present."""
 
     value: str
     since: Moment
 
     def say(self, value: str, moment: Moment) -> bool:
-        """Set the present value. Return True for a change."""
+        """Set the present value. Return True if the value changes."""
         if value == self.value:
             return False
         self.value, self.since = value, moment
@@ -37,15 +37,21 @@ class Fact:
 
 @dataclass(slots=True)
 class DeviceRequester:
-    """One requester and its wish. `wants`: a floor, a door's mode, and the like. Times: `first`, the
-    start of its visit; `since`, its first request for this wish; `lacks`, the start of its wait;
-    `last`, its last request; `passed_on`, the supervisor's last request for it; `met`, the wish seen
-    fulfilled by RMF; `boarded`, the first such time in this visit,
-    for the wish `boarded_at`; `reached`, the last wish so fulfilled; `granted`, its hold of the device;
-    `ended`, its first END, and `end_last`, its latest. `end_passed_on`: the supervisor has passed on
-    END. `gone`: it has stopped without END. `times`: the number of its requests. `own`: it was heard
-    itself, not only through the supervisor. `given_up`: the wish before this one, unless it was met.
-    `stamp_age_s`: the age by our clock of its last request, if that was `stamped`.
+    """One requester and its wish. `wants`: a floor, a door's mode, and the like.
+
+    Times of its requests: `first`: the start of its visit. `since`: its first request for this wish.
+    `last`: its last request. `passed_on`: the supervisor's last request for it. `ended`: its first END.
+    `end_last`: its latest END.
+
+    Times of their effects: `lacks`: the start of its wait. `met`: RMF saw the wish fulfilled.
+    `boarded`: RMF first saw a wish of this visit fulfilled; that wish was `boarded_at`. `granted`: the
+    requester got the device.
+
+    `reached`: the last wish that was fulfilled. `given_up`: the wish before this one, if it was not
+    fulfilled. `end_passed_on`: the supervisor has passed on END. `gone`: the requester has stopped
+    without END. `times`: the number of its requests. `own`: the requester itself was heard, not only
+    the supervisor. `stamp_age_s`: the age (s) of its last request by our clock, if that request was
+    `stamped`.
     """
 
     who: str
@@ -71,21 +77,22 @@ class DeviceRequester:
     stamp_age_s: float = 0.0
 
     def asks(self, now: Moment) -> bool:
-        """Does the requester still ask?"""
+        """Return whether the requester still asks."""
         return self.ended is None and now.at - self.last.at <= REQUESTER_SILENT_S
 
     def ends(self, now: Moment) -> bool:
-        """Does the requester still repeat END?"""
+        """Return whether the requester still repeats END."""
         return self.end_last is not None and now.at - self.end_last.at <= REQUESTER_SILENT_S
 
     def stamp(self, moment: Moment, stamp: Time) -> None:
-        """Note the age of its request, by our clock."""
+        """Note the age of the requester's last request, by our clock."""
         self.stamped = stamp != Time()
         self.stamp_age_s = moment.wall - in_seconds(stamp)
 
 
 class DeviceRequesters:
-    """All requesters of one device. A flood of names drops the requester silent for the longest time.
+    """All requesters of one device. If names flood in, the requester that has been silent for the
+    longest time is dropped.
 
     `began`: the time when we began to listen.
     """
@@ -98,14 +105,14 @@ class DeviceRequesters:
         return iter([*self._all.values()])
 
     def get(self, who: str) -> DeviceRequester | None:
-        """Find this requester, while its visit lasts."""
+        """Find this requester; None if its visit is over."""
         return self._all.get(who)
 
     def ask(
         self, who: str, wants: str, moment: Moment, keep: str = "", *, stands: bool = False
     ) -> tuple[DeviceRequester, bool]:
-        """Take a request. Return the requester, and True for a new wish. `keep`: the requester that
-        must stay. `stands`: no states arrive, so nobody repeats a request."""
+        """Take a request. Return the requester, and True for a new wish. `keep`: a requester that must
+        not be dropped. `stands`: no states arrive, so nobody repeats a request."""
         found = self._all.get(who)
         if found is not None and not stands and moment.at - found.last.at > GIVEN_UP_S:
             found.ended = found.ended or found.last
