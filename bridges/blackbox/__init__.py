@@ -1,1 +1,2 @@
-"""Recordings of a daemon's messages, events and decisions: rings, and the recorder's files."""
+"""Recordings of a daemon's messages, events and decisions: the rings in memory, and the recorder's
+files."""

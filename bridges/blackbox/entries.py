@@ -1,8 +1,8 @@
-"""The contents of a ring: the head of a daemon's run, and its entries.
+"""The contents of a ring: a head that describes one run of a daemon, and the run's entries.
 
-All times are by the daemon's monotonic clock (s); `Clocks` has the matching wall-clock times.
-A subject is a lift, a door, a charger, or a coordinator's site. Its core is a pure function, so its
-memory at one time and the events after that time are enough to repeat every decision.
+All times are by the daemon's monotonic clock (s); `Clocks` has the matching times of the wall clock. A
+subject is a lift, a door, a charger, or a coordinator's site. Its core is a pure function. So the
+subject's memory at one time and the events after that time are enough to repeat every decision.
 """
 
 from collections.abc import Callable
@@ -17,22 +17,23 @@ from bridges.messages.releases import RELEASES
 from bridges.messages.rihs01 import MESSAGES
 
 LATEST_S: Final = 4e9
-"""The greatest time, before or after zero. The sum of three such times is a date, and fits into an MCAP
-file."""
+"""The greatest time (s), before or after zero. The sum of three such times is still a date, and fits
+into an MCAP file."""
 Seconds = Annotated[float, Meta(ge=-LATEST_S, le=LATEST_S)]
 DEEPEST: Final = 60
-"""The greatest depth of a tree. A core's memory is a tenth as deep."""
+"""The greatest depth of a tree of values. A core's memory has a tenth of this depth."""
 E = TypeVar("E")
 
 
 class Invalid(ValueError):
-    """The bytes are not an entry or head of this version. The text gives the reason."""
+    """The bytes are not an entry or head of this version. The error's text gives the reason."""
 
 
 class Head(msgspec.Struct, frozen=True):
-    """One run of a daemon: its software, and the file that it serves.
+    """The description of one run of a daemon: its software, and the file that it serves.
 
-    `file`: the YAML's path. `yaml`: its text. `texts`: profiles and DBC files that it uses.
+    `file`: the YAML's path. `yaml`: the YAML's text. `texts`: the profiles and DBC files that the YAML
+    uses.
     """
 
     run: Annotated[str, Meta(pattern=r"^[\w-]{1,64}$")]
@@ -54,14 +55,15 @@ class RingEntry(msgspec.Struct, frozen=True, array_like=True, tag_field="is"):
 
 
 class Clocks(RingEntry, frozen=True, tag_field="is", tag=0):
-    """The wall clock at this time (s since the epoch)."""
+    """The wall clock's time (s since the epoch) at the entry's time."""
 
     wall: Seconds
 
 
 class Spoken(RingEntry, frozen=True, tag_field="is", tag=1):
-    """A message heard from RMF's graph, or sent. `cdr`: its bytes on the wire in `release`. `node`: the
-    publisher's node, `/namespace/name`; "" if the wire does not name it."""
+    """A message that was heard on RMF's graph, or sent. `cdr`: its bytes on the wire, in the form of
+    `release`. `node`: the publisher's node, `/namespace/name`; "" if the wire does not name the
+    node."""
 
     sent: bool
     topic: str
@@ -84,7 +86,8 @@ class Known(RingEntry, frozen=True, tag_field="is", tag=2):
 
 
 class Decided(RingEntry, frozen=True, tag_field="is", tag=3):
-    """An event and the core's decision. `outputs`, `news`, `faults`: empty if unchanged."""
+    """An event, and the core's decision on it. `outputs`, `news` and `faults` are empty if they have
+    not changed."""
 
     subject: str
     event: Tree
@@ -97,20 +100,20 @@ class Decided(RingEntry, frozen=True, tag_field="is", tag=3):
 
 
 class Same(RingEntry, frozen=True, tag_field="is", tag=4):
-    """Times (doubles) at which the last reading came again and changed no decision."""
+    """The times (doubles) at which the last reading was repeated without changing a decision."""
 
     subject: str
     times: bytes
 
 
 class Published(RingEntry, frozen=True, tag_field="is", tag=5):
-    """The subject's report was published, and its memory records that."""
+    """The subject's report was published, and the subject's memory has noted this."""
 
     subject: str
 
 
 class SubjectForgotten(RingEntry, frozen=True, tag_field="is", tag=6):
-    """The subject is no longer remembered."""
+    """The daemon no longer remembers the subject."""
 
     subject: str
 
@@ -191,7 +194,7 @@ def _decoded(decode: Callable[..., E], content: bytes | str) -> E:
 
 
 def _known(entry: AnyEntry) -> AnyEntry:
-    """Return the entry if this version knows the names in it. Raises Invalid."""
+    """Return the entry. Raises Invalid if this version does not know a name in it."""
     if isinstance(entry, Spoken):
         kind, release = MESSAGES.get(entry.type), RELEASES.get(entry.release)
         if kind is None or release is None or not release.has(kind):

@@ -1,4 +1,4 @@
-"""One incident: the daemon's entries of that time, and the reasons for recording them. The module is
+"""One incident: a daemon's entries around that time, and the reasons for the recording. The module is
 pure."""
 
 from collections.abc import Iterator, Sequence
@@ -18,7 +18,7 @@ ERRORS: Final = (name_of(IoFailed), name_of(WriteFailed), name_of(Suspended))
 
 
 class Note(msgspec.Struct, frozen=True):
-    """A reason for a recording: a fixed name, and a text. `at`: monotonic s."""
+    """A reason for a recording: a fixed name, and a text. `at`: its time (monotonic s)."""
 
     at: float
     code: str
@@ -27,7 +27,7 @@ class Note(msgspec.Struct, frozen=True):
 
 
 class Incident(msgspec.Struct, frozen=True):
-    """The content of a file. `entries` begin with everything that a replay needs."""
+    """The content of one recording's file. `entries` begins with everything that a replay needs."""
 
     head: Head
     entries: Sequence[AnyEntry]
@@ -47,7 +47,8 @@ def part(entries: Sequence[AnyEntry], begin_at: float, end_at: float) -> Sequenc
 
 
 def timed(entries: Sequence[AnyEntry]) -> Iterator[tuple[AnyEntry, float, float]]:
-    """Yield each entry with two times (s since the epoch): on a steady clock, on the wall clock."""
+    """Yield each entry with two times (s since the epoch): one by a steady clock, one by the wall
+    clock."""
     clocks = [entry for entry in entries if isinstance(entry, Clocks)]
     steady = wall = clocks[0].wall - clocks[0].at if clocks else 0.0
     for entry in entries:
@@ -57,7 +58,7 @@ def timed(entries: Sequence[AnyEntry]) -> Iterator[tuple[AnyEntry, float, float]
 
 
 def readable(step: Decided) -> Iterator[tuple[str, Tree]]:
-    """Yield a step as (topic, JSON), for display in Foxglove or `ros2 bag`."""
+    """Yield a decision as pairs of a topic and JSON. Foxglove and `ros2 bag` can show them."""
     event = step.event if isinstance(step.event, dict) else {}
     kind = str(event.get("", ""))
     if kind == READING:
@@ -83,4 +84,4 @@ INSTALL: Final = "in the clone, .venv/bin/pip install '.[recording,sqlite]'"
 
 
 LIBRARY: Final = "rmf-bridges"
-"""The beginning of `library` in the header of our own files."""
+"""The beginning of the field `library` in the header of files that we wrote."""

@@ -1,4 +1,4 @@
-"""The state of each subject as recorded in a ring, and the entries that record it."""
+"""The state of each subject that a ring already has, and the entries that record a state."""
 
 from typing import Any
 
@@ -10,7 +10,8 @@ AnyDecision = Decision[Any, Any, Any]
 
 
 class KnownSubject:
-    """A subject's recorded state. `times`: repeats of the last reading that are not in the ring yet."""
+    """A subject's recorded state. `times`: the times of repeats of the last reading that are not in the
+    ring yet."""
 
     def __init__(self, memory: object) -> None:
         self.memory = memory
@@ -21,7 +22,7 @@ class KnownSubject:
         self.times: list[float] = []
 
     def is_as_before(self, event: object, decision: AnyDecision, news: object) -> bool:
-        """Is this the last reading again, without any change?"""
+        """Return whether the event only repeats the last reading, without any change."""
         return (
             event == self.reading
             and decision.outputs == self.outputs
@@ -33,8 +34,8 @@ class KnownSubject:
 
 
 def known(name: str, subject: KnownSubject, now: float, *, anew: bool = False) -> Known:
-    """Return the entry from which a replay of a subject can start. `anew`: its memory does not come
-    from the last decision."""
+    """Return the entry from which a replay of a subject can start. `anew`: the subject's memory does
+    not come from the last decision."""
     return Known(
         now,
         name,
@@ -54,7 +55,7 @@ def step(
     decision: AnyDecision,
     news: object,
 ) -> Decided:
-    """Return the entry of a decision, without unchanged values."""
+    """Return the entry of a decision. Values that have not changed are left out."""
     faults, before = decision.report.faults, subject.report
     return Decided(
         now,

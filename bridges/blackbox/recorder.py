@@ -1,8 +1,9 @@
 """The recorder: one process beside all daemons of a machine, which turns their rings into files.
 
-It has no devices, and no daemon waits for it. Each second it reads the new entries of each ring. An
-entry that triggers a recording (`triggers.py`) leads to a file, once the ring also has the entries of
-the time after it. Nothing is written while all is well, unless a YAML asks for `keep: continuous`.
+The recorder has no devices, and no daemon waits for it. Each second it reads the new entries of each
+ring. If an entry triggers a recording (`triggers.py`), the recorder waits until the ring also has the
+entries of the time after that entry. Then it writes a file. If all is well, nothing is written, unless
+a YAML asks for `keep: continuous`.
 """
 
 import logging
@@ -27,7 +28,8 @@ from bridges.system.log import pairs
 log = logging.getLogger(__name__)
 
 LATE_S: Final = 60.0
-"""Entries older than this at the first look at a ring are left to the recorder that ran before."""
+"""The age (s) of entries that are left out at the first look at a ring. The recorder that ran before
+has recorded older entries."""
 GRACE_S: Final = 2.0
 """The extra wait (s) after which the ring certainly has all entries of a recording."""
 COUNTED_S: Final = 3600.0
@@ -37,7 +39,8 @@ PART_S: Final = 300.0
 
 
 class Recorder:
-    """Follows the rings of all daemons. `folders`: their runtime directories. `now`: machine s."""
+    """Follows the rings of all daemons. `folders`: their runtime directories. `now`: returns the
+    machine's time (s)."""
 
     def __init__(
         self,
@@ -55,7 +58,8 @@ class Recorder:
         self._counted_at = now()
 
     def look(self) -> None:
-        """Read new entries, and write due recordings. Called each second; does not raise."""
+        """Read new entries, and write the recordings that are due. Called each second; does not
+        raise."""
         folders = list(self._folders())
         for folder in folders:
             self._look_at(folder)
@@ -87,7 +91,7 @@ class Recorder:
             self._take_died(folder / NAME)
 
     def _follow(self, folder: Path) -> "_Followed":
-        """Return the ring of the present run. Raises RingError."""
+        """Return the ring of the daemon's present run. Raises RingError."""
         followed = self._followed.get(folder)
         if followed is not None and not followed.is_replaced():
             return followed
@@ -109,8 +113,8 @@ class Recorder:
             log.warning(pairs("not_counted", folder=self._recordings.folder, reason=error))
 
     def _take_died(self, path: Path) -> None:
-        """Record, once, the ring of a run that did not shut down cleanly. A failed start is not
-        recorded, because the log has it."""
+        """Record, once, the ring of a run that did not shut down cleanly. If the run never served,
+        nothing is recorded, because the log explains a failed start."""
         try:
             identity = _identity(path)
             if identity in self._seen_dead:
@@ -127,7 +131,8 @@ class Recorder:
             self._put(Incident(read.head, part(entries, at - BEFORE_S, at), (note,)), DEATH)
 
     def _is_first(self, head: Head) -> bool:
-        """Is this death still unrecorded, and has no other death been recorded in the last AGAIN_S?"""
+        """Return whether this death is still unrecorded, and no other death was recorded in the last
+        AGAIN_S."""
         last = self._died_at.get(head.file, AGES_AGO)
         if self._recordings.has_death(head) or self._now() < last + AGAIN_S:
             return False
@@ -135,7 +140,8 @@ class Recorder:
         return True
 
     def _put(self, incident: Incident, why: str) -> None:
-        """Write a file. After a failure the recording is lost; repeated failures are logged once."""
+        """Write a file. If writing fails, the recording is lost. Of several failures in a row only the
+        first is logged."""
         others = [followed.head.recording for followed in self._followed.values()]
         try:
             path = self._recordings.put(incident, wall_of(incident.entries), why, others)
@@ -151,7 +157,7 @@ class Recorder:
 
 
 class _Followed:
-    """One ring, and the recordings of it that have begun."""
+    """One ring, and its recordings that have begun."""
 
     def __init__(self, path: Path, now: float) -> None:
         """Open the ring. Raises RingError."""
@@ -165,7 +171,7 @@ class _Followed:
         self._part: list[AnyEntry] = []
 
     def is_replaced(self) -> bool:
-        """Is another run's ring at this path?"""
+        """Return whether the ring of another run has taken this path."""
         return _identity(self._tail.path) != self._identity
 
     def take(self, now: float) -> None:
@@ -186,7 +192,8 @@ class _Followed:
         return {key: one for key, one in found.items() if key[0] == self.head.kind}
 
     def due(self, now: float) -> list[tuple[Incident, str]]:
-        """Return the recordings that are complete now; with `now` infinite, all that have begun."""
+        """Return the recordings that are complete at `now`. If `now` is infinite, return all recordings
+        that have begun."""
         found = []
         if self._notes and now >= self._notes[0].at + AFTER_S + GRACE_S:
             found.append(self._incident())
@@ -204,7 +211,8 @@ class _Followed:
         return Incident(read.head, entries, notes), reason(first.code, first.text)
 
     def _read(self) -> RingContent:
-        """Read the ring again; if it is gone, return the content from the recording's beginning."""
+        """Read the ring again. If the ring is gone, return its content from the recording's
+        beginning."""
         try:
             read = RingContent(self._tail.path)
             if read.head.run == self.head.run:
@@ -215,8 +223,8 @@ class _Followed:
         return self._kept
 
     def _continuous(self, *, whole: bool) -> list[tuple[Incident, str]]:
-        """Return the entries since the last file, up to a place where a replay can start, so that the
-        next file needs no other file."""
+        """Return the entries since the last file, up to a place where a replay can start. So a replay
+        of the next file needs no other file."""
         known = [at for at in range(1, len(self._part)) if begins(self._part, at)]
         end = len(self._part) if whole or not known else known[-1]
         entries, self._part = self._part[:end], self._part[end:]
@@ -224,17 +232,17 @@ class _Followed:
 
 
 def _last_words(entries: Sequence[AnyEntry]) -> str:
-    """Return the cause of a run's death that the entries show."""
+    """Return the cause of a run's death, as its last entries show."""
     for entry in entries:
         if isinstance(entry, DaemonDied):
             return entry.reason
     if isinstance(entries[-1], DaemonEnded):
         return "it ended, and not every output was verified off"
-    return "it ended without an entry: killed, or the machine stopped"
+    return "it left no last entry: it was killed, or the machine stopped"
 
 
 def _runs(pid: int) -> bool:
-    """Is there a process with this pid?"""
+    """Return whether a process with this pid exists."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -245,7 +253,7 @@ def _runs(pid: int) -> bool:
 
 
 def begins(entries: Sequence[AnyEntry], at: int) -> bool:
-    """Can a replay start at this place, with every subject known?"""
+    """Return whether a replay of every subject can start at this place."""
     following = entries[at + 1 : at + 2]
     return isinstance(entries[at], Clocks) and bool(following) and isinstance(following[0], Known)
 

@@ -1,9 +1,9 @@
-"""The store of recordings: their names, and limits that spare an SD card.
+"""The store of recordings: the names of the files, and the limits that spare an SD card.
 
-All daemons of a machine share one store and one bound. Files of little value go first: files of
-`keep: continuous`, then repeats of a fault, then repeated deaths, then the first file of each cause,
-and the first death of a daemon last. Among equals the oldest goes first, by the time in its name.
-Files with other names are a person's: they are neither counted nor removed.
+All daemons of a machine share one store and one bound. Files are removed in this order: files of `keep:
+continuous`, repeats of a fault, repeated deaths, the first file of each cause, and last the first death
+of a daemon. Among equals the oldest file goes first, by the time in its name. A file with another form
+of name is a person's: it is neither counted nor removed.
 """
 
 import os
@@ -20,10 +20,10 @@ from bridges.blackbox.incident import Incident
 from bridges.kinds.shared.recording_section import RecordingSettings
 
 LEAST_FREE: Final = 100_000_000
-"""No recording is written to a disk with less room than this (bytes)."""
+"""The least free room (bytes) on a disk. If there is less, no recording is written."""
 SUFFIX: Final = ".mcap"
 CONTINUOUS: Final = "all"
-"""The word in the names of `keep: continuous` files; other files have their cause there."""
+"""The word in the names of `keep: continuous` files. Other files have their cause at that place."""
 DEATH: Final = "died"
 _NAME: Final = re.compile(r"(.+)_(\d+-\d+-\d+_\d+-\d+-\d+)_([^_]+)_[^_]+")
 _TIME: Final = "%Y-%m-%d_%H-%M-%S"
@@ -42,7 +42,8 @@ class Named(NamedTuple):
 
     @property
     def cause(self) -> tuple[str, str]:
-        """Return daemon and reason; files of one cause are repeats of the first."""
+        """Return daemon and reason. A file with the same daemon and reason as an earlier file is a
+        repeat."""
         return self.daemon, self.why
 
 
@@ -67,7 +68,7 @@ class Recordings:
                 begun.unlink()
 
     def name(self, head: Head, wall: float, why: str) -> str:
-        """Return `<file>_<day>_<time>_<why>_<run>.mcap`; day and time are in the machine's time
+        """Return `<file>_<day>_<time>_<why>_<run>.mcap`. Day and time are in the machine's time
         zone."""
         when = datetime.fromtimestamp(wall).strftime(_TIME)
         return f"{Path(head.file).stem}_{when}_{why}_{head.run[:8]}{SUFFIX}"
@@ -79,8 +80,8 @@ class Recordings:
     def put(
         self, incident: Incident, wall: float, why: str, others: Iterable[RecordingSettings] = ()
     ) -> Path:
-        """Write a recording, and remove files of little value beyond the machine's bound: the
-        largest bound among this daemon's and the `others`. Raises OSError."""
+        """Write a recording. If the store then exceeds the machine's bound, remove files of little
+        value. The bound is the largest bound of this daemon and of the `others`. Raises OSError."""
         from bridges.blackbox import mcap_write
 
         self.folder.mkdir(mode=0o750, parents=True, exist_ok=True)
@@ -97,7 +98,7 @@ class Recordings:
             raise DiskFull(f"less than {LEAST_FREE // 1_000_000} MB are free on {self.folder}")
 
     def _prune(self, newest: Path, most_files: int, most_bytes: float) -> None:
-        """Remove files beyond these limits, but never the newest."""
+        """Remove files until these limits hold, but never the newest file."""
         stored = [
             Stored(path, found, path.stat().st_size)
             for path in self.folder.glob(f"*{SUFFIX}")
@@ -113,8 +114,8 @@ class Recordings:
 
 
 def least_valuable_first(stored: Sequence[Stored], now: float) -> list[Stored]:
-    """Return the files in the order of their removal. `now`: s since the epoch; a file from the future
-    was written before the clock was set back, so that it counts as the oldest."""
+    """Return the files in the order of their removal. `now`: s since the epoch. A file from the future
+    was written before the clock was set back, so it counts as the oldest."""
     by_age = sorted(stored, key=lambda one: (one.name.at <= now, one.name.at))
     first = {one.name.cause: one for one in reversed(by_age)}
 
@@ -127,7 +128,7 @@ def least_valuable_first(stored: Sequence[Stored], now: float) -> list[Stored]:
 
 
 def reason(code: str, text: str = "") -> str:
-    """Return a note's reason as a part of a file's name, such as `fault-lift-door-stuck`."""
+    """Return a note's reason in the form for a file's name, such as `fault-lift-door-stuck`."""
     cause = text.partition(":")[0] if code in ("FAULT", "REFUSED") else ""
     return re.sub(r"[^a-z0-9]+", "-", f"{code} {cause}".lower()).strip("-")[:60]
 

@@ -1,10 +1,11 @@
-"""The ring: a file of fixed size on tmpfs with a daemon's last minutes. The file outlives a kill.
+"""The ring: a file of fixed size on tmpfs with the last minutes of a daemon. The file outlives a kill
+of the daemon.
 
-It has a head, then SEGMENTS of equal size, used in turn. Each segment begins with its number and the
-state of every subject; entries follow, each with its length and a checksum. The checksum also covers
-the segment's number, so an entry from an earlier turn, or an entry that a kill has cut short, is never
-valid. The file is written with `pwrite` and not mapped, because a signal would kill the daemon if
-somebody truncated a mapped file.
+The file has a head, and then SEGMENTS of equal size, which are used in turn. Each segment begins with
+its number and the state of every subject. Entries follow, each with its length and a checksum. The
+checksum also covers the segment's number. So an entry from an earlier turn, or an entry that a kill has
+cut short, is never valid. The file is written with `pwrite` and not mapped, because a signal would kill
+the daemon if somebody truncated a mapped file.
 """
 
 import os
@@ -21,13 +22,13 @@ from bridges.system import user_files
 MAGIC: Final = b"RMFRING1"
 SEGMENTS: Final = 8
 TOP: Final = struct.Struct("<8sBxxxII")
-"""The file begins with: magic, the flag of a clean shutdown, the size of a segment, the head's
-length."""
+"""The beginning of the file: magic, the flag of a clean shutdown, the size of a segment, the length of
+the head."""
 ENDED_AT: Final = 8
 MARK: Final = struct.Struct("<QI")
-"""A segment begins with its number, and the checksum of the number."""
+"""The beginning of a segment: its number, and the checksum of that number."""
 FRAME: Final = struct.Struct("<II")
-"""An entry begins with its length and its checksum."""
+"""The beginning of an entry: its length and its checksum."""
 PAGE: Final = 4096
 LARGEST: Final = 72 << 20
 LONGEST_TOP: Final = 4 << 20
@@ -40,11 +41,12 @@ class RingError(Exception):
 
 
 class Ring:
-    """The writing end. If a method raises OSError, the caller must make a new ring."""
+    """The end of a ring at which the daemon writes. If a method raises OSError, the caller must make a
+    new ring."""
 
     def __init__(self, folder: Path, head: Head, size: int) -> None:
-        """Make the file and reserve all its space. The ring of an earlier run that died is kept beside
-        it."""
+        """Make the file and reserve all its space. If an earlier run died, its ring is kept beside the
+        new one."""
         self.path = folder / NAME
         self._segment_size = max(size // SEGMENTS, PAGE)
         told = entries.encode(head)
@@ -68,7 +70,7 @@ class Ring:
 
     @property
     def lives(self) -> bool:
-        """Is the file still at its path?"""
+        """Return whether the file is still at its path."""
         try:
             return os.path.samestat(os.fstat(self._file), self.path.lstat())
         except OSError:
@@ -80,7 +82,7 @@ class Ring:
         return self._segment_size - MARK.size - 2 * FRAME.size
 
     def fits(self, length: int) -> bool:
-        """Do this many bytes of framed entries still fit into this segment?"""
+        """Return whether this many bytes of framed entries still fit into the present segment."""
         return self._offset + length + FRAME.size <= self._segment_size
 
     def begin_segment(self) -> None:
@@ -101,7 +103,7 @@ class Ring:
         self._offset += len(frames)
 
     def close(self, *, ended: bool) -> None:
-        """Close the ring. `ended`: the run shut down cleanly, so its ring is not needed."""
+        """Close the ring. `ended`: the run shut down cleanly, so nobody needs its ring."""
         try:
             if ended:
                 os.pwrite(self._file, b"\1", ENDED_AT)
@@ -114,7 +116,7 @@ class Ring:
 
 
 def _died(path: Path) -> bool:
-    """Is there a ring whose run did not shut down cleanly?"""
+    """Return whether the path has a ring whose run did not shut down cleanly."""
     try:
         found = user_files.read(path, TOP.size - 1).content
     except OSError:
@@ -123,9 +125,10 @@ def _died(path: Path) -> bool:
 
 
 class RingContent:
-    """A ring's content at one time. `head`: the head of the run. `ended`: the run shut down cleanly.
+    """The content of a ring at one time. `head`: the head of the run. `ended`: the run shut down
+    cleanly.
 
-    `segments`: each segment's number and entries, in order, without incomplete entries.
+    `segments`: the number and the entries of each segment, in order. Incomplete entries are left out.
     """
 
     def __init__(self, path: Path) -> None:
@@ -156,7 +159,7 @@ class RingContent:
 
 
 class Tail:
-    """Follows a ring that is being written, and reads its new entries.
+    """A reader that follows a ring during writing, and returns its new entries.
 
     `head`: the head of the run. The constructor and `new` raise RingError if the file cannot be read.
     """
@@ -168,8 +171,8 @@ class Tail:
         self._offset = MARK.size
 
     def new(self) -> list[AnyEntry]:
-        """Return the entries written since the last call, or all entries at the first call. Entries
-        that the ring has overwritten meanwhile are missing."""
+        """Return the entries written since the last call; at the first call return all entries. Entries
+        that the ring has overwritten since the last call are missing."""
         try:
             with self.path.open("rb") as ring:
                 return self._new(ring)
@@ -193,7 +196,7 @@ class Tail:
         return found
 
     def _start(self, ring: IO[bytes], turn: int) -> int:
-        """Return the number of the segment at a place; 0 if there is no valid segment."""
+        """Return the number of the segment at this place; 0 if no valid segment is there."""
         ring.seek(self._first + turn * self._size)
         start = ring.read(MARK.size)
         if len(start) < MARK.size:
@@ -204,7 +207,8 @@ class Tail:
 
 
 def _top(path: Path) -> tuple[Head, int, int]:
-    """Return a ring's head, its first segment's offset, and the segment size. Raises RingError."""
+    """Return a ring's head, the offset of its first segment, and the size of its segments. Raises
+    RingError."""
     try:
         content = user_files.read(path, LONGEST_TOP).content
         magic, _, size, length = TOP.unpack_from(content)
@@ -224,8 +228,8 @@ def _entries(segment: bytes, number: int) -> list[AnyEntry]:
 
 
 def frames(segment: bytes, number: int, at: int) -> Iterator[tuple[bytes, int]]:
-    """Yield (entry, offset of its end) for a segment's entries from offset `at` to the first torn
-    entry."""
+    """Yield each entry of a segment with the offset of its end. Begin at offset `at`, and stop at the
+    first torn entry."""
     while at + FRAME.size <= len(segment):
         length, checksum = FRAME.unpack_from(segment, at)
         content = segment[at + FRAME.size : at + FRAME.size + length]

@@ -1,10 +1,11 @@
-"""Finds the reasons for a recording in a daemon's entries. The module is pure.
+"""Finds the reasons for a recording in a daemon's entries. The module is pure. The reasons are:
 
 - a fault appears (a hazard is a fault too, because it keeps the device from RMF);
 - a request is refused, unless every normal handover or start causes such a refusal;
 - a request has waited longer than `waiting_s`;
 - the daemon reports a defect that ends it.
-The same reason for the same subject counts once in AGAIN_S.
+
+If the same reason for the same subject comes again within AGAIN_S, it does not count.
 """
 
 from collections.abc import Iterator
@@ -69,7 +70,7 @@ class Triggers:
             yield Note(step.at, REFUSED, step.refused, step.subject)
 
     def _spoken(self, spoken: Spoken) -> Iterator[Note]:
-        """Yield a note for each overlong wait, which the messages alone show."""
+        """Yield a note for each wait that is too long. The messages alone show such a wait."""
         kind, release = MESSAGES.get(spoken.type), RELEASES.get(spoken.release)
         if kind is None or release is None:
             return
@@ -99,7 +100,7 @@ class Triggers:
 
 
 def _codes(faults: Tree) -> dict[str, str]:
-    """Return code -> detail of the faults in a report."""
+    """Return the details of the faults in a report, by code."""
     listed = faults if isinstance(faults, list) else []
     found = [fault for fault in listed if isinstance(fault, dict)]
     return {str(fault.get("code")): str(fault.get("detail", "")) for fault in found}

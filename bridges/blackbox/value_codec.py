@@ -1,9 +1,9 @@
 """Converts a core's values (events, memories, outputs, reports) to trees of plain values, and back.
 
-A tree holds None, bool, int, float, str, lists and mappings with text as keys. A tuple becomes a
-list. Any other value becomes a mapping whose key `""` names its type (`lift.memory.Session`); the
-mapping also has the value's fields, or its content under `=`. Only types with a name (in
-`bridges/kinds/shared/recorded.py`, and in `RECORDED` of each kind) are written and created, so no
+A tree holds None, bool, int, float, str, lists, and mappings with text as keys. A tuple becomes a list.
+Any other value becomes a mapping whose key `""` names its type (`lift.memory.Session`). The mapping
+also has the value's fields, or the value's content under `=`. Only types that have a name are written
+and created; `bridges/kinds/shared/recorded.py` and `RECORDED` of each kind have these names. So no
 recording can call any other code.
 """
 
@@ -21,24 +21,24 @@ from bridges.kinds.shared.recorded import SHARED
 
 if TYPE_CHECKING:
     Tree = None | bool | int | float | str | list["Tree"] | dict[str, "Tree"]
-else:  # msgspec has no recursive types; without types it decodes only plain values
+else:  # msgspec has no recursive types; an untyped decoder makes plain values only
     Tree = Any
 
 TYPE: Final = ""
 HOLDS: Final = "="
 MAP, SET, NUMBER = "map", "set", "number"
 ENDLESS: Final = (math.inf, -math.inf)
-"""Floats that JSON cannot express."""
+"""The floats that JSON cannot express."""
 PLAIN: Final = frozenset({type(None), bool, int, float, str})
 
 
 class UnknownValue(ValueError):
-    """A tree names a type, field or member that this version does not have."""
+    """A tree names a type, a field or a member that this version does not have."""
 
 
 class Struct(NamedTuple):
-    """A type with fields. `name`: its name in a tree. `fields`: (name in code, name in trees); the
-    names differ if the field was renamed (`msgspec.field(name=…)`)."""
+    """A type with fields. `name`: its name in a tree. `fields`: pairs of a name in the code and a name
+    in trees. The two differ if the field was renamed (`msgspec.field(name=…)`)."""
 
     name: str
     fields: tuple[tuple[str, str], ...]
@@ -117,8 +117,9 @@ _structs: dict[type[Any], Struct | None] = {}
 
 
 def first_difference(one: Tree, other: Tree, path: str = "") -> tuple[str, Tree, Tree] | None:
-    """Return the first difference as (path, one, other); None for equal trees. A field that only one
-    tree has does not count, because another version of the program may have more or fewer fields."""
+    """Return the first difference as its path and both values; None for equal trees. A field that only
+    one tree has does not count, because another version of the program may have more or fewer
+    fields."""
     if isinstance(one, dict) and isinstance(other, dict) and one.get(TYPE) == other.get(TYPE):
         names = [name for name in one if name in other]
         below = ((f"{path}.{name}".strip("."), one[name], other[name]) for name in names)
@@ -157,10 +158,10 @@ def name_of(kind: type) -> str:
 
 @cache
 def _type(name: str) -> type[Any]:
-    """Return the type with this name. Only the kind at the name's beginning is loaded. Raises
+    """Return the type with this name. Only the kind that begins the name is loaded. Raises
     UnknownValue."""
     kind = name.partition(".")[0]
     known = recorded(kind) if kind in kind_names() else SHARED
     if name not in known:
-        raise UnknownValue(f"{name!r} is no value of a core that this version knows")
+        raise UnknownValue(f"{name!r} is not the name of a core's value in this version")
     return known[name]
