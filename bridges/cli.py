@@ -1,4 +1,5 @@
-"""The command `rmf-bridge`. A subcommand is a file in `bridges/commands/` or `workbench/commands/`."""
+"""The command `rmf-bridge`. Each subcommand is a file in `bridges/commands/` or
+`workbench/commands/`."""
 
 import argparse
 import atexit
@@ -15,7 +16,7 @@ from bridges import VERSION, exit_codes
 from bridges.system.installed import NotInstalled, is_there, of_workbench
 
 EX_PIPE = 141
-"""The exit code when the reader of our output has gone. A shell shows the same code after SIGPIPE."""
+"""The exit code if the reader of our output has gone. A shell shows the same code after SIGPIPE."""
 
 COMMANDS = {
     "init": (
@@ -125,7 +126,7 @@ COMMANDS = {
         "outputs-off my_lift.yaml",
     ),
 }
-"""Subcommand -> (its purpose, an example)."""
+"""The purpose and an example of each subcommand."""
 WORKBENCH = frozenset(
     {
         "init",
@@ -147,20 +148,20 @@ WORKBENCH = frozenset(
 
 def main(argv: list[str] | None = None) -> int:
     """Run one subcommand and return its exit code."""
-    # This spares Python's garbage collection at exit, which takes a fifth of a short process's CPU
+    # This avoids Python's garbage collection at exit, which takes a fifth of a short process's CPU
     # time.
     atexit.register(gc.freeze)
-    if "_ARGCOMPLETE" in os.environ:  # set by the shell's completion; ends the process
+    if "_ARGCOMPLETE" in os.environ:  # the shell set it; autocomplete ends the process
         import argcomplete
 
         argcomplete.autocomplete(whole_parser())
     arguments, ros_args = split_ros_args(sys.argv[1:] if argv is None else argv)
     for argument in arguments:
-        # Logs, JSON and messages cannot hold bytes that are not UTF-8.
+        # Logs, JSON and messages can hold only UTF-8.
         if any("\ud800" <= one <= "\udfff" for one in argument):
             sys.stderr.write(f"rmf-bridge: {os.fsencode(argument)!r} is not UTF-8: rename it\n")
             return 2
-    # Shows a character that the terminal lacks as an escape.
+    # A character that the terminal cannot show is printed as an escape.
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
     typed = argparse.Namespace(ros_args=ros_args, typed=arguments)
@@ -172,7 +173,7 @@ def main(argv: list[str] | None = None) -> int:
     except NotInstalled as error:
         sys.stderr.write(f"rmf-bridge {arguments[0]}: {error}\n")
         return os.EX_UNAVAILABLE
-    except BrokenPipeError:  # the reader of a pipe has closed it, as `head` does
+    except BrokenPipeError:  # the reader of a pipe, such as `head`, has closed it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EX_PIPE
 
@@ -194,10 +195,10 @@ def _nearest(typed: str, listed: str) -> str:
 
 
 def parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
-    """Return the parser of the subcommand in the arguments; without a subcommand, the parser of all
-    subcommands, without their options.
+    """Return the parser of the subcommand in the arguments. Without a subcommand, return the parser of
+    all subcommands, without their options.
 
-    The other subcommands are neither imported nor described, because `outputs-off` is short of time.
+    The other subcommands are neither imported nor described, because `outputs-off` has little time.
     """
     if arguments and arguments[0] in COMMANDS:
         return _parser(arguments[:1], whole=True)
@@ -205,8 +206,8 @@ def parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
 
 
 def whole_parser() -> argparse.ArgumentParser:
-    """Return the parser with the options of every installed subcommand, for the manual page
-    (`make man`) and completion."""
+    """Return the parser with the options of every installed subcommand. The manual page (`make man`)
+    and the completion need it."""
     lacks = frozenset() if is_there("workbench") else WORKBENCH
     return _parser((name for name in COMMANDS if name not in lacks), whole=True)
 
@@ -230,7 +231,8 @@ def _parser(names: Iterable[str], whole: bool) -> argparse.ArgumentParser:
 
 
 def split_ros_args(argv: list[str]) -> tuple[list[str], list[str]]:
-    """Return (our arguments, ROS's arguments: from each `--ros-args` to the next `--` or the end)."""
+    """Split the command line into our arguments and ROS's arguments. ROS's arguments reach from each
+    `--ros-args` to the next `--` or to the end."""
     ours, ros = list[str](), list[str]()
     into = ours
     for argument in argv:

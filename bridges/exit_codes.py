@@ -1,6 +1,6 @@
-"""The exit codes of each subcommand: for `--help`, the manual page and docs/reference/exit-codes.md.
+"""The exit codes of each subcommand, for `--help`, the manual page and docs/reference/exit-codes.md.
 
-Codes from 64 on have their meaning from sysexits.h.
+sysexits.h defines the meaning of codes from 64 on.
 """
 
 from typing import Final
@@ -168,7 +168,7 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
     "replay": {
         0: "every decision is the same",
         1: "a decision differs",
-        65: "the recording cannot be decided again",
+        65: "the decisions of the recording cannot be repeated",
         **RECORDING,
         **YAML,
     },

@@ -1,7 +1,9 @@
-"""`rmf-bridge check FILE...`: prints the errors of device YAMLs, or a wiring table to be signed.
+"""`rmf-bridge check FILE...`: prints the errors of device YAMLs, or a wiring table that a person can
+sign.
 
-Each file is checked alone, then all files together (`bridges/settings/cross_file_checks.py`). The
-findings about a file (`bridges/settings/sheets/findings.py`) are printed as text, JSON or a sheet.
+Each file is checked alone, and then all files together (`bridges/settings/cross_file_checks.py`). The
+findings about a file (`bridges/settings/sheets/findings.py`) are printed as text or JSON, or written as
+a sheet.
 """
 
 import argparse
@@ -66,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Check every file; return the exit code."""
+    """Check every file and return the exit code."""
     try:
         building = _building(args.building_map)
     except SettingsError as error:
@@ -92,7 +94,7 @@ def _building(file: str | None) -> "BuildingMap | None":
 def _read(
     files: Sequence[str], building: "BuildingMap | None"
 ) -> tuple[dict[str, tuple[Config, Findings]], dict[str, Findings]]:
-    """Read each file once; return (the valid files, the findings of all files)."""
+    """Read each file once. Return the valid files, and the findings of all files."""
     right: dict[str, tuple[Config, Findings]] = {}
     found: dict[str, Findings] = {}
     for file in dict.fromkeys(files):
@@ -107,7 +109,7 @@ def _read(
 
 
 def _against(config: Config, building: "BuildingMap | None") -> tuple[list[Problem], list[str]]:
-    """Compare a file's names with the names on the map; return (problems, notes)."""
+    """Compare a file's names with the names on the map. Return problems and notes."""
     if building is None:
         return [], []
     from bridges.settings.map_names import mismatches, places
@@ -152,8 +154,8 @@ def _beside_fleet(
     found: Mapping[str, Findings],
     building: "BuildingMap | None",
 ) -> dict[str, Findings]:
-    """Return the findings on coordinators and lifts, with the results of the comparison with this
-    fleet's file."""
+    """Compare each coordinator and lift with this fleet's file, and return their findings with the
+    results."""
     from bridges.settings.fleet_config import load_fleet
     from bridges.settings.fleet_names import compared, emergency_levels
 
@@ -189,7 +191,7 @@ def _more(
 
 
 def _with(file: Findings, together: Found) -> Findings:
-    """Return a file's findings, with the results of its comparison with the other files."""
+    """Return a file's findings, together with the results of its comparison with the other files."""
     return _more(
         file,
         [p for p in together.errors if p.file == file.file],
@@ -198,7 +200,7 @@ def _with(file: Findings, together: Found) -> Findings:
 
 
 def _tell(files: Sequence[Findings], args: argparse.Namespace) -> int:
-    """Print the findings and write the sheet; return the exit code."""
+    """Print the findings and write the sheet. Return the exit code."""
     errors = sum(len(file.errors) for file in files)
     code = os.EX_CONFIG if errors else 0
     if args.json:
@@ -241,7 +243,7 @@ def _many(number: int, what: str) -> str:
 
 
 def _complain(lines: Iterable[str]) -> None:
-    """Write to stderr, for a program each problem in one line. Flush stdout before that, because both
+    """Write to stderr; for a program, write each problem in one line. Flush stdout first, because both
     often go to one log."""
     sys.stdout.flush()
     columns = columns_of(sys.stderr)
@@ -251,7 +253,7 @@ def _complain(lines: Iterable[str]) -> None:
 
 
 def _write_sheet(files: Sequence[Findings], path: str) -> int:
-    """Write the commissioning sheet; return 0, or another exit code after a failure."""
+    """Write the commissioning sheet. Return 0, or another exit code if writing fails."""
     from bridges.settings.sheets.html import page
 
     try:

@@ -1,12 +1,12 @@
-"""`rmf-bridge completion SHELL`: prints a script for a shell, which then completes our commands and
-options, a file's device names, and this machine's service names."""
+"""`rmf-bridge completion SHELL`: prints a script for a shell. With the script the shell completes our
+commands and options, the names of a file's devices, and the names of this machine's services."""
 
 import argparse
 from typing import Final
 
 SHELLS = ("bash", "zsh", "fish")
 WHERE: Final = """\
-where a shell looks for it:
+where each shell looks for the script:
   bash: rmf-bridge completion bash > ~/.local/share/bash-completion/completions/rmf-bridge
   zsh:  rmf-bridge completion zsh > ~/.zfunc/_rmf-bridge
         and in ~/.zshrc, before compinit: fpath=(~/.zfunc $fpath)

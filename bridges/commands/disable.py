@@ -1,4 +1,5 @@
-"""`rmf-bridge disable NAME`: stops a service, with its outputs off, and disables it. Its YAML stays."""
+"""`rmf-bridge disable NAME`: stops a service, switches its outputs off, and disables it. Its YAML
+stays."""
 
 import argparse
 import os

@@ -1,9 +1,10 @@
-"""`rmf-bridge enable FILE`: make a running service of a YAML.
+"""`rmf-bridge enable FILE`: makes a running service of a YAML.
 
-It validates the file together with the files of this machine's other services. It stops a running
-instance, which switches its outputs off while it still has access to the old relay. Then it copies the
-file to /etc/rmf-bridges, writes the instance's drop-in (`bridges/runtime/drop_in.py`), and starts the
-instance. If a step fails, an instance that ran before is started again; the earlier steps stay.
+The command takes these steps. It validates the file together with the files of this machine's other
+services. It stops an instance that runs; this switches the instance's outputs off before the new
+drop-in can take away its access to the old relay. It copies the file to /etc/rmf-bridges, writes the
+instance's drop-in (`bridges/runtime/drop_in.py`), and starts the instance. If a step fails, an instance
+that ran before is started again; the earlier steps stay.
 """
 
 import argparse
@@ -43,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the service runs; 78 for an invalid file; 77 without root."""
+    """Return 0 if the service runs, 78 for an invalid file, and 77 without root."""
     if not INSTANCE.fullmatch(args.file.stem):
         print(NO_INSTANCE.format(args.file.stem), file=sys.stderr)
         return os.EX_CONFIG
@@ -79,7 +80,7 @@ def steps(config: Config, root: Path, present: Collection[str]) -> Iterator[Step
 
 
 def groups(root: Path) -> set[str]:
-    """Return the groups of this system that a service may get."""
+    """Return the groups of this system that a service may be given."""
     with suppress(OSError):
         lines = (root / "etc/group").read_text("utf-8", "replace").splitlines()
         return {line.partition(":")[0] for line in lines} & set(GROUPS)
@@ -87,7 +88,7 @@ def groups(root: Path) -> set[str]:
 
 
 def _taken(config: Config, root: Path) -> Iterator[Problem]:
-    """Return a problem for each resource of this file that another service's file uses."""
+    """Yield a problem for each resource of this file that another service's file uses too."""
     others = list(_neighbours(root, config.path.stem))
     return (p for p in taken([*others, config]) if p.file == str(config.path))
 

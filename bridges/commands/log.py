@@ -25,7 +25,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     completed_by(file, service_names)
     parser.add_argument("-f", "--follow", action="store_true", help="keep printing new lines")
     parser.add_argument("-n", "--lines", type=int, default=100, metavar="N", help="default: 100")
-    parser.add_argument("--since", metavar="TIME", help="such as today, '1 hour ago', '09:30'")
+    parser.add_argument(
+        "--since",
+        metavar="TIME",
+        help="print lines since this time, such as today, '1 hour ago', '09:30'",
+    )
     device = parser.add_argument("--device", metavar="NAME", help="only lines about this device")
     completed_by(device, device_names)
     parser.add_argument("--event", metavar="WORD", help="only this event: state, fault, refused …")
@@ -33,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Become journalctl; return 69 without a journal, or if the daemon does not log to the journal."""
+    """Become journalctl. Return 69 if there is no journal, or if the daemon does not log to it."""
     name = args.file.stem
     known = services()
     if name not in known and _runs_by_hand(name):
@@ -59,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def services() -> set[str]:
-    """Return this machine's services, which have a YAML in /etc/rmf-bridges or a unit."""
+    """Return this machine's services: each has a YAML in /etc/rmf-bridges or a unit."""
     return {file.stem for file in ETC.glob("*.yaml")} | set(units())
 
 
@@ -69,7 +73,7 @@ def _runs_by_hand(name: str) -> bool:
 
 
 def _become(words: list[str]) -> NoReturn:
-    """Replace this process by journalctl, so that signals to us reach it."""
+    """Replace this process by journalctl, so that signals sent to us reach journalctl."""
     os.execvp(words[0], words)
 
 

@@ -1,7 +1,8 @@
 """`rmf-bridge outputs-off FILE`: switches every output off, from a new process, after a daemon's death.
 
-systemd runs it as ExecStopPost; for a daemon started by hand, the guard runs it. After a clean stop a
-service leaves the mark that all outputs are off, and then `outputs-off` ends without loading a driver.
+systemd runs this command as ExecStopPost. For a daemon started by hand, the guard runs it. If a service
+stops cleanly, it leaves the mark that all outputs are off. Then this command ends without loading a
+driver.
 """
 
 import argparse
@@ -18,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--all-records",
         action="store_true",
-        help="switch off the outputs of every service that a power cut or death has left a record of;"
+        help="switch off the outputs of every service that left a record at a power cut or death;"
         " takes 6 s at most",
     )
     parser.add_argument("--runtime-dir", metavar="DIR", help="the dead daemon's runtime directory")
@@ -26,7 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if every output is verified off; 1 if an output is not; 69 while the daemon may live."""
+    """Return 0 if every output is verified off, 1 if an output is not, and 69 if the daemon may still
+    live."""
     if last_mark.says_off(os.environ):
         print('nothing_to_switch_off reason="the daemon verified it"', file=sys.stderr)
         return 0

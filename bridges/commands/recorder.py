@@ -1,4 +1,5 @@
-"""`rmf-bridge recorder`: writes recordings, as files, from the rings of this machine's daemons."""
+"""`rmf-bridge recorder`: makes recordings, which are files, from the rings of this machine's
+daemons."""
 
 import argparse
 import os
@@ -75,8 +76,8 @@ def _tell_days(args: argparse.Namespace) -> int:
 
 
 def _folder() -> Path:
-    """Return the folder of recordings: the unit's state directory, or without a unit a folder in
-    the user's state directory."""
+    """Return the folder of recordings. This is the unit's state directory or, without a unit, a folder
+    in the user's state directory."""
     given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
     return Path(given) if given else directories.state_base() / "recordings"
 

@@ -17,8 +17,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the reset was sent; 1 if no daemon runs; 69 if this user may not see or signal the
-    daemon."""
+    """Return 0 if the reset was sent, 1 if no daemon runs, and 69 if this user may not see or signal
+    the daemon."""
     try:
         if not args.runtime_dir and not args.file.exists():
             print(f"{args.file} does not exist", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""`rmf-bridge run FILE`: runs the daemon, on real hardware or with `--simulate` on fake hardware."""
+"""`rmf-bridge run FILE`: runs the daemon on real hardware, or with `--simulate` on fake hardware."""
 
 import argparse
 import logging
@@ -45,16 +45,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--runtime-dir",
         metavar="DIR",
-        help="default: systemd's runtime directory, else a folder in the user's",
+        help="default: systemd's runtime directory, else a folder in the user's runtime directory",
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Validate, claim, serve; return the exit code, which is 78 for an invalid configuration. Raises
-    NotInstalled if `--simulate` needs the fakes, which are not installed."""
+    """Validate the file, claim the outputs and serve. Return the exit code, which is 78 for an invalid
+    configuration. Raises NotInstalled if `--simulate` needs the fakes and they are not installed."""
     log.start(args.log_level.upper(), json=args.log_format == "json")
     if args.simulate and os.environ.get("RMF_BRIDGE_SERVICE") == "1":
-        logging.error("a service never simulates: --simulate is refused where RMF_BRIDGE_SERVICE=1")
+        logging.error("a service never simulates: RMF_BRIDGE_SERVICE=1 forbids --simulate")
         return os.EX_USAGE
     if args.expose and not args.simulate:
         logging.error("--expose needs --simulate: a real device is on the network anyway")
@@ -77,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
     if wrong := drop_in.misfit(config, os.environ) or too_slow(config, watchdog_s()):
         logging.error(wrong)
         return os.EX_CONFIG
-    end = signals.End()  # before other processes can find our pid beside the lock and signal it
+    end = signals.End()  # before other processes can find our pid at the lock and signal it
     signals.ignore_reset()
     try:
         held = runtime.held(args.file, args.runtime_dir, serves=True, simulated=args.simulate)
@@ -94,14 +94,14 @@ def run(args: argparse.Namespace) -> int:
 
 
 def too_slow(config: Config, watchdog: float | None) -> str:
-    """Return the error for a bus whose call may take more than half of systemd's watchdog time; else
-    ""."""
+    """Return the error for a bus on which one call may take more than half of systemd's watchdog time;
+    "" without an error."""
     for name, bus in config.buses.items():
         timeout_s: float = getattr(bus, "timeout_s", 0.0)
         if watchdog is not None and timeout_s > watchdog / 2:
             return (
                 f"{config.path}: bus '{name}': timeout_s is {timeout_s:g} s, but the unit has"
-                f" WatchdogSec={watchdog:g}: a call may take half of that at most"
+                f" WatchdogSec={watchdog:g}: one call may take half of that at most"
             )
     return ""
 
@@ -120,7 +120,7 @@ def _serve(
     simulate = of_workbench("hal_fakes.simulate")
     logging.warning("SIMULATED: no hardware moves, and RMF is told simulated states")
     simulation = simulate.Simulation(config, held.path, log_format=args.log_format)
-    from bridges.runtime.daemon import Daemon  # imported while the fakes start
+    from bridges.runtime.daemon import Daemon  # the import takes place as the fakes start
 
     try:
         return Daemon(

@@ -1,6 +1,7 @@
-"""`rmf-bridge status`: prints, for each daemon on this machine, its state for RMF, faults and remedies.
+"""`rmf-bridge status`: prints the state of each daemon on this machine, as RMF sees it, with faults and
+remedies.
 
-It reads the daemons' status files and asks systemd; it opens no bus and joins no graph.
+The command reads the daemons' status files and asks systemd. It opens no bus and joins no graph.
 """
 
 import argparse
@@ -61,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
             print(f"no daemon {Path(args.name).stem}; there is {', '.join(there)}", file=sys.stderr)
             if not args.json:
                 return NONE
-    else:  # leave out stopped daemons that were started by hand
+    else:  # leave out stopped daemons that somebody started by hand
         found = [one for one in found if one.state != "stopped" or one.unit]
     if args.idle:
         return _tell_use(found)
@@ -158,7 +159,7 @@ def _state(one: DaemonStatus) -> str:
             return "cannot be seen"
         case "serving" if one.status.get("passive"):
             rivals = one.status.get("other_publishers")
-            return "passive" if rivals else "listens before it publishes"
+            return "passive" if rivals else "still listens before it publishes"
         case other:
             return other
 
@@ -170,7 +171,8 @@ def _told(device: Status) -> str:
 
 
 def _age(device: Status, snapshot_s: float) -> str:
-    """Return the age of the input now, because the status file itself is up to a second old."""
+    """Return the present age of the input. The status file itself is up to a second old, so its age is
+    added."""
     age_s = device.get("input_age_s")
     return "never read" if age_s is None else f"read {age_s + snapshot_s:.1f} s ago"
 

@@ -257,9 +257,7 @@ class Daemon:
             found = diagnosis(self._transport.name, self._config.kind, daemon, devices, at)
             self._diagnostics.publish(found)
             self._told += 1
-            if (
-                self._told % max(1, len(devices)) == 0
-            ):  # each message grows with the number of devices
+            if self._told % max(1, len(devices)) == 0:  # each device makes the message longer
                 self._writer.spoken(self._health_topic.name, found, sent=True)
         except (
             TransportError,

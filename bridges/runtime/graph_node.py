@@ -280,8 +280,8 @@ class GraphNode(Generic[S, L, M, E, R]):
         return found or self._add(name, self._kind.initial(name, self._started_at))
 
     def _has_room(self, name: str, shows_itself: bool) -> bool:
-        """Return whether there is room for this name. Invented names must not displace names that the YAML
-        lists or that publish states."""
+        """Return whether there is room for this name. Invented names must not displace names that the
+        YAML lists or that publish states."""
         if name in self._reserved:
             return True
         if shows_itself:

@@ -49,7 +49,7 @@ def _check(kind: str, file: str) -> None:
     found = settings.get("kind") if isinstance(settings, dict) else None
     if found != kind:
         raise RuntimeError(
-            f"{file} is for a {found}: ros2 launch rmf_bridges {found}.launch.py"
+            f"{file} is for a {found}: use ros2 launch rmf_bridges {found}.launch.py"
             if found
             else f"{file} does not say for which kind it is"
         )

@@ -80,7 +80,7 @@ def _in_use(folder: Path, found: LockHolder | None) -> str:
         stop = f"sudo systemctl stop rmf-bridge@{folder.name}"
     return (
         f"{Path(found.file).name} is already running: {found}; rmf-bridge status shows it."
-        f" A device has one daemon. To stop it: {stop}"
+        f" A device has one daemon. To stop this process: {stop}"
     )
 
 

@@ -9,9 +9,9 @@ from typing import TextIO
 
 
 def aligned(rows: Sequence[Sequence[str]], columns: int | None = None) -> list[str]:
-    """Return rows of equal length as lines, with two spaces between columns. If lines would be longer
-    than `columns`, cells of the widest columns are wrapped between words. If that is not enough, one
-    space stands between columns, and long words are cut."""
+    """Return rows of equal length as lines, with two spaces between columns. If a line would be longer
+    than `columns`, the cells of the widest columns are wrapped between words. If that is not enough,
+    only one space stands between columns, and long words are cut."""
     columned = [*zip(*rows, strict=True)]
     widths, gap = [max(map(width, column)) for column in columned], 2
     if columns is not None:
@@ -26,8 +26,8 @@ def aligned(rows: Sequence[Sequence[str]], columns: int | None = None) -> list[s
 
 
 def _fitted(widths: Sequence[int], words: Sequence[int], columns: int) -> list[int]:
-    """Return the widths, the widest cut back until all fit into `columns`. A word is cut only if all
-    fit in no other way."""
+    """Return the widths of the columns. The widest are cut back until all fit into `columns`. A word is
+    cut only if nothing else makes the columns fit."""
     for least in (words, [1] * len(words)):
         for most in range(max(widths), 0, -1):
             fitted = [min(w, max(most, one)) for w, one in zip(widths, least, strict=True)]
@@ -47,7 +47,7 @@ def _row(row: Sequence[str], widths: Sequence[int], gap: str) -> Iterator[str]:
 
 
 def width(text: str) -> int:
-    """Return the text's width in terminal columns: 走 takes two."""
+    """Return the text's width in terminal columns. A character such as 走 takes two columns."""
     return sum(2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
 
 
@@ -65,12 +65,13 @@ def wrapped(text: str, columns: int) -> list[str]:
 
 
 def hanging(text: str, columns: int, indent: int = 2) -> list[str]:
-    """Return the text in lines of at most `columns`, the later ones indented."""
+    """Return the text in lines of at most `columns`. All lines but the first are indented."""
     first, *more = wrapped(text, columns + 1)
     rest = wrapped(" ".join(more), columns + 1 - indent) if more else []
     return [first, *(" " * indent + line for line in rest)]
 
 
 def columns_of(out: TextIO) -> int:
-    """Return the width of a stream's terminal; 0 for a pipe or file, whose lines have any length."""
+    """Return the width of a stream's terminal. Return 0 for a pipe or file, because its lines may have
+    any length."""
     return shutil.get_terminal_size().columns if out.isatty() else 0

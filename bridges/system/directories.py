@@ -1,11 +1,15 @@
-"""A daemon's directories, found by one rule for every command.
+"""A daemon's directories. Every command finds them by one rule.
 
-The order: the directory given on the command line; else, in a unit, systemd's directories; else the
-service's directories, if its lock or record names this file; else the directories of a daemon started
-by hand, for root also by the user who called sudo.
+The rule has this order:
+1. the directory given on the command line;
+2. in a systemd unit, the directories that systemd gives;
+3. the service's directories, if their lock or record names this file;
+4. the directories of a daemon started by hand. For root these also include the directories of the user
+   who called sudo.
 
-`runtime`, with lock and status, is lost at a reboot. `state`, with the record of claimed outputs,
-survives a reboot, because a Modbus relay outlives a power cut of the Pi. A given directory is both.
+`runtime` holds lock and status, and is lost at a reboot. `state` holds the record of claimed outputs.
+It survives a reboot, because a Modbus relay stays on during a power cut of the Pi. A directory given on
+the command line serves as both.
 """
 
 import grp
@@ -24,7 +28,7 @@ USERS_RUN = Path("/run/user")
 TMP = Path("/tmp")
 SERVICE_USER = "rmf-bridge"
 GROUPS = ("gpio", "dialout")
-"""The additional groups that a drop-in may give this user (`drop_in.py`)."""
+"""The additional groups that a drop-in may give the service's user (`drop_in.py`)."""
 
 
 class Directories(Struct, frozen=True):
@@ -40,12 +44,12 @@ class Directories(Struct, frozen=True):
 
 
 def named(file: Path) -> str:
-    """Return a file's canonical path, as used in locks and records."""
+    """Return a file's canonical path, which locks and records use."""
     return os.path.realpath(file)
 
 
 def as_given(given: str | None) -> Directories | None:
-    """Return the directories that the command line or systemd's unit gives; None without both."""
+    """Return the directories that the command line or systemd's unit gives; None if neither does."""
     if given:
         return Directories(Path(given).absolute(), Path(given).absolute())
     runtime = os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
@@ -59,22 +63,21 @@ def of_service(file: Path) -> Directories:
 
 
 def by_hand(file: Path) -> Directories:
-    """Return the directories of a daemon started by hand by this user."""
+    """Return the directories of a daemon that this user started by hand."""
     runtime = Path(os.environ.get("XDG_RUNTIME_DIR") or TMP / f"rmf-bridge-{os.getuid()}")
     return Directories(runtime / "rmf-bridge" / file.stem, state_base() / file.stem)
 
 
 def state_base() -> Path:
-    """Return this user's state directory; without a home, a directory below /tmp."""
+    """Return this user's state directory. A user without a home gets a directory below /tmp."""
     home = os.path.expanduser("~")
     default = Path(home) / ".local/state" if os.path.isabs(home) else TMP / f"rmf-{os.getuid()}"
     return Path(os.environ.get("XDG_STATE_HOME") or default) / "rmf-bridge"
 
 
 def everywhere(file: Path) -> Iterator[Directories]:
-    """Yield the possible directories of this file's daemon, if it is a service, if (for root) the user
-    who called sudo has started it, or if this user has started it by hand.
-    """
+    """Yield the possible directories of this file's daemon. They differ by who started the daemon: the
+    service, the user who called sudo (only for root), or this user by hand."""
     yield of_service(file)
     if os.geteuid() == 0 and (uid := os.environ.get("SUDO_UID", "")).isdecimal():
         yield from _of_user(int(uid), file)
@@ -82,7 +85,7 @@ def everywhere(file: Path) -> Iterator[Directories]:
 
 
 def _of_user(uid: int, file: Path) -> Iterator[Directories]:
-    """Yield this user's directories, if the user owns them."""
+    """Yield this user's directories, but only if the user owns them."""
     for base in (USERS_RUN / str(uid), TMP / f"rmf-bridge-{uid}"):
         runtime = base / "rmf-bridge" / file.stem
         try:
@@ -95,8 +98,8 @@ def _of_user(uid: int, file: Path) -> Iterator[Directories]:
 
 
 def runtimes() -> Iterator[Path]:
-    """Yield the runtime directories of this machine's services and of this user; for root, of all
-    users."""
+    """Yield the runtime directories of this machine's services and of this user. For root, yield those
+    of all users."""
     bases = [SERVICE_RUN, by_hand(Path("any")).runtime.parent]
     if os.geteuid() == 0:
         bases += [*USERS_RUN.glob("*/rmf-bridge"), *TMP.glob("rmf-bridge-*/rmf-bridge")]
@@ -106,11 +109,11 @@ def runtimes() -> Iterator[Path]:
 
 
 class Distrusted(PermissionError):
-    """Another user made a directory, or could write into it. The text names the directory."""
+    """Another user made a directory, or could write into it. The error's text names the directory."""
 
 
 def cannot_be_seen(folder: Path, error: OSError) -> PermissionError:
-    """Return the error, with a remedy, for a folder that this user cannot read."""
+    """Return the error for a folder that this user cannot read. The error's text has a remedy."""
     return PermissionError(
         f"cannot see whether a daemon runs in {folder}: {error.strerror or error}. The folder belongs"
         f" to {owner_of(folder)}: use sudo, or give another directory with --runtime-dir"
@@ -119,11 +122,11 @@ def cannot_be_seen(folder: Path, error: OSError) -> PermissionError:
 
 @contextmanager
 def opened(folder: Path, *, ours: bool = False, make: bool = False) -> Iterator[int]:
-    """Yield a descriptor of a daemon's directory; make a missing directory if `make`.
+    """Yield a descriptor of a daemon's directory. With `make`, make the directory if it is missing.
 
-    Only the directory's owner or root can have made it, and no other user can write into it; with
-    `ours` the owner must be this user. Each directory above is checked in the same way, from the top
-    down. So the caller may use the directory's path. Raises Distrusted, and other OSErrors.
+    Only the directory's owner or root can have made the directory, and no other user can write into it.
+    With `ours` the owner must be this user. Each parent directory is checked in the same way, from the
+    top down. So the caller may use the directory's path. Raises Distrusted, and other OSErrors.
     """
     folder = folder.absolute()
     owner = _owner(folder, ours=ours or make)
@@ -142,7 +145,7 @@ def opened(folder: Path, *, ours: bool = False, make: bool = False) -> Iterator[
 
 
 def _owner(folder: Path, *, ours: bool) -> int:
-    """Return a directory's owner. Raises Distrusted if `ours` and the owner is another user."""
+    """Return a directory's owner. With `ours`, raises Distrusted if the owner is another user."""
     try:
         owner = folder.lstat().st_uid
     except FileNotFoundError:
@@ -157,7 +160,7 @@ def _owner(folder: Path, *, ours: bool) -> int:
 
 def _distrusted(place: Path, owner: int, *, last: bool) -> str:
     """Return the reason why a user other than root or the owner may have made this directory or link;
-    "" without a reason."""
+    "" if there is none."""
     found = place.lstat()
     if found.st_uid not in (Path("/").stat().st_uid, owner):
         return "belongs to another user"
@@ -165,15 +168,16 @@ def _distrusted(place: Path, owner: int, *, last: bool) -> str:
         return "is a symbolic link" if last else ""
     others = 0o022 if os.geteuid() == 0 else 0o002
     if found.st_mode & others and (last or not found.st_mode & stat.S_ISVTX):
-        return "can be written by others"
+        return "can be written by other users"
     return ""
 
 
 def act_as_owner(places: Directories) -> None:
-    """Change permanently from root to the directories' owner, with the unit's groups.
+    """Change permanently from root to the owner of the directories, with the unit's groups.
 
-    Then files in the directories have no more power than their owner. Raises PermissionError if another
-    user could have made the directories, or if they belong to another user and we are not root.
+    Then files in the directories can do no more than their owner could. Raises PermissionError if
+    another user could have made the directories. Raises it also if they belong to another user and we
+    are not root.
     """
     for folder in places.folders:
         with suppress(FileNotFoundError, NotADirectoryError):
@@ -190,7 +194,7 @@ def _become(uid: int, gid: int) -> None:
 
 
 def _groups(uid: int, gid: int) -> list[int]:
-    """Return the user's groups, and for the service's user also the groups that a unit may get."""
+    """Return the user's groups. For the service's user, add the groups that a unit may give it."""
     try:
         user = pwd.getpwuid(uid)
     except KeyError:
@@ -210,7 +214,7 @@ def owner_of(path: Path) -> str:
 
 
 def work_somewhere(places: Directories) -> None:
-    """Change to a directory where lgpio can make its FIFO: one of `places`, else a temporary
+    """Change to a directory in which lgpio can make its FIFO: one of `places`, else a temporary
     directory."""
     for folder in (places.runtime, places.state, TMP, Path("/dev/shm"), Path("/var/tmp")):
         probe = folder / f".rmf-bridge-{os.getpid()}"

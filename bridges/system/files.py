@@ -1,4 +1,4 @@
-"""A daemon's own files. Each is replaced as a whole, so a reader sees either the old or the new
+"""A daemon's own files. Each file is replaced as a whole, so a reader sees either the old or the new
 file."""
 
 import os
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def replace(path: Path, content: bytes) -> None:
-    """Replace a file, and sync the file and its folder to disk; make the folder if needed.
+    """Replace a file, and sync the file and its folder to disk. Make the folder if needed.
 
     Raises OSError; the old file then remains.
     """
@@ -21,7 +21,7 @@ def replace(path: Path, content: bytes) -> None:
 
 
 def show(path: Path, content: bytes) -> None:
-    """Replace a file that need not survive a reboot; its group may read it. Raises OSError."""
+    """Replace a file that need not survive a reboot. The file's group may read it. Raises OSError."""
     new = path.with_name(f".{path.name}.new")
     flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW | os.O_CLOEXEC
     with open(os.open(new, flags, 0o640), "wb") as out:
@@ -30,9 +30,10 @@ def show(path: Path, content: bytes) -> None:
 
 
 def read(path: Path, longest: int) -> bytes:
-    """Return the file's content, up to `longest` bytes. Raises OSError, also for a symbolic link.
+    """Return the file's content, up to `longest` bytes. Raises OSError; a symbolic link is also an
+    error.
 
-    Does not wait for a FIFO in the file's place.
+    If a FIFO is in the file's place, this function does not wait for it.
     """
     flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
     with open(os.open(path, flags), "rb") as source:

@@ -1,9 +1,9 @@
 """Imports the optional packages: the workbench, the fakes and the page's library. No daemon needs them,
 and `bridges` imports them only through this module.
 
-Each optional Debian package has a folder for its version, and the daemons' tree has a `.pth` file with
-the folder of the tree's own version (deb/scripts/rmf-bridges.postinst). For pip all packages are one
-distribution.
+Each optional Debian package has a folder for its version. The daemons' tree has a `.pth` file that
+names the folder of the tree's own version (deb/scripts/rmf-bridges.postinst). For pip all packages are
+one distribution.
 """
 
 import importlib
@@ -20,7 +20,7 @@ class NotInstalled(Exception):
 
 
 def is_there(package: str) -> bool:
-    """Is `workbench` or `hal_fakes` installed, in the version of these daemons?"""
+    """Return whether `workbench` or `hal_fakes` is installed in the version of these daemons."""
     return importlib.util.find_spec(package) is not None
 
 
@@ -32,7 +32,7 @@ def of_workbench(name: str) -> ModuleType:
 
 
 def how_to_install(part: str, site: Path = SITE) -> str:
-    """Return the instruction to install the missing `workbench` or `page`."""
+    """Return an instruction to install the missing `workbench` or `page`."""
     package = f"rmf-bridges-{part}"
     try:
         place = Path((site / f"{package}.pth").read_text().strip())

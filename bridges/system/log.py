@@ -1,4 +1,4 @@
-"""The log: one line `event key=value …` for each event, with journald's priority."""
+"""The log: one line `event key=value …` for each event, with a priority for journald."""
 
 import codecs
 import logging
@@ -13,12 +13,12 @@ from enum import Enum
 import msgspec
 
 ESCAPED = "unicode_escape"
-codecs.lookup(ESCAPED)  # loads the codec now; later no file descriptor may be left
+codecs.lookup(ESCAPED)  # loads the codec now, because later no file descriptor may be free
 _PRIORITY = {"DEBUG": 7, "INFO": 6, "WARNING": 4, "ERROR": 3, "CRITICAL": 2}
 
 
 class LogLine(str):
-    """A log line `event key=value …`, with its event and values for `--log-format json`."""
+    """A log line `event key=value …`. It keeps its event and values for `--log-format json`."""
 
     __slots__ = ("event", "values")
     event: str
@@ -34,9 +34,10 @@ def pairs(event: str, **values: object) -> LogLine:
 
 
 def plain(value: object) -> str:
-    """Return a value as text for people: `agv_request yes, call L3`.
+    """Return a value as text for people, such as `agv_request yes, call L3`.
 
-    Unset fields of a record are left out. None, or a record without set fields, is `-`.
+    Fields of a record that are not set are left out. None is `-`, and so is a record without set
+    fields.
     """
     match value:
         case None:
@@ -72,7 +73,8 @@ def _quoted(text: str) -> str:
 
 
 class _Formatter(logging.Formatter):
-    """Under systemd `<6>text`, with journald's priority; on a terminal `12:34:56.789 INFO text`."""
+    """A formatter of text lines. Under systemd a line is `<6>text`, with journald's priority; on a
+    terminal it is `12:34:56.789 INFO text`."""
 
     def __init__(self, journal: bool) -> None:
         super().__init__(
@@ -90,7 +92,8 @@ class _Formatter(logging.Formatter):
 
 
 class _Json(logging.Formatter):
-    """A line of JSON for each event: at (ISO 8601), priority, event and its values, and the text."""
+    """A formatter of JSON lines. Each event's line has its time `at` (ISO 8601), priority, event,
+    values and text."""
 
     def __init__(self, journal: bool) -> None:
         super().__init__()
@@ -110,13 +113,13 @@ class _Json(logging.Formatter):
 
 
 def _as_json(value: object) -> object:
-    """Return numbers, booleans and texts unchanged; other values as in the text log."""
+    """Return numbers, booleans and texts unchanged. Return other values as in the text log."""
     return value if isinstance(value, int | float | str) else plain(value)
 
 
 class _OthersOnce(logging.Filter):
-    """Passes each log call of a library once, because anybody could trigger the call endlessly with bad
-    frames or datagrams. Our own code already logs each event once."""
+    """A filter that passes each log call of a library once. Without it anybody could trigger the call
+    endlessly with bad frames or datagrams. Our own code already logs each event once."""
 
     OURS = ("root", "bridges", "drivers", "hal_fakes", "workbench")
 
@@ -129,7 +132,7 @@ class _OthersOnce(logging.Filter):
         if record.name.partition(".")[0] in self.OURS:
             return True
         record.exc_info = record.exc_text = None  # a library's traceback helps no operator
-        text = record.getMessage()  # may quote untrusted input
+        text = record.getMessage()  # the text may quote untrusted input
         record.args = None
         record.msg = text if text.isprintable() else text.encode(ESCAPED).decode("ascii")
         first = place not in self._said
@@ -138,10 +141,10 @@ class _OthersOnce(logging.Filter):
 
 
 class Seldom(logging.Filter):
-    """Limits repeated lines: passes the first OFTEN lines of a series, then one line in AGAIN_S (s),
-    with the number of lines left out. A pause longer than PAUSE_S (s) ends the series.
+    """A filter for repeated lines. It passes the first OFTEN lines of a series, then one line in
+    AGAIN_S (s), with the number of lines left out. A pause longer than PAUSE_S (s) ends the series.
 
-    Without this limit a device that is lost and found each second would fill the disk. Lines that
+    Without this filter a device that is lost and found each second would fill the disk. Lines that
     differ only in seconds count as equal. `now`: monotonic s.
     """
 
@@ -158,7 +161,7 @@ class Seldom(logging.Filter):
         run = self._runs.pop(text, None)
         if run is None or now - run.last_at > self.PAUSE_S:
             run = _Run()
-        self._runs[text] = run  # the newest last
+        self._runs[text] = run  # the newest series comes last
         if len(self._runs) > self.MOST:
             del self._runs[next(iter(self._runs))]
         run.times, run.last_at = run.times + 1, now

@@ -1,5 +1,5 @@
-"""Colours, used only on a terminal and without NO_COLOR (https://no-color.org); lines drawn in
-place."""
+"""Colours and lines that are drawn in place. Colours are used only on a terminal and without NO_COLOR
+(https://no-color.org)."""
 
 import os
 from collections.abc import Iterable
@@ -7,13 +7,13 @@ from typing import TextIO
 
 
 def coloured(out: TextIO) -> bool:
-    """Does this output take colours?"""
+    """Return whether this output takes colours."""
     return out.isatty() and not os.environ.get("NO_COLOR")
 
 
 def styled(text: str, style: str) -> str:
-    """Return the text in a style. `style`: numbers of ECMA-48's SGR, such as `1;31`; "" for no
-    style."""
+    """Return the text in a style. `style`: numbers of ECMA-48's SGR, such as `1;31`; "" for plain
+    text."""
     return f"\x1b[{style}m{text}\x1b[0m" if style else text
 
 
@@ -28,6 +28,7 @@ def bold(text: str, out: TextIO) -> str:
 
 
 def repainted(lines: Iterable[tuple[str, str]], before: int) -> str:
-    """Return the text that draws lines (text, style) over the `before` lines above the cursor."""
+    """Return the text that draws these lines over the `before` lines above the cursor. `lines`: pairs
+    of text and style."""
     up = f"\x1b[{before}A" if before else ""
     return up + "".join(f"\r\x1b[K{styled(*line)}\n" for line in lines) + "\x1b[J"

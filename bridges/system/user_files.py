@@ -1,6 +1,7 @@
-"""Files that a user names: only regular files are read, and as a whole. Secrets have stricter rules.
+"""Files that a user names. Only regular files are read, and always as a whole. Secrets have stricter
+rules.
 
-A daemon would wait for ever for a FIFO in a file's place, and a device might never end. A secret comes
+A FIFO in a file's place would stop a daemon for ever, and a device might have no end. A secret comes
 from a file that only the daemon's user can read, never from a YAML.
 """
 
@@ -15,7 +16,7 @@ LONGEST_SECRET: Final = 4096
 
 
 class SecretError(Exception):
-    """The file cannot be read, other users can read it, or it does not hold one secret."""
+    """The file cannot be read, or other users can read it, or it does not hold one secret."""
 
 
 class Content(NamedTuple):
@@ -26,8 +27,8 @@ class Content(NamedTuple):
 
 
 def read(file: str | os.PathLike[str], longest: int) -> Content:
-    """Return up to `longest` + 1 bytes of a file, so that the caller notices a longer file. Raises
-    OSError."""
+    """Return up to `longest` + 1 bytes of a file. The extra byte tells the caller that the file is
+    longer. Raises OSError."""
     descriptor = os.open(file, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     with open(descriptor, "rb") as opened:
         mode = os.fstat(descriptor).st_mode
@@ -41,7 +42,7 @@ def read(file: str | os.PathLike[str], longest: int) -> Content:
 def secret_line(name: str, file: str, what: str) -> str:
     """Return the secret in a file: one line of printable ASCII. Raises SecretError with a remedy.
 
-    `name`: the setting with the file's path. `what`: `token` or `password`, for the error.
+    `name`: the setting that has the file's path. `what`: `token` or `password`, for the error's text.
     """
     line = secret(name, file).strip()
     if not re.fullmatch(rb"[!-~]{1,%d}" % LONGEST_SECRET, line):

@@ -1,4 +1,4 @@
-"""The error text and exit code for a file that a user has asked for and that cannot be written."""
+"""The error text and the exit code for a file that a user wants and that cannot be written."""
 
 import errno
 import os
@@ -7,15 +7,15 @@ from pathlib import Path
 
 
 def no_folder(path: Path) -> str:
-    """Return the reason why no file can be written into the path's folder; "" if a file can."""
+    """Return the reason why no file can be written into the path's folder; "" if there is none."""
     if not path.parent.is_dir():
         return os.strerror(errno.ENOENT)
     return "" if os.access(path.parent, os.W_OK | os.X_OK) else os.strerror(errno.EACCES)
 
 
 def not_written(path: Path | str, why: str | None) -> int:
-    """Print the error to stderr and return EX_CANTCREAT. Flush stdout before that, because both often
-    go to one log."""
+    """Print the error to stderr and return EX_CANTCREAT. Flush stdout first, because both often go to
+    one log."""
     sys.stdout.flush()
     print(f"{path} cannot be written: {why}", file=sys.stderr)
     return os.EX_CANTCREAT

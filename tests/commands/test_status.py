@@ -91,7 +91,7 @@ def test_a_remedy_names_the_device_its_file_and_what_the_file_sets() -> None:
     known = faults.values(file, "Lift1")
     told = faults.remedies()
     assert faults.here(told["RMF_SILENT"], file, "Lift1", known).cause == (
-        "no request for `request_timeout_s` (30 s)"
+        "RMF has sent no request for `request_timeout_s` (30 s)"
     )
     assert faults.here(told["FIRE_LATCHED"], file, "Lift1", known).do == (
         f"when it is safe: `rmf-bridge reset {file}`"

@@ -389,7 +389,7 @@ def test_where_a_live_daemon_cannot_be_ruled_out_only_execstoppost_switches_off(
     (tmp_path / "run").chmod(0o777)
     off = ("outputs-off", module.file, "--runtime-dir", tmp_path / "run")
     by_hand = _told(*off)
-    assert (by_hand.returncode, "can be written by others" in by_hand.stderr) == (
+    assert (by_hand.returncode, "can be written by other users" in by_hand.stderr) == (
         os.EX_UNAVAILABLE,
         True,
     )

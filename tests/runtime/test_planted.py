@@ -39,11 +39,11 @@ def test_a_directory_that_somebody_else_could_have_made_is_not_believed(tmp_path
     shared.chmod(0o1777)
     with opened(shared / "made", make=True):
         pass
-    with pytest.raises(Distrusted, match="can be written by others"), opened(shared):
+    with pytest.raises(Distrusted, match="can be written by other users"), opened(shared):
         pass
     for folder in (anybodys, anybodys / "planted", anybodys / "made"):
         with (
-            pytest.raises(Distrusted, match=f"{anybodys} can be written by others"),
+            pytest.raises(Distrusted, match=f"{anybodys} can be written by other users"),
             opened(folder, make=True),
         ):
             pass

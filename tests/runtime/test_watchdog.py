@@ -33,7 +33,7 @@ def test_run_refuses_a_call_that_is_too_long_for_the_unit_as_installed(tmp_path:
     config = load(with_timeout(tmp_path, 3))
     bus = next(iter(config.buses))
     assert too_slow(config, 5.0) == (
-        f"{config.path}: bus '{bus}': timeout_s is 3 s, but the unit has WatchdogSec=5: a call may"
+        f"{config.path}: bus '{bus}': timeout_s is 3 s, but the unit has WatchdogSec=5: one call may"
         " take half of that at most"
     )
     assert too_slow(config, None) == ""

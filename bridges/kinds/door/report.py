@@ -123,7 +123,7 @@ def _hazards(memory: DoorMemory, view: BelievedDoor, limits: DoorLimits) -> Iter
         done = "held open" if limits.on_fire == "open" else "released"
         yield Fault("FIRE_ALARM", f"the door is {done}")
     if memory.closing and memory.held and memory.latched_at is None and view.obstructed:
-        yield Fault("DOOR_OBSTRUCTED", "held open after CLOSE, because the doorway is not clear")
+        yield Fault("DOOR_OBSTRUCTED", "held open after CLOSE while the doorway is not clear")
     if view.errors:
         yield Fault("DOOR_CONTROLLER_FAULT", "; ".join(view.errors))
 

@@ -143,7 +143,7 @@ def test_an_obstruction_holds_the_door_again_until_it_has_been_away_for_a_second
     core.sees(clear, until=2.5)
     core.sees(replace(BETWEEN, obstruction=True), until=4.0)
     assert core.faults() == (
-        "DOOR_OBSTRUCTED: held open after CLOSE, because the doorway is not clear",
+        "DOOR_OBSTRUCTED: held open after CLOSE while the doorway is not clear",
     )
     core.sees(clear, until=6.0)
     core.sees(replace(BETWEEN, obstruction=False), until=7.0)
