@@ -55,7 +55,7 @@ def test_after_a_kill_the_relay_is_switched_off_from_a_fresh_process_whatever_th
         off = command("outputs-off", module.file, "--runtime-dir", tmp_path / "run")
         refused = subprocess.run(off, env=environment(), capture_output=True, text=True)
         assert (refused.returncode, module.relay()) == (os.EX_UNAVAILABLE, [True])
-        assert "To stop it: " in refused.stderr
+        assert "To stop this process: " in refused.stderr
         running.end(signal.SIGKILL)
     module.file.write_text("kind: lift\n")
     done = subprocess.run(off, env=environment(), capture_output=True, text=True)

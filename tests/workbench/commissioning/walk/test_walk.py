@@ -76,7 +76,7 @@ def test_walk_refuses_a_device_that_is_served(module: Module, tmp_path: Path) ->
     with daemon(module.file, tmp_path / "run") as running:
         running.wait_for("ready file")
         terminal = walk(module, tmp_path)
-        terminal.wait_for("To stop it: ")
+        terminal.wait_for("To stop this process: ")
         assert terminal.end() == os.EX_UNAVAILABLE
 
 
