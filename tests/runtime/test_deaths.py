@@ -216,7 +216,10 @@ def test_reset_and_outputs_off_as_typed_find_the_daemon_started_by_hand(
     wait_until(held, "the relay holds the door")
     assert _told("reset", module.file, **user).returncode == 0
     refused = _told("outputs-off", module.file, **user)
-    assert (refused.returncode, "To stop this process: " in refused.stderr) == (os.EX_UNAVAILABLE, True)
+    assert (refused.returncode, "To stop this process: " in refused.stderr) == (
+        os.EX_UNAVAILABLE,
+        True,
+    )
     assert module.relay() == [True]
     run.terminate()
     assert run.wait(PATIENCE_S) == 0
