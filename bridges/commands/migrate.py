@@ -1,4 +1,5 @@
-"""`rmf-bridge migrate FILE`: writes a device YAML's renamed keys with their new names."""
+"""`rmf-bridge migrate FILE`: replaces the old names of renamed keys in a device YAML by their new
+names."""
 
 import argparse
 import os
@@ -21,7 +22,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the file has no old key any more, 65: by hand, 73: not written, 78: invalid."""
+    """Return 0 if the file has no old key any more, 65 if a person must change it, 73 if it cannot be
+    written, and 78 if it is invalid."""
     try:
         config = load(args.file)
         text = rewritten(config)
@@ -39,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _written(config: Config, text: str) -> int:
-    """Replace the file, if anything has changed; its mode and owner stay."""
+    """Replace the file if anything has changed. Its mode and owner stay."""
     if text.encode() == config.text:
         print(f"{config.path} has no old key")
         return 0

@@ -1,4 +1,4 @@
-"""`rmf-bridge workcell done|again|failed FILE`: a person decides what became of a request in doubt."""
+"""`rmf-bridge workcell done|again|failed FILE`: a person decides the outcome of a request in doubt."""
 
 import argparse
 import json
@@ -38,8 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the decision was sent; 1 if no daemon runs or nothing is in doubt; 69 if this user
-    may not see or signal the daemon."""
+    """Return 0 if the decision was sent, 1 if no daemon runs or nothing is in doubt, and 69 if this
+    user may not see or signal the daemon."""
     try:
         if not args.runtime_dir and not args.file.exists():
             print(f"{args.file} does not exist", file=sys.stderr)
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _status(places: Directories) -> Mapping[str, Any] | None:
-    """Return the status of the living daemon; None before it has written one."""
+    """Return the status of the living daemon; None if it has not written one yet."""
     daemon = holder.look(places)
     try:
         with opened(places.runtime):
@@ -77,7 +77,8 @@ def _status(places: Directories) -> Mapping[str, Any] | None:
 
 
 def _doubts(status: Mapping[str, Any], device: str) -> Iterator[str]:
-    """Yield what the daemon's status says to be in doubt: of this device, or of every device ("")."""
+    """Yield the requests that are in doubt by the daemon's status: of this device, or of every device
+    ("")."""
     found: dict[str, Any] = status.get("devices", {})
     for name, state in found.items():
         for fault in state.get("faults", []):

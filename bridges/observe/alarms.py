@@ -13,8 +13,9 @@ STANDS: Final = frozenset((*RAISED, "reset"))
 
 
 class ObservedAlarm(Struct, frozen=True):
-    """A daemon's statement. `state`: `quiet`, `alarm`, `drill` or `reset`. `fleets`: their names, ""
-    for all. `current`: the daemon still makes statements; the alarm of a silent daemon stands."""
+    """A daemon's statement of its alarm. `state`: `quiet`, `alarm`, `drill` or `reset`. `fleets`: their
+    names, "" for all. `current`: the daemon still makes statements. The alarm of a daemon that falls
+    silent goes on standing."""
 
     node: str
     state: str
@@ -24,12 +25,13 @@ class ObservedAlarm(Struct, frozen=True):
 
     @property
     def stands(self) -> bool:
-        """Do robots stand for it?"""
+        """Return whether robots stand because of this alarm."""
         return self.state in STANDS
 
     @property
     def condition(self) -> str:
-        """The alarm in a few words: `ALARM: fire_panel of Main panel; every fleet is to stand`."""
+        """The alarm in a few words, such as `ALARM: fire_panel of Main panel; every fleet is to
+        stand`."""
         if not self.stands:
             return "no alarm"
         word = {"alarm": f"ALARM: {self.causes}", "drill": "DRILL"}.get(self.state, "reset, waits")
@@ -37,7 +39,7 @@ class ObservedAlarm(Struct, frozen=True):
 
     @property
     def because(self) -> str:
-        """One sentence: why the robots stand."""
+        """One sentence that says why the robots stand."""
         robots = f"Every robot of {self.fleets}" if self.fleets else "Every robot"
         silent = "" if self.current else ", whose daemon has been silent since then"
         why = {
@@ -48,7 +50,8 @@ class ObservedAlarm(Struct, frozen=True):
 
 
 def alarms(nodes: Mapping[str, Diagnosis], now: float) -> Iterator[ObservedAlarm]:
-    """Yield the statement of each daemon that may alarm. `nodes`: `<node>: daemon` -> its report."""
+    """Yield the statement of each daemon that may raise an alarm. `nodes`: the report of each daemon,
+    by `<node>: daemon`."""
     for name, said in sorted(nodes.items()):
         if STATE in said.values:
             told = ", ".join(sorted(fleets_in(said.value(FLEETS))))

@@ -38,7 +38,8 @@ def about(status: DiagnosticStatus) -> tuple[Kind, str] | None:
 
 
 def of_node(status: DiagnosticStatus) -> bool:
-    """Is the status about one of our daemons itself, a coordinator's whole site, or an alarm panel?"""
+    """Return whether the status is about one of our daemons itself, a coordinator's whole site, or an
+    alarm panel."""
     kind = kind_in(status)
     of_daemon = bool(kind) and status.name == f"{status.hardware_id}: daemon"
     return kind in (COORDINATOR, PANEL) or of_daemon

@@ -1,4 +1,5 @@
-"""Observation of a dispenser or ingestor: the requests for it, its queue, and RMF's way to end them."""
+"""Observation of a dispenser or ingestor: the requests for it, its queue, and the ways in which RMF
+ends a request."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -10,13 +11,13 @@ from bridges.observe.news import News
 from bridges.observe.requesters import Fact, Moment
 
 SHOWN: Final = 10
-"""At most this many guids of a queue are remembered for people."""
+"""The greatest number of a queue's guids that are remembered for people."""
 
 
 class ObservedWorkcell(ObservedDevice[d.DispenserState]):
-    """`mode`: RMF's word. `queue`: the listed guids. `results`: guid -> RMF's word for its last result.
-    Its requesters are known by the guids of their requests. An ingestor's messages have the same
-    fields."""
+    """A dispenser or ingestor as observed. `mode`: RMF's word. `queue`: the listed guids. `results`:
+    RMF's word for the last result of each guid. A requester is known by the guid of its request. An
+    ingestor's messages have the same fields."""
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
@@ -30,7 +31,7 @@ class ObservedWorkcell(ObservedDevice[d.DispenserState]):
         return {"mode": words.plain(d.WorkcellMode, state.mode), "queue": ", ".join(guids)}
 
     def lists(self, guid: str) -> bool:
-        """Does the last state list this request?"""
+        """Return whether the last state lists this request."""
         queue = self.state.request_guid_queue if self.state else ()
         return guid in map(self.text, queue)
 

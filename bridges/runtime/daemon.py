@@ -94,8 +94,9 @@ class Daemon:
             config, self._transport, open_bus, kept, unsafe, self._writer, new=simulated, rmf=rmf
         )
         self._loops = self._service.loops
-        # The record, which `outputs-off` reads, is written once every bus is open: if a bus cannot be
-        # opened, there is none. It is written before `serve`, because `serve` claims the outputs.
+        # The record, which `outputs-off` reads, is written once every bus is open. If a bus cannot be
+        # opened, no record is written. It is written before `serve`, because `serve` claims the
+        # outputs.
         if config.drives and not simulated:
             self._convenience("mark", partial(last_mark.leave, name=last_mark.CLAIMED))
             runtime.claim(ours)
@@ -128,7 +129,7 @@ class Daemon:
         return RingWriter(make, clock_of(self._transport), lambda: self._transport.release)
 
     def serve(self) -> int:
-        """Run until a signal; return the exit code, which is 0 if every output is verified off."""
+        """Run until a signal. Return the exit code, which is 0 only if every output is verified off."""
         signals.on_reset(self._obey)
         self._service.subscribe()
         log.info(pairs("serving", file=self._config.path, kind=self._config.kind, **self._about()))
@@ -144,7 +145,7 @@ class Daemon:
         return 0 if safe else 1
 
     def _obey(self) -> None:
-        """Obey a person: the decision that lies in the runtime directory, else a reset."""
+        """Obey a person: carry out the decision in the runtime directory. If there is none, reset."""
         decided = order.take(self._runtime.path, self._config.path)
         if decided is None:
             self._service.reset()

@@ -47,7 +47,7 @@ log = logging.getLogger(__name__)
 
 
 class Node(Generic[S, L, M, X, E, O, R]):
-    """Serves one device. `publish(topic, message)` sends to RMF and does not raise.
+    """The node that serves one device. `publish(topic, message)` sends to RMF and does not raise.
     `not_sent(topic, error)` notes a state that cannot be sent. `tell_alarm(name, causes)` tells the
     daemon's alarm which causes the device sees; None if this device tells the fleets nothing."""
 
@@ -181,7 +181,8 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return Sampled(sample)
 
     def _keep(self) -> None:
-        """Write the memory to disk before outputs and messages follow from it."""
+        """Write the memory to disk. Outputs and messages that follow from the memory come after
+        that."""
         if self._keeper is not None:
             kept: Any = self._keeper.keep(self.subject.memory, self._clock.monotonic())
             if kept is not None:  # an event of every kind with `keeping`
@@ -219,13 +220,14 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._counts.scanned(took_s, decision.outputs, failed=self._failing)
 
     def _tell(self) -> None:
-        """Publish the state if it is due, and results after it. A request alone makes no state due."""
+        """Publish the state if it is due, and then the results. A request alone does not make a state
+        due."""
         subject, now = self.subject, self._clock.monotonic()
         assert subject.decision is not None
         report = subject.decision.report
         news, results = report.news(), self._kind.results(self.name, report)
         if now >= self._pace.due_at(news, at_once=bool(results)):
-            if self._send(report):  # a door admits robots only after OPEN was published
+            if self._send(report):  # a door lets robots in only after OPEN was published
                 self._send_results(results)
                 subject.published(self._kind.published(subject.memory, report))
                 results = ()
@@ -256,7 +258,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
             self._publish(topic, self._kind.stamped(message, stamp))
 
     def _send(self, report: R) -> bool:
-        """Publish the state; return False if it was not sent, or if RMF has no message for it."""
+        """Publish the state. Return False if it was not sent, or if RMF has no message for it."""
         topic = self._kind.states
         if topic is None:
             return False

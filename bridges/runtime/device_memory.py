@@ -1,7 +1,9 @@
-"""The memories of a daemon's devices that must survive a restart: one file, an entry for each device.
+"""The memories of a daemon's devices that must survive a restart. One file has an entry for each
+device.
 
-A device's thread writes its entry before it switches an output or publishes a state that follows from
-it. If writing fails, the core learns the reason, and writing is retried each second.
+A device's thread writes the device's entry before it switches an output or publishes a state that
+follows from the entry. If writing fails, the core learns the reason, and the thread tries again each
+second.
 """
 
 import logging
@@ -24,13 +26,13 @@ NO_FILE: Final = "no memory on disk: this is the first start, or the memory was 
 
 
 class KeptDevices(keep.Kept, frozen=True, forbid_unknown_fields=True):
-    """The content of the file: device -> the JSON that its kind has made."""
+    """The content of the file. `devices` maps a device to the JSON that its kind has made."""
 
     devices: dict[str, msgspec.Raw]
 
 
 class Unkept:
-    """A store for a test or a kind that needs none: it forgets everything."""
+    """A store that forgets everything, for a test or for a kind that needs none."""
 
     def read(self) -> bytes | None:
         """Return None."""
@@ -41,9 +43,9 @@ class Unkept:
 
 
 class DeviceMemories:
-    """The file of one daemon. `lost`: the reason why it cannot be read; "" if it was read.
+    """The file of one daemon. `lost`: the reason why the file cannot be read; "" if it was read.
 
-    `new`: no file means that nothing ever happened, which is true of a simulation alone.
+    `new`: a missing file means that nothing has ever happened. This is true only of a simulation.
     """
 
     def __init__(self, store: MemoryStore, *, new: bool = False) -> None:
@@ -67,7 +69,8 @@ class DeviceMemories:
         return self._found.get(device)
 
     def write(self, device: str, kept: bytes) -> None:
-        """Replace the device's bytes, on disk when this returns; from any thread. Raises OSError."""
+        """Replace the device's bytes; they are on disk when this returns. Any thread may call this.
+        Raises OSError."""
         with self._lock:
             found = {**self._found, device: kept}
             content = KeptDevices(VERSION, {name: msgspec.Raw(raw) for name, raw in found.items()})
@@ -88,8 +91,8 @@ class DeviceKeeper(Generic[M]):
         self._failing = False
 
     def restore(self, initial: M, now: float) -> M:
-        """Return the device's memory: from disk; `initial` for a new simulation; or the memory of a
-        device whose past is lost, with the reason in the log."""
+        """Return the device's memory from disk. A new simulation gets `initial`. If the past is lost,
+        return the kind's memory for that case, and log the reason."""
         kept = self._memories.read(self._device)
         if kept is None and self._memories.new:
             return initial
@@ -103,7 +106,7 @@ class DeviceKeeper(Generic[M]):
         return self._keeping.lost(reason)
 
     def keep(self, memory: M, now: float) -> MemoryKept | MemoryNotKept | None:
-        """Write the memory if its kept part has changed. Returns None if there was nothing to do."""
+        """Write the memory if its kept part has changed. Return None if there was nothing to do."""
         part = self._keeping.part(memory)
         if now < self._again_at or (part == self._part and not self._failing):
             return None

@@ -1,7 +1,7 @@
 """Serves the alarm that the devices of one daemon raise for the fleets, in a thread of its own.
 
 The devices' threads put their causes into this node's inbox, so a slow disk delays no scan. The memory
-is on disk before a message is published (`keeper.py`).
+is written to disk before a message is published (`keeper.py`).
 """
 
 import logging
@@ -38,13 +38,15 @@ from bridges.transports.transport import Transport, any_type
 log = logging.getLogger(__name__)
 
 QUIET_S: Final = 3.0
-"""Our other nodes state their alarms each second; after three statements a silent node is dead."""
+"""The silence (s) after which another node of ours is dead. Each node states its alarm each second, so
+three statements are missing."""
 ALARM: Final = "alarm"
 """The name of the only subject."""
 
 
 class MessagesOnly(NoWriter):
-    """Passes the published alarms to the recording of the daemon, whose kind decides other values."""
+    """A writer that records only the published alarms. The daemon's kind has other values than an
+    alarm's decisions."""
 
     def __init__(self, writer: NoWriter) -> None:
         self._writer = writer
@@ -89,7 +91,8 @@ AlarmKind = GraphKind[
 class FleetAlarmNode(
     GraphNode[GraphSettings, FleetAlarmLimits, FleetAlarmMemory, FleetAlarmEvent, FleetAlarmReport]
 ):
-    """The alarm of one daemon. `tells_nobody`: publish nothing under a release without fleets."""
+    """The alarm of one daemon. `tells_nobody`: publish nothing under a release of RMF whose alarm
+    cannot name fleets."""
 
     def __init__(
         self,
@@ -115,7 +118,7 @@ class FleetAlarmNode(
             self._add(ALARM, fleet_alarm.initial())
 
     def tell(self, device: str, inputs: AlarmInputs) -> None:
-        """Take the causes that a device sees now; from any thread."""
+        """Take the causes that a device sees now. Any thread may call this."""
         self.inbox.put(ALARM, (self._limits.topic, DeviceTells(device, inputs)), device)
 
     def subscribe(self) -> None:
@@ -125,7 +128,7 @@ class FleetAlarmNode(
         self.look()
 
     def look(self) -> None:
-        """Subscribe to a topic that RMF's release has only now; called each second."""
+        """Subscribe to a topic that RMF's release has only now. The daemon calls this each second."""
         self._name_senders()
         for topic in alarming.TOPICS.values():
             if topic.name not in self._hears and self._transport.release.has(topic.type):
@@ -134,7 +137,7 @@ class FleetAlarmNode(
                 self._hears[topic.name] = self._transport.subscribe(name, hear, others_only=True)
 
     def round(self) -> None:
-        """Do a node's round; withdraw a retained `false` when every node has heard it."""
+        """Do a node's round. Withdraw a retained `false` when every node has heard it."""
         super().round()
         memory, now = self.subjects[ALARM].memory, self._clock.monotonic()
         if memory.told is not None:
@@ -152,7 +155,8 @@ class FleetAlarmNode(
         return min(super().wake_at, self._renew_at)
 
     def beside(self, status: Status) -> Status:
-        """Add the daemon's statement, faults and connections to its status; from any thread."""
+        """Add the daemon's statement, faults and connections to its status. Any thread may call
+        this."""
         decision, own = self.subjects[ALARM].decision, self.status()
         assert decision is not None  # a subject decides when it is made
         return {
@@ -193,7 +197,8 @@ class FleetAlarmNode(
         return put
 
     def _names(self, sender: Sender | None, topic: str) -> list[str]:
-        """Return the nodes that may have sent a message; empty until discovery names them."""
+        """Return the nodes that may have sent a message. The result is empty until discovery names
+        them."""
         if sender is not None:
             node = sender.node or (sender.look() if sender.look else "")
             return [node] if node else []
@@ -201,7 +206,7 @@ class FleetAlarmNode(
         return hears.senders() if hears else []
 
     def _unknown(self, sender: Sender | None, topic: str) -> str:
-        """Return the provisional name of a sender; `look` asks for its name each second."""
+        """Return the provisional name of a sender. `look` asks for the real name each second."""
         for name, (known, on) in self._unnamed.items():
             if known is sender and on == topic:
                 return name
@@ -235,7 +240,7 @@ def node_for(
     kept: MemoryStore | None,
     writer: NoWriter,
 ) -> FleetAlarmNode | None:
-    """Return the alarm's node of a file; None if no device of the file tells the fleets."""
+    """Return the alarm node of a file; None if no device of the file tells the fleets."""
     alarms = {n: one for n, one in devices.items() if isinstance(one, alarming.AlarmingSettings)}
     limits = alarming.alarm_limits(alarms)
     if limits is None:

@@ -1,7 +1,7 @@
 """A person's order to a running daemon: a reset, or a decision about a workcell's requests.
 
-A signal carries the order. A decision lies as a file in the runtime directory before the signal; it
-names the daemon's process, so that no later daemon obeys it.
+A signal carries the order. A decision is also a file in the runtime directory, written before the
+signal is sent. The file names the daemon's process, so that no later daemon obeys it.
 """
 
 import logging
@@ -27,7 +27,7 @@ LONGEST: Final = 65536
 
 
 class PersonsOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A decision, the device that it is about ("": every device), and the daemon that shall obey."""
+    """A decision, its device ("" for every device), and the daemon that must obey."""
 
     verdict: DecidedByPerson
     device: str
@@ -36,7 +36,7 @@ class PersonsOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def send(file: Path, places: Directories, verdict: DecidedByPerson | None, device: str = "") -> int:
-    """Send a reset (None) or a decision to the daemon of this file; return the exit code. Raises
+    """Send a reset (None) or a decision to the daemon of this file. Return the exit code. Raises
     PermissionError if this user may not see or signal the daemon."""
     found = holder.look(places)
     if found is None or not found.serves or not found.started:  # another process may have its pid
@@ -56,8 +56,8 @@ def send(file: Path, places: Directories, verdict: DecidedByPerson | None, devic
 
 
 def take(runtime: Path, file: Path) -> PersonsOrder | None:
-    """Return the decision that waits for this process, and remove it; None without one. Does not
-    raise."""
+    """Return the decision that waits for this process, and remove it. Return None if there is none.
+    Does not raise."""
     path, ours = runtime / ORDER, holder.ourselves(file, serves=True)
     try:
         with opened(runtime):

@@ -90,14 +90,12 @@ def service(
     writer: NoWriter = NOBODY,
     *,
     new: bool = False,
-    rmf: Any = None,
 ) -> Service:
     """Return the service for this YAML. Raises HalError if a bus cannot be opened.
 
-    `kept`: the store for the memory across restarts, if the kind has such a memory; None for no store.
-    `new`: without a file in the store nothing has ever happened.
-    `unsafe`: devices that a dead daemon may have left on. `writer`: the recording's writer. `rmf`: the
-    stand-in of RMF's fleet adapter; None for the real one.
+    `kept`: the store in which the memory survives restarts, if the kind has such a memory; None for no
+    store. `new`: if the store has no file, nothing has ever happened. `unsafe`: devices that a dead
+    daemon may have left on. `writer`: the recording's writer.
     """
     kind = kind_called(config.kind)
     named = partial(named_by, config)
@@ -105,12 +103,6 @@ def service(
     if isinstance(kind, GraphKind):
         node = GraphNode(kind, config.section, transport, clock, named, kept, writer)
         return GraphService(node, clock)
-    if kind.section:
-        from bridges.runtime.fleet.service import FleetDevices
-
-        return FleetDevices(
-            config, kind, transport, open_bus, named, clock, unsafe, writer, rmf=rmf
-        )
     memories = None
     if kind.keeping is not None and kept is not None:
         memories = DeviceMemories(kept, new=new)
@@ -151,7 +143,8 @@ class Devices:
         alarm: FleetAlarmNode | None = None,
         memories: DeviceMemories | None = None,
     ) -> None:
-        """`alarm`: the node that tells the fleets of the devices' alarms; None if no device does."""
+        """Make a node for each device. `alarm`: the node that tells the fleets of the devices' alarms;
+        None if no device raises alarms."""
         self._config = config
         self._alarm = alarm
         self._memories = memories

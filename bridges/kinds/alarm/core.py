@@ -4,13 +4,13 @@ The latch, the reset and the messages to the fleets are those of every alarm
 (`bridges/kinds/shared/fleet_alarm.py`). A panel has no outputs.
 
 Rules:
-ALARM-1. A source is active once it has been asserted for its debounce, and over once it has been clear
-   for `clear_s`. Before its first debounce is over, a single asserted reading counts. A failed reading
-   restarts the debounce.
-ALARM-2. Without a good reading for `stale_after_s` the panel is silent, which is a fault. Its sources
+ALARM-1. A source is active once it has been asserted for its debounce. It is over once it has been
+   clear for `clear_s`. Before its first debounce is over, a single asserted reading counts. A failed
+   reading restarts the debounce.
+ALARM-2. After `stale_after_s` without a good reading the panel is silent, which is a fault. Its sources
    stay as they were, and none of them can be reset.
-ALARM-3. A silence of `silent_alarm_after_s`, counted from the last good reading or from the start, is a
-   cause of an alarm itself. The next good reading ends that cause.
+ALARM-3. A silence of `silent_alarm_after_s` is itself a cause of an alarm. The silence counts from the
+   last good reading or from the start. The next good reading ends that cause.
 ALARM-4. A drill begins when the drill contact comes on after it was seen off. It ends `drill_s` later,
    or when the contact goes off. A contact that is on at the start begins no drill.
 """
@@ -69,7 +69,8 @@ def _read(memory: PanelMemory, sample: PanelSample, now: float, limits: PanelLim
 
 
 def _hold_s(name: str, before: Settled[bool] | None, on: bool, limits: PanelLimits) -> float:
-    """Return how long this value must last: the end of a source that was active lasts `clear_s`."""
+    """Return the time (s) for which this value must last. The end of a source that was active must last
+    `clear_s`."""
     over = before is not None and before.value is not None and not on
     return limits.t.clear_s if over else limits.debounce.get(name, 0.0)
 

@@ -10,7 +10,8 @@ from bridges.kinds.shared.durations import AGES_AGO
 
 
 class PanelLimits(msgspec.Struct, frozen=True):
-    """The settings of a panel that its core needs. `t`: the durations. `debounce`: signal -> s."""
+    """The settings of a panel that its core needs. `t`: the durations. `debounce` maps a signal to its
+    debounce (s)."""
 
     silent_alarm_after_s: float
     drill_s: float = 0.0
@@ -25,8 +26,8 @@ class PanelLimits(msgspec.Struct, frozen=True):
 
 
 class PanelMemory(msgspec.Struct, frozen=True):
-    """The memory of one panel. `began_at`: the start, or the last good reading. `read_at`: the last
-    good reading; None before the first.
+    """The memory of one panel. `began_at`: the time of the last good reading, or of the start.
+    `read_at`: the time of the last good reading; None before the first.
 
     `sources`: each source, debounced. `drill`: the drill contact, debounced. `drill_until`: the end of
     the present drill. `io_fault`: the error of the last reading; "" if it succeeded.

@@ -1,4 +1,5 @@
-"""A panel has no message of RMF: its state is in the log, the status file and `/diagnostics`."""
+"""RMF has no message for a panel's state. The log, the status file and `/diagnostics` show the
+state."""
 
 from collections.abc import Mapping
 
@@ -7,7 +8,7 @@ from bridges.messages.definitions import Message, Time
 
 
 def state_message(name: str, settings: object, report: PanelReport, stamp: Time) -> Message:
-    """Raise NotImplementedError: nothing asks for this message, because the kind has no topic of
+    """Raise NotImplementedError. Nobody calls this function, because the kind has no topic of
     states."""
     raise NotImplementedError("RMF has no message for the state of an alarm panel")
 

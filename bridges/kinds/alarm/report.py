@@ -6,7 +6,8 @@ from bridges.kinds.shared.decision import AlarmInputs, Fault
 
 
 class PanelReport(msgspec.Struct, frozen=True):
-    """The present state of a panel. `active`: its active sources. `silent`: it gives no readings.
+    """The present state of a panel. `active`: its active sources. `silent`: the panel gives no
+    readings.
 
     `alarm`: the causes for the fleets. `read_at`: monotonic seconds, None before the first reading.
     """

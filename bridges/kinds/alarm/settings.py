@@ -37,11 +37,11 @@ class PanelSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_
     )
 
     def stale_after(self) -> float:
-        """Return `stale_after_s` of the limits."""
+        """Return the limits' `stale_after_s`."""
         return self.limits.stale_after_s
 
     def problems(self) -> Remarks:
-        """Yield the contradictions between fields."""
+        """Yield the fields that contradict each other."""
         yield from alarm_problems(self)
         if self.alarm == "none":
             text = (

@@ -7,15 +7,16 @@ import msgspec
 from bridges.kinds.shared.decision import IoFailed, OperatorReset, RivalSeen, Sampled
 
 SILENT: Final = "silence"
-"""The cause of an alarm by a silent panel."""
+"""The cause of an alarm that a panel's silence raises."""
 DRILL: Final = "drill"
 """The signal of the drill contact."""
 
 
 class PanelSample(msgspec.Struct, frozen=True):
-    """Every input of one panel, with its polarity resolved and not debounced.
+    """Every input of one panel: active or not, in whichever way it is wired, and not debounced.
 
-    `sources`: source -> is it asserted? `drill`: the drill contact; None if it is not wired.
+    `sources`: for each source, whether it is asserted. `drill`: the drill contact; None if it is not
+    wired.
     """
 
     sources: dict[str, bool] = {}

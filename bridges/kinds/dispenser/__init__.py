@@ -1,6 +1,7 @@
-"""Dispensers: a DispenserRequest starts one cycle of a machine, whose inputs give the DispenserResult.
+"""Dispensers: a DispenserRequest starts one cycle of a machine, and the machine's inputs become the
+DispenserResult.
 
-`bridges/kinds/ingestor` is the same with an ingestor's messages.
+`bridges/kinds/ingestor` does the same with an ingestor's messages.
 """
 
 from bridges.kinds.dispenser import core, keep, memory, messages, report, signals
@@ -53,4 +54,4 @@ RECORDED: Recorded = {
     "dispenser.signals.WorkcellOutputs": signals.WorkcellOutputs,
     "dispenser.signals.WorkcellSample": signals.WorkcellSample,
 }
-"""The recorded names of an ingestor's values too."""
+"""The recorded names of a dispenser's values. An ingestor's values have the same names."""

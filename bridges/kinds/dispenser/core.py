@@ -6,26 +6,26 @@ target that no longer lists the request completes it too, once the request was l
 So a node that forgets a request, or stops listing a failed one, sends the robot off unloaded.
 
 Rules:
-DISPENSER-1. One guid is one cycle, however often RMF repeats it. A request for the guid of a finished
-   request repeats that result.
-DISPENSER-2. First a request is on disk, then it is listed in a newer state, then it is acknowledged. A
-   cycle and its outcome too are on disk before an output or a message shows them.
-DISPENSER-3. A request stays listed until it is done on disk. A failed request stays listed, because RMF
-   may not have heard its result.
-DISPENSER-4. One cycle runs at a time, in the order of the requests. A cycle starts only while RMF
-   repeats its request, the inputs are fresh, `done` is off, `ready` is on if it is wired, and nothing
+DISPENSER-1. One guid is one cycle, however often RMF repeats the request. If RMF requests the guid of a
+   finished request again, that request's result is sent again.
+DISPENSER-2. A request is first written to disk, then listed in a newer state, then acknowledged. A
+   cycle and its outcome are also on disk before an output or a message shows them.
+DISPENSER-3. A request stays listed until the disk says that it is done. A failed request stays listed,
+   because RMF may not have heard its result.
+DISPENSER-4. One cycle runs at a time, in the order of the requests. A cycle starts only if RMF still
+   repeats its request, the inputs are fresh, `done` is off, `ready` is on or not wired, and nothing
    else forbids the start.
-DISPENSER-5. A cycle ends with `done`: SUCCESS. It has FAILED with a reported fault, when `busy` is over
-   for `settle_s` without `done`, and after `cycle_limit_s`. The outputs are off at once. After a
-   failure no cycle starts before an operator's reset.
-DISPENSER-6. After a failed read or write, and when `busy` is over without `done`, the start is off and
-   stays off in this cycle: a controller that restarts must not take a start that is still on for
-   another request. `done` may still come until the limit.
-DISPENSER-7. The outcome is in doubt if the daemon has died in mid-cycle; if the memory on disk is lost;
-   if a guid comes again with other items; if it comes again after `repeats_within_s` of silence. Then
-   the state is OFFLINE, no cycle starts, and the request gets no result until a person decides. While
-   the memory is lost, or nothing was read yet, the state has the stamp 0, which RMF ignores, and lists
-   nothing.
+DISPENSER-5. A cycle that ends with `done` is a SUCCESS. A cycle has FAILED in three cases: a fault is
+   reported; `busy` has been over for `settle_s` without `done`; `cycle_limit_s` has passed. The outputs
+   then go off at once. After a failure no cycle starts before an operator's reset.
+DISPENSER-6. The start goes off, and stays off in this cycle, after a failed read or write, and when
+   `busy` is over without `done`. Otherwise a controller that restarts could take a start that is still
+   on for another request. `done` may still come until the limit.
+DISPENSER-7. The outcome is in doubt in these cases: the daemon has died in mid-cycle; the memory on
+   disk is lost; a guid comes again with other items; a guid comes again after `repeats_within_s` of
+   silence. Then the state is OFFLINE, no cycle starts, and the request gets no result until a person
+   decides. If the memory is lost, or nothing has been read yet, the state has the stamp 0, which RMF
+   ignores, and lists nothing.
 DISPENSER-8. A finished request is forgotten a day after RMF's last request for it.
 """
 
@@ -61,11 +61,11 @@ from bridges.kinds.shared.decision import (
 from bridges.kinds.shared.durations import NEVER
 
 MOST_LISTED: Final = 100
-"""More requests than any site has robots; another request is refused."""
+"""The greatest number of listed requests. No site has as many robots; a further request is refused."""
 REMEMBERED_S: Final = 86400.0
 
 Heard = tuple[WorkcellMemory, str]
-"""The memory after an event, and the reason for a refusal; "" for an obeyed event."""
+"""The memory after an event, and the reason for a refusal ("" for an obeyed event)."""
 
 
 def initial(limits: WorkcellLimits, now: float) -> WorkcellMemory:
@@ -129,8 +129,8 @@ def _cut(memory: WorkcellMemory) -> WorkcellMemory:
 
 
 def _kept(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellMemory:
-    """Note that the phases are on disk. The time of a cycle begins when its start may be on; a request
-    that RMF has given up in the meantime waits again."""
+    """Note that the phases are on disk. A cycle's time counts from now, because its start may now be
+    on. A request that RMF has given up since then waits again."""
     jobs = tuple(replace(job, kept=job.phase) for job in memory.jobs)
     cycle, kept = memory.cycle, replace(memory, jobs=jobs, not_kept="")
     before = memory.job(cycle.guid) if cycle else None
@@ -174,7 +174,7 @@ def _put(memory: WorkcellMemory, changed: Job) -> WorkcellMemory:
 
 
 def _judge(memory: WorkcellMemory, said: DecidedByPerson, now: float) -> Heard:
-    """Obey a person: an outcome for one request in doubt, or for everything in doubt."""
+    """Obey a person's decision on the outcome of one request in doubt, or of everything in doubt."""
     named = [job for job in memory.doubtful() if said.request in ("", job.guid)]
     if not named and (said.request or not memory.lost):
         return memory, f"nothing in doubt: {said.request or 'no request waits for a decision'}"
@@ -186,7 +186,7 @@ def _judge(memory: WorkcellMemory, said: DecidedByPerson, now: float) -> Heard:
 
 
 def _forget(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellMemory:
-    """Close finished requests about which RMF is silent, and forget them after a day."""
+    """Close the finished requests about which RMF is silent. Forget them after a day."""
     jobs = []
     for job in memory.jobs:
         silent_s = now - (now if job.asked_at is None else job.asked_at)
@@ -198,7 +198,7 @@ def _forget(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Workc
 
 
 def _watch(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellMemory:
-    """Note what the inputs show of the cycle."""
+    """Note the progress of the cycle that the inputs show."""
     cycle, senses = memory.cycle, memory.senses
     if cycle is None:
         return memory

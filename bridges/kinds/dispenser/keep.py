@@ -17,7 +17,7 @@ CUT_OFF: Final = "the daemon ended in the middle of its cycle"
 
 
 class JobRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A Job without the times, which a restart does not know."""
+    """A Job without its times, because they mean nothing after a restart."""
 
     guid: Text
     phase: Phase
@@ -30,7 +30,8 @@ class JobRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class KeptWorkcell(keep.Kept, frozen=True, forbid_unknown_fields=True):
-    """The parts of WorkcellMemory that are kept. `lost`: the memory before this file is missing."""
+    """The parts of WorkcellMemory that are kept. `lost`: the memory that was kept before this file is
+    missing."""
 
     jobs: list[JobRecord]
     halted: str = ""
@@ -38,13 +39,14 @@ class KeptWorkcell(keep.Kept, frozen=True, forbid_unknown_fields=True):
 
 
 def persist(memory: WorkcellMemory) -> bytes:
-    """Encode the memory for the next start. The bytes stay the same until a kept part changes."""
+    """Encode the memory for the next start. The bytes change only when a kept part changes."""
     jobs = [_record(job) for job in memory.jobs]
     return msgspec.json.encode(KeptWorkcell(VERSION, jobs, memory.halted, memory.lost))
 
 
 def restore(kept: bytes, now: float) -> WorkcellMemory:
-    """Decode the memory. A cycle that ran has an unknown outcome. Raises ValueError for other bytes.
+    """Decode the memory. If a cycle was running, its outcome is unknown. Raises ValueError for other
+    bytes.
 
     The silence of RMF counts anew from `now` (monotonic s), because nobody knows how long the daemon
     was down.

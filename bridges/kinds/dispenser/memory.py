@@ -13,16 +13,17 @@ from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
 
 SIGNALS: Final = ("done", "busy", "ready", "fault")
 Contact = Settled[bool | None]
-"""One debounced input. If it is not wired, its value and its candidate are None."""
+"""One debounced input. An input that is not wired has the value None and the candidate None."""
 DECIDE: Final = "decide: rmf-bridge workcell done, again or failed"
 SHOWN: Final = 3
-"""At most this many requests in doubt are named in a fault's text."""
+"""The greatest number of requests in doubt that a fault's text names."""
 Phase = Literal["queued", "running", "done", "failed", "doubtful"]
-"""`doubtful`: nobody but a person knows the outcome."""
+"""The phases of a request. `doubtful`: only a person can find out the outcome."""
 
 
 class WorkcellLimits(msgspec.Struct, frozen=True):
-    """The settings that the core needs. `debounce`: signal -> s. `pulse_s`: None for a steady start."""
+    """The settings that the core needs. `debounce` maps a signal to its debounce (s). `pulse_s`: the
+    length of the start's pulse; None for a start that stays on."""
 
     t: WorkcellDurations = WorkcellDurations()
     debounce: Mapping[str, float] = {}
@@ -35,7 +36,7 @@ class WorkcellLimits(msgspec.Struct, frozen=True):
 
 
 class WorkcellSenses(msgspec.Struct, frozen=True):
-    """The inputs, each None before its first reading. `read_at`: the time of the last reading."""
+    """The inputs. Each is None before its first reading. `read_at`: the time of the last reading."""
 
     done: Contact | None = None
     busy: Contact | None = None
@@ -45,12 +46,13 @@ class WorkcellSenses(msgspec.Struct, frozen=True):
     read_at: float | None = None
 
     def is_on(self, signal: str) -> bool:
-        """Has this input settled as asserted?"""
+        """Return whether this input has settled as asserted."""
         contact: Contact | None = getattr(self, signal)
         return contact is not None and contact.value is True
 
     def is_off(self, signal: str) -> bool:
-        """Has this input settled as not asserted? An input that is not wired has not."""
+        """Return whether this input has settled as not asserted. For an input that is not wired the
+        answer is False."""
         contact: Contact | None = getattr(self, signal)
         return contact is not None and contact.value is False
 
@@ -61,12 +63,12 @@ class WorkcellSenses(msgspec.Struct, frozen=True):
 
 
 class Job(msgspec.Struct, frozen=True):
-    """One request. `kept`: its phase on disk; None before it is there. Other nodes and the outputs
-    follow `kept`, so a restart never contradicts them.
+    """One request. `kept`: its phase on disk, None if it is not on disk yet. Other nodes and the
+    outputs follow `kept`, so a restart never contradicts them.
 
-    `transporter`: the fleet that asks. `why`: the reason of a failure or a doubt. `asked_at`: the time
+    `transporter`: the fleet that asks. `why`: the reason for a failure or a doubt. `asked_at`: the time
     of RMF's last request. `due`: RMF waits for a result. `closed`: RMF has been silent about a finished
-    request for so long that a repeat would be in doubt.
+    request for a long time, so a repeat would be in doubt.
     """
 
     guid: str
@@ -81,26 +83,27 @@ class Job(msgspec.Struct, frozen=True):
 
     @property
     def named(self) -> str:
-        """Return the request for people: its guid, its content, and the fleet that asks."""
+        """Describe the request for people: its guid, its content, and the fleet that asks."""
         whose = f" for {self.transporter}" if self.transporter else ""
         return f"{self.guid} ({self.item}{whose})"
 
     @property
     def is_over(self) -> bool:
-        """Has the request been done, or has it failed?"""
+        """Return whether the request is done or has failed."""
         return self.phase in ("done", "failed")
 
     @property
     def is_listed(self) -> bool:
-        """Is the request in the published queue? RMF takes a request that it no longer finds there for
-        done, so only a request that is done on disk leaves the queue: a failed one stays."""
+        """Return whether the request is in the published queue. If RMF no longer finds a request there,
+        RMF takes the request for done. So a request leaves the queue only when it is done on disk; a
+        failed request stays."""
         return self.kept is not None and (self.phase, self.kept) != ("done", "done")
 
 
 class Cycle(msgspec.Struct, frozen=True):
-    """The cycle that runs. `started_at`: the time since which the start may be on. `worked`: `busy` was
-    seen. `rested_at`: the time since which `busy` has been over. `cut`: something has failed in this
-    cycle, so the start stays off until its end."""
+    """The cycle that runs. `started_at`: the start may be on since this time. `worked`: `busy` was
+    seen. `rested_at`: `busy` has been over since this time. `cut`: something has failed in this
+    cycle, so the start stays off until the cycle's end."""
 
     guid: str
     started_at: float
@@ -110,7 +113,7 @@ class Cycle(msgspec.Struct, frozen=True):
 
 
 class WorkcellMemory(msgspec.Struct, frozen=True):
-    """Everything that the next decision needs to know of the past. Times are monotonic seconds.
+    """The facts of the past that the next decision needs. Times are monotonic seconds.
 
     `lost`: the reason why the memory of earlier requests is missing. `halted`: the reason why no cycle
     starts before an operator's reset. `not_kept`: the reason why the memory is not on disk.
@@ -130,7 +133,7 @@ class WorkcellMemory(msgspec.Struct, frozen=True):
         return next((job for job in self.jobs if job.guid == guid), None)
 
     def running(self) -> Job | None:
-        """Return the request whose cycle runs, once that is on disk."""
+        """Return the request whose cycle runs. A cycle that is not on disk yet does not count."""
         job = self.job(self.cycle.guid) if self.cycle else None
         return job if job is not None and job.kept == "running" else None
 
@@ -142,7 +145,7 @@ class WorkcellMemory(msgspec.Struct, frozen=True):
 def take(
     senses: WorkcellSenses, sample: WorkcellSample, now: float, limits: WorkcellLimits
 ) -> WorkcellSenses:
-    """Add one reading. After a time without readings every input is unknown again."""
+    """Add one reading. After a long time without readings every input is unknown again."""
     if not is_fresh(senses, now, limits):
         senses = WorkcellSenses()
     contacts: dict[str, Contact] = {
@@ -171,8 +174,8 @@ def rivalled(memory: WorkcellMemory, now: float) -> bool:
 
 
 def obstacles(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Iterator[Fault]:
-    """Yield everything that keeps a cycle from starting, most serious first. No text has a running
-    number, because every change of a text is published."""
+    """Yield every fault that keeps a cycle from starting, most serious first. No text contains a number
+    that runs on, because every change of a text is published."""
     if memory.lost:
         yield Fault("MEMORY_LOST", f"{memory.lost}; {DECIDE}")
     if doubtful := memory.doubtful():

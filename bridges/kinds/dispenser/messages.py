@@ -1,6 +1,6 @@
-"""Turns requests into events, refuses invalid requests, and makes states and results of reports.
+"""Turns requests into events, refuses invalid requests, and turns reports into states and results.
 
-Dispensers and ingestors have the same fields in messages of other names.
+The messages of dispensers and ingestors have the same fields, and differ only in their names.
 """
 
 from collections.abc import Callable, Mapping
@@ -30,12 +30,13 @@ Request = DispenserRequest | IngestorRequest
 State = DispenserState | IngestorState
 Result = DispenserResult | IngestorResult
 UNSAYABLE: Final = "cannot be asked here"
-"""The kind of a refusal that is answered FAILED: no repeat of the request will ever be obeyed."""
+"""The kind of a refusal whose answer is FAILED, because no repeat of the request will ever be
+obeyed."""
 
 
 def accept(message: Request, settings: WorkcellSettings) -> ItemRequested:
-    """Turn a request into an event. Raises RequestRefused if it is malformed, or asks for anything that
-    the YAML does not list."""
+    """Turn a request into an event. Raises RequestRefused if the request is malformed, or names
+    something that the YAML does not list."""
     if not message.request_guid:
         raise RequestRefused("empty request_guid", "a result must name its request")
     check_length(request_guid=message.request_guid, transporter_type=message.transporter_type)
@@ -73,14 +74,15 @@ def device_name(message: Request | State) -> str:
 
 
 def state_of(made: type[State]) -> Callable[[str, object, WorkcellReport, Time], State]:
-    """Return the kind's `state_message`. RMF gets no `seconds_remaining`: nobody knows that time."""
+    """Return the kind's function `state_message`. The state has no `seconds_remaining`, because nobody
+    knows that time."""
     return lambda name, settings, report, stamp: made(
         time=stamp, guid=name, mode=int(report.mode), request_guid_queue=report.queue
     )
 
 
 def results_on(topic: Topic[Result]) -> Callable[[str, WorkcellReport], tuple[Said, ...]]:
-    """Return the kind's `results`, without stamps."""
+    """Return the kind's function `results`. Its messages have no stamps."""
     return lambda name, report: tuple(
         (topic, topic.type(request_guid=guid, source_guid=name, status=int(status)))
         for guid, status in report.results
@@ -90,7 +92,8 @@ def results_on(topic: Topic[Result]) -> Callable[[str, WorkcellReport], tuple[Sa
 def answer_on(
     topic: Topic[Result],
 ) -> Callable[[str, object, str, WorkcellReport], RefusalAnswer | None]:
-    """Return the kind's `answer`: FAILED, without a stamp, for a request that no repeat can improve."""
+    """Return the kind's function `answer`. Its answer to a request that no repeat can improve is
+    FAILED, without a stamp."""
 
     def answer(
         name: str, request: object, reason: str, report: WorkcellReport
@@ -98,7 +101,7 @@ def answer_on(
         if not isinstance(request, Request) or not reason.startswith(UNSAYABLE):
             return None
         if request.request_guid in report.queue:
-            return None  # its request with other items still waits for its own result
+            return None  # the guid's request with other items still waits for its own result
         failed = topic.type(
             request_guid=request.request_guid, source_guid=name, status=WorkcellStatus.FAILED
         )
@@ -108,7 +111,8 @@ def answer_on(
 
 
 def stamped(message: Result, stamp: Time) -> Result:
-    """Return the result with its time of sending: RMF ignores a result older than its last state."""
+    """Return the result with its time of sending, because RMF ignores a result that is older than the
+    last state."""
     return replace(message, time=stamp)
 
 

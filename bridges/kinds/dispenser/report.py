@@ -15,11 +15,12 @@ from bridges.messages.constants import WorkcellMode, WorkcellStatus
 
 
 class WorkcellReport(msgspec.Struct, frozen=True):
-    """The state for RMF and the status file. `queue`: the guids that are listed. `results`: (guid,
-    result) for each request that waits for one; a state with `queue` is published before them.
+    """The state for RMF and the status file. `queue`: the guids that are listed. `results`: a pair of
+    guid and result for each request that waits for a result; a state with `queue` is published
+    before them.
 
-    `running`: the guid of the running cycle, and `item` its content. `start`: its start may be on.
-    `waits`: the reason why the next request does not run.
+    `running`: the guid of the running cycle. `item`: the content of that request. `start`: the cycle's
+    start may be on. `waits`: the reason why the next request does not run.
     """
 
     mode: WorkcellMode
@@ -38,9 +39,9 @@ class WorkcellReport(msgspec.Struct, frozen=True):
 
 
 def report(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellReport:
-    """Report the present state, as far as it is on disk. Without its memory the state has no time: RMF
-    would take a request that a newer state does not list for done. A state without a time has no list
-    either, so that RMF never compares two of them."""
+    """Report the present state, as far as it is on disk. If the memory is lost, the state has no time:
+    RMF takes a request for done if a newer state does not list it. A state without a time has no
+    list either, so that RMF never compares two such states."""
     runs = memory.running()
     read_at = None if memory.lost else memory.senses.read_at
     listed = [job for job in memory.jobs if job.is_listed and read_at is not None]
@@ -83,7 +84,7 @@ def _faults(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Itera
 
 
 def _waits(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> str:
-    """Return the reason why no cycle runs although a request waits; "" without one."""
+    """Return the reason why no cycle runs although a request waits; "" if there is none."""
     queued = [job for job in memory.jobs if job.phase == "queued"]
     if memory.cycle is not None or not (queued or memory.doubtful()):
         return ""

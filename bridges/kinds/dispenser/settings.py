@@ -66,11 +66,11 @@ class WorkcellSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown
     ] = None
 
     def stale_after(self) -> float:
-        """Return `stale_after_s` of the limits."""
+        """Return the limits' `stale_after_s`."""
         return self.limits.stale_after_s
 
     def problems(self) -> Remarks:
-        """Yield the contradictions between fields."""
+        """Yield the fields that contradict each other."""
         if self.pulse_s is not None and self.pulse_s >= self.limits.cycle_limit_s:
             yield (
                 ("pulse_s",),

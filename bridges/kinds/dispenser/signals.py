@@ -26,7 +26,7 @@ class Item(msgspec.Struct, frozen=True):
 
 
 class WorkcellSample(msgspec.Struct, frozen=True):
-    """Every input, with its polarity resolved and not debounced; None if not wired.
+    """Every input: active or not, in whichever way it is wired, and not debounced. None if not wired.
 
     `done`: the cycle has succeeded. `busy`: a cycle runs. `ready`: a cycle may start. `fault`: the
     workcell reports a fault. `errors`: the faults that its controller names.
@@ -40,7 +40,8 @@ class WorkcellSample(msgspec.Struct, frozen=True):
 
 
 class WorkcellOutputs(msgspec.Struct, frozen=True):
-    """Every output: the start of a cycle, and its request. `item` holds as long as the cycle runs."""
+    """Every output: the start of a cycle, and the item that was requested. `item` stays the same as
+    long as the cycle runs."""
 
     start: bool = False
     guid: str = ""
@@ -48,7 +49,8 @@ class WorkcellOutputs(msgspec.Struct, frozen=True):
 
 
 class ItemRequested(msgspec.Struct, frozen=True):
-    """RMF asks for one dispensing or ingesting, and repeats this each second until it has a result."""
+    """RMF requests one dispensing or ingesting, and repeats the request each second until it has a
+    result."""
 
     guid: str
     item: Item = Item()

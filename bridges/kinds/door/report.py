@@ -23,7 +23,7 @@ class DoorReport(msgspec.Struct, frozen=True):
     off between two pulses.
 
     `estimated`: no contact proves `mode`. `waits`: the reason why RMF's OPEN is not yet fulfilled; ""
-    without an OPEN, or when the door is OPEN. `alarm`: the fire input, for the fleets.
+    if RMF does not want the door open, or if the door is OPEN. `alarm`: the fire input, for the fleets.
     """
 
     mode: DoorModeValue

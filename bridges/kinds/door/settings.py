@@ -83,7 +83,7 @@ class DoorSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
         return self.limits.stale_after_s
 
     def problems(self) -> Remarks:
-        """Yield the contradictions between fields."""
+        """Yield the fields that contradict each other."""
         yield from alarm_problems(self)
         if self.alarm != "none" and self.on_fire is None:
             text = "this door has no fire input, so it raises no alarm: delete alarm, or wire fire"

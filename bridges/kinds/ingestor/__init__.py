@@ -1,4 +1,4 @@
-"""Ingestors take what a robot brings. They are dispensers with an ingestor's messages."""
+"""Ingestors, which take what a robot brings. The code is a dispenser's; only the messages differ."""
 
 from msgspec.structs import replace
 

@@ -216,7 +216,8 @@ def _reset(memory: LiftMemory, now: float, limits: LiftLimits) -> LiftMemory:
 
 
 def _latch(memory: LiftMemory, view: BelievedLift, now: float, limits: LiftLimits) -> LiftMemory:
-    """Latch a fire if `fire_reset` says so. Forget a rival that has been silent for RIVAL_QUIET_S."""
+    """Latch a fire if `fire_reset` is `manual`. Forget a rival (a second node for this lift) that has
+    been silent for RIVAL_QUIET_S."""
     burning = Hazard.FIRE in view.hazards
     manual = limits.fire_reset == "manual"
     rival_at = memory.rival_at

@@ -20,9 +20,9 @@ Waiting = Literal["agv", "floor", "door"]
 class LiftLimits(msgspec.Struct, frozen=True, dict=True):
     """The settings of a lift that its core needs.
 
-    `stops`: RMF's floor name -> landing and door, from the lowest up. `t`: the durations.
-    `debounce`: signal -> s. `alarm_on`: the hazards that the fleets are told of.
-    `by_call`: a call brings AGV mode.
+    `stops` maps RMF's floor name to landing and door, from the lowest up. `t`: the durations.
+    `debounce` maps a signal to its debounce (s). `alarm_on`: the hazards that the fleets are told of.
+    `by_call`: a call switches AGV mode on.
     """
 
     stops: Mapping[str, Stop]

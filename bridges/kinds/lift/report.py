@@ -22,8 +22,8 @@ class LiftReport(msgspec.Struct, frozen=True):
 
     `floor`: RMF's name, "" when unknown. `read_at`: monotonic seconds, None before the first reading.
     `estimated`: no contact proves `door`. `boarded`: a robot may be inside. `waits`: the reason why the
-    session's request is not fulfilled yet; "" without a request, or once RMF sees it fulfilled.
-    `alarm`: the hazards of `alarm_on`.
+    session's request is not fulfilled yet; "" without a request, or once RMF sees the request
+    fulfilled. `alarm`: the hazards of `alarm_on`.
     """
 
     read_at: float | None

@@ -1,4 +1,4 @@
-"""Settings of devices that may tell the fleets of an alarm, and the messages of that alarm."""
+"""The settings of devices that may tell the fleets of an alarm, and the messages of that alarm."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Final, Literal
@@ -22,7 +22,8 @@ TOPICS: Final[Mapping[str, Topic[Message]]] = {
     topic.name: topic for topic in (FIRE_ALARM_TRIGGER, EMERGENCY_SIGNAL)
 }
 STATE, FLEETS, CAUSES = "alarm state", "alarm fleets", "alarm causes"
-"""Keys of a daemon's statement on `/diagnostics`: its status has the same words below `alarm`."""
+"""The keys of a daemon's statement on `/diagnostics`. The status file has the same words below
+`alarm`."""
 RAISED: Final = frozenset({"alarm", "drill"})
 
 
@@ -69,8 +70,8 @@ def alarm_problems(settings: AlarmingSettings) -> Remarks:
 
 
 def alarm_limits(devices: Mapping[str, AlarmingSettings]) -> FleetAlarmLimits | None:
-    """Return the limits of a file's alarm; None if no device tells the fleets. Devices that do agree on
-    the topic and the fleets (`disagreements`)."""
+    """Return the limits of a file's alarm; None if no device tells the fleets. `disagreements` has
+    ensured that the devices agree on the topic and the fleets."""
     alarming = {name: one for name, one in devices.items() if one.alarm != "none"}
     if not alarming:
         return None
@@ -79,7 +80,7 @@ def alarm_limits(devices: Mapping[str, AlarmingSettings]) -> FleetAlarmLimits | 
 
 
 def disagreements(devices: Mapping[str, AlarmingSettings]) -> Iterator[tuple[str, str]]:
-    """Yield (device, text) of each device whose alarm differs from that of the file's first device."""
+    """Yield each device whose alarm differs from that of the file's first device, with a text."""
     alarming = [(name, one) for name, one in devices.items() if one.alarm != "none"]
     for name, one in alarming[1:]:
         first = alarming[0][1]
@@ -95,7 +96,7 @@ def disagreements(devices: Mapping[str, AlarmingSettings]) -> Iterator[tuple[str
 
 
 def heard(message: Message, senders: Iterable[str]) -> AlarmHeard:
-    """Convert a message of an alarm's topic."""
+    """Turn a message on an alarm's topic into an event."""
     if isinstance(message, EmergencySignal):
         on, fleets = message.is_emergency, frozenset(message.fleet_names)
     else:
@@ -105,14 +106,14 @@ def heard(message: Message, senders: Iterable[str]) -> AlarmHeard:
 
 
 def statement(report: FleetAlarmReport, fleets: Fleets) -> dict[str, str]:
-    """Return the daemon's statement, key -> text, for the status file and `/diagnostics`."""
+    """Return the keys and texts of the daemon's statement, for the status file and `/diagnostics`."""
     causes = ", ".join(map(str, report.causes))
     told = msgspec.json.encode(sorted(fleets)).decode()
     return {"state": report.state, "fleets": told, "causes": causes or "-"}
 
 
 def stated(message: DiagnosticArray) -> Iterator[AlarmStated]:
-    """Yield the statements of our daemons in a message of `/diagnostics`; none if it has none."""
+    """Yield the statements of our daemons in a message of `/diagnostics`. A message may have none."""
     for status in message.status:
         values = {pair.key: pair.value for pair in status.values}
         if STATE in values:
@@ -124,7 +125,7 @@ def stated(message: DiagnosticArray) -> Iterator[AlarmStated]:
 
 
 def fleets_in(text: str) -> Fleets:
-    """Return the fleets of a statement; all fleets for a text that `statement` did not make."""
+    """Return the fleets in a statement. A text that `statement` did not make means all fleets."""
     try:
         return frozenset(msgspec.json.decode(text, type=list[str]))
     except msgspec.MsgspecError:
@@ -132,7 +133,7 @@ def fleets_in(text: str) -> Fleets:
 
 
 def alarm_notes(settings: AlarmingSettings) -> Remarks:
-    """Yield effects of the alarm that the site should know."""
+    """Yield the effects of the alarm that the site should know."""
     if settings.alarm != "none" and not settings.fleets:
         text = "an alarm stops the robots of every fleet on this graph, in every building of it"
         yield ("alarm",), f"{text}; emergency_signal with fleets names fewer"

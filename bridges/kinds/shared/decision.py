@@ -71,9 +71,10 @@ class OperatorReset(msgspec.Struct, frozen=True):
 
 
 class AlarmInputs(msgspec.Struct, frozen=True):
-    """The causes at one device that the fleets are told of (`bridges/kinds/shared/fleet_alarm.py`).
+    """The causes of an alarm that one device sees (`bridges/kinds/shared/fleet_alarm.py` tells the
+    fleets).
 
-    `present`: the causes that are seen now. `seen`: the inputs are read, so that a cause outside
+    `present`: the causes that are seen now. `seen`: the inputs are read, so a cause that is not in
     `present` is over. `drill`: the device asks for a drill.
     """
 
@@ -93,7 +94,8 @@ class MemoryNotKept(msgspec.Struct, frozen=True):
 
 
 class DecidedByPerson(msgspec.Struct, frozen=True):
-    """A person has run `rmf-bridge workcell`: the outcome of a request that the daemon does not know.
+    """A person has run `rmf-bridge workcell`, and decides the outcome of a request that the daemon does
+    not know.
 
     `request`: the request's guid; "" for every request in doubt, and for a lost memory.
     """

@@ -4,30 +4,33 @@ Lifts, doors and panels report their present causes (a burning fire contact). Fl
 robots at a `true` and resume at any `false`, whoever sent it. So all sources of a graph are one alarm.
 
 Rules:
-FLEET-ALARM-1. A cause that is present latches, and the daemon's alarm is raised while a cause is
-   latched. Only a person's reset of this daemon ends a latched cause, and only while its device is read
+FLEET-ALARM-1. A cause that is present latches, and the daemon's alarm is raised as long as a cause is
+   latched. Only a person's reset of this daemon ends a latched cause, and only if its device is read
    and the cause is absent. Causes of a device that is no longer in the YAML may be reset.
 FLEET-ALARM-2. A raised alarm is published as `true`, once and at once. The publisher retains that
    message for fleet adapters that start later.
-FLEET-ALARM-3. A daemon publishes `false` only if it has published `true`, none of its causes is
-   latched, and no alarm of another node stands for any of the same fleets. So the alarm ends when every
-   cause has ended and every daemon that saw one was reset. Each of these daemons then publishes its own
-   `false`, because the `true` that it retains would stop a fleet adapter that starts later.
+FLEET-ALARM-3. A daemon publishes `false` only under three conditions: it has published `true`, none of
+   its causes is latched, and no alarm of another node stands for any of the same fleets. So the alarm
+   ends when every cause has ended and every daemon that saw a cause was reset. Each of these daemons
+   publishes its own `false`, because the `true` that it retains would stop a fleet adapter that starts
+   later.
 FLEET-ALARM-4. Another node's alarm stands from its `true`, or from the statement of one of our nodes on
-   `/diagnostics`, until that node publishes `false` or states that its alarm is over. Silence ends no
-   alarm: its source may have died in the fire. A `false` of any node also ends what stands, except the
-   alarms of our nodes that still make statements: RMF has obeyed, so the robots drive already. In the
-   quiet start that `false` may be an old, retained one, and ends only its sender's alarm.
-FLEET-ALARM-5. If another node publishes `false` while the alarm is raised, `true` is published again,
-   but no more often than each AGAIN_S, and the contradiction is a fault.
+   `/diagnostics`. It stands until that node publishes `false` or states that its alarm is over. Silence
+   ends no alarm, because the alarm's source may have died in the fire. A `false` of any node also ends
+   all standing alarms, except the alarms of our nodes that still make statements. The reason is that
+   RMF has obeyed the `false`, so the robots already drive. In the quiet start such a `false` may be an
+   old, retained one, and ends only its sender's alarm.
+FLEET-ALARM-5. If another node publishes `false` during a raised alarm, `true` is published again, but
+   no more often than each AGAIN_S. The contradiction is a fault.
 FLEET-ALARM-6. Latched causes, the published `true` and other nodes' alarms survive a restart. After a
    restart a raised alarm is published again, because the earlier process took its retained `true` with
-   it. In the quiet start no `false` is published: other nodes state their alarms each second. A daemon
-   that ends publishes nothing.
-FLEET-ALARM-7. A drill raises the alarm without latching, and its end needs no reset. A cause that
-   comes during a drill makes a real alarm of it.
-FLEET-ALARM-8. Where the wire hides a message's sender, any present publisher that is not one of our
-   nodes may have sent it. Until discovery names a sender, its alarm stands as that of an unknown node.
+   it. In the quiet start no `false` is published, because other nodes state their alarms each second. A
+   daemon that ends publishes nothing.
+FLEET-ALARM-7. A drill raises the alarm without latching, and its end needs no reset. If a cause comes
+   during a drill, the alarm becomes a real alarm.
+FLEET-ALARM-8. If the wire hides a message's sender, any present publisher that is not one of our nodes
+   may have sent the message. Until discovery names the sender, its alarm stands as that of an unknown
+   node.
 """
 
 from collections.abc import Collection, Mapping
@@ -43,16 +46,16 @@ from bridges.messages.definitions import Bool, EmergencySignal, Message
 from bridges.messages.topics import EMERGENCY_SIGNAL, Topic
 
 AGAIN_S: Final = 0.2
-"""The least time between two `true`, because a node may publish `false` without end."""
+"""The least time (s) between two `true`, because another node may publish `false` without end."""
 RENEW_S: Final = 5.0
-"""A retained `false` is withdrawn this long after it was published, when every node has heard it: a
+"""The time (s) after which a retained `false` is withdrawn, when every node has heard it. Otherwise a
 fleet adapter that starts in a later alarm might hear the old `false` last."""
 MOST_OTHERS: Final = 200
-"""The most other nodes whose alarms are remembered; a site has some dozens of daemons."""
+"""The greatest number of other nodes whose alarms are remembered. A site has some dozens of daemons."""
 UNKNOWN: Final = "unknown node"
-"""Begins the provisional name of a node that discovery has not named yet."""
+"""The beginning of the provisional name of a node that discovery has not named yet."""
 OR: Final = " or "
-"""Joins the nodes of which one has sent a message."""
+"""The word between the names of nodes of which one has sent a message."""
 
 Fleets = frozenset[str]
 """The fleets that are told; empty for all fleets."""
@@ -116,9 +119,10 @@ class FleetAlarmMemory(msgspec.Struct, frozen=True):
 
     `told`: the fleets that our `true` went to; None if we have published no `true` since our last
     `false`. `told_at`, `ended_at`: the times of our last `true` and `false`. `owed`: our `true` no
-    longer counts, so a raised alarm must be published again. `others`: node -> the fleets of its
-    standing alarm. `ours`: our other nodes -> the time of their last statement. `may_end`: the quiet
-    start is over. `contradicted`: the nodes that published `false` against our alarm, and the time.
+    longer counts, so a raised alarm must be published again. `others`: the fleets of each other node's
+    standing alarm. `ours`: the time of the last statement of each other node of ours. `may_end`: the
+    quiet start is over. `contradicted`: the nodes that published `false` against our alarm, and the
+    time.
     """
 
     inputs: Mapping[str, AlarmInputs] = {}
@@ -134,18 +138,18 @@ class FleetAlarmMemory(msgspec.Struct, frozen=True):
 
     @property
     def drill(self) -> bool:
-        """Is the alarm raised by a drill alone?"""
+        """Return whether only a drill raises the alarm."""
         return not self.latched and any(inputs.drill for inputs in self.inputs.values())
 
     @property
     def raised(self) -> bool:
-        """Must the robots of our fleets stand, for a cause or a drill of our own?"""
+        """Return whether the robots of our fleets must stand for a cause or a drill of our own."""
         return bool(self.latched) or self.drill
 
 
 class FleetAlarmReport(msgspec.Struct, frozen=True):
-    """The daemon's statement. `state`: `quiet`, `alarm`, `drill`, or `reset` while our `true` waits for
-    the end of other alarms. `waits`: these alarms' nodes."""
+    """The daemon's statement. `state`: `quiet`, `alarm`, `drill`, or `reset` if our `true` waits for
+    the end of other alarms. `waits`: the nodes of these alarms."""
 
     state: str
     causes: tuple[AlarmCause, ...] = ()
@@ -159,7 +163,7 @@ class FleetAlarmReport(msgspec.Struct, frozen=True):
 
 
 def overlap(one: Fleets, other: Fleets) -> bool:
-    """Is any fleet told by both? An empty set means all fleets."""
+    """Return whether both sets tell the same fleet. An empty set means all fleets."""
     return not one or not other or bool(one & other)
 
 

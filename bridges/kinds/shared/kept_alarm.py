@@ -11,7 +11,7 @@ VERSION: Final = 1
 
 
 class KeptAlarm(keep.Kept, frozen=True, forbid_unknown_fields=True):
-    """The parts of the memory that are kept. `latched`: device and signal of each cause."""
+    """The parts of the memory that are kept. `latched`: the device and the signal of each cause."""
 
     latched: list[tuple[str, str]]
     told: list[str] | None
@@ -19,7 +19,7 @@ class KeptAlarm(keep.Kept, frozen=True, forbid_unknown_fields=True):
 
 
 def persist(memory: FleetAlarmMemory) -> bytes:
-    """Encode the memory for the next start. The bytes stay the same until a kept part changes."""
+    """Encode the memory for the next start. The bytes change only when a kept part changes."""
     return msgspec.json.encode(
         KeptAlarm(
             VERSION,
@@ -28,7 +28,7 @@ def persist(memory: FleetAlarmMemory) -> bytes:
             {
                 node: sorted(fleets)
                 for node, fleets in sorted(memory.others.items())
-                if not node.startswith(UNKNOWN)  # it retains its message for our next start
+                if not node.startswith(UNKNOWN)  # its retained message comes again
             },
         )
     )
