@@ -40,7 +40,11 @@ def send(file: Path, places: Directories, verdict: DecidedByPerson | None, devic
     PermissionError if this user may not see or signal the daemon."""
     found = holder.look(places)
     if found is None or not found.serves or not found.started:  # another process may have its pid
-        why = f"{found}, which is not a daemon of this version" if found else "no process holds it"
+        why = (
+            f"{found}, which is not a daemon of this version"
+            if found
+            else "no process holds this directory"
+        )
         print(f"no daemon serves {file}: {places.runtime}: {why}", file=sys.stderr)
         return 1
     if verdict is not None:

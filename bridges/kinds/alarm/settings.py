@@ -13,10 +13,12 @@ class PanelDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     """Durations of a panel."""
 
     stale_after_s: Annotated[
-        Period, tells("after so long without a good reading the panel is silent, which is a fault.")
+        Period,
+        tells("the time without a good reading after which the panel is silent, which is a fault."),
     ] = 1.0
     clear_s: Annotated[
-        Seconds, tells("how long a source must be clear to count as over; a person resets later.")
+        Seconds,
+        tells("how long a source must be clear to count as over; after that a person may reset."),
     ] = 1.0
 
 
@@ -30,7 +32,9 @@ class PanelSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_
     ]
     drill_s: Annotated[
         Timeout | None,
-        tells("how long a drill lasts that the drill contact begins; then it ends by itself."),
+        tells(
+            "how long a drill lasts, counted from the drill contact; then the drill ends by itself."
+        ),
     ] = None
     limits: Annotated[PanelDurations, tells("the durations that differ from their defaults.")] = (
         PanelDurations()

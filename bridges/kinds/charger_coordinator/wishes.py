@@ -1,9 +1,9 @@
-"""Robots that want to be charged. Place, battery and task decide; the mode is a hint.
+"""Robots that want to be charged. Place, battery and task decide this; the mode is only a hint.
 
-RMF's fleet adapter shows the mode CHARGING from the first charge on, in every later task too, and never
-shows IDLE in a task (rmf_ros2 9dedd0f: TaskManager::robot_mode; RobotContext::current_mode, which only
-WaitForCharge and DockRobot set). The id of a task shows whether it came from RMF's dispatcher; such a
-task is no charge.
+From a robot's first charge on, RMF's fleet adapter shows the mode CHARGING in every later task too, and
+it never shows IDLE in a task. (See rmf_ros2 9dedd0f: TaskManager::robot_mode;
+RobotContext::current_mode, which only WaitForCharge and DockRobot set.) The id of a task shows whether
+the task came from RMF's dispatcher; such a task is no charge.
 For a robot that has stood at one of our waypoints for SETTLES_S:
 COORDINATOR-WISHES-1. Below `again_percent` the robot wants to be charged if it has no task, or if its
    mode is CHARGING or DOCKING.

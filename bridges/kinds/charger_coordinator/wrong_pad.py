@@ -1,8 +1,8 @@
 """Robots on a wrong pad, and the orders that make them leave.
 
 RMF's fleet adapter starts a robot's ChargeBattery again when the waypoint or the mode of its charging
-assignment changes (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart). That moves a robot, but
-only while its ChargeBattery runs: as a task, or as `finishing_request: charge`. Rules:
+assignment changes (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart). Such a change moves
+a robot only during its ChargeBattery: as a task, or by `finishing_request: charge`. Rules:
 COORDINATOR-WRONG-PAD-1. A robot with a station may come to another station, or stay at another station
    for LEAVES_S. The coordinator then tells the robot to wait, and TOLD_S later to charge at its own
    station. The coordinator does so at most twice for one request.

@@ -1,9 +1,10 @@
 """The decision core of a dispenser or ingestor: one pure decision for each event.
 
-RMF's side (rmf_ros2 9dedd0f, phases/DispenseItem.cpp and IngestItem.cpp): the fleet adapter repeats
-its request each second, without a stamp and without end. A result SUCCESS completes it. A state of the
-target that no longer lists the request completes it too, once the request was listed or acknowledged.
-So a node that forgets a request, or stops listing a failed one, sends the robot off unloaded.
+RMF's side is in rmf_ros2 9dedd0f, phases/DispenseItem.cpp and IngestItem.cpp. The fleet adapter repeats
+its request each second, without a stamp and without end. A result SUCCESS completes the request. A
+state of the target that no longer lists the request completes it too, if the request was listed or
+acknowledged before. So a node that forgets a request, or stops listing a failed request, sends the
+robot off unloaded.
 
 Rules:
 DISPENSER-1. One guid is one cycle, however often RMF repeats the request. If RMF requests the guid of a

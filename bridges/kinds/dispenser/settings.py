@@ -17,19 +17,23 @@ class WorkcellDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
     """Durations of a dispenser or ingestor."""
 
     stale_after_s: Annotated[
-        StaleAfter, tells("after so long without a good reading: OFFLINE, and the start is off.")
+        StaleAfter,
+        tells(
+            "the time without a good reading after which the state is OFFLINE and the start is off."
+        ),
     ] = 1.0
     cycle_limit_s: Annotated[
         Timeout,
-        tells("how long one cycle may take; without `done` in this time it has FAILED."),
+        tells("how long one cycle may take; a cycle without `done` in this time has FAILED."),
     ] = 120.0
     settle_s: Annotated[
-        Brief, tells("how long `done` may follow the end of `busy`; after that it has FAILED.")
+        Brief,
+        tells("how long `done` may follow the end of `busy`; after that the cycle has FAILED."),
     ] = 1.0
     asked_within_s: Annotated[
         Patience,
-        tells("""a request starts only if RMF has repeated it in this time: later no robot may be
-        there."""),
+        tells("""a request starts only if RMF has repeated it in this time, because later its robot
+        may be gone."""),
     ] = 5.0
     repeats_within_s: Annotated[
         Patience,
@@ -44,7 +48,7 @@ class AskedFor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     most: Annotated[Quantity, tells("the greatest quantity in one request.")] = 1
     compartments: Annotated[
         list[Name],
-        tells("the names that a request may give as its compartment; when absent, it gives none."),
+        tells("the compartments that a request may name; when absent, a request names none."),
     ] = []
 
 

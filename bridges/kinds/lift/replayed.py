@@ -1,9 +1,10 @@
 """Replayed requests: a floor of an earlier ride is requested while a robot may be on the threshold.
 
 A fleet adapter retains its last 100 requests. When RMF's supervisor restarts, or reaches a cut-off
-adapter again, it hears them all once more and passes each on with a new stamp (rmf_ros2,
+adapter again, it hears all these requests once more and passes each on with a new stamp (rmf_ros2,
 lift_supervisor/Node.cpp). Requests of earlier rides would release the door before the present request
-is heard. Our node hears no replays on `adapter_lift_requests`, but each robot's own request when sent.
+is heard. On `adapter_lift_requests` our node hears no replays, but only the requests that each robot
+sends now.
 Rules:
 LIFT-REPLAYED-1. If the door is held, a request for another destination is doubted if the robot's own
    last request was for the present destination. That own request counts even if the robot sent it

@@ -1,7 +1,8 @@
 """One alarm for the fleets of a graph: what one daemon publishes about the causes that its devices see.
 
-Lifts, doors and panels report their present causes (a burning fire contact). Fleet adapters stop their
-robots at a `true` and resume at any `false`, whoever sent it. So all sources of a graph are one alarm.
+Lifts, doors and panels report their present causes, such as a fire contact that is on. Fleet adapters
+stop their robots at a `true`, and resume at any `false`, whoever sent it. So all sources of a graph
+together make one alarm.
 
 Rules:
 FLEET-ALARM-1. A cause that is present latches, and the daemon's alarm is raised as long as a cause is
