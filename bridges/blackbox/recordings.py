@@ -74,7 +74,7 @@ class Recordings:
         return f"{Path(head.file).stem}_{when}_{why}_{head.run[:8]}{SUFFIX}"
 
     def has_death(self, head: Head) -> bool:
-        """Does a recording of this run's death already exist?"""
+        """Return whether a recording of this run's death already exists."""
         return any(self.folder.glob(f"*_{DEATH}_{head.run[:8]}{SUFFIX}"))
 
     def put(

@@ -41,7 +41,7 @@ class Rounds(Protocol):
 
     @property
     def ready(self) -> bool:
-        """Are the devices or the kind in service?"""
+        """Return whether the devices or the kind are in service."""
 
     def round(self) -> None:
         """Take the waiting events and do the due work."""
@@ -100,7 +100,7 @@ class Serving:
 
     @property
     def ready(self) -> bool:
-        """Has the thread finished its first round, and is its service ready?"""
+        """Return whether the thread has finished its first round and its service is ready."""
         return self._rounds > 0 and self._serves.ready
 
     def _run(self) -> None:

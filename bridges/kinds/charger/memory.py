@@ -93,10 +93,11 @@ class ChargerMemory(msgspec.Struct, frozen=True):
 
 
 def rivalled(memory: ChargerMemory, now: float) -> bool:
-    """Does another node publish this charger's states?"""
+    """Return whether another node publishes this charger's states."""
     return now - memory.rival_at < RIVAL_QUIET_S
 
 
 def unreachable(memory: ChargerMemory, limits: ChargerLimits) -> bool:
-    """Have `misses` polls failed since the last good reading, or has there been no reading yet?"""
+    """Return whether there has been no reading yet, or `misses` polls have failed since the last good
+    reading."""
     return memory.sample is None or memory.misses >= limits.t.misses

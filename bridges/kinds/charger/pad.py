@@ -54,11 +54,11 @@ class PadOccupant(msgspec.Struct, frozen=True):
     robot: RobotName | None = None
 
     def may_be(self, who: RobotName) -> bool:
-        """Can this robot be on the pad, as far as the station can tell?"""
+        """Return whether this robot can be on the pad, as far as the station can tell."""
         return self.sort == "unverified" or self.robot == who
 
     def is_another(self, who: RobotName) -> bool:
-        """Is another robot on the pad?"""
+        """Return whether another robot is on the pad."""
         return self.sort in ("robot", "stranger") and self.robot != who
 
 

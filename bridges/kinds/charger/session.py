@@ -56,7 +56,7 @@ def follow(
 
 
 def shown_released(holder: ChargeSession, now: float, limits: ChargerLimits) -> bool:
-    """Has RELEASED been shown for `released_s`?"""
+    """Return whether RELEASED has been shown for `released_s`."""
     return holder.released_at is not None and now - holder.released_at >= limits.t.released_s
 
 
@@ -109,7 +109,7 @@ def _pending(
 
 
 def cleared_to_start(memory: ChargerMemory, limits: ChargerLimits) -> bool:
-    """Is the right robot on the pad and in range, as far as the station can tell?"""
+    """Return whether the right robot is on the pad and in range, as far as the station can tell."""
     holder, sample = memory.holder, memory.sample
     if holder is None or sample is None or memory.read_at is None:
         return False

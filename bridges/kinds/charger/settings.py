@@ -94,7 +94,8 @@ class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_
     ] = "stop"
 
     def can_stop(self) -> bool:
-        """Does this station obey an order to stop? Drivers override this for stations that do not."""
+        """Return whether this station obeys an order to stop. Drivers override this for stations that
+        do not."""
         return True
 
     def problems(self) -> Remarks:

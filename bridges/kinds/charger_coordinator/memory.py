@@ -243,15 +243,16 @@ class SiteMemory(msgspec.Struct, frozen=True):
 
     @property
     def assigns(self) -> bool:
-        """May the coordinator assign charging places to robots?"""
+        """Return whether the coordinator may assign charging places to robots."""
         return self.may_speak and self.alone
 
     def faulty(self, robot: RobotName) -> bool:
-        """Has this robot failed so often that it is not tried again until an operator's reset?"""
+        """Return whether this robot has failed so often that it is not tried again before an operator's
+        reset."""
         return len(self.strikes.get(robot, ())) >= STRIKES
 
     def speaks(self, station: str, now: float) -> bool:
-        """Has this station's state arrived lately?"""
+        """Return whether this station's last state is recent."""
         return station in self.stations and now < self.stations[station].at + STATION_SILENT_S
 
     def silent_since(self, station: str) -> float:

@@ -60,7 +60,7 @@ class Charging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return everybody or who.fleet in self.fleets or str(who) in self.robots
 
     def under_way(self, when: LocalTime) -> bool:
-        """Does `when` lie between the beginning and the end?"""
+        """Return whether `when` lies between the beginning and the end."""
         begins, lasts = _minute(self.at), self.lasts_min()
         today, yesterday = DAYS[when.day], DAYS[when.day - 1]
         began_today = today in self.days and 0 <= when.minute - begins < lasts

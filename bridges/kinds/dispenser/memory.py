@@ -57,7 +57,7 @@ class WorkcellSenses(msgspec.Struct, frozen=True):
         return contact is not None and contact.value is False
 
     def seen(self) -> bool:
-        """Has each input settled?"""
+        """Return whether each input has settled."""
         contacts: list[Contact | None] = [getattr(self, signal) for signal in SIGNALS]
         return all(one is not None and one.steady_at is not None for one in contacts)
 
@@ -164,12 +164,12 @@ def miss(senses: WorkcellSenses) -> WorkcellSenses:
 
 
 def is_fresh(senses: WorkcellSenses, now: float, limits: WorkcellLimits) -> bool:
-    """Is the last reading younger than `stale_after_s`?"""
+    """Return whether the last reading is younger than `stale_after_s`."""
     return senses.read_at is not None and now < senses.read_at + limits.t.stale_after_s
 
 
 def rivalled(memory: WorkcellMemory, now: float) -> bool:
-    """Does another node publish states under this name?"""
+    """Return whether another node publishes states under this name."""
     return memory.rival_at is not None and now < memory.rival_at + RIVAL_QUIET_S
 
 

@@ -80,7 +80,7 @@ class DoorMemory(msgspec.Struct, frozen=True):
 
 
 def rivalled(memory: DoorMemory, now: float) -> bool:
-    """Does another node publish this door's states?"""
+    """Return whether another node publishes this door's states."""
     return memory.rival_at is not None and now < memory.rival_at + RIVAL_QUIET_S
 
 

@@ -79,7 +79,7 @@ def miss(senses: DoorSenses) -> DoorSenses:
 
 
 def is_fresh(senses: DoorSenses, now: float, limits: DoorLimits) -> bool:
-    """Is the last reading younger than `stale_after_s`?"""
+    """Return whether the last reading is younger than `stale_after_s`."""
     return senses.read_at is not None and now < senses.read_at + limits.t.stale_after_s
 
 
@@ -106,7 +106,7 @@ def look(
 
 
 def released_by_fire(view: BelievedDoor, limits: DoorLimits) -> bool:
-    """Has a fire alarm released the hold?"""
+    """Return whether a fire alarm has released the hold."""
     return view.fresh and view.fire and limits.on_fire == "release"
 
 

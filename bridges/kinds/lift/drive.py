@@ -37,7 +37,7 @@ RETRY_AFTER_S = (10.0, 30.0, 60.0)
 
 
 def at_destination(session: LiftSession, view: BelievedLift, limits: LiftLimits) -> bool:
-    """Does the car stand at the session's destination?"""
+    """Return whether the car stands at the session's destination."""
     return view.stopped and view.level == limits.stops[session.destination].level
 
 
@@ -48,7 +48,7 @@ def agv_ok(view: BelievedLift) -> bool:
 
 
 def silent(session: LiftSession, now: float, limits: LiftLimits) -> bool:
-    """Is RMF's last request for this session older than `request_timeout_s`?"""
+    """Return whether RMF's last request for this session is older than `request_timeout_s`."""
     return now >= session.asked_at + limits.t.request_timeout_s
 
 

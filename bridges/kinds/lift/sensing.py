@@ -74,7 +74,7 @@ class BelievedLift(msgspec.Struct, frozen=True):
 
     @property
     def fresh(self) -> bool:
-        """Can the inputs be believed?"""
+        """Return whether the inputs can be believed."""
         return not self.blind
 
     def door(self, side: Side) -> DoorSeen:

@@ -99,7 +99,7 @@ class SupervisedLift(msgspec.Struct, frozen=True):
 
     @property
     def nobody_is_sent(self) -> bool:
-        """Does the lift's mode forbid sending a robot to it?"""
+        """Return whether the lift's mode forbids sending a robot to the lift."""
         return self.shown is not None and self.shown.mode in NOBODY_IS_SENT
 
     def flows(self, now: float) -> bool:

@@ -1,4 +1,4 @@
-"""Does an adapter's request count, or is it a replay of an old request?
+"""Decides whether an adapter's request counts, or is a replay of an old request.
 
 A stamp comes from the requester's clock, which may disagree with our clock. So a stamp is first
 compared with the earlier stamps of the same requester. Rules:
