@@ -10,8 +10,8 @@ AnyDecision = Decision[Any, Any, Any]
 
 
 class KnownSubject:
-    """A subject's recorded state. `times`: the times of repeats of the last reading that are not in the
-    ring yet."""
+    """A subject's recorded state. `times`: when the last reading was repeated, as far as the ring does
+    not have these times yet."""
 
     def __init__(self, memory: object) -> None:
         self.memory = memory

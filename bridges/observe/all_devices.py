@@ -115,7 +115,7 @@ class ObservedGraph(Generic[D]):
         return [one for one in every if kind in (None, one.kind) and one.state is not None]
 
     def make(self, kind: words.Kind, name: str) -> D:
-        """Make a device of which no message has been taken yet."""
+        """Make a device that has not heard any message yet."""
         made: D = self.makes[kind](name, self.began or self.now)
         return made
 

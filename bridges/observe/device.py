@@ -18,7 +18,7 @@ T = TypeVar("T", d.LiftState, d.DoorState, d.ChargerState, d.DispenserState)
 
 
 class Check(NamedTuple):
-    """One condition of a phase of RMF: the value that is shown, and the value that RMF wants."""
+    """One condition of an RMF phase: the value that is shown, and the value that RMF wants."""
 
     name: str
     shown: str

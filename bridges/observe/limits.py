@@ -24,8 +24,8 @@ in between."""
 FORGOTTEN_S: Final = durations.FORGOTTEN_S
 """The silence after which another device may replace a device in a full table."""
 OLD_S: Final = 3.0
-"""The age at which a reading is old, because three polls are missing. A reading that is this far in the
-future has a stamp of another clock."""
+"""The age at which a reading is old, because three polls are missing. If a reading's stamp is as far in
+the future, the stamp comes from another clock."""
 CLOCKS_DIFFER_S: Final = 5.0
 """The distance from our time at which a request's stamp must come from another clock."""
 FLAPS: Final = 3

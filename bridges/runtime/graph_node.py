@@ -38,9 +38,9 @@ invented."""
 MAX_UNSHOWN = 100
 """The greatest number of lifts or doors that only requests name and that publish no state."""
 MAX_REQUESTERS = 10_000
-"""The greatest number of requesters of all lifts or doors that the YAML does not name. No site has as
-many robots. The number is bounded because a holder is never forgotten, so invented requesters would
-accumulate."""
+"""The greatest number of requesters. Requesters of lifts and doors in the YAML do not count. No site
+has as many robots. The number is bounded because a holder is never forgotten, so invented requesters
+would accumulate."""
 DEFECT = "a defect"
 
 

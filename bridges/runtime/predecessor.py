@@ -110,8 +110,8 @@ class Predecessor:
 
 
 class SafeFirst:
-    """A wrapper of the driver of a silent device that a dead daemon may have left on. As soon as the
-    device answers, the wrapper switches its outputs off, before anything else."""
+    """A driver around the driver of a silent device. A dead daemon may have left this device on. As
+    soon as the device answers, its outputs are switched off, before anything else."""
 
     def __init__(self, name: str, driver: Driver[Any, Any]) -> None:
         self._name = name

@@ -24,8 +24,8 @@ LOOK_EVERY_S = 0.25
 """The pause (s) between two looks for other nodes on the graph."""
 MOST_NAMED: Final = 3
 SPREAD_LEAST_S, SPREAD_MOST_S = 0.5, 3.0
-"""The bounds (s) of a random time. A node that has met a rival listens longer by this time. Discovery
-takes less."""
+"""The bounds (s) of a random time. A node that has met a rival listens longer by this time, which is
+more than discovery needs."""
 
 
 class Presence:

@@ -20,7 +20,8 @@ from bridges.messages.words import LONGEST_NAME
 
 NAME = "ChargerRequest refused"
 OCCUPIED = "charger occupied"
-"""The only reason for a refusal that a later release of the charger removes."""
+"""The reason for a refusal that ends by itself: another robot has the charger, and will release it. All
+other reasons remain."""
 LONGEST_REASON = 500
 
 

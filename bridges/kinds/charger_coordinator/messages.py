@@ -136,7 +136,7 @@ def accept_withdrawal(
 def accept_assignments(
     message: d.ChargingAssignments, settings: CoordinatorSettings, wall: float
 ) -> Dedicated:
-    """Turn another node's charging assignments into an event, which gives the station of each of our
+    """Turn another node's charging assignments into an event. The event names a station for each of our
     robots."""
     fleet, known = message.fleet_name, settings.robots()
     stations = {places.get(fleet): name for name, places in settings.places().items()}

@@ -94,7 +94,7 @@ def due(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[float]:
 
 
 def _strayed(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWrongPad]:
-    """Yield robots that stand at another station than their own, and were not charged at their own
+    """Yield robots that have a station, but stand at another one and have not been charged at their own
     yet."""
     for name, grant in memory.grants.items():
         if grant.over or grant.started:

@@ -98,5 +98,5 @@ class GraphSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
 
 def quiet_s(settings: GraphSettings) -> float:
-    """Return the time (s) after its start in which the node only listens."""
+    """Return the time (s) for which the node only listens after its start."""
     return settings.quiet_start_s

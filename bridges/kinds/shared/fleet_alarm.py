@@ -56,7 +56,7 @@ MOST_OTHERS: Final = 200
 UNKNOWN: Final = "unknown node"
 """The beginning of the provisional name of a node that discovery has not named yet."""
 OR: Final = " or "
-"""The word between the names of nodes of which one has sent a message."""
+"""The word between the names of several nodes. One of these nodes has sent a message."""
 
 Fleets = frozenset[str]
 """The fleets that are told; empty for all fleets."""
