@@ -30,8 +30,8 @@ FAULT, REFUSED, WAITING, DIED = "FAULT", "REFUSED", "WAITING", "DIED"
 
 
 class Triggers:
-    """Finds the reasons to record one run of a daemon. `waiting_s`: the wait (s) that is a reason.
-    `tally`: what the devices in its messages did."""
+    """The finder of reasons to record one run of a daemon. `waiting_s`: the wait (s) that is a reason.
+    `tally`: the counts of what the devices in the messages did."""
 
     def __init__(self, waiting_s: float) -> None:
         self._faults: dict[str, set[str]] = {}

@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 after SIGTERM or SIGINT; 69 if the library is missing."""
+    """Return 0 after SIGTERM or SIGINT, and 69 if the library is missing."""
     if args.csv or args.days is not None:
         return _tell_days(args)
     log.start()

@@ -51,8 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if all daemons serve; 1 for faults; 2 if a daemon died or is silent; 3 without a visible
-    daemon. With --idle: 0 if no device is in use, else 4."""
+    """Return 0 if all daemons serve, 1 for faults, 2 if a daemon died or is silent, and 3 if this user
+    can see no daemon. With --idle return 0 if no device is in use, else 4."""
     folders = [Path(args.runtime_dir)] if args.runtime_dir else list(runtimes())
     found = list(daemons(folders, {} if args.runtime_dir else units(), time.time()))
     if args.name:
