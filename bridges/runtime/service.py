@@ -1,6 +1,6 @@
-"""The service of a daemon: either devices on buses, or a kind without hardware.
+"""The service of a daemon: devices on buses, or a kind without hardware.
 
-A service of either sort has threads, subscribes to RMF's topics, and reports a status.
+Both sorts of service have threads, subscribe to RMF's topics, and report a status.
 """
 
 import logging
@@ -56,13 +56,13 @@ class Service(Protocol):
         """Subscribe to RMF's topics."""
 
     def reset(self) -> None:
-        """Clear latched faults at an operator's order."""
+        """Clear latched faults on an operator's order."""
 
     def decided(self, verdict: DecidedByPerson, device: str) -> None:
         """Pass on a person's decision about one device, or about every device ("")."""
 
     def look(self) -> None:
-        """Look for other nodes on the graph. The daemon calls this each second."""
+        """Look for other nodes on the graph; called each second."""
 
     def status(self) -> Status:
         """Return the status of the whole service, for the status file."""
@@ -72,7 +72,7 @@ class Service(Protocol):
 
 
 def named_by(config: Config, topic: Topic[M_co]) -> Topic[M_co]:
-    """Return the topic, under the name that the YAML gives it."""
+    """Return the topic, under its name in the YAML if the YAML renames it."""
     return topic.named(config.rmf.topics.get(topic.name, topic.name))
 
 
@@ -90,12 +90,14 @@ def service(
     writer: NoWriter = NOBODY,
     *,
     new: bool = False,
+    rmf: Any = None,
 ) -> Service:
     """Return the service for this YAML. Raises HalError if a bus cannot be opened.
 
-    `kept`: the store in which the memory survives restarts, if the kind has such a memory; None for no
-    store. `new`: if the store has no file, nothing has ever happened. `unsafe`: devices that a dead
-    daemon may have left on. `writer`: the recording's writer.
+    `kept`: the store for the memory across restarts, if the kind has such a memory; None for no store.
+    `new`: without a file in the store nothing has ever happened.
+    `unsafe`: devices that a dead daemon may have left on. `writer`: the recording's writer. `rmf`: the
+    stand-in of RMF's fleet adapter; None for the real one.
     """
     kind = kind_called(config.kind)
     named = partial(named_by, config)
@@ -103,6 +105,12 @@ def service(
     if isinstance(kind, GraphKind):
         node = GraphNode(kind, config.section, transport, clock, named, kept, writer)
         return GraphService(node, clock)
+    if kind.section:
+        from bridges.runtime.fleet.service import FleetDevices
+
+        return FleetDevices(
+            config, kind, transport, open_bus, named, clock, unsafe, writer, rmf=rmf
+        )
     memories = None
     if kind.keeping is not None and kept is not None:
         memories = DeviceMemories(kept, new=new)
@@ -143,8 +151,7 @@ class Devices:
         alarm: FleetAlarmNode | None = None,
         memories: DeviceMemories | None = None,
     ) -> None:
-        """Make a node for each device. `alarm`: the node that tells the fleets of the devices' alarms;
-        None if no device raises alarms."""
+        """`alarm`: the node that tells the fleets of the devices' alarms; None if no device does."""
         self._config = config
         self._alarm = alarm
         self._memories = memories
@@ -165,8 +172,8 @@ class Devices:
         self._placed = {node.name: (node, loop) for loop in self._loops for node in loop.nodes}
 
     def subscribe(self) -> None:
-        """Subscribe to requests, to topics that are only recorded, and to states that other nodes
-        publish of our devices."""
+        """Subscribe to requests, to topics that are only recorded, and to states of our devices that
+        other nodes publish."""
         for topic, accept in self._kind.requests.items():
             hear = self._to_inbox(topic, accept)
             self._hears[topic.name] = self._transport.subscribe(self._named(topic), hear)
@@ -192,7 +199,7 @@ class Devices:
                 loop.inbox.put(name, verdict)
 
     def look(self) -> None:
-        """Tell each device when the first node appears that may send requests, and when the last such
+        """Tell each device when a first node that may send requests appears, and when the last such
         node disappears."""
         if self._alarm:
             self._alarm.look()
@@ -248,8 +255,8 @@ class Devices:
     def _to_inbox(
         self, topic: Topic[Message], accept: Callable[[Any, Any], object]
     ) -> Callable[[Message], None]:
-        """Return a callback for the transport's thread. The callback puts messages about our devices
-        into the inbox, and counts requests for other devices."""
+        """Return a callback for the transport's thread, which puts messages about our devices into the
+        inbox and counts requests for other devices."""
         states = topic == self._kind.states
         heard_on = self._named(topic)
 
@@ -271,7 +278,7 @@ class Devices:
         return put
 
     def _record(self, topic: Topic[Message], message: Message) -> None:
-        """Note a message about one of our devices. Only the transport's callback may call this."""
+        """Note a message about one of our devices; only in the transport's callback."""
         if self._kind.device_name(message) in self._placed:
             sender = self._transport.sender()
             self._writer.spoken(topic.name, message, sent=False, sender=sender)

@@ -1,7 +1,7 @@
 """The record of a kind of device: its topics, and the pure functions of its folder.
 
-`bridges/kinds/<kind>/__init__.py` holds one `KIND`. The loop knows nothing else about lifts or doors.
-Each `KIND` states its types, so mypy proves that its functions fit together.
+`bridges/kinds/<kind>/__init__.py` holds one `KIND`; the loop knows nothing else about lifts or
+doors. Each `KIND` states its types, so mypy proves that its functions fit together.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -39,8 +39,7 @@ FLOOR, LIFT, DOOR, CHARGER, WAYPOINT = "floor", "lift", "door", "charger", "wayp
 """Kinds of names on RMF's map."""
 
 Place = tuple[tuple[str, ...], str, str]
-"""A setting with a name on RMF's map: the setting's path, the kind of the name (`FLOOR`, …), the
-name."""
+"""A setting with a name on RMF's map: the setting's path, the kind of name (`FLOOR`, …), the name."""
 
 
 class RefusalAnswer(NamedTuple):
@@ -56,9 +55,9 @@ class Keeping(Struct, Generic[M], frozen=True):
 
     `part(memory)`: this part, compared by value. `persist(memory)`: its bytes. `restore(kept, now)`:
     the memory from these bytes; raises ValueError for other bytes. `lost(reason)`: the memory of a
-    daemon that finds no bytes, or wrong bytes, although an earlier daemon may have written some. The
-    core gets `DecidedByPerson` as an event. It also gets `MemoryKept` or `MemoryNotKept` after each
-    attempt to write, before outputs and messages follow.
+    daemon that finds no bytes, or wrong bytes, where there may have been some.
+    The core's events include `MemoryKept` and `MemoryNotKept`, for each attempt to write, before
+    outputs and messages; and `DecidedByPerson`.
     """
 
     part: Callable[[M], object]
@@ -71,27 +70,30 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     """One kind of device: its settings, limits, memory, sample, requests, outputs and report.
 
     `devices_key`: the section of the devices in the YAML. `states`: the topic of their states; None if
-    RMF has no message about their state. `requests`: each topic that a device obeys, with its function
-    `accept(message, settings) -> event`. `accept` raises RequestRefused for a message that is malformed
-    or impossible for this device. `device_name`: a function that returns the device named in a message
-    (request or state). `sender`: a function that returns the requester behind a request. If several
-    requests wait for the next scan, only the last of each sender counts. `limits(settings,
-    debounce_s)`: the limits, from the device's settings and the debounce of each signal in the wiring
-    table. `initial(limits, now)`: the core's memory at start. `decide`: the core. `state_message(name,
-    settings, report, stamp)`: the report as RMF's message. `summary(report)`: keys and values for the
-    log line, the status file and `watch`. `published(memory, report)`: the memory after this report has
-    been sent to RMF. `publishes(settings)`: the topics on which a device publishes beside its states.
+    RMF has no message about their state.
+    `requests`: each topic that it obeys, with `accept(message, settings) -> event`, which raises
+    RequestRefused for a message that is malformed or impossible for this device.
+    `device_name`: the device named in a message (request or state). `sender`: the requester behind a
+    request. If several requests wait for the next scan, only the last of each sender counts.
+    `limits(settings, debounce_s)`: the limits, from the device's settings and the debounce of each
+    signal in the wiring table. `initial(limits, now)`: the core's memory at start.
+    `decide`: the core. `state_message(name, settings, report, stamp)`: the report as RMF's message.
+    `summary(report)`: key -> value for the log line, the status file and `watch`.
+    `published(memory, report)`: the memory after this report has gone out to RMF.
+    `publishes(settings)`: the topics on which a device publishes beside its states.
     `alarm_inputs(report)`: the causes of an alarm for the fleets that the device sees
-    (`bridges/kinds/shared/fleet_alarm.py`); None for a kind without alarms. `answer(name, request,
-    reason, report)`: the published answer to a refused request; None for no answer. `request` is the
-    message if it is malformed, else the event. `on_map(settings)`: settings that name a place on RMF's
-    map, as `Place`s. `check` compares the device's own name with the map for every kind. `drives`: do
-    the devices have outputs? Without outputs there is nothing to switch off. `results(name, report)`:
-    messages that are sent right after the state of this report. As long as there are any, the state is
-    due. `stamped(message, stamp)`: a result or an answer with its time. `keeping`: the functions for a
-    memory that must survive a restart. `attended_by`: a topic of requests. The core gets `Attended`
-    when publishers of this topic appear or vanish. `recorded`: topics with messages about the device
-    that are only recorded; no core gets these messages.
+    (`bridges/kinds/shared/fleet_alarm.py`); None for a kind without alarms.
+    `answer(name, request, reason, report)`: the published answer to a refused request; None for no
+    answer. `request`: the message if it is malformed, else the event.
+    `on_map(settings)`: settings that name a place on RMF's map, as `Place`s. The device's own name is
+    checked for every kind.
+    `drives`: do its devices have outputs? Without outputs there is nothing to switch off.
+    `results(name, report)`: messages that go out right after the state of this report; while there
+    are any, the state is due. `stamped(message, stamp)`: a result or an answer with its time.
+    `section`: the key and the struct of a section that all devices of a file share.
+    `keeping`: for a memory that must survive a restart.
+    `attended_by`: a topic of requests; the core gets `Attended` when its publishers appear or vanish.
+    `recorded`: topics with messages about the device that are recorded, and that no core gets.
     """
 
     name: str
@@ -115,6 +117,7 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     results: Callable[[str, R], tuple[Said, ...]] = lambda name, report: ()
     stamped: Callable[[Any, Time], Message] = lambda message, stamp: message
     keeping: Keeping[M] | None = None
+    section: tuple[str, type[Struct]] | None = None
     attended_by: Topic[Message] | None = None
     recorded: tuple[Topic[Message], ...] = ()
     drives: bool = True
@@ -126,4 +129,4 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
 
 
 AnyDeviceKind = Kind[Any, Any, Any, Any, Any, Any, Any]
-"""A kind that was found by its name, so its types are unknown."""
+"""A kind that was found by its name; its types are unknown."""
