@@ -1,4 +1,4 @@
-"""Stories of one panel: which causes of an alarm does it see?"""
+"""Stories of one alarm panel, in virtual time: the causes that the core reports after each reading."""
 
 from typing import Any
 
@@ -22,7 +22,10 @@ STEP_S = 0.125
 
 
 class Panel:
-    """A panel that is read each STEP_S. `told` has (s, present causes, seen, drill) of each change."""
+    """A panel that is read every STEP_S.
+
+    `told` has (s, present causes, seen, drill), with one entry for each change.
+    """
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -169,7 +172,10 @@ def test_a_key_that_is_on_at_the_start_begins_no_drill() -> None:
 
 
 def test_no_history_hides_a_lasting_cause_or_makes_a_drill_last() -> None:
-    """Every history of some readings, 0.375 s or 6 s apart, checked in other words."""
+    """All histories of five readings, or of seven in `make deep`, 0.375 s or 6 s apart.
+
+    Each history is checked by rules that do not use the core's code.
+    """
     moves = ("fire", "out", "key", "no key", "dead", "later")
 
     def after(state: tuple[PanelMemory, float, bool, bool], move: str) -> Any:

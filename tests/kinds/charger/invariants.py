@@ -1,7 +1,7 @@
-"""Rules for every decision of the charger's core, whatever happened before.
+"""Rules for every decision of the charger's core, in any history.
 
-The rules judge the event, the readings, the outputs and the walk's ledger. They ask the core's memory
-only whether a request still holds the station.
+The rules judge the event, the readings, the outputs and the walk's ledger. The rules ask the core's
+memory only whether a request still holds the station.
 """
 
 from bridges.kinds.charger.signals import Activity
@@ -14,7 +14,7 @@ BAD = (Activity.ERROR, Activity.UNKNOWN)
 
 
 def check(step: Step) -> None:
-    """Check every rule; the AssertionError shows the broken rule."""
+    """Check every rule. An AssertionError names the broken rule in its traceback."""
     the_message_is_whole(step)
     the_state_is_what_was_read(step)
     power_has_a_reason(step)
@@ -28,7 +28,10 @@ def check(step: Step) -> None:
 
 
 def the_message_is_whole(step: Step) -> None:
-    """Require a text in ERROR only, and beside each request the robot of that request."""
+    """Require an error text in state ERROR, and in no other state.
+
+    Beside each request id the message must name the robot of that request.
+    """
     shown = step.decision.report
     assert shown.state in set(State)
     assert (shown.error_message != "") == (shown.state is State.CHARGER_ERROR)
@@ -47,7 +50,10 @@ def the_message_is_whole(step: Step) -> None:
 
 
 def the_state_is_what_was_read(step: Step) -> None:
-    """Require CHARGING exactly while current flows, and ERROR if lost, faulty or served twice."""
+    """Require CHARGING exactly while current flows.
+
+    Require ERROR if the station is lost or faulty, or if a second node serves the same station.
+    """
     state = step.decision.report.state
     sighted = _sighted(step)
     flows = step.seen is not None and step.seen.activity in FLOWS
@@ -63,7 +69,7 @@ def the_state_is_what_was_read(step: Step) -> None:
 
 
 def power_has_a_reason(step: Step) -> None:
-    """Require, for power, a valid request and a healthy station that answers."""
+    """Require a valid request and a healthy station that answers, whenever power is ordered."""
     power, shown = step.decision.outputs.power, step.decision.report
     if power:
         assert step.ledger.granted is not None
@@ -87,7 +93,10 @@ def power_has_a_reason(step: Step) -> None:
 
 
 def nobody_else_is_energised(step: Step) -> None:
-    """Require, where robots are verified, power for the requesting robot only, at first in range."""
+    """Require that a station that recognises robots gives power to the requesting robot only.
+
+    The robot must be in range when the power begins.
+    """
     power, sample, limits = step.decision.outputs.power, step.seen, step.limits
     if not limits.receivers or sample is None or not _sighted(step):
         return
@@ -106,7 +115,10 @@ def nobody_else_is_energised(step: Step) -> None:
 
 
 def protection_lasts(step: Step) -> None:
-    """Require, before "out of service" ends, a clearing and soon after it a good reading."""
+    """Require a clearing of errors before the end of "out of service".
+
+    A good reading must follow the clearing within CLEAR_S.
+    """
     before, after = step.before.ledger, step.ledger
     if before.out and not after.out:
         assert isinstance(step.event, Sampled)
@@ -116,7 +128,10 @@ def protection_lasts(step: Step) -> None:
 
 
 def requests_end_on_good_readings(step: Step) -> None:
-    """Require a good reading for a request's end, or an operator's reset at a long silent station."""
+    """Require a good reading whenever a request ends.
+
+    The exception is an operator's reset at a station that has been silent for a long time.
+    """
     before = step.before.ledger
     if before.granted is None or step.ledger.granted == before.granted:
         return
@@ -127,7 +142,7 @@ def requests_end_on_good_readings(step: Step) -> None:
         assert before.read_at is None or step.now - before.read_at >= silent_s
     elif step.ledger.granted is None:
         assert isinstance(step.event, Sampled)
-    else:  # another request of the robot that is seen there
+    else:  # the request of another robot, which the station sees on its pad
         assert step.seen
         seen = step.limits.receivers.get(step.seen.measured.receiver_id or "")
         assert seen == step.ledger.robot
@@ -135,7 +150,10 @@ def requests_end_on_good_readings(step: Step) -> None:
 
 
 def commands_are_counted(step: Step) -> None:
-    """Require at most one new command of each type, and no clearing beside a second node."""
+    """Require at most one new command of each type in a decision.
+
+    No errors may be cleared while a second node serves the station.
+    """
     before, outputs = step.before.memory, step.decision.outputs
     assert outputs.clear_errors - before.clear_errors in (0, 1)
     assert outputs.range_checks - before.range_checks in (0, 1)
@@ -146,8 +164,8 @@ def commands_are_counted(step: Step) -> None:
 def a_request_that_waits_has_a_reason(step: Step) -> None:
     """Require a reason for each waiting request.
 
-    A request waits while it has the station, unless the station charges with permission or shows that
-    the request is over (RELEASED).
+    A request that holds the station waits in two states: ASSIGNED and ERROR. In CHARGING the request
+    waits too, if the core forbids the power.
     """
     shown, seen = step.decision.report, step.seen
     may_not = step.decision.outputs.power is False and seen and seen.activity is Activity.CHARGING

@@ -32,7 +32,7 @@ FULL = ChargerLimits(DURATIONS, RECEIVERS)
 
 
 def observed(**durations: Any) -> ChargerLimits:
-    """Return a station that can only be observed, with these durations and otherwise the defaults."""
+    """Return the limits of a station that can only be observed, with these durations changed."""
     return ChargerLimits(ChargerDurations(**durations), can_stop=False)
 
 
@@ -65,10 +65,10 @@ CANCEL_1 = Cancelled("req-1")
 
 @dataclass
 class Story:
-    """A core with its memory.
+    """A core with its memory, in virtual time.
 
-    `told` has (time, state, request id or error) for each change of the news. `powered` has the
-    decision about power after each poll by `sees`.
+    `told` has (time, state, request id or error), with one entry for each change. `powered` has the
+    core's decision about power after each poll by `sees`.
     """
 
     limits: ChargerLimits = LIMITS
@@ -98,7 +98,8 @@ class Story:
         return self
 
     def polls(self, script: str) -> "Story":
-        """Poll once a second; `idle 3, charging 2`: three polls read idle, then two read charging."""
+        """Poll once a second. With `idle 3, charging 2`, three polls read idle, then two polls read
+        charging."""
         for part in script.split(","):
             word, count = part.split()
             for _ in range(int(count)):
@@ -107,7 +108,10 @@ class Story:
         return self
 
     def sees(self, *readings: tuple[Activity, str, int], **known: Any) -> "Story":
-        """Poll a station that knows the robot on its pad: `(activity, receiver, number of polls)`."""
+        """Poll a station that recognises the robot on its pad.
+
+        Each reading is `(activity, receiver, number of polls)`.
+        """
         for activity, receiver, count in readings:
             sample = ChargerSample(activity, 0, measured=Measured(receiver_id=receiver, **known))
             for _ in range(count):
@@ -124,5 +128,5 @@ class Story:
 
 
 def measured(sample: ChargerSample, **known: float) -> Sampled[ChargerSample]:
-    """Return a reading of a station that measures."""
+    """Return a reading with these measured values."""
     return Sampled(replace(sample, measured=Measured(**known)))  # type: ignore[arg-type]

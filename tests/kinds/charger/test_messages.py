@@ -1,4 +1,4 @@
-"""ChargerRequest and ChargerCancel in, ChargerState out."""
+"""The charger's daemon reads ChargerRequest and ChargerCancel, and writes ChargerState."""
 
 import pytest
 from msgspec.structs import replace

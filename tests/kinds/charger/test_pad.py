@@ -1,4 +1,5 @@
-"""The robot on a pad can be read back from ChargerState's error_message, whatever the names are."""
+"""ChargerState's error_message names the robot on the pad, and a reader gets that name back
+unchanged."""
 
 import pytest
 from hypothesis import given, settings

@@ -1,4 +1,4 @@
-"""A refused ChargerRequest is answered: on a topic, in the status and in diagnostics."""
+"""The daemon reports a refused ChargerRequest on a topic, in the status and in diagnostics."""
 
 from dataclasses import dataclass, field
 from typing import Any

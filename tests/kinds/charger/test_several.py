@@ -17,7 +17,7 @@ from tests.transports.memory import MemoryNetwork, MemoryTransport
 from tests.waiting import wait_until
 
 TIMEOUT_S = 0.5
-"""The timeout of the bad station. The sound stations have more time, for a busy machine."""
+"""The timeout (s) of the bad station. The sound stations have a longer timeout, for a busy machine."""
 
 
 def silent(caller: Caller) -> None:
@@ -32,7 +32,7 @@ def trickles(caller: Caller) -> None:
 
 @contextmanager
 def daemon(file: Path, **stations: Conversation) -> Iterator[list[ChargerState]]:
-    """Yield the states of these stations, each on its own bus; `b` is a bad station."""
+    """Yield the states of these stations. Each station has its own bus, and station `b` is faulty."""
     buses, chargers = {}, {}
     with ExitStack() as open_:
         for name, talk in stations.items():

@@ -1,6 +1,6 @@
-"""A station that sees the robot on its pad and obeys, in the five situations of a shared charger.
+"""A station that recognises the robot on its pad and can be switched.
 
-The stories show the station's part of each situation, in virtual time, with one poll a second.
+The stories play the five situations of a shared charger, in virtual time, with one poll a second.
 """
 
 import pytest
@@ -47,7 +47,7 @@ def story(limits: ChargerLimits = FULL) -> Story:
 
 
 def docked() -> Story:
-    """Return a story at 5 s: AMR01 asked at 1 s, docked, and has charged since 4 s."""
+    """Return a story at 5 s. AMR01 asked at 1 s, then docked, and has charged since 4 s."""
     return (
         story().event(AMR1).sees((A.IDLE, NOBODY, 2), (A.HANDSHAKE, ONE, 1), (A.CHARGING, ONE, 1))
     )
@@ -127,7 +127,7 @@ def test_a_receiver_that_is_lost_from_sight_while_current_flows_keeps_its_power(
 def test_nothing_is_energised_before_a_check_of_the_range_that_was_asked_for_says_yes() -> None:
     it = story().event(AMR1).sees((A.IDLE, NOBODY, 1), in_range=True)
     assert it.outputs == ChargerOutputs(power=False)
-    it.sees((A.IDLE, ONE, 1), in_range=True)  # an old result: the core has not ordered that check
+    it.sees((A.IDLE, ONE, 1), in_range=True)  # older than the core's first check
     assert it.outputs == ChargerOutputs(power=False, range_checks=1)
     it.sees((A.IDLE, ONE, 1), in_range=False)
     assert it.outputs == ChargerOutputs(power=False, range_checks=1)

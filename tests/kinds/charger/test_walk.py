@@ -1,4 +1,4 @@
-"""All states within some steps of the start and of each stage of a charge, checked by the rules."""
+"""A check of the charger's rules in every state near the start and near each stage of a charge."""
 
 import pytest
 from msgspec.structs import replace
@@ -27,12 +27,12 @@ STAGES: dict[str, tuple[str | float, ...]] = {
 
 
 def path(limits: ChargerLimits, *steps: str | float) -> World:
-    """Return the state after these moves and waits."""
+    """Return the world after these moves and waits (s)."""
     return walker(limits).path(World(), *steps, seen=check)
 
 
 def shown(world: World, limits: ChargerLimits) -> tuple[str, str, bool | None]:
-    """Return the state, request and power of one more scan."""
+    """Return the state, the request and the ordered power after one more scan."""
     steps: list[Step] = []
     walker(limits).path(world, 0.5, seen=steps.append)
     decision = steps[-1].decision
@@ -91,7 +91,7 @@ def test_from_every_state_a_sound_station_comes_back_and_charges_the_robot_that_
 
 
 def _mended(world: World, limits: ChargerLimits) -> World:
-    """Return the world mended: pad clear, everything answers and is well, latched faults reset."""
+    """Return the world after repairs: a clear pad, healthy parts that answer, and reset latches."""
     world = replace(world, readable=True, writable=True)
     steps = ("idle", "the pad is clear", "in range", "gap right", "pad at height")
     then = ("A cancels", "B cancels", 32.0, "reset", 4.0)
@@ -99,7 +99,7 @@ def _mended(world: World, limits: ChargerLimits) -> World:
 
 
 def _charged(world: World, limits: ChargerLimits) -> World:
-    """Return the world after the first robot has asked, come and begun to charge."""
+    """Return the world in which the first robot has asked, has come, and has begun to charge."""
     asked = ChargeRequested("req-new", "tiny", "A")
     world = moved(world, lambda before: (before, [asked]), limits, check)
     world = walker(limits).path(world, "A docks", 2.0, seen=check)

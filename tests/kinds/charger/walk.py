@@ -1,8 +1,10 @@
-"""All states that the charger's core can reach within some steps.
+"""A walk through all states that the charger's core can reach within some steps.
 
-A state has the core's memory with every time relative to now, the station with its pad, and a ledger
-that notes the events in the rules' own words. Ages beyond every limit are made equal, and counts are
-left out, so that states that cannot behave differently count as one state.
+A state has the core's memory, the station with its pad, and a ledger of events. All times in a state
+are relative to now. The ledger is written without the core's code.
+
+Ages beyond every limit are made equal, and counts are left out. So two states that cannot behave
+differently count as one state.
 """
 
 from collections.abc import Callable
@@ -53,12 +55,14 @@ SITES = {
 
 
 class Ledger(msgspec.Struct, frozen=True):
-    """Events without the core's conclusions. Times are relative to the state's time.
+    """The events so far, noted without the core's conclusions. Times are relative to the state's time.
 
-    `granted` is the last accepted request, until its end is seen; `robot` is the robot of that request.
-    `spoiled`: since the grant the request was cancelled or an error was read. `read_at` is the time of
-    the last good reading, `misses` counts failed readings since. `out`: the station's own fault was
-    read, and no clearing has helped since. `cleared_at` is the time of the last clearing.
+    - `granted` is the last accepted request, until its end is seen.
+    - `robot` is the robot of that request.
+    - `spoiled` says that since the grant the request was cancelled or an error was read.
+    - `read_at` is the time of the last good reading, and `misses` counts the failed readings after it.
+    - `out` says that the station's own fault was read, and that no clearing has helped yet.
+    - `cleared_at` is the time of the last clearing.
     """
 
     granted: str | None = None
@@ -73,7 +77,10 @@ class Ledger(msgspec.Struct, frozen=True):
 
 
 class World(msgspec.Struct, frozen=True):
-    """Memory and ledger at time 0, the station, and whether it can be read and commanded."""
+    """The core's memory and the ledger at time 0, and the station.
+
+    `readable` and `writable` say whether the station answers readings and obeys commands.
+    """
 
     memory: ChargerMemory = ChargerMemory()
     ledger: Ledger = Ledger()
@@ -84,7 +91,7 @@ class World(msgspec.Struct, frozen=True):
 
 
 class Step(msgspec.Struct, frozen=True):
-    """One decision with the facts around it; `ledger` is the ledger after the decision."""
+    """One decision of the core, with the world before it and the ledger after it."""
 
     before: World
     event: Event
@@ -199,7 +206,7 @@ def decided(world: World, event: Event, now: float, limits: ChargerLimits, seen:
 
 
 def noted(world: World, event: Event, now: float, limits: ChargerLimits, decision: Any) -> Ledger:
-    """Return the ledger after an event."""
+    """Return the ledger after an event and the core's decision about the event."""
     ledger = world.ledger
     cleared = decision.outputs.clear_errors > world.memory.clear_errors
     if isinstance(event, Sampled):
@@ -246,13 +253,16 @@ def _read(ledger: Ledger, sample: ChargerSample, now: float, limits: ChargerLimi
 
 
 def _held(ledger: Ledger, decision: Any) -> Ledger:
-    """Note that no request is shown any more. Other rules judge the way in which the request ended."""
+    """Return the ledger without its request, if the core holds no request now.
+
+    Other rules judge how the request ended.
+    """
     shown = decision.report
     if decision.memory.holder is None:
         return replace(ledger, granted=None, robot=None, spoiled=False)
     who = RobotName(shown.fleet, shown.robot)
     if not shown.request_id and (ledger.granted != "" or who != ledger.robot):
-        # charging without a request
+        # a robot that charges without a request
         return replace(ledger, granted="", robot=who, spoiled=False, adopted=False)
     return ledger
 
@@ -261,7 +271,10 @@ def _held(ledger: Ledger, decision: Any) -> Ledger:
 
 
 def alike(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
-    """Return the memory at time 0, equal for memories that cannot behave differently."""
+    """Return the memory with its times relative to now.
+
+    Two memories that cannot behave differently become equal.
+    """
     holder = memory.holder
     if holder:
         holder = replace(
@@ -296,7 +309,8 @@ def _shifted(ledger: Ledger, now: float) -> Ledger:
 
 
 def _at(at: Any, now: float, oldest_s: float = OLDEST_S) -> Any:
-    """Return a time relative to now, cut off where more age makes no difference; None stays None."""
+    """Return a time relative to now. Ages above `oldest_s` are cut to `oldest_s`, and None stays
+    None."""
     return None if at is None else max(at - now, -oldest_s)
 
 

@@ -1,4 +1,4 @@
-"""The coordinator's core alone with two stations, in virtual time, with its messages noted."""
+"""The coordinator's core with two stations, without network or daemon, in virtual time."""
 
 from typing import Any
 
@@ -27,7 +27,7 @@ A, B = "charger_a", "charger_b"
 
 
 class Alone(alone.Alone[SiteMemory, Event, SiteLimits, SiteReport]):
-    """The core alone, with each station's state (`shows`) and the robots that fleets show (`seen`)."""
+    """The core alone. `shows` has each station's state, and `seen` has the robots that fleets show."""
 
     def __init__(self) -> None:
         self.shows = {name: ChargerStateHeard(name, IDLE) for name in (A, B)}
@@ -65,7 +65,7 @@ class Alone(alone.Alone[SiteMemory, Event, SiteLimits, SiteReport]):
         self.seen[who] = Sighting(who, True, place, percent, f"task of {who.name}")
 
     def does(self, station: str, state: Any, error: str = "") -> None:
-        """Let the station show this state with the request that it got last."""
+        """Let the station show this state, with the last request that the coordinator sent to it."""
         grant = self.memory.grants[station]
         self.shows[station] = ChargerStateHeard(
             station, state, grant.request_id, grant.robot, error

@@ -1,4 +1,4 @@
-"""COORDINATOR-2: two brands of robots at the same stations, each with its own names for the places."""
+"""COORDINATOR-2: two brands of robots share the stations, and each brand has its own waypoint names."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The coordinator's memory across a restart, and the parts that are not believed afterwards."""
+"""The coordinator's memory after a restart, and the entries that the coordinator then distrusts."""
 
 import pytest
 from msgspec.structs import replace

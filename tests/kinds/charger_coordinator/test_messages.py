@@ -1,4 +1,4 @@
-"""Messages and settings of the coordinator: accepted, or refused with a reason."""
+"""The coordinator accepts messages and settings, or refuses them with a reason."""
 
 from pathlib import Path
 from typing import Any

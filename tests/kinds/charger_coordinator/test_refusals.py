@@ -1,4 +1,4 @@
-"""A wish that the coordinator refuses is answered, like a charger's refusal."""
+"""The coordinator reports a refused wish in the same way as a charger reports a refused request."""
 
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The coordinator's report and texts, and the times at which it wakes."""
+"""The coordinator's report with its texts, and the times at which the coordinator wants to be woken."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The coordinator's own schedule: when and for which robots it applies, and its settings."""
+"""The coordinator's own charging schedule: its settings, its times, and the robots that it covers."""
 
 from pathlib import Path
 

@@ -1,6 +1,6 @@
-"""The meaning of a station's state for a request, and the side at fault, rule by rule.
+"""A station's state ends, fails or continues a request, and shows which side is at fault.
 
-Each test makes a memory by hand, and compares the whole memory after the state.
+Each test makes a memory, lets the station show a state, and compares the whole memory afterwards.
 """
 
 import pytest
@@ -35,12 +35,13 @@ LOST, MISPLACED = "Charger unreachable", "wrong docking: tiny/AMR02 is not assig
 
 
 def at(who: RobotName, place: str | None, since: float = AGES_AGO) -> Standing:
-    """Return a robot without a task, as its fleet showed it last."""
+    """Return a robot without a task. `place` is the place that its fleet showed last."""
     return Standing(Sighting(who, False, place, 50.0, ""), 20.0, since, since)
 
 
 def site(**changes: object) -> SiteMemory:
-    """Return a memory in which AMR01 has charger_a and AMR02 waits, both at their waiting places."""
+    """Return a memory in which AMR01 has charger_a and AMR02 waits. Both stand at their waiting
+    places."""
     robots = {ONE: at(ONE, "wait_1"), TWO: at(TWO, "wait_2")}
     known = {"may_speak": True, "wishes": WISHES, "grants": {A: GRANT}, "robots": robots}
     return SiteMemory(**{**known, **changes})  # type: ignore[arg-type]
@@ -51,7 +52,10 @@ def shows(state: int, error: str = "", since: float = 10.0, heard: float = 20.0)
 
 
 def after(memory: SiteMemory, state: int, error: str = "", request_id: str = "r1") -> SiteMemory:
-    """Return the memory after charger_a has shown this at 30 s, but with the shown states as before."""
+    """Return the memory after charger_a has shown this state at 30 s.
+
+    The shown states themselves are left as before, so that a test sees only the conclusions.
+    """
     heard = ChargerStateHeard(A, state, request_id, ONE, error)  # type: ignore[arg-type]
     return replace(stations.heard(memory, heard, 30.0, SITE), stations=memory.stations)
 

@@ -1,4 +1,5 @@
-"""Whole situations of shared chargers: a fleet adapter, the chargers' own cores, the coordinator."""
+"""Whole situations of shared chargers: the coordinator works with a fleet adapter and chargers'
+cores."""
 
 from typing import Any
 
@@ -14,7 +15,7 @@ from tests.kinds.charger_coordinator.virtual_site import Yard
 
 
 def yard(**changes: object) -> Yard:
-    """Return a yard in which all is up and no robot has a wish yet."""
+    """Return a yard in which all parts run and no robot has a wish yet."""
     found = Yard(**changes)  # type: ignore[arg-type]
     assert found.run(5.0) == [
         (0.25, "charger_a: IDLE"),
@@ -249,7 +250,7 @@ def charges_at_a(*, by_operator: bool, knows: bool) -> Yard:
 
 
 AGAIN: Any = [(16.25, "charger_a: ASSIGNED AMR01"), (18.25, "charger_a: CHARGING AMR01")]
-"""The history once the station is readable again and gets a request."""
+"""The end of the history: the station can be read again and gets a request."""
 REFUSED = (16.25, "charger_a: ERROR AMR01 (wrong docking: tiny/AMR01 is not assigned here)")
 
 
@@ -338,7 +339,10 @@ def test_a_coordinator_that_has_lost_its_memory_takes_over_what_the_stations_sho
 
 
 def dedicate(site: Yard, **places: str) -> Publisher[Any]:
-    """Begin RMF's charging schedule, which sends each robot to its place, to wait at a `wait_…`."""
+    """Publish RMF's charging schedule, which sends each robot to its place.
+
+    A robot with a place named `wait_…` waits there instead of charging.
+    """
     schedule: Publisher[Any] = site.rmf.publisher(topics.CHARGING_ASSIGNMENTS)
     modes = {who: int(place.startswith("wait")) for who, place in places.items()}
     told = tuple(d.ChargingAssignment(who, place, modes[who]) for who, place in places.items())

@@ -1,8 +1,8 @@
-"""All histories to a depth, and drawn ones: rules that hold whatever fleets, stations and time do.
+"""Rules that hold in every history, checked in all short histories and in randomly drawn long ones.
 
-The walk takes all histories of three moves (in `make deep` of four: 10^4), each a second or more apart.
-Two robots and two stations behave as RMF's charger messages say. After the last move everything is
-mended, and every robot that wants to charge must be charged.
+The walk takes all histories of three moves, and `make deep` takes all 10^4 histories of four moves. Two
+moves are at least a second apart. Two robots and two stations behave as RMF's charger messages say.
+After the last move everything is mended. Then every robot that wants to charge must be charged.
 """
 
 from copy import copy
@@ -48,10 +48,10 @@ STEP_S = 1.25
 
 
 class Node:
-    """A charger's daemon that obeys the rules.
+    """A charger's daemon that obeys the rules of the charger messages.
 
-    `holder` is the request id and robot; `ends`: the request was cancelled. `on_pad` is the robot that
-    was charging when the daemon was restarted.
+    `holder` is the id and the robot of the present request. `ends` says that this request was
+    cancelled. `on_pad` is the robot that was charging when the daemon was restarted.
     """
 
     def __init__(self) -> None:
@@ -63,11 +63,11 @@ class Node:
         self.known: set[str] = set()
 
     def takes(self, who: RobotName) -> bool:
-        """May this robot have the station?"""
+        """Return whether the station is free for this robot."""
         return self.state is IDLE or (self.holder is None and self.on_pad == who)
 
     def restarts(self) -> None:
-        """Restart the daemon: the request is forgotten, and current flows for one more state."""
+        """Restart the daemon, which forgets its request. Current flows on until the next state."""
         self.on_pad = self.holder[1] if self.holder and self.state is CHARGING else None
         self.state = CHARGING if self.on_pad else IDLE
         self.holder, self.error, self.known = None, "", set()
@@ -85,7 +85,7 @@ class Node:
                 self.state = RELEASED
 
     def goes_on(self) -> None:
-        """Take the next step of an undisturbed charge."""
+        """Take the next step of a charge without faults."""
         if self.on_pad and self.state is CHARGING:
             self.fails(f"wrong docking: {self.on_pad} is not assigned here")
             return
@@ -109,7 +109,7 @@ class Node:
 
 
 class Ledger:
-    """The coordinator's core, two stations and two robots, with the rules for each message."""
+    """The coordinator's core with two stations and two robots. Each message is checked by the rules."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -123,7 +123,7 @@ class Ledger:
         self.passes()
 
     def copy(self) -> "Ledger":
-        """Return a copy with the same history, to continue in another way."""
+        """Return a copy with the same history. The copy can continue in another way."""
         made = copy(self)
         made.nodes = {name: copy(node) for name, node in self.nodes.items()}
         for node in made.nodes.values():
@@ -143,7 +143,7 @@ class Ledger:
             self._check(message)
 
     def passes(self) -> None:
-        """Let time pass, and let the states of stations and fleet arrive."""
+        """Let STEP_S pass; the stations and the fleet then show their states."""
         self.now += STEP_S
         for name, node in self.nodes.items():
             self.hears(node.shown(name))
@@ -153,7 +153,8 @@ class Ledger:
         self.hears(Woken())
 
     def check_all_are_charged_in_the_end(self) -> None:
-        """Mend everything and go on; fail unless every robot that wants to charge is charged."""
+        """Mend everything, let time pass, and fail unless every robot that wants to charge is
+        charged."""
         if not self.speaks:
             self.hears(MaySpeak(True))
         before = dict(self.charged)
@@ -173,7 +174,7 @@ class Ledger:
             case d.ChargerRequest(charger_name=name):
                 node, who = self.nodes[name], RobotName(message.fleet_name, message.robot_name)
                 if message.request_id in node.known:
-                    return  # a repeat
+                    return  # a repeated request
                 assert node.takes(who), "asked for a station that is not free"
                 assert who not in self._live(), "a robot that has a station asks for another"
                 assert not self.memory.faulty(who)
@@ -188,7 +189,7 @@ class Ledger:
         assert len(set(live)) == len(live), "one robot has two stations"
 
     def _live(self) -> list[RobotName]:
-        """Return the robots that have a station and need not leave it."""
+        """Return the robots that have a station and were not told to leave."""
         return [
             node.holder[1]
             for node in self.nodes.values()
@@ -196,7 +197,7 @@ class Ledger:
         ]
 
     def restarts(self) -> None:
-        """Restart the coordinator, and let its quiet time pass."""
+        """Restart the coordinator, and let the quiet time after its start pass."""
         memory = self.memory
         kept = keep.persist({"site": memory})
         self.memory = keep.restore(kept, SETTINGS, self.now)["site"]
@@ -235,7 +236,7 @@ MOVES: list[Any] = [
 
 
 def after(ledger: Ledger, move: Any) -> Ledger:
-    """Return a copy one move later."""
+    """Return a copy of the ledger after one more move."""
     ledger = ledger.copy()
     move(ledger)
     ledger.passes()

@@ -1,4 +1,7 @@
-"""Wishes to be charged, rule by rule: memories made by hand, and the changes by one FleetState."""
+"""Robots' wishes to be charged, rule by rule.
+
+Each test makes a memory, and compares it with the memory after one FleetState.
+"""
 
 import pytest
 from msgspec.structs import replace
@@ -30,14 +33,17 @@ AT_NIGHT, AT_NOON = LocalTime(0, 23 * 60), LocalTime(0, 12 * 60)
 def seen(
     place: str | None = "wait_1", percent: float = 50.0, task: str = "", charges: bool = False
 ) -> Sighting:
-    """Return AMR01 as its fleet shows it."""
+    """Return AMR01 as its fleet's FleetState shows the robot."""
     return Sighting(ONE, charges, place, percent, task)
 
 
 def after(
     memory: SiteMemory, sighting: Sighting, now: float, site: SiteLimits = SITE
 ) -> SiteMemory:
-    """Return the memory after this sighting, but with the remembered sightings as before."""
+    """Return the memory after this sighting.
+
+    The remembered sightings are left as before, so that a test sees only the conclusions.
+    """
     return replace(wishes.sighted(memory, sighting, now, site), robots=memory.robots)
 
 
@@ -134,7 +140,7 @@ def test_a_robot_that_did_not_come_loses_station_and_wish_and_is_not_called_for_
 def charged(by: By = "fleet", **changes: object) -> SiteMemory:
     """Return a memory in which AMR01 charges at charger_a.
 
-    It failed before at charger_b, and stands at the pad of charger_a in the task "t1".
+    AMR01 failed at charger_b before. Now AMR01 stands at the pad of charger_a in the task "t1".
     """
     return SiteMemory(
         wishes=(Wish(ONE, by, "t1"), Wish(TWO, "fleet")),

@@ -1,4 +1,4 @@
-"""Robots on the wrong pad, rule by rule: memories made by hand, and whole results."""
+"""Robots on the wrong pad, rule by rule. Each test makes a memory and compares the whole result."""
 
 from collections.abc import Mapping
 
@@ -37,12 +37,13 @@ PAD = "wrong docking: tiny/AMR01 is not assigned here"
 def at(
     who: RobotName, place: str | None, since: float, task: str = "", heard: float = 85.0
 ) -> Standing:
-    """Return a robot at this waypoint since `since`, last shown by its fleet at `heard`."""
+    """Return a robot that came to this waypoint at `since`. `heard` is its fleet's last word about
+    it."""
     return Standing(Sighting(who, False, place, 50.0, task), heard, since, since)
 
 
 def shows(state: ChargerStateValue = IDLE, since: float = 0.0, error: str = "") -> StationSeen:
-    """Return a station with this state since `since`."""
+    """Return a station that has shown this state since `since` (s)."""
     return StationSeen(state, "", None, error, 85.0, since)
 
 
@@ -57,7 +58,7 @@ def site(*robots: Standing, **changes: object) -> SiteMemory:
 
 
 def found(memory: SiteMemory, *times: float) -> list[list[OnWrongPad]]:
-    """Return the robots on wrong pads at each of these times."""
+    """Return the robots on wrong pads, with one list for each of these times."""
     return [list(wrong_pad.found(memory, now, SITE).values()) for now in times]
 
 
@@ -100,7 +101,8 @@ def test_the_stations_own_word_for_who_is_on_its_pad_counts_at_once_and_only_in_
 def history(
     memory: SiteMemory, *times: float
 ) -> list[tuple[float, dict[RobotName, Nudge], bool, bool]]:
-    """Return for each time (s, nudges so far, is ONE nudged now?, is an alarm raised?)."""
+    """Return an entry for each time: (s, nudges so far, whether ONE is nudged now, whether an alarm is
+    on)."""
     lines = []
     for now in times:
         memory = wrong_pad.nudged(memory, now, SITE)
@@ -174,7 +176,8 @@ def blocks(station: str) -> OnWrongPad:
 
 
 def blocked(came_at: float = 30.0, **changes: object) -> SiteMemory:
-    """Return a memory in which TWO stands at charger_a without charging, and ONE waits."""
+    """Return a memory in which TWO stands at charger_a without charging, while ONE waits for a
+    station."""
     return site(at(TWO, AT[A], came_at), **{"wishes": WAITS, **changes})
 
 
@@ -192,7 +195,8 @@ def test_nobody_blocks_where_nobody_waits_or_the_waiting_robot_itself_stands() -
 
 
 def test_waiting_robots_are_looked_for_among_all_wishes_and_their_pads_in_order() -> None:
-    """THREE, first in the queue, has its station already. ONE and TWO wait, and TWO stands on a pad."""
+    """THREE is first in the queue and has its station already. ONE and TWO wait, and TWO stands on a
+    pad."""
     memory = blocked(
         wishes=(Wish(THREE, "fleet"), Wish(TWO, "fleet"), Wish(ONE, "fleet")),
         grants={B: Grant(THREE, "r3", 10.0, shown=True)},

@@ -1,7 +1,7 @@
-"""A charging yard in virtual time: our coordinator as in its daemon, chargers, and an obedient fleet.
+"""A charging yard in virtual time: our coordinator, chargers, and a fleet that obeys.
 
-Each charger is its daemon's own core with a plant. A fleet adapter moves the robots as it is told. The
-network is the memory transport.
+The coordinator runs as in its daemon. Each charger has the core of its daemon and a plant. A fleet
+adapter moves the robots to the assigned places. The network is the memory transport.
 """
 
 from typing import Any
@@ -42,7 +42,7 @@ BIG_GRAPH = {
     "bay_1": ("L1", 0.0, 10.0),
     "ward": ("L1", 50.0, 0.0),
 }
-"""The waypoints of the other brand, which has other names for the same places."""
+"""The waypoints of the second brand, which has its own names for the same places."""
 PLACES = {
     "charger_a": {"tiny": "charger_a", "big": "station_1"},
     "charger_b": {"tiny": "dock_b", "big": "station_2"},
@@ -53,7 +53,7 @@ BIG = {"RX-9": RobotName("big", "B01")}
 
 
 def settings(**changes: Any) -> CoordinatorSettings:
-    """Return the settings of two stations and three robots; `AMR03` may use charger_b only."""
+    """Return the settings of two stations and three robots. AMR03 may use charger_b only."""
     robots = {
         who.name: RobotSettings(
             stations=["charger_a", "charger_b"][who.name == "AMR03" :],
@@ -79,7 +79,7 @@ def settings(**changes: Any) -> CoordinatorSettings:
 
 
 def two_brands() -> CoordinatorSettings:
-    """Return the settings of the same two stations, with a fleet of another brand beside the first."""
+    """Return the settings of the same two stations, with a second fleet of another brand."""
     tiny = settings().fleets["tiny"]
     waypoints = {
         n: Waypoint(level=a, x=x, y=y) for n, (a, x, y) in BIG_GRAPH.items() if n != "ward"
@@ -98,9 +98,11 @@ def two_brands() -> CoordinatorSettings:
 class Charger:
     """A charger's daemon: its own core, and a station.
 
-    Possible faults: `broken` gives an error on the side `fails` as soon as power flows; `refuses` has
-    receivers whose handshake fails; an `unplugged` station does not answer its daemon; `dead` is a dead
-    daemon.
+    Possible faults:
+    - `broken`: the station shows an error on the side `fails` as soon as power flows.
+    - `refuses`: the handshake with these receivers fails.
+    - `unplugged`: the station does not answer its daemon.
+    - `dead`: the daemon is dead.
     """
 
     def __init__(self, name: str, knows: bool = True) -> None:
@@ -123,17 +125,18 @@ class Charger:
         self._told_at = -1.0
 
     def restarts(self, now: float, switched_off: bool = True) -> None:
-        """Restart a killed daemon. `switched_off`: `outputs-off` reached the station meanwhile."""
+        """Restart a killed daemon. `switched_off` says that `outputs-off` switched the station off
+        meanwhile."""
         self.memory = charger.initial(self.limits, now)
         self._power = self._power and not switched_off
         self._clears, self._told, self.dead = 0, None, False
 
     def stops(self) -> None:
-        """End the power, whatever the daemon orders."""
+        """End the power, although the daemon may order it."""
         self._power = False
 
     def scan(self, now: float) -> d.ChargerState | None:
-        """Read, decide and drive; return the state when it is due."""
+        """Read, decide and drive. Return the state if a state must be published now, otherwise None."""
         self._run(now)
         if self.unplugged:
             return self.decide(IoFailed("no route to host"), now)
@@ -181,7 +184,10 @@ class Charger:
 
 
 class Yard:
-    """The whole yard. `story` has (s, event) in order; `fills` is the charging speed (%/s)."""
+    """The whole yard.
+
+    `story` has (s, event) in order of time. `fills` is the charging speed (%/s).
+    """
 
     def __init__(
         self,

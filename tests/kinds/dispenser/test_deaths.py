@@ -1,4 +1,4 @@
-"""RMF's phase never counts an undelivered item as done, wherever the daemon dies and whatever is lost.
+"""RMF's phase never counts an undelivered item as done, although the daemon dies or messages are lost.
 
 DISPENSER-1, DISPENSER-2, DISPENSER-3, DISPENSER-7: the daemon dies at each effect of a dispensing.
 """
@@ -15,7 +15,7 @@ WHOLE_S = 6.0
 
 
 def told(world: World) -> str:
-    """Let a person who looks at the machine decide what is in doubt."""
+    """Let a person look at the machine and decide a request in doubt. Return the person's verdict."""
     if "OUTCOME_UNKNOWN" not in world.faults:
         return ""
     world.run(4.0)
@@ -26,14 +26,14 @@ def told(world: World) -> str:
 
 
 def effects(jam: str = "") -> list[str]:
-    """Return every effect of a dispensing without a death."""
+    """Return every effect of a dispensing in which the daemon does not die."""
     world = World()
     dispensed(world, jam)
     return world.effects
 
 
 def dispensed(world: World, jam: str = "", seconds: float = 12.0) -> WorkcellPhase:
-    """Let RMF ask, up to the end of its phase or a doubt. `jam`: the conveyor's failure."""
+    """Let RMF ask until its phase ends or its request is in doubt. `jam` is the conveyor's failure."""
     if jam:
         world.plant.fail("conveyor", "stuck")
     phase = world.ask()
@@ -45,10 +45,10 @@ def test_a_request_is_on_disk_then_listed_then_acknowledged_and_so_is_its_start(
     every = effects()
     asked = every.index("before the disk", every.index("after dispenser_states"))
     assert every[asked : asked + 10] == [
-        *("before the disk", "after the disk"),  # the request
+        *("before the disk", "after the disk"),  # the daemon keeps the request
         *("before dispenser_states", "after dispenser_states"),
         *("before dispenser_results", "after dispenser_results"),
-        *("before the disk", "after the disk"),  # its start
+        *("before the disk", "after the disk"),  # the daemon keeps the start
         *("before the outputs", "after the outputs"),
     ]
 
@@ -65,7 +65,7 @@ def test_wherever_the_daemon_dies_rmf_goes_on_only_with_the_item_and_with_one(ja
         what = (place, world.effects[place : place + 1], said, phase.outcome, phase.why)
         assert world.plant.moved == (0 if jam else 1), what
         assert phase.outcome == ("failed" if jam else "completed"), what
-    assert doubts > 4  # the deaths between the start and the outcome
+    assert doubts > 4  # deaths between start and outcome
 
 
 def is_over(phase: WorkcellPhase) -> Callable[[], bool]:
@@ -77,7 +77,7 @@ def losing(topic: str, first: int, last: int) -> Callable[[str, int], bool]:
 
 
 def losses(most: int) -> Iterable[tuple[str, int, int]]:
-    """Yield each topic, and a first and a last message of it that are lost."""
+    """Yield (topic, first, last): the messages of the topic from `first` to `last` are lost."""
     for topic in ("dispenser_requests", "dispenser_states", "dispenser_results"):
         for first in range(most):
             for last in range(first, most):
@@ -102,7 +102,7 @@ def every_third(first: int) -> Callable[[str, int], bool]:
 
 
 def test_a_death_and_lost_messages_together_send_no_robot_off_without_its_item() -> None:
-    """The states after the restart are the ones that could complete RMF's phase wrongly."""
+    """Only the states after the restart could complete RMF's phase wrongly."""
     for place in range(0, len(effects()) + 4, depth(3, 1)):
         for first in range(3):
             world = World(die_at=place, lose=every_third(first))

@@ -1,4 +1,4 @@
-"""Stories of a dispenser with RMF's phase, its daemon, its disk and its machine, in virtual time."""
+"""Stories of a dispenser in virtual time: RMF's phase, the daemon, its disk and the machine."""
 
 from collections.abc import Callable
 
@@ -18,7 +18,7 @@ def over(*phases: WorkcellPhase) -> Callable[[], bool]:
 
 
 def finished(world: World, guid: str = "task", seconds: float = 20.0) -> WorkcellPhase:
-    """Let RMF ask until it has an outcome, or for so long."""
+    """Let RMF ask until its phase has an outcome, for at most `seconds`."""
     phase = world.ask(guid)
     world.run(seconds, until=over(phase))
     return phase
@@ -213,7 +213,7 @@ def test_a_steady_start_is_on_until_done() -> None:
 
 
 def test_a_plc_that_restarts_in_mid_cycle_does_not_dispense_twice() -> None:
-    """With a steady start, a restarted PLC would take the start that is still on for another."""
+    """A restarted PLC would take a steady start signal for a new start."""
     limits = WorkcellDurations(cycle_limit_s=8.0, settle_s=4.0)
     world = World(replace(SETTINGS, pulse_s=None, limits=limits))
     phase = world.ask()
@@ -243,7 +243,7 @@ def test_after_a_failed_reading_the_start_stays_off_and_done_still_counts() -> N
 
 
 def doubtful(world: World) -> WorkcellPhase:
-    """Kill the daemon in mid-cycle while the machine is jammed."""
+    """Kill the daemon in mid-cycle while the machine is jammed. Return the world."""
     phase = world.ask()
     world.run(5.0, until=lambda: world.relays() == [True])
     world.run(0.25)
@@ -312,7 +312,8 @@ def test_a_daemon_without_its_memory_is_offline_and_gives_no_result_until_a_pers
 
 
 def test_a_lost_memory_completes_no_request_that_the_daemon_has_acknowledged_before() -> None:
-    """The first states after the restart list nothing yet; RMF ignores them, as their stamp is 0."""
+    """The first states after the restart list no request. RMF ignores these states, because their stamp
+    is 0."""
     world = World(new=False)
     world.decide("again")
     world.run(1.0)
@@ -337,7 +338,7 @@ def test_a_damaged_entry_loses_the_memory_of_its_device() -> None:
 
 
 def test_the_guid_of_a_finished_request_with_other_items_is_in_doubt() -> None:
-    """tasks/Delivery.cpp gives two pickups of one task the same guid."""
+    """RMF's tasks/Delivery.cpp gives two pickups of one task the same guid."""
     world = World()
     finished(world)
     second = world.ask(items=JAR)
@@ -361,7 +362,8 @@ def test_the_guid_of_a_waiting_request_with_other_items_is_refused() -> None:
 
 
 def test_the_guid_of_a_finished_request_is_in_doubt_after_a_long_silence() -> None:
-    """rmf_task_ros2 gives a task five random hexadecimal digits, or a count from 0 at each start."""
+    """Guids can repeat: rmf_task_ros2 uses five random hexadecimal digits, or counts from 0 at each
+    start."""
     world = World()
     finished(world)
     world.run(301.0)

@@ -1,4 +1,4 @@
-"""In every state within some steps RMF goes on only with its item, and nothing is moved twice."""
+"""A check of every state within some steps: RMF goes on only with its item, and no item moves twice."""
 
 from typing import Any
 
@@ -21,7 +21,7 @@ BEGUN = (
 
 
 def checked(step: Any) -> None:
-    """Check one step: DISPENSER-1, DISPENSER-2, DISPENSER-3, DISPENSER-7."""
+    """Check the rules DISPENSER-1, DISPENSER-2, DISPENSER-3 and DISPENSER-7 in one step."""
     world: World = step.world
     phase, moved = world.phase, world.moved
     assert not (phase.outcome == "completed" and moved == 0 and not world.decided), world

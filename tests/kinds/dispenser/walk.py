@@ -1,7 +1,8 @@
-"""All states that the core, its disk, its machine and RMF's phase can reach within some steps.
+"""A walk through all states that a dispenser and RMF's phase can reach within some steps.
 
-A state has the core's memory with every time relative to now. RMF's phase is written here in its own
-words (`_get_status` of DispenseItem.cpp), with every message newer than those before it.
+A state has the core's memory, the disk, the machine and RMF's phase. All times are relative to now.
+RMF's phase is written here anew, after `_get_status` of DispenseItem.cpp. Every message is newer than
+the messages before it.
 """
 
 import math
@@ -33,8 +34,11 @@ GUID = "task"
 
 
 class Phase(msgspec.Struct, frozen=True):
-    """RMF's phase. `deaf`: its node hears nothing. `stamped`: it has heard a message with a stamp, so
-    that a state with the stamp 0 is older."""
+    """RMF's phase.
+
+    `deaf` says that its node hears nothing. `stamped` says that the phase has heard a message with a
+    stamp, so that a state with the stamp 0 counts as older.
+    """
 
     asks: bool = False
     stamped: bool = False
@@ -44,8 +48,14 @@ class Phase(msgspec.Struct, frozen=True):
 
 
 class World(msgspec.Struct, frozen=True):
-    """`disk`: the bytes that outlive the daemon. `works`: the machine runs a cycle. `moved`: the items
-    that left. `again`, `decided`: a person has said so."""
+    """The daemon, its machine, and RMF's phase.
+
+    - `disk` has the bytes that outlive the daemon.
+    - `works` says that the machine runs a cycle.
+    - `moved` is the number of items that left the machine.
+    - `again` is the number of times that a person has ordered another cycle.
+    - `decided` says that a person has decided a doubt.
+    """
 
     memory: WorkcellMemory
     disk: bytes = b""
@@ -77,7 +87,7 @@ Move = Callable[[World], tuple[World, Event | None]]
 
 
 def reading(world: World) -> Event:
-    """Return the reading of a scan."""
+    """Return the event of a scan: a reading, or a timeout."""
     if world.down:
         return IoFailed("timeout")
     ready = not (world.works or world.done)
@@ -104,7 +114,7 @@ def _stops(world: World) -> tuple[World, Event | None]:
 
 
 def _dies(world: World) -> tuple[World, Event | None]:
-    """The daemon dies: its outputs go off, and a new daemon reads the disk."""
+    """Let the daemon die. Its outputs go off, and a new daemon reads the disk."""
     world = _switched(replace(world, memory=KEEPING.restore(world.disk, 0.0)), on=False)
     return world, reading(world)
 
@@ -116,7 +126,10 @@ def _loses(world: World) -> tuple[World, Event | None]:
 
 
 def _decides(verdict: Any) -> Move:
-    """A person looks at the machine first: `done` only for a moved item, `again` only without one."""
+    """Return the move in which a person looks at the machine and decides.
+
+    The person says `done` only if an item has moved, and `again` only if no item has moved.
+    """
 
     def move(world: World) -> tuple[World, Event | None]:
         in_doubt = bool(world.memory.lost or world.memory.doubtful())
@@ -162,13 +175,13 @@ TIMES = (0.5, 2.0, 8.0, 512.0)
 
 
 def moved(world: World, move: Move, seen: Callable[[Any], None]) -> World:
-    """Return the state after a move and its scan."""
+    """Return the state after a move and the scan after it."""
     world, event = move(world)
     return _scanned(world, event or reading(world), 0.0, seen)
 
 
 def waited(world: World, seconds: float, seen: Callable[[Any], None]) -> World:
-    """Return the state after some time, in which RMF repeats its request and readings come."""
+    """Return the state after some time, in which RMF repeats its request and the daemon scans."""
     now, step_s = 0.0, max(0.25, seconds / 8)
     while now < seconds:
         now += step_s
@@ -179,7 +192,8 @@ def waited(world: World, seconds: float, seen: Callable[[Any], None]) -> World:
 
 
 def _scanned(world: World, event: Event, now: float, seen: Callable[[Any], None]) -> World:
-    """Decide, keep, write and publish, as the daemon's node does."""
+    """Decide, write the memory to the disk, drive the outputs and publish, as the daemon's node
+    does."""
     decision = decide(world.memory, event, now, LIMITS)
     kept = KEEPING.persist(decision.memory)
     if kept != world.disk or decision.memory.not_kept:
@@ -195,7 +209,7 @@ def _scanned(world: World, event: Event, now: float, seen: Callable[[Any], None]
 
 
 def _switched(world: World, *, on: bool) -> World:
-    """Drive the start: its edge begins a cycle, its end takes `done` away."""
+    """Drive the start output. Switching it on begins a cycle, and switching it off clears `done`."""
     begins = on and not world.on and not world.works
     return replace(world, on=on, works=world.works or begins, done=world.done and on and not begins)
 
@@ -220,7 +234,7 @@ def _heard(phase: Phase, report: Any) -> Phase:
 
 
 def _shifted(value: Any, by: float) -> Any:
-    """Return a memory with its times earlier; ages beyond every limit are made equal."""
+    """Return a memory whose times are earlier by `by`. Ages beyond every limit are made equal."""
     if isinstance(value, tuple):
         return tuple(_shifted(one, by) for one in value)
     if not isinstance(value, msgspec.Struct):

@@ -1,8 +1,9 @@
-"""One dispenser in virtual time: RMF's phase, the network, the daemon's node, its disk, the machine.
+"""One dispenser in virtual time: RMF's phase, the network, the daemon's node, its disk and the machine.
 
-The daemon is the product's own `Node` with its keeper and the driver on contacts. `die_at` counts
-effects: writes to the disk, messages and switched outputs, each before and after it happens. The daemon
-dies at that effect, its outputs go off, and a new daemon starts on the same disk after DOWN_S.
+The daemon is the product's own `Node`, with its keeper and the driver for contacts. An effect is the
+instant before or after a write to the disk, a message, or a switched output. The daemon dies at the
+effect with the number `die_at`. Then its outputs go off, and a new daemon starts on the same disk after
+DOWN_S.
 """
 
 from collections.abc import Callable, Mapping
@@ -53,12 +54,12 @@ SETTINGS = DryContactWorkcellSettings(
 
 
 class Killed(BaseException):
-    """The daemon's process is gone."""
+    """The death of the daemon's process."""
 
 
 @dataclass
 class Disk:
-    """The file that outlives the daemon. `full`: the reason why writing fails."""
+    """The file that outlives the daemon. `full` is the reason why writing fails, or ""."""
 
     content: bytes | None = None
     full: str = ""
@@ -77,7 +78,10 @@ class Disk:
 
 @dataclass
 class World:
-    """`lose(topic, number)`: is this message lost? `said`: every message that the daemon published."""
+    """The dispenser with everything around it.
+
+    `lose(topic, number)` decides whether a message is lost. `said` has every message of the daemon.
+    """
 
     settings: DryContactWorkcellSettings = SETTINGS
     die_at: int = -1
@@ -110,7 +114,7 @@ class World:
         return phase
 
     def run(self, seconds: float, until: Callable[[], bool] = lambda: False) -> "World":
-        """Let time pass, up to `until`."""
+        """Let time pass, until the condition `until` holds or for at most `seconds`."""
         end = self.now + seconds
         while self.now < end and not until():
             self.now += SCAN_S
@@ -140,7 +144,7 @@ class World:
 
     @property
     def state(self) -> d.DispenserState:
-        """The daemon's last state."""
+        """Return the daemon's last state."""
         return next(m for _, m in reversed(self.said) if isinstance(m, d.DispenserState))
 
     def results(self, guid: str = "task") -> list[str]:
@@ -154,16 +158,16 @@ class World:
 
     @property
     def faults(self) -> list[str]:
-        """The codes of the present faults."""
+        """Return the codes of the present faults."""
         return [fault["code"] for fault in self.status.get("faults", [])]
 
     @property
     def status(self) -> Mapping[str, Any]:
-        """The part of the status file."""
+        """Return the dispenser's part of the status file."""
         return self.daemon.status() if self.daemon else {}
 
     def relays(self, signal: str = "start") -> list[bool]:
-        """Return the edges of a relay."""
+        """Return the edges of a relay: True for on, False for off."""
         edges = self.plant.edges
         return [bool(e.value) for e in edges if e.what == "relay" and e.signal == signal]
 
@@ -203,7 +207,7 @@ class World:
                 phase.hear(message, self.now)
 
     def _arrives(self, topic: str, message: d.Message) -> None:
-        """Take a request, as the transport's thread does."""
+        """Put a request into the daemon's inbox, as the transport's thread does."""
         assert isinstance(message, d.DispenserRequest)
         if self.daemon is None or self._is_lost(topic):
             return
@@ -228,7 +232,7 @@ class World:
 
 
 class _Mortal:
-    """A driver whose daemon may die before and after each switched output."""
+    """A driver whose daemon may die just before or after each switched output."""
 
     def __init__(self, driver: Any, around: Callable[[str], None]) -> None:
         self._driver = driver
@@ -238,7 +242,7 @@ class _Mortal:
         self.make_safe, self.close = driver.make_safe, driver.close
 
     def write(self, outputs: Any) -> None:
-        """Write, with two effects if the outputs change."""
+        """Write the outputs. A change of the outputs is two effects: before and after the write."""
         changes, self._last = outputs != self._last, outputs
         if changes:
             self._around("before the outputs")

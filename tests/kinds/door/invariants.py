@@ -1,4 +1,4 @@
-"""Rules for every decision of the door's core, whatever happened before.
+"""Rules for every decision of the door's core, in any history.
 
 The rules judge the event, the inputs, the outputs and the walk's ledger, but never the core's memory.
 """
@@ -14,7 +14,7 @@ from tests.kinds.door.walk import UNLIKE, Step, World, burns, fresh, reading, si
 
 
 def check(step: Step) -> None:
-    """Check every rule; the AssertionError shows the broken rule."""
+    """Check every rule. An AssertionError names the broken rule in its traceback."""
     the_hold_has_a_reason(step)
     the_relay_follows_the_hold(step)
     open_is_the_truth(step)
@@ -25,7 +25,11 @@ def check(step: Step) -> None:
 
 
 def the_hold_has_a_reason(step: Step) -> None:
-    """Require a reason for a hold: RMF's request, a fire, or an obstruction after such a hold."""
+    """Require a reason whenever the door is held open.
+
+    A reason is RMF's request, a fire, or an obstruction that appears while the door closes after a
+    hold.
+    """
     held, ledger = step.decision.report.hold, step.ledger
     if not _sighted(step):
         assert not held
@@ -47,14 +51,19 @@ def the_hold_has_a_reason(step: Step) -> None:
 
 
 def the_relay_follows_the_hold(step: Step) -> None:
-    """Require the relay to follow the hold: steadily, or in pulses from the start of the hold."""
+    """Require the relay to follow the hold: on all the time, or in pulses from the start of the
+    hold."""
     on, pulse = step.decision.outputs.hold_open, step.limits.pulse
     in_pulse = pulse is None or (step.now - step.ledger.held_since) % pulse.every_s < pulse.on_s
     assert on == (step.ledger.held and in_pulse)
 
 
 def open_is_the_truth(step: Step) -> None:
-    """Require, for OPEN, a fresh reading of the open contact, or, if permitted, the opening time."""
+    """Require evidence whenever OPEN is shown.
+
+    Evidence is a fresh reading of the open contact. A door that may be estimated needs the opening time
+    instead.
+    """
     shown, sample = step.decision.report, step.world.sample
     if not _sighted(step):
         assert shown.mode is DoorModeValue.MODE_OFFLINE
@@ -77,10 +86,10 @@ def open_is_the_truth(step: Step) -> None:
 
 
 def a_request_that_waits_has_a_reason(step: Step) -> None:
-    """Require a reason for each waiting OPEN.
+    """Require a reason for each waiting OPEN request.
 
-    An OPEN waits while RMF wants the door open and the door is not shown OPEN. If the hold is missing
-    too, there must be a fault, except before the first reading.
+    An OPEN request waits while RMF wants the door open and the door does not show OPEN. If the door is
+    not held either, there must be a fault. Before the first reading no fault is needed.
     """
     shown = step.decision.report
     assert bool(shown.waits) == (step.ledger.wanted and shown.mode is not DoorModeValue.MODE_OPEN)
@@ -89,7 +98,10 @@ def a_request_that_waits_has_a_reason(step: Step) -> None:
 
 
 def hazards_are_as_read(step: Step) -> None:
-    """Require hazards as read: a fire begins at once, ends with a delay, and alone refuses OPEN."""
+    """Require hazards as the contacts show them.
+
+    A fire begins at once and ends with a delay. Only a fire refuses an OPEN request.
+    """
     clear_s = step.limits.t.hazard_clear_s
     if fresh(step.ledger, step.now, step.limits):
         assert not (burns(step.decision) and _told_otherwise(step, "fire", clear_s))
@@ -102,7 +114,8 @@ def hazards_are_as_read(step: Step) -> None:
 
 
 def nothing_changes_before_wake_at(world: World, limits: DoorLimits) -> None:
-    """Require scans of unchanged inputs between now and `wake_at` to decide nothing new."""
+    """Require scans before `wake_at` to change neither outputs nor report if the inputs stay the
+    same."""
     now = _scan(world, world.memory, 0.0, limits)
     until = min(now.wake_at, 1e4)
     later = _scan(world, now.memory, until * (1.0 - 1e-6), limits)
@@ -126,7 +139,7 @@ def _codes(step: Step) -> set[str]:
 
 
 def _exact(step: Step) -> bool:
-    """Has the core just seen the world's inputs, and do they count at once?"""
+    """Return whether this step is a reading that counts at once, without debounce."""
     return isinstance(step.event, Sampled) and not step.limits.debounce
 
 
@@ -135,6 +148,7 @@ def _signal(step: Step, name: str) -> bool:
 
 
 def _told_otherwise(step: Step, name: str, for_s: float) -> bool:
-    """Have the readings shown, for `for_s` and without a gap, that the contact is not asserted?"""
+    """Return whether every reading of the last `for_s` seconds said that the contact is not
+    asserted."""
     since = step.ledger.unlike[UNLIKE.index(name)]
     return since is not None and step.now >= since + for_s

@@ -1,11 +1,11 @@
-"""DOOR-2: a door whose supervisor has gone stays held, unless the site limits that time."""
+"""DOOR-2: a door whose supervisor has gone stays held open, unless the site limits that time."""
 
 from bridges.kinds.shared.decision import Attended
 from tests.kinds.door.virtual import OBSTRUCTION, Door
 
 
 def held(**limits: float) -> Door:
-    """Return a door that is held open from 1 s on and loses its supervisor at 20 s."""
+    """Return a door that is held open from 1 s on, and whose supervisor goes at 20 s."""
     door = Door(limits=limits, inputs={"obstruction": OBSTRUCTION})
     door.scan(Attended(True))
     door.run(1.0)

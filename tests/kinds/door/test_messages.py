@@ -1,4 +1,4 @@
-"""RMF's door messages, where they enter and leave the daemon."""
+"""The daemon reads RMF's door requests, and writes RMF's door states."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Properties of a door in long histories of requests, readings, gaps, rivals and alarms."""
+"""Properties of a door in long random histories of requests, readings, gaps, rivals and alarms."""
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -28,7 +28,7 @@ LIMITS = st.builds(
 
 
 def checked(step: Step) -> None:
-    """Check that the rules hold, and that a repeated decision gives the same result."""
+    """Check that the rules hold, and that the core decides the same when it is asked again."""
     check(step)
     once = step.decision
     assert decide(step.before, step.event, step.now, step.limits) == once

@@ -12,7 +12,7 @@ from workbench.rmf_model.supervisors import DoorSupervisor
 
 
 class Corridor:
-    """A door, RMF's door supervisor, and robots. States go out at 1 Hz and on change."""
+    """A door, RMF's door supervisor, and robots. The door publishes its state at 1 Hz and on change."""
 
     def __init__(self, **changes: Any) -> None:
         self.door = Door(**changes)
@@ -20,7 +20,7 @@ class Corridor:
         self._told: tuple[int, int] | None = None
 
     def robot(self, name: str, mode: DoorModeValue) -> None:
-        """Let a robot's fleet adapter ask the supervisor, which may ask the door."""
+        """Let a robot's fleet adapter ask the supervisor. The supervisor may then ask the door."""
         self._deliver(door_request("door", name, mode, self.door.now))
 
     def run(self, until: float) -> None:

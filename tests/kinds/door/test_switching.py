@@ -1,4 +1,4 @@
-"""DOOR-1: the grace after CLOSE limits switching; it may lengthen a hold, but refuses none."""
+"""DOOR-1: the grace after CLOSE limits how often the relay switches. It never refuses a hold."""
 
 import pytest
 

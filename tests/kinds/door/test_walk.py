@@ -1,4 +1,4 @@
-"""All states within some steps of the start and of each stage of a passage, checked by the rules."""
+"""A check of the door's rules in every state near the start and near each stage of a passage."""
 
 import pytest
 from msgspec.structs import replace
@@ -37,12 +37,12 @@ STAGES: dict[str, tuple[str | float, ...]] = {
 
 
 def path(*steps: str | float, limits: DoorLimits = PLAIN) -> World:
-    """Return the state after these moves and waits."""
+    """Return the world after these moves and waits (s)."""
     return walker(limits).path(start(limits), *steps)
 
 
 class Scan:
-    """One more scan of a state, checked, with its decision."""
+    """One more scan of a state, which is checked by the rules; the scan has the core's decision."""
 
     def __init__(self, world: World, limits: DoorLimits) -> None:
         self._steps: list[Step] = []
@@ -79,7 +79,7 @@ def test_each_stage_of_a_passage_is_what_its_name_says() -> None:
 
 
 def check_rules_within(steps: int, roots: list[World], limits: DoorLimits) -> int:
-    """Check every step and state; return the number of states."""
+    """Check every step and state, and return the number of states."""
     found = walker(limits).walk(roots, steps, check)
     for world in found:
         nothing_changes_before_wake_at(world, limits)
@@ -105,18 +105,19 @@ def test_the_rules_hold_within_some_steps_of_all_stages_at_each_kind_of_site(sit
 
 
 def mended(world: World, limits: DoorLimits) -> World:
-    """Return the world mended: the door shut, the doorway empty, no fire, everything answers."""
+    """Return the world after repairs: a shut door, an empty doorway, no fire, and contacts that
+    answer."""
     world = replace(world, sample=start(limits).sample, readable=True, writable=True)
     return path_checked(world, limits, 6.0)
 
 
 def path_checked(world: World, limits: DoorLimits, *steps: str | float) -> World:
-    """Return the world after these moves and waits, with each step checked."""
+    """Return the world after these moves and waits (s). Each step is checked by the rules."""
     return walker(limits).path(world, *steps, seen=check)
 
 
 def states_around_all_stages(limits: DoorLimits) -> list[World]:
-    """Return every state within a step of the stages."""
+    """Return every state that is at most one step away from a stage of a passage."""
     roots = [path(*steps, limits=limits) for steps in STAGES.values()]
     return walker(limits).walk(roots, 1, check)
 

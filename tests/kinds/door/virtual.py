@@ -1,4 +1,7 @@
-"""A door in virtual time: its core alone, or with driver, wires and plant, scanned as the loop does."""
+"""A door in virtual time, with its core alone or with driver, wires and plant.
+
+The door is scanned as the daemon's loop scans it.
+"""
 
 from typing import Any
 
@@ -17,7 +20,7 @@ from tests.drivers.far import PointsFar
 
 SCAN_S = 0.125
 DEBOUNCE_S = 0.0625
-"""Powers of two, so that sums of times are exact and histories can be compared with ==."""
+"""The debounce (s), a power of two. So sums of times are exact, and tests compare histories with ==."""
 
 CLOSED = DoorSample(opened=False, closed=True)
 OPEN = DoorSample(opened=True, closed=False)
@@ -34,7 +37,10 @@ def word(mode: DoorModeValue) -> str:
 
 
 class CoreAlone:
-    """The core, fed by hand. `told` has (s, mode, hold relay) for each change of mode or relay."""
+    """The core alone, which gets its events from the test.
+
+    `told` has (s, mode, hold relay), with one entry for each change of mode or relay.
+    """
 
     def __init__(self, limits: DoorLimits | None = None) -> None:
         self.limits = limits or DoorLimits(debounce=DEBOUNCED)
@@ -53,7 +59,7 @@ class CoreAlone:
         return decided
 
     def sees(self, sample: DoorSample | IoFailed, until: float) -> Decided:
-        """Scan with these inputs, from now until then."""
+        """Scan with these inputs from now until the time `until`."""
         event: Event = sample if isinstance(sample, IoFailed) else Sampled(sample)
         decided = self.hears(event)
         while self.now < until:
@@ -68,7 +74,8 @@ class CoreAlone:
 
 
 def settings(**changes: Any) -> DryContactDoorSettings:
-    """Return the settings of a door on a Modbus module, as from a YAML, with these keys changed."""
+    """Return the settings of a door on a Modbus module, as a YAML file gives them, with these keys
+    changed."""
     inputs = changes.pop("inputs", {})
     plain = {
         "inputs": {
@@ -93,7 +100,10 @@ FIRE = _input(3, "low")
 
 
 class Door:
-    """The whole door. `told` has (s, mode) as RMF hears it; `faults` has each change of faults."""
+    """The whole door.
+
+    `told` has (s, mode) as RMF hears it. `faults` has an entry for each change of the faults.
+    """
 
     def __init__(self, **changes: Any) -> None:
         self.settings = settings(**changes)
@@ -107,20 +117,20 @@ class Door:
         self.restart()
 
     def restart(self) -> None:
-        """Start a new daemon on the same door: outputs off, nothing remembered."""
+        """Start a new daemon on the same door. Its outputs are off, and it remembers nothing."""
         self.driver: DryContactDoor = create("door", self.settings, self.bus)
         self.memory = initial(self.limits, self.now)
         self.driver.open()
         self.scan()
 
     def run(self, until: float) -> None:
-        """Scan from now until then."""
+        """Scan from now until the time `until`."""
         while self.now < until:
             self.now = min(until, self.now + SCAN_S, self.wake_at)
             self.scan()
 
     def scan(self, *requests: Event) -> None:
-        """Read, decide, write; the requests come after the reading."""
+        """Read, decide and write. The core gets the requests after the reading."""
         self.scans += 1
         decided = self._decide(self._read())
         for request in requests:

@@ -1,8 +1,10 @@
-"""All states that the door's core can reach within some steps.
+"""A walk through all states that the door's core can reach within some steps.
 
-A state has the core's memory with every time relative to now, the building around it, and a ledger that
-follows the rules in its own words. Ages beyond every limit are made equal, so that states that cannot
-behave differently count as one state. All durations are sums of powers of two, so no time is rounded.
+A state has the core's memory, the building, and a ledger of events. All times in a state are relative
+to now. The ledger follows the rules without the core's code.
+
+Ages beyond every limit are made equal. So two states that cannot behave differently count as one state.
+All durations are sums of powers of two, so no time is rounded.
 """
 
 from collections.abc import Callable
@@ -22,24 +24,27 @@ from tests.kinds.door.virtual import Decided
 from tests.walk import Walker
 
 LONG_S = 32.0
-"""The longest gap between scans (s) if the core asks for no earlier scan; below `stale_after_s`."""
+"""The longest gap between two scans (s), if the core asks for no earlier scan. Less than
+`stale_after_s`."""
 
 DURATIONS: dict[str, float] = {"stale_after_s": 60.0, "max_hold_s": 30.0}
-"""Changed defaults: longer `stale_after_s` saves scans; `max_hold_s` gives the open door's alarm."""
+"""Changed defaults (s). A longer `stale_after_s` saves scans, and `max_hold_s` permits its alarm."""
 
 
 def limits_of(durations: dict[str, float] | None = None, **facts: Any) -> DoorLimits:
-    """Return the limits: these durations, then DURATIONS, then the defaults."""
+    """Return limits. `durations` come before DURATIONS, and DURATIONS come before the defaults."""
     return DoorLimits(t=DoorDurations(**{**DURATIONS, **(durations or {})}), **facts)
 
 
 class Ledger(msgspec.Struct, frozen=True):
-    """Events without the core's conclusions. Times are relative to the state's time.
+    """The events so far, noted without the core's conclusions. Times are relative to the state's time.
 
-    `wanted`: RMF has asked for the door open; `ends_at` is when RMF's CLOSE takes effect. `let_go`: the
-    reason for the hold has ended, and no reading since has said closed. `shut`: the last reading says
-    closed. `sure_since` is when the hold last changed or a failure ended. `unlike` has, for each
-    contact, since when the readings have said that the contact is not asserted.
+    - `wanted` says that RMF has asked for an open door.
+    - `ends_at` is the time at which RMF's CLOSE takes effect.
+    - `let_go` says that the reason for the hold has ended, and that no reading has said closed yet.
+    - `shut` says that the last reading says closed.
+    - `sure_since` is the time at which the hold last changed or a failure ended.
+    - `unlike` has, for each contact, the start of the readings that say "not asserted".
     """
 
     held: bool = False
@@ -58,7 +63,10 @@ UNLIKE = ("opened", "obstruction", "fire")
 
 
 class World(msgspec.Struct, frozen=True):
-    """Memory and ledger at time 0, and the building: can it be read, and written to?"""
+    """The core's memory and the ledger at time 0, and the building.
+
+    `readable` and `writable` say whether the door's contacts and relays answer.
+    """
 
     memory: DoorMemory
     sample: DoorSample
@@ -68,7 +76,7 @@ class World(msgspec.Struct, frozen=True):
 
 
 def start(limits: DoorLimits) -> World:
-    """Return a daemon just started on a closed door; an estimated door has no contacts."""
+    """Return a daemon that has just started on a closed door. An estimated door has no contacts."""
     opened, closed = (None, None) if limits.estimated else (False, True)
     return World(initial(limits, 0.0), DoorSample(opened, closed, obstruction=False, fire=False))
 
@@ -119,7 +127,7 @@ def _relay(world: World) -> tuple[World, Event]:
 
 
 def reading(world: World) -> Event:
-    """Return the reading of a scan."""
+    """Return the event of a scan: a reading, or a failure."""
     return Sampled(world.sample) if world.readable else IoFailed("timeout")
 
 
@@ -141,7 +149,7 @@ MOVES: dict[str, Move] = {
     "reset": _event(OperatorReset()),
 }
 TIMES = (0.0625, 1.0, 4.0, 16.0, 64.0)
-"""Times on both sides of debounce, hazards' end, grace, travel, opening and age."""
+"""Waits (s). They lie on both sides of debounce, the hazards' end, grace, travel, opening and age."""
 
 
 # ---- one step
@@ -150,7 +158,7 @@ Seen = Callable[["Step"], None]
 
 
 class Step(msgspec.Struct, frozen=True):
-    """One decision at time `now` after the state began; `ledger` includes this step."""
+    """One decision at time `now`, in seconds after the state began. `ledger` includes this step."""
 
     before: DoorMemory
     event: Event
@@ -184,7 +192,7 @@ def waited(world: World, seconds: float, limits: DoorLimits, seen: Seen) -> Worl
 def _scanned(
     world: World, event: Event, now: float, limits: DoorLimits, seen: Seen
 ) -> tuple[World, float]:
-    """Scan once: decide and write. Return the world, and the time of the next scan."""
+    """Decide and write once. Return the new world, and the time of the next scan (s)."""
     step = _step(world, event, now, limits, seen)
     world = replace(world, memory=step.decision.memory, ledger=step.ledger)
     if not world.writable:
@@ -204,7 +212,10 @@ def _step(world: World, event: Event, now: float, limits: DoorLimits, seen: Seen
 def noted(
     ledger: Ledger, event: Event, now: float, decision: Decided, limits: DoorLimits
 ) -> Ledger:
-    """Return the ledger after a decision, of which it uses only the hold, the refusal and the fire."""
+    """Return the ledger after a decision.
+
+    From the decision this function takes only the hold, the refusal and the fire.
+    """
     wanted, ends_at = _asked(ledger, event, now, bool(decision.refused), limits)
     if limits.on_fire == "release" and burns(decision):
         wanted, ends_at = False, None
@@ -239,7 +250,7 @@ def fresh(ledger: Ledger, now: float, limits: DoorLimits) -> bool:
 
 
 def sighted(ledger: Ledger, now: float, limits: DoorLimits) -> bool:
-    """Is there a fresh reading, and no other node of this name?"""
+    """Is there a fresh reading, and no second node of this name?"""
     rival_at = ledger.rival_at
     alone = rival_at is None or now >= rival_at + RIVAL_QUIET_S
     return alone and fresh(ledger, now, limits)
@@ -253,7 +264,7 @@ def burns(decision: Decided) -> bool:
 def _asked(
     ledger: Ledger, event: Event, now: float, refused: bool, limits: DoorLimits
 ) -> tuple[bool, float | None]:
-    """Return whether RMF wants the door open, and when a CLOSE takes effect after its grace."""
+    """Return whether RMF wants the door open, and the time (s) at which a CLOSE takes effect."""
     wanted, ends_at = ledger.wanted, ledger.ends_at
     if ends_at is not None and now >= ends_at and not isinstance(event, OpenRequested):
         wanted, ends_at = False, None
@@ -268,7 +279,7 @@ def _asked(
 def _unlike(
     ledger: Ledger, event: Event, now: float, limits: DoorLimits
 ) -> tuple[float | None, ...]:
-    """Return when each contact began to read as not asserted, without a gap since then."""
+    """Return for each contact the start (s) of the unbroken readings that say "not asserted"."""
     if isinstance(event, Sampled):
         gap = not fresh(ledger, now, limits)
         said = [getattr(event.sample, signal) for signal in UNLIKE]
@@ -285,7 +296,7 @@ def _unlike(
 
 
 def shifted(memory: DoorMemory, by: float, limits: DoorLimits) -> DoorMemory:
-    """Return the same memory with every time moved by so much, and old times cut off."""
+    """Return the same memory with every time moved by `by` seconds. Old times are cut off."""
     t, senses = limits.t, memory.senses
     return replace(
         memory,
@@ -320,12 +331,13 @@ def _shifted(ledger: Ledger, by: float, limits: DoorLimits) -> Ledger:
 
 
 def _at(at: Any, by: float, oldest_s: float = float("inf")) -> Any:
-    """Return a moved time, cut off where more age makes no difference; None stays None."""
+    """Return a time moved by `by`. Ages above `oldest_s` are cut to `oldest_s`, and None stays None."""
     return None if at is None else max(at + by, -oldest_s)
 
 
 def _held_since(at: float, by: float, limits: DoorLimits) -> float:
-    """Return the start of the hold; an old start is cut off by whole pulses."""
+    """Return the moved start of the hold. An old start is moved by whole pulses, to keep the pulses'
+    phase."""
     age_s, oldest_s = -(at + by), max(limits.t.travel_s, limits.t.open_timeout_s)
     if age_s <= oldest_s:
         return -age_s
@@ -333,7 +345,8 @@ def _held_since(at: float, by: float, limits: DoorLimits) -> float:
 
 
 def _settled(seen: Settled[Any] | None, by: float) -> Any:
-    """Return a settled contact without its time, and an unsettled contact with its time."""
+    """Return a contact. A settled contact loses its time, and an unsettled contact keeps its moved
+    time."""
     if seen is None:
         return None
     return Settled(
@@ -346,7 +359,8 @@ def _settled(seen: Settled[Any] | None, by: float) -> Any:
 
 
 def alike(world: World, limits: DoorLimits) -> World:
-    """Return the world in a form that is equal for states that cannot behave differently."""
+    """Return the world in a reduced form. Two worlds that cannot behave differently have the same
+    form."""
     return replace(
         world,
         memory=shifted(world.memory, 0.0, limits),

@@ -1,4 +1,7 @@
-"""The supervisor's core alone, for one door, in virtual time: tests give events and note messages."""
+"""The door supervisor's core for one door, without network, in virtual time.
+
+Tests give events to the core, and the core's messages are noted.
+"""
 
 from bridges.kinds.door_supervisor import core
 from bridges.kinds.door_supervisor.memory import DoorSupervisorLimits, SupervisedDoor
@@ -16,7 +19,7 @@ SECOND_NS = 10**9
 
 
 class Alone(alone.Alone[SupervisedDoor, Event, DoorSupervisorLimits, DoorHoldReport]):
-    """The core for one door. `faults` has (s, texts) for each change."""
+    """The core for one door. `faults` has (s, texts), with one entry for each change."""
 
     def __init__(self, limits: DoorSupervisorLimits | None = None, *, speaks: bool = True) -> None:
         self.faults: list[tuple[float, tuple[str, ...]]] = []
@@ -36,18 +39,19 @@ class Alone(alone.Alone[SupervisedDoor, Event, DoorSupervisorLimits, DoorHoldRep
             self.faults.append((round(self.now, 3), faults))
 
     def opens(self, who: str = "a", *, aged: float = 0.0) -> None:
-        """Let a requester's OPEN arrive, sent `aged` s ago by the requester's clock."""
+        """Let an OPEN arrive that is `aged` seconds old by the requester's clock."""
         self.hears(RequesterOpens(who, self.stamp(aged)))
 
     def closes(self, who: str = "a", *, aged: float = 0.0) -> None:
-        """Let a requester's CLOSE arrive, sent `aged` s ago by the requester's clock."""
+        """Let a CLOSE arrive that is `aged` seconds old by the requester's clock."""
         self.hears(RequesterCloses(who, self.stamp(aged)))
 
     def stamp(self, aged: float) -> int:
         return round(self.stamped(aged) * SECOND_NS)
 
     def shows(self, mode: str, until: float | None = None) -> None:
-        """Let a DoorState arrive; with `until`, one each second from now until then."""
+        """Let a DoorState arrive. With `until`, let a DoorState arrive each second from now until
+        then."""
         self.hears(DoorStateHeard(DoorModeValue[f"MODE_{mode}"]))
         while until is not None and self.now + 1.0 <= until:
             self.until(self.now + 1.0)

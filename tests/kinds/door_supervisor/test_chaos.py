@@ -1,7 +1,7 @@
-"""Robots at a door while messages are lost, late, doubled and reordered, and every party dies at times.
+"""Robots at a door while messages are lost, late, doubled and reordered, and while parties die.
 
-There must be no CLOSE while a robot is let in, and no flood of messages. Once the network is well again
-every robot must get through, and the door must close behind the last.
+The supervisor must send no CLOSE while a robot is let in, and must not flood the network. Once the
+network is well again, every robot must get through. The door must close behind the last robot.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,7 +33,7 @@ def late(random: Random) -> Sequence[float]:
 
 
 class Storm:
-    """The site, with a watch over our supervisor's messages."""
+    """The site in bad conditions. The storm watches each message of our supervisor."""
 
     def __init__(self, seed: int, fate: Fate, disk: Disk | None = None) -> None:
         self.random = Random(seed)
@@ -53,7 +53,7 @@ class Storm:
         self.wrong: list[tuple[float, tuple[str, ...]]] = []
 
     def rages(self) -> None:
-        """Kill a party every few seconds, and start it again after a while."""
+        """Kill a party every 2 s to 15 s, and start that party again."""
         while self.world.now < STORM_S:
             self.run(self.world.now + self.random.uniform(2.0, 15.0))
             match self.random.choice(("supervisor", "supervisor", "door", *ROBOTS)):
@@ -72,7 +72,7 @@ class Storm:
         self.run(self.world.now + CALM_S)
 
     def run(self, until: float) -> None:
-        """Run in small steps, to see which robots are let in and which leave."""
+        """Run in steps of 1/16 s, to note each robot that is let in or leaves."""
         while self.world.now < until:
             self.world.run(min(until, self.world.now + 0.0625))
 
@@ -88,7 +88,10 @@ class Storm:
             self.wrong.append((self.world.now, tuple(self.let_in)))
 
     def _look(self) -> None:
-        """Note the robots that are let in, or that an earlier heartbeat has misled."""
+        """Note each robot that is let in.
+
+        A robot without an entry in the table was misled by an earlier heartbeat.
+        """
         for who, walker in self.walkers.items():
             if not walker.passing:
                 self.let_in.discard(who)
@@ -101,7 +104,7 @@ class Storm:
 
 
 def rates(storm: Storm, topic: Any) -> list[float]:
-    """Return the gaps (s) between our supervisor's messages on this topic, across its restarts too."""
+    """Return the gaps (s) between our supervisor's messages on this topic, restarts included."""
     at = [when for when, who, said, _ in storm.world.sent if (who, said) == ("supervisor", topic)]
     return [b - a for a, b in pairwise(at)]
 
@@ -129,14 +132,15 @@ def test_no_door_closes_on_a_robot_and_no_robot_waits_for_ever(seed: int, fate: 
 
 
 class Forgetful(Disk):
-    """A table that is not on disk, so a restart loses it, as with RMF's own supervisor."""
+    """A table that is not on a disk. A restart loses the table, as in RMF's own supervisor."""
 
     def read(self) -> bytes | None:
         return None
 
 
 def test_the_test_notices_a_close_on_a_robot() -> None:
-    """Without the table on disk a restart closes the door on robots, and the watch notices."""
+    """Without the table on disk a restarted supervisor closes the door on robots. The watch must see
+    that."""
     wrong = 0
     for seed in range(4):
         storm = Storm(seed, lossy, Forgetful())

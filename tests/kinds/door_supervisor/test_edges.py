@@ -1,4 +1,4 @@
-"""Messages from RMF's graph and memory from the state directory: accepted, or refused with a reason."""
+"""The supervisor accepts or refuses RMF's messages and the table in its state directory."""
 
 import pytest
 

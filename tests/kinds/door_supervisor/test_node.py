@@ -1,4 +1,4 @@
-"""The door supervisor as the daemon runs it, on the memory transport, in virtual time."""
+"""The door supervisor's node as in its daemon, on the memory transport, in virtual time."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ HEARTBEAT = topics.DOOR_SUPERVISOR_HEARTBEAT
 
 
 class Graph:
-    """One network with our node; `heard` has (s, words) of all its messages."""
+    """One network with our node. `heard` has (s, words) for each message of the node."""
 
     def __init__(self) -> None:
         self.now = 0.0

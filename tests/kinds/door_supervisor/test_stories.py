@@ -1,4 +1,4 @@
-"""Whole stories: a door and its daemon, robots as RMF drives them, and the supervisor between."""
+"""Whole stories of a door with its daemon, robots with RMF's rules, and a supervisor between them."""
 
 from bridges.kinds.door_supervisor import keep
 from bridges.messages import definitions as d
@@ -18,7 +18,7 @@ A, B = "fleet/a", "fleet/b"
 
 
 class Site:
-    """One door, robots with these plans, and a supervisor: ours with its disk, or RMF's."""
+    """One door and robots with these plans. The supervisor is ours with its disk, or RMF's."""
 
     def __init__(
         self, *plans: list[tuple[float, float]], theirs: bool = False, **changes: object
@@ -35,7 +35,7 @@ class Site:
         ]
 
     def restarts(self, after_s: float = 0.0) -> None:
-        """Kill our supervisor and start it again after a while."""
+        """Kill our supervisor, and start it again `after_s` seconds later."""
         self.ours.leave()
         self.world.run(self.world.now + after_s)
         self.ours.restart()
@@ -277,7 +277,8 @@ def test_a_door_that_falls_silent_is_forgotten() -> None:
 
 
 def doorway(*, rival: bool = False, quiet_s: float = 3.0) -> Site:
-    """Let the door's node and our supervisor die while a silent robot stands in the doorway."""
+    """Return a site in which the door's node and our supervisor died while a silent robot was in the
+    door."""
     site = Site([(10.0, 60.0)], quiet_start_s=quiet_s)
     site.world.run(25.0)
     assert site.walkers[0].passing

@@ -1,9 +1,9 @@
-"""All histories to a depth, and drawn ones, checked by the rules in other words.
+"""All histories to a depth, and drawn ones, checked by rules that do not use the core's code.
 
-The first walk has all 4^7 = 16384 histories of seven steps, 0.75 s apart: two requesters open and
-close, with stamps in order. The second walk has all 6^5 = 7776 histories of late requests, states and
-permissions to publish. `make test` leaves out the last two steps of the first walk and the last step of
-the second.
+The first walk has all 4^7 = 16384 histories of seven steps, 0.75 s apart. In these histories two
+requesters open and close, with stamps in order. The second walk has all 6^5 = 7776 histories of late
+requests, states and permissions to publish. `make test` leaves out the last two steps of the first walk
+and the last step of the second walk.
 """
 
 from collections.abc import Callable
@@ -30,7 +30,7 @@ STEP_S = 0.75
 
 
 class Ledger:
-    """The table by RMF's rules for requests in order, with the rules for each message."""
+    """The table of holders by RMF's rules, if requests come in order. Each message is checked."""
 
     def __init__(self, *, speaks: bool) -> None:
         self.memory: SupervisedDoor = core.initial("ward", 0.0)
@@ -44,7 +44,7 @@ class Ledger:
         self.hears(MaySpeak(speaks))
 
     def copy(self) -> "Ledger":
-        """Return a copy with the same history, to continue in another way."""
+        """Return a copy with the same history. The copy can continue in another way."""
         made = copy(self)
         made.holders, made.newest, made.sent = set(self.holders), dict(self.newest), [*self.sent]
         return made
@@ -62,7 +62,8 @@ class Ledger:
         codes = [fault.code for fault in decided.report.faults]
         assert ("DOOR_HELD_OPEN" in codes) == bool(late)
         assert bool(decided.report.waits) == (bool(self.holders) and not self.speaks)
-        # A new holder's OPEN reaches the node soon: a message is due, or the last message was OPEN.
+        # A new holder's OPEN reaches the node soon. So a message is due now, or the last message was
+        # OPEN.
         if self.speaks and self.holders:
             assert self.memory.sent == OPEN or self.wake_at <= self.now + GAP_S
 
@@ -99,7 +100,7 @@ def stamp(now: float, aged: float = 0.0) -> int:
 
 
 def after(ledger: Ledger, event: Callable[[float], Any]) -> Ledger:
-    """Return a copy that has heard this event and let a step's time pass."""
+    """Return a copy that has heard this event, and let STEP_S pass."""
     ledger = ledger.copy()
     ledger.hears(event(ledger.now))
     ledger.until(ledger.now + STEP_S)
@@ -164,10 +165,10 @@ def told(history: list[tuple[float, Any]]) -> Ledger:
 
 
 def _would_be_believed(ledger: Ledger, event: Any) -> bool:
-    """Would this old request be accepted?
+    """Would the core accept this old request?
 
-    An old stamp long after the last request means that a clock was set back or the requester was
-    forgotten; test_core has stories of both.
+    An old stamp counts again long after the requester's last request. By then the requester's clock was
+    set back, or the core has forgotten the requester. test_core has stories of both cases.
     """
     if not isinstance(event, RequesterOpens | RequesterCloses) or event.stamp >= ledger.newest.get(
         event.requester, 0

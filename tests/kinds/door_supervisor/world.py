@@ -1,6 +1,6 @@
-"""A corridor in virtual time: a door with its daemon's core, robots of RMF, and a door supervisor.
+"""A corridor in virtual time: a door with its daemon's core, RMF's robots, and a door supervisor.
 
-The supervisor is ours as it is served, or the stand-in for RMF's supervisor.
+The supervisor is our supervisor as in its daemon, or a stand-in for RMF's supervisor.
 """
 
 from collections.abc import Iterable
@@ -22,7 +22,7 @@ WARD = "ward"
 
 
 def holds(disk: Disk, who: str) -> bool:
-    """Would a supervisor that starts now know that this requester holds the door?"""
+    """Does the table on this disk say that the requester holds the door?"""
     found = keep.restore(disk.kept, DoorSupervisorSettings(), 0.0) if disk.kept else {}
     return WARD in found and found[WARD].holder(who) is not None
 
@@ -46,7 +46,7 @@ class RmfsSupervisor(StandIn):
 
 
 def to_door(world: World) -> list[tuple[float, str, str]]:
-    """Return every message on door_requests: (s, sender, OPEN or CLOSED)."""
+    """Return every message on door_requests as (s, sender, OPEN or CLOSED)."""
     return [
         (at, who, d.DoorModeValue(request.requested_mode.value).name[5:])
         for at, who, request in world.said_on(topics.DOOR_REQUESTS)
@@ -54,7 +54,10 @@ def to_door(world: World) -> list[tuple[float, str, str]]:
 
 
 class DoorDaemon:
-    """A door's daemon: it scans, obeys door_requests, and publishes its state at 1 Hz and on change."""
+    """A door's daemon, which scans and obeys door_requests.
+
+    The daemon publishes the door's state at 1 Hz and on change.
+    """
 
     def __init__(self, world: World, name: str = WARD, **changes: Any) -> None:
         self.name = name
@@ -66,7 +69,7 @@ class DoorDaemon:
         world.add(self, topics.DOOR_REQUESTS)
 
     def hear(self, topic: topics.Topic[Any], message: Any) -> None:
-        """Take a request for this door or for another door."""
+        """Take a request, which may be for another door."""
         if message.door_name == self.name:
             self.door.now = self.world.now
             self.door.scan(door_messages.accept(message, self.door.settings))
@@ -83,7 +86,7 @@ class DoorDaemon:
         return min(self.door.now + SCAN_S, self.door.wake_at)
 
     def restart(self) -> None:
-        """Restart the daemon: outputs off, nothing remembered."""
+        """Restart the daemon. Its outputs are off, and it remembers nothing."""
         self.door.now = self.world.now
         self.door.restart()
 
@@ -99,8 +102,9 @@ class DoorDaemon:
 class Walker:
     """A fleet adapter and its robot, which goes through the door again and again.
 
-    `log` has (s, event). `passing`: the robot has been let in and has not sent CLOSE yet. `skew`: how
-    far the adapter's clock is ahead (s).
+    - `log` has (s, event).
+    - `passing` says that the robot has been let in and has not sent CLOSE yet.
+    - `skew` is how far the adapter's clock is ahead (s).
     """
 
     def __init__(
@@ -120,22 +124,23 @@ class Walker:
         world.add(self, *RobotContext.subscribes)
 
     def hear(self, topic: topics.Topic[Any], message: Any) -> None:
-        """Apply the robot's own rules, then begin the next step of its day if it is due."""
+        """Apply the robot's own rules to a message, then begin the robot's next step if the step is
+        due."""
         say(self.world, self.name, self.robot.hear(message, self.world.now + self.skew))
         self._go_on()
 
     def wake(self) -> None:
-        """Run the robot's timers, and the next step of its day if it is due."""
+        """Run the robot's timers, and begin the robot's next step if the step is due."""
         if self.world.now >= self.robot.wake_at() - self.skew:
             say(self.world, self.name, self.robot.tick(self.world.now + self.skew))
         self._go_on()
 
     def wake_at(self) -> float:
-        """Return the time of the next repeat or of the robot's next step."""
+        """Return the time of the next repeat or of the robot's next step (s)."""
         return min(self.robot.wake_at() - self.skew, self._next_at)
 
     def restart(self) -> None:
-        """Restart the fleet adapter, which then knows of no door."""
+        """Restart the fleet adapter, which forgets the door."""
         self.robot, self.passing = RobotContext(self.name), False
         self._note("restarted")
         self._plan_next()

@@ -1,4 +1,4 @@
-"""The lift's core alone: tests give one event after the other, at chosen times."""
+"""The lift's core without driver or network. Tests give events to the core at chosen times."""
 
 from typing import Any
 
@@ -33,7 +33,7 @@ ASKED = LiftRequested("A", True, "L1")
 
 
 class Alone:
-    """A core alone, which gets one event after the other; `decision` is the last decision."""
+    """A core that gets its events from the test. `decision` is its last decision."""
 
     def __init__(
         self, debounce: dict[str, float] | None = None, by_call: bool = False, **limits: Any

@@ -1,4 +1,4 @@
-"""Rules for every decision of the lift's core, whatever happened before.
+"""Rules for every decision of the lift's core, in any history.
 
 The rules compare the event, the inputs and the outputs with the core's memory.
 """
@@ -29,7 +29,7 @@ HINDER_NOBODY = {"FORGOTTEN_BY_SUPERVISOR", "RELAY_RESTS"}
 
 
 def check(step: Step) -> None:
-    """Check every rule; the AssertionError shows the broken rule."""
+    """Check every rule. An AssertionError names the broken rule in its traceback."""
     outputs_make_sense(step)
     nothing_is_driven_when_forbidden(step)
     sessions_end_by_end_alone(step)
@@ -39,10 +39,11 @@ def check(step: Step) -> None:
 
 
 def outputs_make_sense(step: Step) -> None:
-    """Require sensible outputs: calls and door commands exclude each other.
+    """Require that no landing is called while a door is held.
 
-    Both need AGV mode, a session and the right place. A call that is to bring AGV mode needs no AGV
-    mode, and may be for the car's own landing.
+    A call and a held door both need AGV mode, a session and the right floor. On a lift whose AGV mode
+    is brought by a call, that call needs no AGV mode. That call may also be for the landing where the
+    car is.
     """
     driven, memory, sample = step.decision.outputs, step.decision.memory, step.world.sample
     session, grace = memory.session, memory.grace
@@ -70,7 +71,10 @@ def outputs_make_sense(step: Step) -> None:
 
 
 def nothing_is_driven_when_forbidden(step: Step) -> None:
-    """Require all outputs off, at once, under a hazard, another node, blindness or HUMAN mode."""
+    """Require all outputs off, at once, in four cases.
+
+    The cases are a hazard, another node of this name, no fresh reading, and HUMAN mode.
+    """
     memory, now = step.decision.memory, step.now
     session = memory.session
     forbidden = (
@@ -86,11 +90,12 @@ def nothing_is_driven_when_forbidden(step: Step) -> None:
 
 
 def sessions_end_by_end_alone(step: Step) -> None:
-    """Require sessions to begin and end only as permitted.
+    """Require sessions to begin and end only as the rules permit.
 
-    A request begins a session of a free lift. The holder's END ends it, and so does the silence of a
-    robot after its supervisor's END; nothing else does. In the grace a robot that may be in the car
-    gets the lift back, and no other session gets it.
+    A request begins a session of a free lift. The holder's END ends the session. The silence of a robot
+    after its supervisor's END also ends the session. No other event ends it.
+
+    In the grace a robot that may be in the car gets the lift back. No other session gets the lift then.
     """
     before, after, event = _id(step.before), _id(step.decision.memory), step.event
     if before and _fell_silent(step):
@@ -124,7 +129,7 @@ def _is_asked_for(event: object, session: str) -> bool:
 
 
 def _fell_silent(step: Step) -> bool:
-    """Has the robot been silent for five seconds after the supervisor ended its session?"""
+    """Has the robot been silent for five seconds after the supervisor's END for its session?"""
     session = step.before.session
     assert session is not None
     disowned = session.forgotten is not None and session.forgotten.disowned
@@ -134,8 +139,8 @@ def _fell_silent(step: Step) -> bool:
 def _is_its_end(step: Step, event: object) -> bool:
     """Is the event an END that counts?
 
-    Such an END comes from a person, from the robot's own adapter where that is permitted, or from the
-    supervisor unless the robot goes on asking.
+    An END of a person counts. An END of the robot's own adapter counts where that is permitted. An END
+    of the supervisor counts if the robot has stopped asking.
     """
     session = step.before.session
     assert session is not None
@@ -155,7 +160,10 @@ def _is_its_end(step: Step, event: object) -> bool:
 
 
 def open_is_the_truth(step: Step) -> None:
-    """Require, for OPEN, an open door of a standing car at a known floor; to board, a healthy lift."""
+    """Require an open door of a standing car at a known floor whenever OPEN is shown.
+
+    A robot may board only a healthy lift.
+    """
     shown: LiftReport = step.decision.report
     if shown.door is not LiftDoor.DOOR_OPEN:
         return
@@ -181,8 +189,8 @@ def open_is_the_truth(step: Step) -> None:
 def a_request_that_waits_has_a_reason(step: Step) -> None:
     """Require a reason for each waiting request.
 
-    A request waits while it has the session and the lift does not show OPEN at the floor that was
-    requested last. A wait for a worn relay is a fault as well.
+    A request waits while it has the session and the lift does not show OPEN at the requested floor. A
+    worn relay that must rest is also shown as a fault.
     """
     shown, session = step.decision.report, step.decision.memory.session
     event = step.event
@@ -215,7 +223,8 @@ def _worn(channel: Any, step: Step) -> bool:
 
 
 def nothing_changes_before_wake_at(world: World, limits: LiftLimits) -> None:
-    """Require scans of unchanged inputs between now and `wake_at` to decide nothing new."""
+    """Require scans before `wake_at` to change neither outputs nor report if the inputs stay the
+    same."""
     now = _scan(world, world.memory, 0.0, limits)
     until = min(now.wake_at, 1e4)
     later = _scan(world, now.memory, until * (1.0 - 1e-6), limits)
@@ -232,7 +241,7 @@ def _scan(world: World, memory: LiftMemory, now: float, limits: LiftLimits) -> A
 
 
 def _sampled(step: Step) -> bool:
-    """Has the core just seen the world's inputs, and do they count at once?"""
+    """Is this step a reading that counts at once, without debounce?"""
     read = step.world.readable and not isinstance(step.event, IoFailed)
     return step.exact and (read or isinstance(step.event, Sampled))
 

@@ -1,4 +1,4 @@
-"""RMF around one lift: stand-ins for its supervisor and its fleet adapters talk to the real node."""
+"""RMF around one lift. Stand-ins for its supervisor and its fleet adapters talk to the real node."""
 
 from collections.abc import Callable, Sequence
 
@@ -14,15 +14,18 @@ from workbench.rmf_model.supervisors import LiftSupervisor
 STEP_S = 0.25
 
 REPLAYED = 100
-"""The number of old requests that a transient-local publisher gives to a new subscriber."""
+"""The number of old requests that a new subscriber gets from a transient-local publisher."""
 
 
 class World:
-    """The lift's node and RMF's parties.
+    """The lift's node, RMF's supervisor and fleet adapters.
 
-    `fate` gives the delays (s) of a LiftRequest to the node: an empty list loses the request, two
-    delays double it. `hears`: does RMF get this LiftState? By default all messages arrive at once and
-    in order. With `adapters_first` the robots hear each state before the supervisor.
+    - `fate` gives the delays (s) of a LiftRequest to the node. An empty list loses the request, and two
+      delays double it.
+    - `hears` decides whether RMF gets a LiftState.
+    - `adapters_first` lets the robots hear each state before the supervisor.
+
+    By default all messages arrive at once and in order.
     """
 
     def __init__(self, story: Story, *robots: RobotContext, adapters_first: bool = False) -> None:
@@ -38,7 +41,7 @@ class World:
         story.hear = self._hear
 
     def run(self, until: float) -> None:
-        """Let time pass, and deliver late requests."""
+        """Let time pass, and deliver delayed requests."""
         while self.story.now < until:
             self.story.run(min(until, self.story.now + STEP_S))
             arrived = [r for at, r in self._flying if at <= self.story.now]
@@ -77,7 +80,7 @@ class World:
     def restart_supervisor(self, first: RobotContext | None = None) -> None:
         """Start a new supervisor, which gets the adapters' retained requests.
 
-        The requests of `first` come before those of the other adapters.
+        The retained requests of `first` arrive before the requests of the other adapters.
         """
         self.supervisor = LiftSupervisor()
         who = first.requester_id if first else ""
@@ -87,7 +90,8 @@ class World:
         self._arrive()
 
     def finds_again(self, robot: RobotContext, apart_s: float = 0.02) -> None:
-        """Let the supervisor find a cut-off adapter again, and hear its retained requests."""
+        """Let the supervisor find an adapter that was cut off, and hear the adapter's retained
+        requests."""
         for request in self.asked_by(robot):
             self._deliver(self.supervisor.hear(request, self._now))
             self._arrive()

@@ -1,7 +1,7 @@
-"""A lift in virtual time: the real node and core, and behind the driver a building that tests control.
+"""A lift in virtual time: the real node and core, and a building that tests control.
 
-Scans come each `scan_s`, at every `wake_at` and with every request, as in the daemon's loop. Histories
-are lists of (s, event), so a test can compare a whole history with ==.
+The node scans every `scan_s`, at every `wake_at` and with every request, as the daemon's loop does.
+Histories are lists of (s, event), so a test can compare a whole history with ==.
 """
 
 import math
@@ -50,14 +50,14 @@ AGV, HUMAN, END = (
 OUTPUTS = ("agv_request", "call", "hold_door")
 
 STANDING = LiftSample("L1", DoorReading.CLOSED, motion=Motion.STOPPED, agv=False)
-"""The car at L1, closed, without a session."""
+"""The reading of a car that stands at L1 with its door closed and without a session."""
 
 
 class Building:
-    """A passive lift, set by the test (`drivers.Driver[LiftSample, LiftOutputs]`).
+    """A passive lift, whose inputs the test sets (`drivers.Driver[LiftSample, LiftOutputs]`).
 
     `edges` has (s, output, value). `unreadable` and `unwritable` are the reasons why reading or writing
-    fails.
+    fails, or "".
     """
 
     def __init__(self, sample: LiftSample = STANDING) -> None:
@@ -118,7 +118,8 @@ def _of(outputs: LiftOutputs, name: str) -> Any:
 class Controller(Building):
     """A lift that works: it grants AGV mode, goes to called floors, and opens while its door is held.
 
-    A floor takes `FLOOR_S`, with no floor shown in the middle; the door takes `DOOR_S`.
+    A ride of one floor takes `FLOOR_S`, and in the middle of the ride no floor is shown. Opening or
+    closing takes `DOOR_S`.
     """
 
     AGV_S, FLOOR_S, DOOR_S = 0.5, 2.0, 1.0
@@ -187,9 +188,10 @@ def words(state: LiftState) -> str:
 
 
 class Story:
-    """One lift in service. `told` has every LiftState that RMF heard, as (s, LiftState).
+    """One lift in service.
 
-    `hear` is called with each state; messages that it puts into `incoming` arrive at once.
+    `told` has (s, LiftState) for every state that RMF heard. `hear` is called with each state. Messages
+    that `hear` puts into `incoming` arrive at once.
     """
 
     def __init__(
@@ -218,7 +220,7 @@ class Story:
         self.limits = LiftLimits.of(self.settings, DEBOUNCE if debounce is None else debounce)
         self.now = 0.0
         self.wall_step_s = 0.0
-        self.deaf = False  # if True, nothing can be sent
+        self.deaf = False  # if True, sending fails
         self.told: list[tuple[float, LiftState]] = []
         self.alarms: list[tuple[float, Message]] = []
         self.hear: Callable[[LiftState], None] = lambda state: None
@@ -231,7 +233,7 @@ class Story:
     # ---- events
 
     def restart(self) -> None:
-        """Start a new daemon on the same lift; it remembers nothing."""
+        """Start a new daemon on the same lift. The new daemon remembers nothing."""
         clock = Clock(lambda: self.now, lambda: WALL + self.now + self.wall_step_s)
         self.node = Node(
             "Lift1", self._kind, self.settings, self.limits, self.building, self._publish, clock
@@ -241,7 +243,7 @@ class Story:
         self._scan()
 
     def run(self, until: float) -> None:
-        """Scan from now until then."""
+        """Scan from now until the time `until`."""
         while self.now < until:
             due = min(self._scans * self._scan_s, max(self.node.wake_at, self.now + LEAST_GAP_S))
             while due == self._scans * self._scan_s:
@@ -251,7 +253,7 @@ class Story:
                 self._scan()
 
     def until(self, what: Callable[[], object], within: float = 60.0) -> float:
-        """Scan until the condition holds; return that time (s)."""
+        """Scan until the condition holds, and return that time (s)."""
         end = self.now + within
         while not what():
             assert self.now < end, f"not within {within} s: {self.state}"
@@ -259,12 +261,12 @@ class Story:
         return round(self.now, 2)
 
     def asks(self, session: str, floor: str, mode: LiftRequestType = AGV) -> None:
-        """Let a request arrive as fleet adapters and rmf-web send it."""
+        """Let a request arrive in the form that fleet adapters and rmf-web send."""
         self.request(LiftRequest("Lift1", session_id=session, request_type=int(mode),
                                  destination_floor=floor, door_state=2))  # fmt: skip
 
     def ends(self, session: str) -> None:
-        """Let END_SESSION arrive as fleet adapters send it: no floor, door 0."""
+        """Let END_SESSION arrive in the form that fleet adapters send: no floor, and door 0."""
         self.request(LiftRequest("Lift1", session_id=session, request_type=int(END)))
 
     def request(self, *requests: LiftRequest) -> None:

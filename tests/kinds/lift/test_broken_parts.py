@@ -1,7 +1,7 @@
-"""Each wire and each part of the lift, broken in turn, under RMF: node, driver, wires and plant.
+"""Each wire and each part of the lift breaks in turn while RMF rides: node, driver, wires and plant.
 
-While a part is broken a robot may wait for ever, but OPEN is shown only of a truly open door. After the
-repair, and after the robot has given up, the next ride completes.
+While a part is broken a robot may wait for ever, but OPEN is shown only if the door is truly open.
+After the repair the robot gives up, and the next ride completes.
 """
 
 from dataclasses import dataclass
@@ -19,12 +19,13 @@ from tests.kinds.lift.wired import WiredStory, shipped
 from workbench.rmf_model.robot import RobotContext
 
 LATE_S = 0.3
-"""The permitted age of a state: debounce, a scan, and the least gap between states."""
+"""The greatest permitted age of a state (s): the debounce, a scan, and the least gap between states."""
 
 WIRES = [w.signal for w in wires(shipped())]
 WIRE_FAILURES: list[FailureMode] = ["off", "stuck", "wrong"]
 LIES = {("door", "wrong")}
-"""A contact that says open while the door is closed; no second contact contradicts it."""
+"""The failures that may show a false OPEN: the contact says open, and no second contact contradicts
+it."""
 
 BREAKS = [(w, mode) for w in WIRES for mode in WIRE_FAILURES if (w, mode) not in LIES]
 BREAKS += [(p, m) for p, modes in FAILS.items() for m in modes if p != "rear_door_operator"]
@@ -32,7 +33,7 @@ BREAKS += [(p, m) for p, modes in FAILS.items() for m in modes if p != "rear_doo
 
 @dataclass
 class Witness:
-    """Looks at the real car at each state, and remembers where the car stood open."""
+    """A witness that looks at the real car at each state, and remembers where the car stood open."""
 
     story: WiredStory
     open_at: str | None = None
@@ -51,7 +52,8 @@ class Witness:
 
 
 def ride(broken: str, mode: FailureMode, broken_at: float) -> WiredStory:
-    """Play a ride on a lift that breaks; after the repair the robot gives up and another rides."""
+    """Play a ride on a lift that breaks. After the repair the robot gives up, and another robot
+    rides."""
     story = WiredStory(scan_s=0.1, agv_timeout_s=5, floor_timeout_s=10, door_timeout_s=5)
     robot, other = RobotContext("fleet/a"), RobotContext("fleet/b")
     rmf = World(story, robot, other)

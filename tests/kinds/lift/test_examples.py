@@ -1,4 +1,4 @@
-"""A robot's ride on every lift of `config/`: the driven outputs, and the states that RMF hears."""
+"""A robot's ride on every lift of `config/`, with the driven outputs and the states for RMF."""
 
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ A = "fleet/a"
 
 
 def in_service(name: str) -> Story:
-    """Return the lift of an example, in service."""
+    """Return the lift of an example in `config/`, in service."""
     settings: Any = load(CONFIG / name).devices["Lift1"]
     if isinstance(settings, dry_contact.DryContactLiftSettings):
         return WiredStory(settings)
@@ -34,7 +34,7 @@ def in_service(name: str) -> Story:
 
 
 def told(story: Story) -> list[str]:
-    """Return the states that RMF heard, without those between floors."""
+    """Return the states that RMF heard. States between two floors are left out."""
     return [words for _, words in story.states if "moving" not in words and "at ?" not in words]
 
 
@@ -69,7 +69,7 @@ def test_a_robot_rides_from_l1_to_l3_and_lets_go(name: str) -> None:
 
 
 def driven(story: Story) -> dict[str, bool]:
-    """Return the last value of each relay, as the lift has it."""
+    """Return the last value of each relay at the lift."""
     plant = story.building.plant  # type: ignore[attr-defined]
     return {edge.signal: bool(edge.value) for edge in plant.edges if edge.what == "relay"}
 

@@ -1,7 +1,7 @@
-"""LIFT-2: a supervisor that has forgotten the robot in the car, by RMF's rules and rule by rule.
+"""LIFT-2: a supervisor has forgotten the robot in the car, by RMF's rules and rule by rule.
 
-rmf_ros2, lift_supervisor/Node.cpp: there is one slot for each lift. The first session that is heard
-takes the slot; requests of any other session, END too, are dropped.
+RMF's supervisor (rmf_ros2, lift_supervisor/Node.cpp) has one slot for each lift. The first session that
+asks takes the slot. The supervisor drops all requests of other sessions, even END.
 """
 
 from collections.abc import Sequence
@@ -83,7 +83,7 @@ def test_an_end_that_was_lost_while_another_robot_waits_is_heard_from_its_adapte
 
 
 class Overheard:
-    """A lift that `A` holds, open at L2. `adapter` sends requests in A's name past the supervisor."""
+    """A lift that `A` holds, open at L2. `adapter` sends A's requests directly to the lift's node."""
 
     def __init__(self, building: Building | None = None) -> None:
         self.story = Story(building or Controller())
@@ -143,7 +143,7 @@ def test_an_end_counts_when_it_is_heard_twice_with_no_newer_request_between() ->
 
 
 def test_an_old_request_does_not_count_and_an_end_without_a_stamp_does() -> None:
-    """Jazzy's fleet adapter sends END without a stamp (RobotContext.cpp, _check_lift_state)."""
+    """Jazzy's fleet adapter sends an END without a stamp (RobotContext.cpp, _check_lift_state)."""
     lift = Overheard()
     lift.story.asks(B, "L1")
     lift.adapter(AGV, "L2")

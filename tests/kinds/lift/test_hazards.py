@@ -1,4 +1,4 @@
-"""Hazards and rivals that take the lift away from RMF, and how RMF gets the lift back."""
+"""Hazards and rival nodes take the lift away from RMF. After them RMF gets the lift back."""
 
 import pytest
 from msgspec.structs import replace
@@ -37,7 +37,8 @@ MODES = [
 
 
 def waiting(**options: object) -> Story:
-    """Return a story in which A waits outside at L1, where the car stands closed with its door held."""
+    """Return a story in which A waits outside at L1. The car stands there, closed, with its door
+    held."""
     story = Story(Building(CLOSED_AT_L1), door_timeout_s=600, **options)  # type: ignore[arg-type]
     story.run(1.0)
     story.asks("A", "L1")
@@ -47,7 +48,7 @@ def waiting(**options: object) -> Story:
 
 
 def inside(**options: object) -> Story:
-    """Return a story in which A may be inside at L1: the open door has been published."""
+    """Return a story in which A may be inside at L1, because RMF has heard of the open door."""
     story = Story(Building(OPEN_AT_L1), **options)  # type: ignore[arg-type]
     story.run(1.0)
     story.asks("A", "L1")
@@ -396,7 +397,7 @@ def test_a_code_blue_is_told_to_the_fleets_where_the_settings_say_so_until_an_op
     on, off = EmergencySignal((), True), EmergencySignal((), False)
     story.building.hazard(Hazard.CODE_BLUE)
     story.run(5.0)
-    story.building.hazard(Hazard.CODE_BLUE, Hazard.FIRE)  # one alarm, sent once
+    story.building.hazard(Hazard.CODE_BLUE, Hazard.FIRE)  # one alarm is sent, and only once
     story.run(8.0)
     story.building.hazard()
     story.run(20.0)
@@ -476,7 +477,7 @@ def test_a_latched_fire_stays_latched_while_nobody_can_see_whether_it_is_over(ov
     assert story.faults == ["FIRE_LATCHED", "INPUTS_NOT_FRESH"]
     story.building.unreadable = ""
     story.run(11.05)
-    story.resets()  # the inputs are read, but not settled yet
+    story.resets()  # the inputs are read, but not yet debounced
     story.run(20.0)
     assert story.faults == ["FIRE_LATCHED" if over else "FIRE"]
     assert story.alarms == [(2.1, Bool(True))]

@@ -1,4 +1,4 @@
-"""Relays that may never be on together, pauses between changes, and switching off without delay."""
+"""Relays that may never be on together, rests between changes, and switching off without delay."""
 
 import pytest
 from msgspec.structs import replace
@@ -18,7 +18,7 @@ def limits(**changes: float) -> LiftDurations:
 def driven(
     relays: Relays, wishes: list[tuple[float, LiftOutputs]], rules: LiftDurations
 ) -> list[str]:
-    """Return the outputs after each wish: `A` for AGV mode, the called floor, the held door."""
+    """Return the outputs after each wish: `A` for AGV mode, then the called floor or the held door."""
     shown = []
     for now, wish in wishes:
         relays = relays.step(wish, now, rules)
@@ -164,7 +164,7 @@ def test_a_door_that_is_only_open_for_its_own_dwell_time_is_not_offered(inside: 
         story.building.set(door=DoorReading.OPEN)
         story.until(lambda: story.state == "AGV, open at L1, A to L1")
         story.building.set(door=DoorReading.CLOSED)
-    for motion in (Motion.UP, Motion.STOPPED) * 2:  # a loose contact: the hold's relay must rest
+    for motion in (Motion.UP, Motion.STOPPED) * 2:  # a loose contact, so the relay must rest
         story.run(story.now + 1.0)
         story.building.set(motion=motion)
     story.run(8.0)

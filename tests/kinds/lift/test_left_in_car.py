@@ -1,7 +1,7 @@
-"""LIFT-2: RMF's supervisor ends a session while its robot is in the car, or a robot is left there.
+"""LIFT-2: RMF's supervisor ends a session while its robot is in the car, or a robot is left in the car.
 
-The first stories follow RMF's own rules. A starting supervisor sends END for the session that the lift
-shows, and takes the first session that it hears (rmf_ros2, lift_supervisor/Node.cpp). A starting fleet
+The first stories follow RMF's own rules (rmf_ros2, lift_supervisor/Node.cpp). A starting supervisor
+sends END for the session that the lift shows, and takes the first session that asks. A starting fleet
 adapter sends END for its robot's session (RobotContext.cpp, _check_lift_state).
 """
 
@@ -24,7 +24,7 @@ LEFT_S = 60.0
 def riding(
     jazzy: bool = False, adapters_first: bool = False
 ) -> tuple[World, RobotContext, RobotContext]:
-    """Return the world and its two robots: A rides from L2 to L4, B waits at L1."""
+    """Return the world and its two robots. A rides from L2 to L4, and B waits at L1."""
     a, b = RobotContext(A, jazzy), RobotContext(B, jazzy)
     rmf = world(a, b, adapters_first=adapters_first)
     rmf.supervisor = LiftSupervisor(jazzy)
@@ -44,7 +44,7 @@ def riding(
 def test_a_supervisor_that_restarts_and_ends_the_session_takes_no_lift_from_a_robot_in_the_car(
     jazzy: bool, adapters_first: bool, after_s: float
 ) -> None:
-    """This holds for any session that the supervisor takes then, and at any moment of the ride."""
+    """The robot keeps the lift at any moment of its ride, whichever session the supervisor takes."""
     rmf, a, b = riding(jazzy, adapters_first)
     rmf.run(rmf.story.now + after_s)
     edges = list(rmf.story.edges)
@@ -72,7 +72,8 @@ CALLED_AND_HELD = [("call", None), ("hold_door", "front")]
 
 
 class InMidRide(Overheard):
-    """A has been let in at L2 and rides to L4; A's adapter has just repeated the request."""
+    """A ride in which A was let in at L2 and now rides to L4. A's adapter has just repeated the
+    request."""
 
     def __init__(self) -> None:
         super().__init__()

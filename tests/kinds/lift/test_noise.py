@@ -1,4 +1,7 @@
-"""Jazzy's RMF repeats some messages at every start, handover and idle second: they give no warning."""
+"""Jazzy's RMF repeats some messages at every start, at every handover and in every idle second.
+
+The node must not warn about these repeats.
+"""
 
 import logging
 

@@ -1,4 +1,4 @@
-"""Any events in any order: the rules hold on a debounced lift, and RMF survives a storm."""
+"""The rules hold on a debounced lift for any events in any order, and RMF recovers from a storm."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ STORMS = settings(max_examples=examples(40))
 
 @dataclass
 class Judge:
-    """Checks every decision of a story; `open_seen_at` is when the contact last said open (s)."""
+    """A judge of every decision of a story. `open_seen_at` is when the contact last said open (s)."""
 
     building: Building
     open_seen_at: float = -1.0
@@ -45,7 +45,7 @@ class Judge:
 
 
 def judged(building: Building, **options: Any) -> tuple[Story, Judge]:
-    """Return a story, and the judge that checks its decisions."""
+    """Return a story, and the judge of its decisions."""
     judge = Judge(building)
     return Story(building, kind=replace(KIND, decide=judge.decide), **options), judge
 

@@ -1,4 +1,4 @@
-"""Requests of earlier rides that RMF's supervisor hears again, by RMF's rules and rule by rule."""
+"""RMF's supervisor hears requests of earlier rides again, by RMF's rules and rule by rule."""
 
 from collections.abc import Mapping
 
@@ -17,7 +17,8 @@ OPEN_FOR_A = "AGV, open at L2, fleet/a to L2"
 
 
 def on_its_threshold(rides_before: int) -> tuple[World, RobotContext]:
-    """Return a world whose robot enters the car at L3, after so many rides just before."""
+    """Return a world whose robot is entering the car at L3. The robot made `rides_before` rides just
+    before."""
     robot = RobotContext(A)
     rmf = world(robot)
     for _ in range(rides_before):
@@ -35,7 +36,7 @@ def on_its_threshold(rides_before: int) -> tuple[World, RobotContext]:
 def test_an_earlier_ride_that_rmf_hears_again_lets_no_door_go_while_a_robot_goes_in(
     rides_before: int,
 ) -> None:
-    """`make soak SEED=7 RMF=kilted` found this: an adapter was cut off for longer than a lease."""
+    """`make soak SEED=7 RMF=kilted` found this case: an adapter was cut off for longer than a lease."""
     rmf, robot = on_its_threshold(rides_before)
     before = list(rmf.story.edges)
     rmf.finds_again(robot)
@@ -60,7 +61,8 @@ def test_a_supervisor_that_restarts_and_hears_an_earlier_ride_lets_no_door_go_ei
 def test_a_robot_that_is_cut_off_before_it_gets_the_lift_is_as_safe_when_it_is_found_again() -> (
     None
 ):
-    """In `make soak SEED=7 RMF=kilted`, at 12.6 h, the robot was cut off before it got the lift."""
+    """`make soak SEED=7 RMF=kilted` found this case at 12.6 h: the robot was cut off before its
+    grant."""
     first, robot = RobotContext(B), RobotContext(A)
     rmf = world(first, robot)
     rmf.rides(robot, "L2", "L1")
@@ -82,9 +84,9 @@ def test_a_robot_that_is_cut_off_before_it_gets_the_lift_is_as_safe_when_it_is_f
 def test_an_earlier_ride_that_rmf_hears_again_shows_a_robot_no_door_that_was_let_go(
     after_s: float,
 ) -> None:
-    """A robot's next ride began where the last had ended, while RMF's real supervisor was dead.
+    """RMF's real supervisor was dead when a robot's next ride began where its last ride had ended.
 
-    The robot entered on the earlier ride's state, and the door closed.
+    The robot entered because of the state of the earlier ride, and then the door closed.
     """
     lift = Overheard(Building(LiftSample("L2", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)))
     assert lift.story.state == OPEN_FOR_A

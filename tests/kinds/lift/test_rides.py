@@ -1,4 +1,4 @@
-"""One robot's ride: the lift's actions and states, from the request to the end of the session."""
+"""One robot's ride, from the request to the end of the session: the lift's outputs and its states."""
 
 import pytest
 from msgspec.structs import replace

@@ -1,7 +1,7 @@
-"""The twelve defects of RMF's first dry-contact lift node, each with a story that the old node fails.
+"""The twelve defects of RMF's first lift node for dry contacts. The old node fails each story.
 
-The old node is sharp-rmf/low_level_lift 4425e25 (2020); the letters are ours. A test's name describes
-the behaviour of the old node.
+The old node is sharp-rmf/low_level_lift 4425e25 (2020), and the letters are ours. The name of a test
+describes the behaviour of the old node.
 """
 
 import logging
@@ -19,7 +19,7 @@ OPEN_AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
 
 
 def test_defect_a_a_request_for_another_lift_changed_this_ones_session_and_destination() -> None:
-    """Here the daemon's inbox sorts messages by name before a node sees them."""
+    """In this project the daemon's inbox sorts messages by name before a node gets them."""
     story = Story(Controller())
     story.run(1.0)
     story.asks("A", "L3")
@@ -55,7 +55,8 @@ def test_defect_c_a_call_that_timed_out_stayed_on() -> None:
 
 
 def test_defect_d_a_request_blocked_everything_until_the_car_had_come() -> None:
-    """Here a request takes no time: a hazard just after the request is obeyed in the next scan."""
+    """In this project a request takes no time. A hazard just after the request counts in the next
+    scan."""
     story = Story(Controller())
     story.run(1.0)
     story.asks("A", "L4")
@@ -114,7 +115,7 @@ def test_defect_h_no_code_read_as_the_lowest_floor_and_a_passing_code_as_another
 ) -> None:
     story = Story(Building(LiftSample(level, DoorReading.CLOSED, motion=Motion.UP, agv=True)))
     story.run(1.0)
-    story.building.set(level="L3")  # two bits of a floor code do not change at the same instant
+    story.building.set(level="L3")  # the two bits of a floor code change one after the other
     story._scan()
     story.run(1.05)
     story.building.set(level=level)

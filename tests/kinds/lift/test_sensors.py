@@ -1,4 +1,4 @@
-"""Trust in inputs that are broken, contradictory, glitching, stale, restless or moving."""
+"""The core's trust in inputs that are broken, contradictory, stale, restless or in motion."""
 
 import pytest
 from msgspec.structs import replace
@@ -30,7 +30,7 @@ OPEN_AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
 
 
 def boarding(**inputs: object) -> Story:
-    """Return a story in which A waits at L1 and the lift stands open; `inputs` change the reading."""
+    """Return a story in which A waits at L1 and the lift stands open. `inputs` changes the reading."""
     story = Story(Building(replace(OPEN_AT_L1, **inputs)))
     story.run(1.0)
     story.asks("A", "L1")
@@ -632,7 +632,8 @@ def test_a_new_fault_is_news_but_a_change_of_its_words_is_not() -> None:
 
 
 class FloorsInAgvMode(Controller):
-    """A lift whose floor code is valid only in AGV mode (`valid_when`), its motion lines always."""
+    """A lift whose floor code is valid only in AGV mode (`valid_when`). Its motion lines are always
+    valid."""
 
     def read(self) -> LiftSample:
         sample = super().read()

@@ -1,4 +1,5 @@
-"""The holder of the lift: grant, refresh, refusal, END and the grace after END."""
+"""The session that holds the lift: its grant, its refresh, refusals, its END and the grace after
+END."""
 
 from typing import Any
 
@@ -30,7 +31,7 @@ OPEN_AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
 
 
 def boarded() -> Story:
-    """Return a story in which a robot may be inside: its open door was published 3 s ago."""
+    """Return a story in which a robot may be inside, because OPEN was published 3 s ago."""
     story = Story(Building(OPEN_AT_L1))
     story.run(1.0)
     story.asks("A", "L1")

@@ -1,4 +1,4 @@
-"""The shipped wiring has no motion lines: debounce alone tells a glitch from a door's motion."""
+"""The shipped wiring has no motion lines. Only debounce separates a glitch from a moving door."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Events that do not come in time: AGV mode, the floor, the open door, RMF's next request, an I/O."""
+"""Events that are late: AGV mode, the floor, the open door, RMF's next request, and an I/O answer."""
 
 from itertools import pairwise
 
@@ -25,7 +25,8 @@ OFF = LiftOutputs()
 
 
 def lift(level: str, door: DoorReading, *, agv: bool, **limits: object) -> Story:
-    """Return a story with a standing car, scanned twice a second, and a request for L1 at 1 s."""
+    """Return a story with a standing car and a request for L1 at 1 s. The car is scanned twice a
+    second."""
     building = Building(LiftSample(level, door, motion=Motion.STOPPED, agv=agv))
     story = Story(building, scan_s=0.5, **limits)  # type: ignore[arg-type]
     story.run(1.0)
@@ -34,7 +35,7 @@ def lift(level: str, door: DoorReading, *, agv: bool, **limits: object) -> Story
 
 
 def keep_asking(story: Story, until: float) -> None:
-    """Repeat RMF's request until then."""
+    """Repeat RMF's request from now until the time `until`."""
     while story.now < until:
         story.asks("A", "L1")
         story.run(min(until, story.now + 5.0))
@@ -104,7 +105,7 @@ def test_a_latched_fault_ends_with_the_session() -> None:
 
 
 def test_a_latched_fault_ends_with_an_end_though_the_same_session_is_back_at_once() -> None:
-    """An operator ends the session, and the fleet adapter repeats its request within a second."""
+    """An operator ends the session, but the fleet adapter repeats its request within a second."""
     story = lift("L1", DoorReading.OPEN, agv=True, door_timeout_s=4.0)
     story.run(3.0)
     story.building.set(door=DoorReading.CLOSED)
@@ -135,7 +136,7 @@ def test_a_latched_fault_ends_with_an_operators_reset() -> None:
 
 def test_a_reset_during_a_retry_lets_the_request_wait_for_agv_mode_again() -> None:
     def history(reset_at: float) -> list[tuple[float, bool, list[str]]]:
-        """Return (s, AGV request, faults) at each change, scanned twice a second."""
+        """Return (s, AGV request, faults) for each change. The lift is scanned twice a second."""
         alone = Alone(agv_timeout_s=5.0)
         alone(0.0, replace(CLOSED, agv=False), ASKED)
         shown: list[tuple[float, bool, list[str]]] = []
@@ -211,7 +212,7 @@ def test_agv_mode_lost_with_the_robot_at_the_open_door_shows_the_true_door() -> 
 
 
 def test_the_call_stays_on_while_people_take_the_car_first() -> None:
-    """Without an AGV status line nothing keeps people from taking the car first."""
+    """Without an AGV status line people may take the car before the robot."""
     building = Building(LiftSample("L2", DoorReading.CLOSED, motion=Motion.STOPPED, agv=None))
     story = Story(building)
     story.run(1.0)

@@ -1,4 +1,4 @@
-"""All states within some steps of the start and of each stage of a ride, checked by the rules."""
+"""A check of the lift's rules in every state near the start and near each stage of a ride."""
 
 from math import inf
 
@@ -60,7 +60,7 @@ def test_each_stage_of_a_ride_is_what_its_name_says() -> None:
 
 
 def check_rules_around(*roots: World) -> int:
-    """Check every step and state; return the number of states."""
+    """Check every step and state, and return the number of states."""
     found = WALKER.walk(roots, DEPTH, check)
     for world in found:
         nothing_changes_before_wake_at(world, LIMITS)
@@ -78,7 +78,7 @@ def test_the_rules_hold_within_some_steps_of_each_stage_of_a_ride(root: str) -> 
 
 
 def mended_and_idle(world: World) -> World:
-    """Return the world mended and idle at L1, with all sessions ended and all latches reset."""
+    """Return the world after repairs: the car idle at L1, all sessions ended and all latches reset."""
     world = replace(world, sample=IDLE, readable=True, writable=True)
     world = WALKER.path(world, 6.0, "A ends", "B ends", "reset", 9.0, seen=check)
     assert world.memory.session is None

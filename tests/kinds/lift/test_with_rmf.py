@@ -1,4 +1,5 @@
-"""LIFT-1, LIFT-2: the node under RMF's lift supervisor and fleet adapters, with losses and restarts."""
+"""LIFT-1, LIFT-2: the node works with RMF's lift supervisor and fleet adapters, with losses and
+restarts."""
 
 import pytest
 
@@ -18,12 +19,12 @@ def world(*robots: RobotContext, adapters_first: bool = False) -> World:
 
 
 def ons(story: Story, output: str) -> int:
-    """Return how often an output was switched on."""
+    """Return the number of times that an output was switched on."""
     return sum(1 for _, name, value in story.edges if name == output and value)
 
 
 def sessions(story: Story) -> list[str]:
-    """Return the sessions that the lift has shown, one after the other; "" for none."""
+    """Return the sessions that the lift has shown, in order. "" stands for no session."""
     shown = [state.session_id for _, state in story.told]
     return [s for s, before in zip(shown, [None, *shown], strict=False) if s != before]
 
@@ -78,7 +79,7 @@ def test_a_robot_that_waits_is_served_after_the_one_that_rides(adapters_first: b
     assert sessions(rmf.story) == ["", A, "", B]
     granted_at = next(at for at, state in rmf.story.told if state.session_id == B)
     states_of_nobody = [s for at, s in rmf.story.told if released_at < at and not s.session_id]
-    assert granted_at - released_at < 5.0  # the next state, the grace of 3 s, the next request
+    assert granted_at - released_at < 5.0  # the next state, the grace of 3 s, and the next request
     assert len(states_of_nobody) <= 5
 
 

@@ -1,7 +1,7 @@
-"""All states that the lift's core can reach within some steps.
+"""A walk through all states that the lift's core can reach within some steps.
 
-A state has the core's memory, with every time relative to now, and the building around it. Ages beyond
-every limit are made equal, so that states that cannot behave differently count as one state.
+A state has the core's memory and the building. All times in a state are relative to now. Ages beyond
+every limit are made equal. So two states that cannot behave differently count as one state.
 """
 
 from collections.abc import Callable
@@ -32,13 +32,15 @@ from bridges.kinds.shared.freshness import Requester
 from tests.walk import Walker
 
 LONG_S = 55.0
-"""The longest gap between scans (s) if the core asks for no earlier scan; below `stale_after_s`."""
+"""The longest gap between two scans (s), if the core asks for no earlier scan. Less than
+`stale_after_s`."""
 
 
 def limits_of(
     debounce: dict[str, float] | None = None, agv_mode: Any = "requested", **changes: Any
 ) -> LiftLimits:
-    """Return the default limits with readings fresh for a minute, which saves scans of the walk."""
+    """Return the default limits, with readings that stay fresh for a minute. This saves scans of the
+    walk."""
     settings = LiftSettings(
         floors=["L1", "L2", "L3"],
         limits=LiftDurations(**{"stale_after_s": 60.0, **changes}),
@@ -50,7 +52,10 @@ def limits_of(
 
 
 class World(msgspec.Struct, frozen=True):
-    """Memory at time 0, and the building: its inputs, and can it be read, and written to?"""
+    """The core's memory at time 0, and the building with its inputs.
+
+    `readable` and `writable` say whether the building answers readings and obeys outputs.
+    """
 
     memory: LiftMemory
     sample: LiftSample
@@ -104,7 +109,7 @@ def _relays(world: World) -> tuple[World, Event]:
 
 
 def reading(world: World) -> Event:
-    """Return the reading of a scan."""
+    """Return the event of a scan: a reading, or a failure."""
     return Sampled(world.sample) if world.readable else IoFailed("timeout")
 
 
@@ -145,7 +150,8 @@ Seen = Callable[["Step"], None]
 
 
 class Step(msgspec.Struct, frozen=True):
-    """One decision at time `now` after the state began. `exact`: no input is debounced."""
+    """One decision at time `now`, in seconds after the state began. `exact` says that no input is
+    debounced."""
 
     before: LiftMemory
     event: Event
@@ -211,7 +217,7 @@ AGES = {
 
 
 def shifted(memory: LiftMemory, by: float) -> LiftMemory:
-    """Return the same memory with every time moved by so much, and old times cut off."""
+    """Return the same memory with every time moved by `by` seconds. Old times are cut off."""
     senses, session, grace = memory.senses, memory.session, memory.grace
     return replace(
         memory,
@@ -249,7 +255,8 @@ def shifted(memory: LiftMemory, by: float) -> LiftMemory:
 
 
 def _at(at: Any, by: float, kind: str = "") -> Any:
-    """Return a moved time, cut off at the greatest age of its `kind`, if any; None stays None."""
+    """Return a moved time. An age is cut to the greatest age in AGES for this `kind`. None stays
+    None."""
     if at is None:
         return None
     return max(round(at + by, 6), -AGES.get(kind, 1e9))
@@ -283,7 +290,8 @@ def _forgotten(forgotten: ForgottenSession, by: float) -> ForgottenSession:
 
 
 def _robot(robot: OwnWords, by: float) -> OwnWords:
-    """Return the robot's words with times moved; a robot that was never heard stays so."""
+    """Return the requests of the robot's adapter with moved times. A robot that was never heard stays
+    so."""
     heard = robot.asked_at > AGES_AGO
     asked_at = max(_at(robot.asked_at, by), -7.0) if heard else AGES_AGO
     ended_at = round(robot.ended_at + by, 6)
@@ -311,7 +319,7 @@ def _channel(channel: Channel[Any], by: float) -> Any:
 
 
 def key(world: World) -> tuple[Any, ...]:
-    """Return a key that is equal for states that cannot behave differently."""
+    """Return a key. Two worlds that cannot behave differently have the same key."""
     memory, senses = world.memory, world.memory.senses
     hazards = tuple(senses.hazards.get(h) for h in Hazard)
     return (

@@ -1,4 +1,4 @@
-"""The whole lift except its pins: node, driver, wires and plant, in virtual time."""
+"""A lift without real pins, in virtual time: node, driver, simulated wires and plant."""
 
 from pathlib import Path
 from typing import Any, cast
@@ -46,7 +46,7 @@ class Driven(Building):
 
 
 class WiredBuilding(Driven):
-    """A building that is the plant at the far ends of the wires."""
+    """A building whose plant is connected by single wires."""
 
     def __init__(self, settings: DryContactLiftSettings) -> None:
         super().__init__()
@@ -61,7 +61,7 @@ class WiredBuilding(Driven):
 
 
 class GatewayBuilding(Driven):
-    """A building that is the plant behind a gateway's registers."""
+    """A building whose plant is behind the registers of a gateway."""
 
     def __init__(self, settings: register.RegisterLiftSettings) -> None:
         super().__init__()
@@ -71,7 +71,7 @@ class GatewayBuilding(Driven):
 
 
 class WiredStory(Story):
-    """A lift in service, by default the shipped lift."""
+    """A wired lift in service, by default the example in `config/`."""
 
     building: WiredBuilding
 
@@ -91,5 +91,5 @@ class WiredStory(Story):
         self.building.plant.fail(part, mode)
 
     def press(self, what: str, asserted: bool) -> None:
-        """Let somebody in the building press a signal or let it go."""
+        """Let somebody in the building assert a signal, or release it."""
         self.building.plant.press(what, asserted, self.now)

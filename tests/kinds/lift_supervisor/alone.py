@@ -1,4 +1,7 @@
-"""The supervisor's core alone, for one lift, in virtual time: tests give events and note messages."""
+"""The lift supervisor's core for one lift, without network, in virtual time.
+
+Tests give events to the core, and the core's messages are noted.
+"""
 
 from bridges.kinds.lift_supervisor import core
 from bridges.kinds.lift_supervisor.memory import LiftSupervisorLimits, SupervisedLift
@@ -37,13 +40,13 @@ class Alone(alone.Alone[SupervisedLift, Event, LiftSupervisorLimits, SupervisorR
         return words(message)
 
     def asks(self, session: str, floor: str = "L3", *, kind: int = 1, aged: float = 0.0) -> None:
-        """Let an adapter's request arrive, sent `aged` s ago by the adapter's clock."""
+        """Let an adapter's request arrive that is `aged` seconds old by the adapter's clock."""
         stamp = self.stamped(aged)
         door = 2 if kind == 1 else 0
         self.hears(RideRequested(session, Target(kind, floor, door), stamp, self.now - stamp))
 
     def ends(self, session: str, *, aged: float = 0.0) -> None:
-        """Let an adapter's END arrive, sent `aged` s ago by the adapter's clock."""
+        """Let an adapter's END arrive that is `aged` seconds old by the adapter's clock."""
         stamp = self.stamped(aged)
         self.hears(RideEnded(session, stamp, self.now - stamp))
 
@@ -62,7 +65,7 @@ class Alone(alone.Alone[SupervisedLift, Event, LiftSupervisorLimits, SupervisorR
         self.hears(LiftStateHeard(session, floor, to, door, MODES[mode], floors))
 
     def ride(self, session: str = "a") -> None:
-        """Show the lift open at L3 for this session, so that nothing is left to ask for."""
+        """Show the lift open at L3 for this session. After that the supervisor has nothing to ask."""
         self.shows(session, "L3", to="L3", open=True)
 
     @property

@@ -1,4 +1,4 @@
-"""The lift supervisor's rules, a sentence each, with all messages to the lift's node."""
+"""The lift supervisor's rules one by one, each with all its messages to the lift's node."""
 
 import math
 
@@ -184,7 +184,7 @@ def test_nobody_else_is_served_before_a_state_after_the_end_shows_that_it_was_ob
     desk = Alone()
     desk.asks("a")
     desk.asks("b", "L1")
-    desk.shows("", "L2")  # a state from before the grant
+    desk.shows("", "L2")  # an old state, sent before the grant
     desk.ends("a")
     desk.until(0.1)
     for second in range(1, 4):
@@ -207,7 +207,7 @@ def test_a_state_from_before_the_end_was_sent_confirms_nothing() -> None:
     desk = Alone()
     desk.asks("a")
     desk.until(0.05)
-    desk.ends("a")  # the END waits for its turn on the wire
+    desk.ends("a")  # the END must wait, because a message was just sent
     desk.shows("", "L1")
     desk.asks("b")
     assert desk.report.holder == "a"
@@ -234,7 +234,8 @@ def test_an_end_from_a_robot_that_neither_has_nor_wants_the_lift_is_ignored() ->
 
 
 def test_an_end_of_the_session_that_the_lift_shows_is_passed_on_whoever_waits() -> None:
-    """A session was granted without this supervisor; its robot or an operator ends it."""
+    """The lift granted the session without this supervisor. The robot or an operator now ends the
+    session."""
     desk = Alone()
     desk.asks("b")
     desk.shows("a", "L2")
@@ -326,7 +327,7 @@ def test_a_robot_that_waits_in_silence_for_10_s_leaves_the_queue_and_comes_back_
 
 
 def test_requesters_may_be_silent_while_the_lift_is_silent() -> None:
-    """Fleet adapters repeat their requests at a lift's states, and at nothing else."""
+    """Fleet adapters repeat a request only when a state of the lift arrives."""
     desk = Alone(LiftSupervisorLimits(holder_ttl_s=70.0))
     desk.asks("a")
     desk.asks("b")
@@ -588,7 +589,7 @@ def test_a_lift_that_does_not_take_the_holder_or_does_not_release_it_raises_an_a
 
 
 def shown_each_second(desk: Alone, session: str, until: int) -> tuple[Fault, ...]:
-    """Let states show this session each second until then; return the last faults."""
+    """Let states show this session each second until the time `until`. Return the last faults."""
     for second in range(int(desk.now), until + 1):
         desk.until(float(second))
         desk.shows(session, "L1", to="L3")

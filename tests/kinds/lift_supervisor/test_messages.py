@@ -1,4 +1,4 @@
-"""Adapters' messages become events or are refused with a reason; the content of the status file."""
+"""Adapters' messages become events or are refused with a reason. The status file has its content."""
 
 import pytest
 from msgspec.structs import replace

@@ -1,4 +1,5 @@
-"""Properties that hold under losses, delays, copies and restarts, and in every order of events."""
+"""Properties that hold in spite of losses, delays, copies and restarts, and in every order of
+events."""
 
 import random
 from collections.abc import Iterator, Sequence
@@ -40,7 +41,10 @@ def bad_network(rng: random.Random, loss: float) -> Any:
 
 
 def check_rates(requests: list[tuple[float, str]]) -> None:
-    """Require 0.1 s between any two messages, 1 s between equal messages, and few messages in all."""
+    """Require pauses: 0.1 s between any two messages, and 1 s between two equal messages.
+
+    Require at most 20 messages in any 10 s.
+    """
     for (at, text), (later, again) in pairwise(requests):
         assert later - at >= (0.999 if text == again else 0.099), (at, text, again)
     for at, _ in requests:
@@ -57,7 +61,7 @@ Restart = st.tuples(st.floats(0, 150), st.sampled_from(["supervisor", "Lift1", *
     our_skew=st.sampled_from([0.0, -3600.0, 3600.0]),
     restarts=st.lists(Restart, max_size=6),
 )
-@example(seed=1, loss=0.0, our_skew=0.0, restarts=[])  # once, a late state began the same END again
+@example(seed=1, loss=0.0, our_skew=0.0, restarts=[])  # a late state began an END twice
 def test_every_live_robot_is_served_whatever_is_lost_and_whoever_restarts(
     seed: int, loss: float, our_skew: float, restarts: list[tuple[float, str]]
 ) -> None:
@@ -119,7 +123,7 @@ LIMITS = LiftSupervisorLimits(holder_alarm_s=15.0, holder_ttl_s=20.0)
 
 
 class Watched:
-    """The core, with the rules for each of its decisions."""
+    """The core, with a check of each of its decisions."""
 
     def __init__(
         self, memory: SupervisedLift, now: float, limits: LiftSupervisorLimits = LIMITS
@@ -130,7 +134,7 @@ class Watched:
         self.wake_at = float("inf")
 
     def hears(self, event: Any) -> str:
-        """Make one decision; return the message that was sent, or ""."""
+        """Make one decision. Return the sent message, or "" if no message was sent."""
         before = self.memory
         decided = core.decide(before, event, self.now, self.limits)
         self.memory = memory = decided.memory
@@ -158,7 +162,10 @@ class Watched:
         return text
 
     def _check_turn(self, before: SupervisedLift, after: SupervisedLift, event: Any) -> None:
-        """Require END and a later state, or another session at the lift, for the end of a turn."""
+        """Require a reason whenever a session's turn ends.
+
+        A reason is an END and a later state, or another session that has the lift.
+        """
         if not after.may_speak:
             assert after.turn is None
             return
@@ -177,7 +184,7 @@ class Watched:
 
 
 def events_at(now: float) -> list[Any]:
-    """Return the events that may happen next."""
+    """Return the events that may happen next, at the time `now`."""
     agv, fire = LiftMode.MODE_AGV, LiftMode.MODE_FIRE
     return [
         RideRequested("a", Target(1, "L3", 2), now, 0.0),
@@ -201,7 +208,7 @@ def events_at(now: float) -> list[Any]:
 def test_every_order_of_events_to_this_depth_keeps_the_rules(
     may_speak: bool, steps: int, steps_s: tuple[float, ...], at_least: int
 ) -> None:
-    """A memory that comes twice at the same time is walked once."""
+    """A memory that two histories reach at the same time is continued once."""
     memory = core.initial("Lift1", 0.0)
     memory = core.decide(memory, MaySpeak(may_speak), 0.0, LIMITS).memory
 
@@ -257,7 +264,7 @@ def test_from_every_state_a_lift_that_obeys_is_granted_to_a_robot_that_asks(
 
 
 def obeys(session: str, text: str) -> str:
-    """Return the session that has the lift after this request, if `session` had it before."""
+    """Return the session that has the lift after this request. `session` had the lift before."""
     kind, who = (*text.split(" "), "", "")[:2]
     if kind == "AGV" and not session:
         return who

@@ -1,4 +1,4 @@
-"""The YAML's section, and the part of it that reaches the core."""
+"""The supervisor's section of the YAML file, and the keys that reach the core."""
 
 import math
 from pathlib import Path

@@ -37,7 +37,7 @@ def supervisor_first(sender: str, receiver: str) -> Sequence[float]:
 
 
 def changes(world: World) -> list[str]:
-    """Return the messages to the node, without repeats."""
+    """Return the messages to the lift's node, without repeats."""
     said = [text for _, text in requests(world)]
     return [text for text, before in zip(said, ["", *said], strict=False) if text != before]
 
@@ -168,7 +168,7 @@ def test_a_lift_node_that_restarts_in_mid_ride_gets_the_session_again_and_the_ri
 def test_a_supervisor_that_restarts_with_a_robot_in_the_car_moves_no_relay(
     skew: float, our_skew: float
 ) -> None:
-    """This holds whatever the clocks of the supervisor and the adapter show."""
+    """The robot keeps its ride, whatever the clocks of the supervisor and of the adapter show."""
     world = World()
     supervisor = OurSupervisor(world, wall_skew=our_skew)
     lift, robot = LiftNode(world), Rider(world, A, UP, skew=skew)
@@ -185,12 +185,12 @@ def test_a_supervisor_that_restarts_with_a_robot_in_the_car_moves_no_relay(
 def test_rmfs_own_supervisor_restarted_in_the_same_way_ends_the_ride_and_asks_for_it_again() -> (
     None
 ):
-    """For RMF's supervisor the lift's node has a grace after END; ours never needs the grace."""
+    """The lift's node has a grace after END because of RMF's supervisor. Ours never needs the grace."""
     world = World()
     supervisor = RmfsSupervisor(world)
     lift, robot = LiftNode(world), Rider(world, A, UP)
     world.run(16.5)
-    world.retained.clear()  # as if the replay came too late
+    world.retained.clear()  # the replay comes too late
     supervisor.restart()
     world.run(60.0)
     assert changes(world)[2:4] == ["END fleet/a L3", "AGV fleet/a L3"]
@@ -270,7 +270,8 @@ def test_a_second_supervisor_of_ours_stands_by_and_takes_over() -> None:
 
 
 def test_an_operator_releases_the_lift_of_a_dead_robot_for_those_who_wait() -> None:
-    """`send lift Lift1 --end` does so, here from a machine whose clock is a minute slow."""
+    """The command `send lift Lift1 --end` sends this END. Here the operator's clock is a minute
+    slow."""
     world = World()
     OurSupervisor(world)
     LiftNode(world)

@@ -1,4 +1,5 @@
-"""Two supervisors start at the same moment, as after a power cut, and one of them serves in the end."""
+"""Two supervisors start at the same moment, as after a power cut. Exactly one of them serves in the
+end."""
 
 from collections import deque
 from collections.abc import Callable
@@ -17,7 +18,8 @@ STEP_S = 0.05
 
 
 class Late:
-    """A subscription that sees a publisher come or go DISCOVERY_S late, as on a network."""
+    """A subscription that learns of a publisher, or of its end, DISCOVERY_S late, as on a real
+    network."""
 
     def __init__(self, end: Subscription) -> None:
         self._end = end
@@ -34,7 +36,7 @@ class Late:
 
 
 class LateTransport(MemoryTransport):
-    """A node whose view of the graph lags."""
+    """A transport whose view of the other nodes lags by DISCOVERY_S."""
 
     def __init__(self, network: MemoryNetwork, name: str) -> None:
         super().__init__(network, name)

@@ -1,8 +1,8 @@
-"""All histories to a depth: a request for a lift is passed on, or the report gives the reason.
+"""All histories to a depth: each request for a lift is passed on, or the report says why not.
 
-There are nine moves: two robots ask, one ends, states of the lift, permission to publish, silence.
-`make deep` has all 9^5 = 59,049 histories of five moves, `make test` all 9^4 = 6,561 of four. The test
-judges the sent messages and the report.
+The nine moves: two robots ask, one robot ends, the lift shows states, the permission to publish
+changes, and silence. `make deep` has all 9^5 = 59,049 histories of five moves. `make test` has all 9^4
+= 6,561 histories of four moves. The test judges the sent messages and the report.
 """
 
 from collections.abc import Callable
@@ -27,7 +27,7 @@ MOVES: list[Move] = [
     lambda one: one.until(one.now + 12.0),
 ]
 PACE_S = 0.2
-"""More than the least time between two messages."""
+"""A pause (s) longer than the least time between two messages."""
 
 
 def after(one: Alone, move: Move) -> Alone:
@@ -40,7 +40,7 @@ def after(one: Alone, move: Move) -> Alone:
 
 
 def check(one: Alone) -> None:
-    """Require a reason in the report while a robot's request is not the last message sent."""
+    """Require a reason in the report unless the last message sent was the robot's request."""
     last = one.sent[-1][1] if one.sent else ""
     unserved = [c for c in one.memory.claims if last != f"AGV {c.session} {c.target.floor}"]
     assert bool(one.report.waits) >= bool(unserved), one.report

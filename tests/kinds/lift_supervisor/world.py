@@ -1,7 +1,7 @@
-"""A lift's part of the graph in virtual time: the node of a lift that works, riders, supervisors.
+"""A lift, its riders and a supervisor in virtual time.
 
-The supervisor is ours as it is served, or the stand-in for RMF's supervisor. The lift's node is ours as
-it is served (Node). The fleet adapters follow RMF's rules.
+The supervisor is our supervisor as in its daemon, or a stand-in for RMF's supervisor. The lift's node
+is our Node as in its daemon, with a lift that works. The fleet adapters follow RMF's rules.
 """
 
 from typing import Any
@@ -26,7 +26,7 @@ FLOORS = ["L1", "L2", "L3"]
 
 
 def requests(world: World) -> list[tuple[float, str]]:
-    """Return the messages to the lift's node: (s, words)."""
+    """Return the messages to the lift's node as (s, words)."""
     return [(at, words(message)) for at, _, message in world.said_on(LIFT_REQUESTS)]
 
 
@@ -60,7 +60,7 @@ class RmfsSupervisor(StandIn):
 
 
 class LiftNode:
-    """Our lift's node, which scans a lift that works."""
+    """Our lift's node, which scans a working lift."""
 
     SCAN_S = 0.25
 
@@ -73,7 +73,7 @@ class LiftNode:
         self.restart()
 
     def restart(self) -> None:
-        """Start a new daemon: outputs off, nothing remembered."""
+        """Start a new daemon. Its outputs are off, and it remembers nothing."""
         clock = Clock(lambda: self.world.now, lambda: EPOCH + self.world.now)
         limits = LIFT.limits(self.settings, {})
         self.lift.advance(self.world.now)
@@ -103,9 +103,10 @@ class LiftNode:
 
 
 class Rider:
-    """A robot with its fleet adapter: it rides each of its trips, then is done.
+    """A robot with its fleet adapter. The robot makes each of its trips, and then is done.
 
-    `skew`: how far its clock is ahead of ours (s). `rode` has (s, trip) of each completed ride.
+    `skew` is how far the adapter's clock is ahead of ours (s). `rode` has (s, trip) for each complete
+    ride.
     """
 
     ENTER_S = 3.0

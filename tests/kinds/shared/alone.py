@@ -1,4 +1,7 @@
-"""The core of a kind without hardware, alone in virtual time: tests give events and note messages."""
+"""The core of a kind without hardware, in virtual time.
+
+Tests give events to the core, and the core's messages are noted.
+"""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -15,9 +18,9 @@ E = TypeVar("E")
 
 
 class Alone(ABC, Generic[M, E, L, R]):
-    """A core alone. `sent` has (s, words) of each message, `refused` (s, reason).
+    """A core alone. `sent` has (s, words) of each message, and `refused` has (s, reason).
 
-    Requesters' clocks are `skew` ahead of ours.
+    Requesters' clocks are `skew` seconds ahead of ours.
     """
 
     def __init__(
@@ -40,7 +43,7 @@ class Alone(ABC, Generic[M, E, L, R]):
 
     @abstractmethod
     def words(self, message: Message) -> str:
-        """Return a message in short words, or "" for a message that is not noted."""
+        """Return a message in short words, or "" if the message is not to be noted."""
 
     def hears(self, event: E | MaySpeak | Woken) -> None:
         """Make one decision, now."""
@@ -53,7 +56,7 @@ class Alone(ABC, Generic[M, E, L, R]):
             self.refused.append((at, decided.refused))
 
     def until(self, at: float) -> None:
-        """Let time pass, and wake the core at its own times."""
+        """Let time pass, and wake the core at the times that it asked for."""
         while self.wake_at <= at:
             self.now = self.wake_at
             self.hears(Woken())
@@ -61,5 +64,5 @@ class Alone(ABC, Generic[M, E, L, R]):
         self.now = at
 
     def stamped(self, aged: float) -> float:
-        """Return a stamp (s) that is `aged` s old by the requester's clock."""
+        """Return the stamp (s) of a message that is `aged` seconds old by the requester's clock."""
         return self.now + self.skew - aged

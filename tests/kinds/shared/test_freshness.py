@@ -1,4 +1,4 @@
-"""Which of an adapter's requests count, by the adapter's stamps and by our clock."""
+"""The rules decide by the adapter's stamps and by our clock whether an adapter's request counts."""
 
 import math
 
@@ -22,7 +22,10 @@ class Clocked:
         self.requester = Requester()
 
     def at(self, now: float, *, sent: float | None = None, ends: bool = False) -> bool:
-        """Does a message count that was `sent` (s, our clock; default: now) and arrives `now`?"""
+        """Return whether a message counts that arrives at `now`.
+
+        `sent` is the time of sending by our clock (s), by default `now`.
+        """
         sent = now if sent is None else sent
         stamp = STAMP + sent + self.skew
         age_s = now - sent - self.skew
@@ -79,7 +82,7 @@ def test_a_request_from_the_future_counts_unless_a_limit_is_set() -> None:
 
 
 def test_an_end_is_compared_with_earlier_ends_only() -> None:
-    """An operator who ends a robot's session may have another clock than the robot."""
+    """A robot and the operator who ends its session may have different clocks."""
     requester = Clocked()
     assert requester.at(100.0)
     assert requester.at(100.0, sent=95.0, ends=True)

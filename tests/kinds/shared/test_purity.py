@@ -1,4 +1,5 @@
-"""Lists in pyproject.toml: the purity contract includes every kind, and files for mutation exist."""
+"""The purity contract in pyproject.toml includes every kind, and the files listed for mutation
+exist."""
 
 import tomllib
 from pathlib import Path

@@ -1,4 +1,7 @@
-"""One search finds a rule and its stories: every rule is cited, and every citation names a rule."""
+"""A search for a rule's number finds the rule and its stories.
+
+So every rule must be cited by a test, and every citation must name a rule.
+"""
 
 import ast
 import re
@@ -10,7 +13,7 @@ KINDS, STORIES = Path(kinds.__path__[0]), Path(__file__).parents[1]
 
 
 def named(module: Path) -> list[str]:
-    """Return the rules in a module's docstring, named after its path: LIFT-1, LIFT-DRIVE-1, …"""
+    """Return the rules in a module's docstring. Their names follow its path: LIFT-1, LIFT-DRIVE-1, …"""
     words = [
         w for w in module.relative_to(KINDS).with_suffix("").parts if w not in ("core", "shared")
     ]
