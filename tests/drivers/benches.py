@@ -1,4 +1,4 @@
-"""The bench and the buses that the contracts of lift, door and charger drivers share."""
+"""The bench and the buses in the contract tests of lift, door and charger drivers."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
@@ -31,7 +31,8 @@ Outputs = TypeVar("Outputs")
 
 
 class Bench(Generic[Sample, Outputs]):
-    """One driver on one bus with a plant behind it. `clock` is the time of the bus's pauses."""
+    """One driver on one bus, with a plant behind the bus. `clock` gives the time for the bus's
+    pauses."""
 
     def __init__(
         self, driver: Driver[Sample, Outputs], plant: Plant, clock: Time | None = None
@@ -57,11 +58,11 @@ class Bench(Generic[Sample, Outputs]):
         at_last(lambda: self.driver.write(outputs), "the outputs are written", self.a_moment)
 
     def a_moment(self) -> None:
-        """Let time pass until all pauses of the bus are over."""
+        """Let time pass until no pause of the bus is left."""
         self.clock.now += 60.0
 
     def patiently(self) -> Sample | str:
-        """Return a reading after all pauses, or the error's text if reading fails."""
+        """Return a reading after all pauses, or the text of the error."""
         self.a_moment()
         try:
             return self.driver.read()
@@ -71,7 +72,10 @@ class Bench(Generic[Sample, Outputs]):
     def until_it_fails(
         self, part: str, mode: FailureMode, makes_no_sense: Callable[[Sample], bool]
     ) -> list[Sample]:
-        """Let a part fail; return the readings until a reading is an error or `makes_no_sense`."""
+        """Let a part fail, and return the readings after that.
+
+        The list ends when a reading raises an error or when `makes_no_sense` holds for it.
+        """
         self.plant.fail(part, mode)
         seen: list[Sample] = []
 
@@ -90,11 +94,11 @@ B = TypeVar("B", bound="Bench[Any, Any]")
 
 
 class Contract(ABC, Generic[B]):
-    """Tests that each get their own bench."""
+    """Tests in which each test has its own bench."""
 
     @abstractmethod
     def benches(self) -> AbstractContextManager[B]:
-        """Yield a bench with an idle plant; nothing is open yet."""
+        """Yield a bench with an idle plant. Bus and driver are not open yet."""
 
     @pytest.fixture
     def bench(self) -> Iterator[B]:
@@ -114,7 +118,7 @@ def on_modbus(
     serial: modbus.Serial | None = None,
     timeout_s: float = TIMEOUT_S,
 ) -> Iterator[tuple[modbus.ModbusBus, Time]]:
-    """A bus to a simulated gateway, or line, on which these are."""
+    """Yield a bus to a simulated gateway or line with these devices."""
     clock = Time()
     server = (
         RtuLine(far_sides, serial, slow_s=2.2 * timeout_s)
@@ -152,7 +156,7 @@ def on_http(
 def on_mqtt(
     world: RealTime, wirings: Sequence[PlantWiring], points: dict[str, object], timeout_s: float
 ) -> Iterator[mqtt.MqttBus]:
-    """Yield a bus to a real broker, with these devices behind it; its clock is real."""
+    """Yield a bus to a real broker with these devices behind it. The bus has a real clock."""
     plain: dict[str, object] = {
         "type": "mqtt",
         "host": "x",

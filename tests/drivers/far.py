@@ -1,8 +1,8 @@
 """The far side of every bus in virtual time, in place of `drivers/hal/`.
 
-A bus that is `down` raises HalError with that text, as the HAL does after its timeout. The module
-behind a down bus drops its outputs after WATCHDOG_S, like modules with a watchdog. The GPIO header has
-no bus that could be lost.
+A bus whose `down` has a text raises HalError with that text, as the HAL does after its timeout. The
+module behind that bus drops its outputs after WATCHDOG_S, like a module with a watchdog. Only a bus can
+be lost, so the GPIO header cannot.
 """
 
 import json
@@ -25,7 +25,7 @@ class Clocked(Protocol):
 
     @property
     def now(self) -> float:
-        """Return virtual seconds."""
+        """Return the virtual time (s)."""
 
 
 class Cells(Protocol):
@@ -34,10 +34,10 @@ class Cells(Protocol):
     outputs: frozenset[Point]
 
     def get(self, point: Point, now: float) -> int:
-        """Return the value that is read there."""
+        """Return the value of a register or coil."""
 
     def set(self, point: Point, value: int, now: float) -> bool:
-        """Write a value; return False if nothing can be written there."""
+        """Write a value, and return False if the point cannot be written."""
 
 
 class PointsFar:
@@ -60,7 +60,7 @@ class PointsFar:
         return _Lines(self, dict(outputs))
 
     def watchdog(self) -> None:
-        """Drop the outputs if the bus has been down for too long."""
+        """Drop the outputs if the bus has been down for WATCHDOG_S."""
         if self.down:
             self.drive(self._safe)
 
@@ -106,9 +106,7 @@ class _Lines:
 
 
 class RegisterFar:
-    """A controller's registers, like the part of `drivers.hal.modbus.ModbusBus` that the driver
-    uses.
-    """
+    """A controller's registers, with the part of `drivers.hal.modbus.ModbusBus` that drivers use."""
 
     def __init__(self, clock: Clocked, cells: Cells) -> None:
         self.down = ""
@@ -122,13 +120,13 @@ class RegisterFar:
         return self
 
     def check(self) -> None:
-        """Raise nothing: no module's watchdog has tripped."""
+        """Do nothing, because this module has no watchdog that could trip."""
 
     def insist(self) -> None:
-        """Do nothing: no pause can be cut short."""
+        """Do nothing, because this bus makes no pauses."""
 
     def watchdog(self) -> None:
-        """Restore the first values if the bus has been down for too long."""
+        """Restore the first values if the bus has been down for WATCHDOG_S."""
         if self.down:
             for point, value in self._first.items():
                 self._cells.set(point, value, self.now())
@@ -156,7 +154,7 @@ class HttpFar:
         self._station = FakeHttpCharger(plant, settings)
 
     def watchdog(self) -> None:
-        """Do nothing: this station has no timeout of its own."""
+        """Do nothing, because this station has no timeout of its own."""
 
     def get_json(self, path: str) -> dict[str, Any]:
         self._plant.advance(self._clock.now)
@@ -172,7 +170,10 @@ class HttpFar:
         self._plant.drive("clear_error", True, self._clock.now)
 
     def _answers(self, failures: Mapping[str, Any]) -> None:
-        """Raise HalError: a deadline, a refusal and nonsense are all the same to the driver."""
+        """Raise HalError for every failure.
+
+        The driver cannot distinguish a deadline, a refusal and nonsense.
+        """
         server, body = failures.get("server"), failures.get("body")
         broken = server in ("off", "slow", "garbage") or "headers" in failures
         if self.down or broken or body in ("off", "stuck", "slow", "garbage"):

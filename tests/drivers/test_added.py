@@ -1,4 +1,4 @@
-"""Drivers, kinds and bus types are added by new files alone: `check` and `run` find them by name."""
+"""New files alone add drivers, kinds and bus types, because `check` and `run` find them by name."""
 
 import json
 import shutil
@@ -70,7 +70,7 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Site:
-    """One YAML, and the commands run on it in the copy."""
+    """One YAML file in the copy, and the commands that run on the file."""
 
     def __init__(self, here: Path, domain: int, text: str, bus: dict[str, Any]) -> None:
         self.here, self._text = here, text
@@ -80,7 +80,7 @@ class Site:
         self.point_at({})
 
     def point_at(self, replace: dict[str, Any]) -> None:
-        """Write the YAML with its bus pointed at this far side."""
+        """Write the YAML file with the address of this far side in its bus."""
         bus = json.dumps(self._bus | replace).replace('"1":', "1:")  # JSON has no numbers as keys
         self.file.write_text(self._text.format(domain=self._domain, bus=bus))
 
@@ -94,7 +94,7 @@ class Site:
 
     @contextmanager
     def far_side(self) -> Iterator[dict[str, Any]]:
-        """Run the far side of the bus in its own process; yield the settings for the bus."""
+        """Run the far side of the bus in its own process. Yield the settings for the bus."""
         socket = ["--socket", str(self.here / "plant.sock")]
         child = [sys.executable, "-m", "hal_fakes", str(self.file), "b", *socket]
         pipe = subprocess.PIPE
@@ -105,7 +105,7 @@ class Site:
             running.stdin.close()
 
     def served(self, *options: str) -> dict[str, Any]:
-        """Serve the door until its state is known; return the status file after a clean end."""
+        """Serve the door until its state is known, and end cleanly. Return the status file."""
         status = self.here / "run" / "status.json"
         with daemon(self.file, self.here / "run", *options) as running:
             running.wait_for("ready")

@@ -1,7 +1,7 @@
-"""A register, unit or reply that fails keeps no output on: off is written all the same.
+"""A failing register, unit or reply keeps no output on, because off is written in any case.
 
-Each story has an output that is on, and a part of the same device, or of its neighbour on the bus, that
-cannot be read once or ever again.
+Each story has an output that is on. A part of the same device, or a neighbour on the bus, cannot be
+read once or ever again.
 """
 
 import struct
@@ -31,14 +31,14 @@ __all__ = ["hang_up", "module"]
 
 HELD, RELEASED = DoorOutputs(hold_open=True), DoorOutputs(hold_open=False)
 STATUS, COMMAND = (3, 10), (3, 20)
-"""A door's holding registers, by the function that reads them."""
+"""A door's holding registers, as (function that reads the register, address)."""
 SERVER_FAILURE, ILLEGAL_ADDRESS = 4, 2
 
 
 class Registers:
-    """Units of registers and coils on our own module that answer as a test orders.
+    """A module with units of registers and coils, which answers as a test orders.
 
-    `refused`: (unit, reading function, address) -> the exception; 0 is silence.
+    `refused` is (unit, reading function, address) -> the exception code. The code 0 means silence.
     """
 
     def __init__(self, module: Module) -> None:
@@ -48,7 +48,7 @@ class Registers:
         module.reply = self.answer
 
     def answer(self, request: bytes) -> bytes:
-        """Answer functions 1 to 6 as the specification says."""
+        """Answer functions 1 to 6 as the Modbus specification says."""
         unit, function, address, value = struct.unpack(">BBHH", request[6:12])
         reads = {5: 1, 6: 3}.get(function, function)
         count = value if function < 5 else 1
@@ -164,7 +164,7 @@ def test_a_relay_goes_off_while_the_inputs_of_its_unit_fail_for_ever(
     door.read()
     door.write(HELD)
     registers.refused[1, 2, 0] = code
-    for _ in range(20):  # the pause is long by now, and each reading starts it anew
+    for _ in range(20):  # the pause is long now, and each reading starts a new pause
         clock.now += 30.0
         assert not tried(door.read)
     door.write(RELEASED)
@@ -266,7 +266,7 @@ def test_a_charge_on_canopen_is_stopped_while_its_state_is_not_answered() -> Non
 
 
 class HttpStation:
-    """Answers /state as a test orders, and accepts commands."""
+    """A station that answers /state as a test orders, and accepts commands."""
 
     def __init__(self) -> None:
         station = self

@@ -1,1 +1,1 @@
-"""Example files that the tests copy into a copy of the project; no existing file there is edited."""
+"""Example files that the tests add to a copy of the project. The tests edit no existing file there."""

@@ -28,7 +28,7 @@ Bench = benches.Bench[PanelSample, PanelOutputs]
 
 
 def wired(points: list[str], **pull: str) -> dry_contact.DryContactPanelSettings:
-    """Return a panel on these points; a cut loop of `fire` or `blue` reads as an alarm."""
+    """Return a panel on these points. A cut loop of `fire` or `blue` reads as an alarm."""
     active = "high" if pull else "low"
     fire, blue, drill = ({"point": point, "active": active, **pull} for point in points)
     plain = {**BASE, "sources": {"fire": fire, "blue": blue}, "drill": {**drill, "active": "high"}}
@@ -58,7 +58,7 @@ class PanelContract(Contract[Bench]):
 
 
 class LinkedPanelContract(PanelContract):
-    """Duties of a driver whose link can fail. `parts`: its parts that can be off."""
+    """Duties of a driver whose link can fail. `parts` has the parts of its far side that can be off."""
 
     parts: ClassVar[tuple[str, ...]] = ("unit", "server")
 

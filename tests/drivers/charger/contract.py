@@ -26,14 +26,15 @@ from tests.waiting import wait_until
 
 ON, OFF, AS_IT_IS = ChargerOutputs(True), ChargerOutputs(False), ChargerOutputs(None)
 PACE = 20.0
-"""Speed of a charger that no test has to wait for."""
+"""The speed of a simulated charger, so high that no test has to wait for the charger."""
 
 ChargerDriver = Driver[ChargerSample, ChargerOutputs]
 OnDeath = Literal["stop", "keep"]
 
 
 class Bench(benches.Bench[ChargerSample, ChargerOutputs]):
-    """A bench with a charger. `new` makes another driver for the same charger, with this `on_death`."""
+    """A bench with a charger. `new` makes a second driver for the same charger, with the given
+    `on_death`."""
 
     switch: ClassVar[str] = "power"
 
@@ -42,16 +43,16 @@ class Bench(benches.Bench[ChargerSample, ChargerOutputs]):
         self.new = new
 
     def press(self, signal: str, there: bool = True) -> None:
-        """Let a robot, or something else, come or go."""
+        """Let a robot or another object come to the pad or go."""
         self.plant.press(signal, there, time.monotonic())
 
     def switched(self, signal: str = "") -> list[object]:
-        """Return every command so far for this signal; without a signal, for the power."""
+        """Return every command so far for this signal. The default signal is the power."""
         wanted = signal or self.switch
         return [value for name, value in self.relays() if name == wanted]
 
     def scan(self, outputs: ChargerOutputs) -> Activity:
-        """Run one scan; return the station's activity."""
+        """Run one scan, and return the station's activity."""
         activity = self.read().activity
         self.write(outputs)
         return activity
@@ -61,14 +62,15 @@ class Bench(benches.Bench[ChargerSample, ChargerOutputs]):
         wait_until(lambda: self.scan(outputs) is activity, f"the station is {activity}")
 
     def does(self) -> Activity | None:
-        """Return the activity after all pauses; None if the station cannot be read."""
+        """Return the activity after all pauses, or None if the station cannot be read."""
         found = self.patiently()
         return None if isinstance(found, str) else found.activity
 
 
 def behind(driver: Any, settings: Any, canonical: Callable[[str], str] = str) -> tuple[Any, Any]:
-    """Return a fast world with this driver's own fake, and the fake's station, or its wires to a
-    bus.
+    """Return a fast world with this driver's own fake, and the far side for the bus.
+
+    The far side is the fake's station, or the fake's wires if the fake has no station.
     """
     table = list(driver.DRIVER.wires(settings))
     fake: Fake[Any] = import_module(driver.DRIVER.fake or "hal_fakes.plants.charger").FAKE
@@ -82,7 +84,7 @@ def behind(driver: Any, settings: Any, canonical: Callable[[str], str] = str) ->
 
 
 def news(driver: Any, settings: Any, bus: Bus) -> Callable[[OnDeath], ChargerDriver]:
-    """Return a function that makes drivers of this module for a bench."""
+    """Return a function that makes drivers with these settings. Its argument is `on_death`."""
 
     def new(on_death: OnDeath) -> ChargerDriver:
         changed = msgspec.structs.replace(settings, on_death=on_death)
@@ -98,7 +100,10 @@ class ChargerContract(Contract[Bench]):
     link: ClassVar[str]
     """The part of the plant whose failure breaks the wire."""
     cut: ClassVar[str] = ""
-    """The part whose `off` breaks the wire but leaves the station alone, if `link` does not."""
+    """A part whose failure `off` breaks the wire and leaves the station alone.
+
+    The value is "" if `link` is such a part.
+    """
     measures: ClassVar[bool] = True
     """Does the station measure the current?"""
     foreign_object: ClassVar[str] = "foreign object"
@@ -177,7 +182,7 @@ class ChargerContract(Contract[Bench]):
         assert len(self.checks(bench)) == 2
 
     def checks(self, bench: Bench) -> list[object]:
-        """Return the range checks that the station has been asked for."""
+        """Return the range checks that the driver has ordered."""
         return bench.switched("range_check")
 
     @pytest.mark.parametrize("mode", ["off", "slow", "garbage", "wrong"])
@@ -212,7 +217,8 @@ def _is_unknown(sample: ChargerSample) -> bool:
 
 
 class MovingPadContract(Contract[Bench]):
-    """A driver that reads whether the pad is at its height and whether a robot is in range."""
+    """The contract of a driver that reads two facts: is the pad at its height, and is a robot in
+    range?"""
 
     celsius: ClassVar[tuple[str, ...]] = ()
     """The temperatures that the driver reads, by name."""
@@ -235,7 +241,7 @@ class MovingPadContract(Contract[Bench]):
         assert all(20 <= celsius <= 30 for _, celsius in found)
 
     def pad(self, bench: Bench, wanted: tuple[bool, bool]) -> bool:
-        """Wait until height and range are read as wanted."""
+        """Wait until the driver reads these values for height and range."""
 
         def shown() -> bool:
             bench.write(OFF)

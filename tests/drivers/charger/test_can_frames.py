@@ -1,4 +1,4 @@
-"""The driver of makers' frames: published bytes, the pace of sending, and wrong maps."""
+"""The driver of makers' frames: its bytes as published, its pace of sending, and wrong maps."""
 
 import itertools
 from collections.abc import Iterator
@@ -45,8 +45,9 @@ KEPT_OFF = [(CONTROL, "0000000000000000"), (DISABLE, "aa00000000000000")]
 
 
 class Charger:
-    """Wiferion's charger in virtual time: sends its frames when told, and logs the frames that it
-    gets.
+    """Wiferion's charger in virtual time.
+
+    It sends its frames when the test says so, and logs the frames that the driver sends.
     """
 
     def __init__(self) -> None:
@@ -68,13 +69,14 @@ class Charger:
         self.far.coming.append(can.Message(arbitration_id=frame_id, is_extended_id=True, data=data))
 
     def status(self, state: int = 0) -> None:
-        """Send a whole status, with no volts and amps."""
+        """Send a whole status without voltage and current."""
         self.says(0x1FFD0101, "0000126700000000")
         self.says(0x18FF50E5, f"00000000000000{state:02x}")
 
     def scan(self, outputs: ChargerOutputs, for_s: float = 0.05) -> list[tuple[int, str]]:
-        """Send a status, read, write, and let a scan's time pass; return the frames that the driver
-        sent.
+        """Send a status, read, write, and let a scan's time pass.
+
+        Return the frames that the driver sent, as (id, payload in hexadecimal digits).
         """
         self.status()
         self.driver.read()
@@ -163,7 +165,7 @@ def test_height_and_range_are_signals_of_the_map_and_without_them_there_is_no_re
             "station",
             "the station is too hot; the receiver is too hot",
         ),
-        ("0000000000000010", "", ""),  # kept off by our own frames: no error
+        ("0000000000000010", "", ""),  # frames of ours block the charger: no error
     ],
 )
 def test_error_bits_name_the_fault_and_its_side(
@@ -322,7 +324,7 @@ def test_closing_takes_away_what_was_given_and_nothing_else(charger: Charger) ->
     assert charger.got == KEPT_OFF
 
 
-# ---- a charger that is not seen
+# ---- a charger that is silent
 
 
 def test_without_a_status_frame_there_is_no_state(charger: Charger) -> None:

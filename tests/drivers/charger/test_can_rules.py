@@ -1,4 +1,7 @@
-"""A charger on CAN without a state number: rules, an error number and a flag byte give its state."""
+"""A charger on CAN without a state number.
+
+Rules find its state from an error number and a byte of flags.
+"""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -59,8 +62,9 @@ class Charger:
         self.driver: FrameDriver = create("c", SETTINGS, self.bus)
 
     def shows(self, payload: str) -> tuple[Activity, int | str, str, str, bool]:
-        """Return the driver's reading of a status: activity, code, text, side at fault, does it
-        charge.
+        """Return the driver's reading of a status.
+
+        The tuple is (activity, code, text, side at fault, does current flow).
         """
         for frame_id, said in ((0x100, payload), (0x101, "00 00 12 67")):
             data = bytes.fromhex(said)
@@ -134,7 +138,7 @@ def test_a_map_must_say_in_some_way_what_the_state_is() -> None:
 
 
 class TestTheFakeShowsIt(Frames):
-    """The fake on the same map: the driver reads the plant's true state."""
+    """The fake with the same map, so that the driver must read the plant's true state."""
 
     foreign_object = "foreign object"
     settings: ClassVar = {"map": MAP}

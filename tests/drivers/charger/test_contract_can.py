@@ -1,4 +1,4 @@
-"""Chargers on CAN keep the contract of every charger, and further rules for a pad with a robot."""
+"""Chargers on CAN: the contract of every charger, and further rules for a robot on the pad."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -34,10 +34,10 @@ WIFERION: dict[str, Any] = {
 
 
 class PadBench(Bench):
-    """A bench whose range checks need 1 s before their result counts."""
+    """A bench for range checks. The result of a check counts after 1 s."""
 
     def sample(self, outputs: ChargerOutputs) -> ChargerSample | None:
-        """Run one scan; return the reading, or None if the station cannot be read."""
+        """Run one scan, and return the reading, or None if the station cannot be read."""
         try:
             sample = self.driver.read()
         except DriverError:
@@ -46,7 +46,7 @@ class PadBench(Bench):
         return sample
 
     def fault(self) -> ChargerSample:
-        """Scan until the station is in error; return that reading."""
+        """Scan until the station is in error, and return the reading with the error."""
         found: list[ChargerSample] = []
 
         def failed() -> bool:
@@ -228,7 +228,7 @@ class TestACanOpenReceiverBehindAnAdapter(CanOpen, OnAnAdapter):
 
 
 class Frames(CanContract):
-    """Wiferion's charger. It publishes no sign of a foreign object, and checks the range by itself."""
+    """Wiferion's charger, which reports no foreign object and checks the range by itself."""
 
     link = "node"
     foreign_object = "the station is too hot"

@@ -1,4 +1,4 @@
-"""The HTTP charger's driver: JSON becomes a reading, and a clearing is sent once."""
+"""The driver of the HTTP charger: its readings from JSON, and error clearings, each sent once."""
 
 import json
 from pathlib import Path
@@ -30,7 +30,7 @@ EXAMPLE = Path(__file__).parents[3] / "config" / "charger_http.yaml"
 
 
 class Station:
-    """A bus whose far side answers with `answer`."""
+    """A bus on which every request gets `answer`."""
 
     def __init__(self, answer: Any = None) -> None:
         self.answer = answer

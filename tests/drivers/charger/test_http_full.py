@@ -1,4 +1,4 @@
-"""Another make's JSON, by YAML alone: fields, words, commands, and answers that cannot be read."""
+"""Another make's JSON with a YAML map alone: fields, words, commands, and unreadable answers."""
 
 from pathlib import Path
 from typing import Any
@@ -185,7 +185,10 @@ def test_whatever_json_comes_it_is_a_driver_error_or_a_sample_and_charging_only_
 
 
 def driver() -> tuple[Station, Any]:
-    """Return a station, and `scan(outputs, state)`: the driver's commands after reading that state."""
+    """Return a station, and a function `scan(outputs, state)`.
+
+    The function reads the state, writes the outputs, and returns the driver's commands.
+    """
     station = Station(answer())
     made = create("a", FULL, station)
 

@@ -1,4 +1,4 @@
-"""Xnergy's receiver on Modbus: the requests of the driver, and what `check` reports."""
+"""The driver of Xnergy's receiver on Modbus: its requests, and the output of `check`."""
 
 from pathlib import Path
 

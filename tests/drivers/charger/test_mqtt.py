@@ -1,4 +1,4 @@
-"""A charging station behind a real broker: its topics become a reading, and power is a level."""
+"""A charging station behind a real broker: readings from its topics, and a lasting power command."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -24,7 +24,7 @@ ON, OFF = ChargerOutputs(power=True), ChargerOutputs(power=False)
 
 
 class Pad:
-    """The example's station with its driver; its broker is real."""
+    """The station of the example with its driver and a real broker."""
 
     def __init__(self) -> None:
         config = load(EXAMPLE)
@@ -50,7 +50,7 @@ class Pad:
         self.world.close()
 
     def reads(self, wanted: Callable[[ChargerSample], bool], what: str) -> ChargerSample:
-        """Read until a reading is as wanted; return it."""
+        """Read until a reading is as wanted, and return the reading."""
         found: list[ChargerSample] = []
 
         def read() -> bool:

@@ -1,4 +1,4 @@
-"""Stations that move their pads: height, range and temperatures, on every wire that carries them."""
+"""Stations that move their pads: height, range and temperatures, on every bus with these values."""
 
 import contextlib
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A charger's state by rules, and its errors by numbers and bits, whatever the protocol."""
+"""Rules that find a charger's state, and numbers and bits that name its errors, on any protocol."""
 
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from drivers.charger.http import HttpChargerSettings, create
 from drivers.charger.rules import ErrorBits, ErrorNumber, StationErrors
 from drivers.charger.rules import (
     Test as Condition,
-)  # pytest would collect a class with the name Test
+)  # pytest would collect a class named Test
 from hal_fakes.charger_values import values
 from tests.drivers.charger.test_http import Station
 from tests.settings.reading import changed, texts_of

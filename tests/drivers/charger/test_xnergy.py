@@ -1,5 +1,6 @@
-"""Xnergy's numbers: every code has a meaning, every error a side at fault, every start a range
-check.
+"""Xnergy's numbers.
+
+Every code has a meaning, every error has a side at fault, and every start orders a range check.
 """
 
 import pytest
@@ -130,7 +131,7 @@ def test_whatever_the_words_are_only_state_5_without_an_error_is_charging(
 
 
 def run(*scans: tuple[float, ChargerOutputs, int]) -> list[tuple[float, Orders]]:
-    """Return each order that is not empty, with its time; a scan is a time, outputs and a state."""
+    """Return each order that is not empty, with its time (s). A scan is (time, outputs, state)."""
     given_, written = [], Written()
     for now, outputs, code in scans:
         written, orders = steer(written, outputs, code, now)

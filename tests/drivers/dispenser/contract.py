@@ -13,10 +13,10 @@ REST = WorkcellOutputs()
 
 
 class Bench(benches.Bench[WorkcellSample, WorkcellOutputs]):
-    """A bench with a workcell whose cycle takes no time that a test would notice."""
+    """A bench with a workcell whose cycle is so short that no test waits for it."""
 
     def moved(self) -> int:
-        """Return the number of items that left."""
+        """Return the number of items that left the workcell."""
         return sum(edge.signal == "moved" for edge in self.plant.edges)
 
     def starts(self) -> list[object]:
@@ -30,7 +30,7 @@ class Bench(benches.Bench[WorkcellSample, WorkcellOutputs]):
 
 
 class WorkcellContract(Contract[Bench]):
-    """The contract on any bus. A bench begins with a workcell at rest."""
+    """The contract on any bus. Each bench begins with a workcell at rest."""
 
     def test_opening_the_driver_starts_nothing(self, bench: Bench) -> None:
         bench.open()
@@ -72,7 +72,7 @@ class WorkcellContract(Contract[Bench]):
 
 
 class WiredWorkcellContract(WorkcellContract):
-    """The contract on a bus whose far side can fail: part `server` of the plant."""
+    """The contract on a bus whose far side can fail. The far side is the plant's part `server`."""
 
     @pytest.mark.parametrize("mode", ["off", "garbage", "wrong", "slow"])
     def test_every_failure_is_a_driver_error_and_never_reads_done(

@@ -29,7 +29,7 @@ def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def dry(inputs: tuple[str, str, str], outputs: tuple[str, str], **pull: str) -> Any:
-    """Return a workcell on contacts at these points: done, busy, fault; start and the sort."""
+    """Return a workcell on contacts. The points are done, busy and fault, then start and the sort."""
     signals = dict(zip(("done", "busy", "fault"), inputs, strict=True))
     plain = {
         "items": {"box": {}},

@@ -1,7 +1,7 @@
 """Duties of every driver of a door, on any bus. Each test has its own bench.
 
-A test class derives from `DoorContract`, or from `WiredDoorContract` if the link can fail, and builds
-its bench.
+A test class builds its bench and derives from `DoorContract`. If the link can fail, the class derives
+from `WiredDoorContract`.
 """
 
 from collections.abc import Iterable
@@ -28,7 +28,7 @@ class Pace(TypedDict):
 
 
 QUICK: Pace = {"open_s": 0.05, "close_s": 0.05, "auto_close_s": 0.05}
-"""Times of a door that no test has to wait for."""
+"""The times of a simulated door (s), so short that no test has to wait."""
 
 
 Ends = tuple[bool | None, bool | None]
@@ -43,11 +43,11 @@ class Bench(benches.Bench[DoorSample, DoorOutputs]):
         return [value for _, value in self.relays()]
 
     def ends(self) -> Ends:
-        """Return the reading of both ends."""
+        """Return the readings of both limit switches."""
         return ends(self.read())
 
     def reads(self, wanted: Ends) -> bool:
-        """Does the driver read these ends after all pauses?"""
+        """Does the driver give these readings after all pauses?"""
         found = self.patiently()
         return isinstance(found, DoorSample) and ends(found) == wanted
 
@@ -60,7 +60,7 @@ OPEN, CLOSED, BETWEEN = (True, False), (False, True), (False, False)
 
 
 class DoorContract(Contract[Bench]):
-    """The contract on any bus. A bench begins with a closed door."""
+    """The contract on any bus. Each bench begins with a closed door."""
 
     def test_opening_the_driver_moves_nothing(self, bench: Bench) -> None:
         bench.open()
@@ -114,7 +114,7 @@ class DoorContract(Contract[Bench]):
 
 
 class WiredDoorContract(DoorContract):
-    """The contract on a bus whose far side can fail: parts `server` and `unit` of the plant."""
+    """The contract on a bus whose far side can fail: the plant's parts `server` and `unit`."""
 
     @pytest.mark.parametrize("part", ["server", "unit"])
     def test_a_link_that_is_gone_is_a_driver_error_and_a_hold_survives_it(
@@ -145,5 +145,5 @@ class WiredDoorContract(DoorContract):
 
 
 def quick(name: str, wires: Iterable[Wire]) -> DoorPlant:
-    """Return a door that reaches either end at once."""
+    """Return a door that reaches either end in 0.05 s."""
     return DoorPlant(name, wires, **QUICK)

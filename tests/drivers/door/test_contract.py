@@ -73,7 +73,7 @@ class TestDryContactsOnGpio(DoorContract):
 
 
 class MqttBench(Bench):
-    """A bench whose bus has a real clock, so that a pause of the bus is skipped."""
+    """A bench whose bus has a real clock, so no test can pass over a pause of the bus."""
 
     bus: MqttBus
 
@@ -101,7 +101,7 @@ class TestDryContactsOnMqtt(WiredDoorContract):
 
 
 class RegisterContract(WiredDoorContract):
-    """The contract for doors on registers, by their settings."""
+    """The contract for a door on registers. Each subclass has its own settings."""
 
     settings: ClassVar[dict[str, Any]]
     serial: ClassVar[modbus.Serial | None] = None

@@ -1,4 +1,4 @@
-"""A door on a relay that answers HTTP: the contract, the relay's timer, and the YAML."""
+"""A door behind a relay that answers HTTP: the contract, the relay's timer, and the YAML."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -89,7 +89,7 @@ class TestAShortTimer(HttpContract):
 
 
 class Relay:
-    """A bus whose far side answers these inputs and this relay."""
+    """A bus whose far side answers with these inputs and the state of this relay."""
 
     def __init__(self, opened: Any = False, held: Any = False) -> None:
         self.inputs, self.held = [opened, not opened], held

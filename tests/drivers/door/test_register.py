@@ -1,4 +1,4 @@
-"""The door on registers: the meaning of its numbers, and its YAML and profiles."""
+"""A door on registers: what its numbers mean, its YAML and its profiles."""
 
 import re
 from pathlib import Path

@@ -1,7 +1,9 @@
 """Duties of every driver of a lift, on any bus. Each test has its own bench.
 
-A test class derives from `LiftContract`, or from `WiredLiftContract` if the link can fail, and builds
-its bench. The lift has the landings B1, G and 1 and stands at B1 with its door closed. The wires are
+A test class builds its bench and derives from `LiftContract`. If the link can fail, the class derives
+from `WiredLiftContract`.
+
+The lift has the landings B1, G and 1, and stands at B1 with its door closed. The wires are
 `fire_alarm`, `agv_mode`, `door_opened`, `door_closed`, `moving`, and a line for each landing.
 """
 
@@ -19,7 +21,7 @@ from tests.drivers.benches import Contract
 from tests.waiting import wait_until
 
 QUICK = LiftPace(floor_s=0.2, door_s=0.05, agv_s=0.02, dwell_s=0.1)
-"""Times of a lift that no test has to wait for."""
+"""The times of a simulated lift (s), so short that no test has to wait."""
 
 IDLE = LiftSample("B1", DoorReading.CLOSED, motion=Motion.STOPPED, agv=False)
 OFF, AGV = LiftOutputs(), LiftOutputs(agv_request=True)
@@ -30,7 +32,7 @@ class Bench(benches.Bench[LiftSample, LiftOutputs]):
     """A bench with a lift."""
 
     def until(self, holds: Callable[[LiftSample], bool], what: str) -> list[LiftSample]:
-        """Read until the condition holds; return all readings on the way."""
+        """Read until the condition holds, and return all readings on the way."""
         seen: list[LiftSample] = []
 
         def look() -> bool:
@@ -41,7 +43,10 @@ class Bench(benches.Bench[LiftSample, LiftOutputs]):
         return seen
 
     def rides(self) -> list[LiftSample]:
-        """Ride to 1 in AGV mode, and hold the door open there; return all readings since the call."""
+        """Ride to landing 1 in AGV mode, and hold the door open there.
+
+        Return all readings since the call.
+        """
         self.write(AGV)
         self.until(lambda sample: sample.agv is True, "AGV mode")
         self.write(CALL)
@@ -51,7 +56,7 @@ class Bench(benches.Bench[LiftSample, LiftOutputs]):
 
 
 class LiftContract(Contract[Bench]):
-    """The contract on any bus. A bench begins with an idle lift."""
+    """The contract on any bus. Each bench begins with an idle lift."""
 
     def test_opening_a_lift_switches_no_output(self, bench: Bench) -> None:
         bench.open()
@@ -141,7 +146,7 @@ class LiftContract(Contract[Bench]):
 
 
 class WiredLiftContract(LiftContract):
-    """The contract on a bus whose far side can fail: parts `server` and `unit` of the plant."""
+    """The contract on a bus whose far side can fail: the plant's parts `server` and `unit`."""
 
     @pytest.mark.parametrize("part", ["server", "unit"])
     def test_a_link_that_is_gone_is_a_driver_error_and_the_outputs_survive_it(

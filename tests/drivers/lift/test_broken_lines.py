@@ -1,4 +1,4 @@
-"""A code with one cut or shorted line must never read as a safer state than the true state."""
+"""A code with one cut or shorted line must never read as a state that is safer than the true state."""
 
 from typing import Any
 
@@ -122,7 +122,7 @@ def test_what_the_site_accepts_is_not_refused() -> None:
 
 
 SAFEST = ("agv_mode", "normal", "fire_alarm")
-"""From the state with most permissions to the state with none."""
+"""Three states of a service code, from most permissions to none."""
 
 
 @given(

@@ -1,4 +1,5 @@
-"""Refusals of a lift's wiring, refusals that a file may accept by name, and warnings."""
+"""What `check` says of a lift's wiring: refusals, refusals that a file may accept by name, and
+warnings."""
 
 from pathlib import Path
 from typing import Any
@@ -273,7 +274,10 @@ def test_a_safe_choice_of_pins_is_not_refused() -> None:
 
 
 def test_the_first_public_wiring_is_possible_when_its_two_unsafe_places_are_accepted() -> None:
-    """The door contact reads open when cut; the door opens on low, the level of its pin since boot."""
+    """The wiring has two unsafe places. The door contact reads open when its wire is cut.
+
+    The door opens on a low level, and the pin is low from boot on.
+    """
     literal = {
         "floors": ["L1", "L2", "L3", "L4"],
         "inputs": {

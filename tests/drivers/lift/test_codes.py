@@ -1,4 +1,4 @@
-"""Numbers on lines, and the reading of a floor code from lines."""
+"""Binary numbers on lines, and floor codes that are read from lines."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from tests.drivers.lift.wirings import FLOORS, bits, line, settings
 
 
 def on(text: str) -> list[bool]:
-    """Return the lines of a number: `011` is 3, written most significant first, as people write."""
+    """Return the lines of a binary number. `011` is 3, because the most significant bit comes first."""
     return [c == "1" for c in reversed(text)]
 
 

@@ -25,7 +25,7 @@ class TestDryContactsOnModbus(WiredLiftContract):
     serial: ClassVar[modbus.Serial | None] = None
 
     def wired(self) -> dict[str, Any]:
-        """Return the wiring as in a YAML."""
+        """Return the wiring in the form of a YAML file."""
         return whole(inputs=inputs(moving=line(4)))
 
     @contextmanager
@@ -38,7 +38,7 @@ class TestDryContactsOnModbus(WiredLiftContract):
 
 
 class MqttBench(Bench):
-    """A bench whose bus has a real clock, so that a pause of the bus is skipped."""
+    """A bench whose bus has a real clock, so no test can pass over a pause of the bus."""
 
     bus: MqttBus
 
@@ -47,7 +47,7 @@ class MqttBench(Bench):
 
 
 class TestWordsOnMqtt(WiredLiftContract):
-    """A gateway that publishes words in one JSON object, and takes a word for each command."""
+    """A gateway that publishes words in one JSON object. Each command to the gateway is a word."""
 
     @contextmanager
     def benches(self) -> Iterator[Bench]:
@@ -82,7 +82,7 @@ def _point(wire: Wire) -> dict[str, object]:
 
 
 def on_topics(part: Any, names: list[str]) -> Any:
-    """Return the same wiring with a name in place of each point."""
+    """Return the same wiring, in which each point is replaced by a name."""
     if not isinstance(part, dict):
         return part
     if "point" in part:
@@ -152,7 +152,7 @@ class TestDryContactsOnRs485(TestDryContactsOnModbus):
 
 
 def in_registers(part: Any) -> Any:
-    """Return the same wiring with each contact as a bit of a gateway's register."""
+    """Return the same wiring, in which each contact is a bit of a gateway's register."""
     if not isinstance(part, dict):
         return part
     if "point" in part and "discrete input" in part["point"]:
@@ -170,7 +170,7 @@ class TestContactsAsBitsOfRegisters(TestDryContactsOnModbus):
 
 
 def on_header(part: Any, pins: Iterator[int]) -> Any:
-    """Return the same wiring with each point on the next of these pins."""
+    """Return the same wiring, in which each point is the next of these pins."""
     if not isinstance(part, dict):
         return part
     if "point" in part:
@@ -195,7 +195,8 @@ def contact(number: int, active: str = "high") -> dict[str, Any]:
 
 
 class TestRegistersBesideContacts(TestRegistersWithCallsAsNumbers):
-    """The floor is a number in the gateway, unit 3; the rest is wired to a module, unit 4."""
+    """A lift whose floor is a number in the gateway, unit 3. All other signals are at a module, unit
+    4."""
 
     serial: ClassVar[modbus.Serial | None] = None
 

@@ -1,4 +1,4 @@
-"""The meaning of a lift's lines: truth tables from asserted signals to a sample, and back to lines."""
+"""A lift's lines: truth tables from asserted signals to a sample, and from outputs back to lines."""
 
 from itertools import product
 from typing import Any

@@ -1,4 +1,4 @@
-"""Signals on points: polarity, the order of switching, and writes when the state is unknown."""
+"""Signals on points: polarity, the order of switching, and writes in an unknown state."""
 
 from collections.abc import Mapping
 
@@ -15,7 +15,7 @@ WIRES = (
 
 
 class Recorded:
-    """A bus and its lines that notes every write in order. `broken`: writes fail."""
+    """A bus with lines that notes every write in order. If `broken` is set, writes fail."""
 
     def __init__(self) -> None:
         self.claims: list[tuple[Mapping[str, Pull | None], Mapping[str, bool]]] = []

@@ -1,4 +1,5 @@
-"""The meaning of a gateway's numbers, the refusals of a map, and the writes for each command."""
+"""A lift on a gateway's registers: what its numbers mean, refused maps, and the writes of each
+command."""
 
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,6 @@
-"""The tables of `check` for a lift's codes: likely mistakes change them, and each cut line is
-listed.
+"""The tables of `check` for a lift's codes.
+
+A likely mistake in the file changes a table, and the tables list each cut line.
 """
 
 from pathlib import Path

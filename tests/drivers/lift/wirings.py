@@ -1,4 +1,5 @@
-"""Lift wirings for tests. Points have consecutive numbers, since only the meanings matter."""
+"""Lift wirings for tests. Points have consecutive numbers, because the tests need only their
+meanings."""
 
 from typing import Any
 
@@ -10,12 +11,12 @@ FLOORS = ["B1", "G", "1"]
 
 
 def line(number: int, **more: Any) -> dict[str, Any]:
-    """Return an input that reads not asserted when its wire is cut."""
+    """Return an input that reads "not asserted" when its wire is cut."""
     return {"point": f"unit 1 discrete input {number}", "active": "high", **more}
 
 
 def alarm(number: int) -> dict[str, Any]:
-    """Return an input that reads asserted when its wire is cut."""
+    """Return an input that reads "asserted" when its wire is cut."""
     return line(number) | {"active": "low"}
 
 
@@ -24,7 +25,7 @@ def coil(number: int) -> dict[str, Any]:
 
 
 def whole(**changes: Any) -> dict[str, Any]:
-    """Return a right wiring; `changes` replace whole sections."""
+    """Return a correct wiring. `changes` replaces whole sections."""
     return {
         "floors": FLOORS,
         "inputs": {
@@ -48,7 +49,7 @@ def settings(**changes: Any) -> DryContactLiftSettings:
 
 
 def inputs(**more: Any) -> dict[str, Any]:
-    """Return the inputs of `whole` with `more`; None removes an input."""
+    """Return the inputs of `whole` with the inputs in `more`. None removes an input."""
     return {k: v for k, v in {**whole()["inputs"], **more}.items() if v is not None}
 
 

@@ -1,4 +1,4 @@
-"""The far side of a `line` bus: a real server on 127.0.0.1 that asks each station in turn."""
+"""The far side of a `line` bus: a real server on 127.0.0.1, which asks each station in turn."""
 
 import socketserver
 import threading
@@ -9,10 +9,10 @@ from hal_fakes.fake import Outside
 
 
 class Station(Protocol):
-    """A station that may answer; "" if the question is for another station."""
+    """A station on the line, which may answer a question."""
 
     def answer(self, question: str) -> str:
-        """Return one line."""
+        """Return one line, or "" if the question is for another station."""
 
 
 class LineServer:

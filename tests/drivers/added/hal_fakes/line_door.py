@@ -1,4 +1,4 @@
-"""A door that answers in words; behind the words moves the plant of every door."""
+"""A fake door that answers in words. It moves like every simulated door."""
 
 import time
 from typing import Any
@@ -23,7 +23,7 @@ class LineDoor:
         self._called = called
 
     def answer(self, question: str) -> str:
-        """Return the door's place, or a confirmation that the door is held or released."""
+        """Return the door's place, or a confirmation of the command."""
         name, _, verb = question.rpartition(" ")
         if name != self._called:
             return ""

@@ -1,4 +1,4 @@
-"""A `virtual` CAN bus of python-can, and test tools for its other end."""
+"""A `virtual` CAN bus of python-can, and tools for the other end of the bus."""
 
 import itertools
 import time
@@ -21,7 +21,7 @@ def channel() -> str:
 
 
 class Clock(Time):
-    """Real time that can jump ahead: `now` is the sum of the jumps (s)."""
+    """Real time with jumps ahead. `now` is the sum of the jumps (s)."""
 
     def __call__(self) -> float:
         return time.monotonic() + self.now
@@ -34,7 +34,7 @@ def data_frame(frame_id: int, payload: str, extended: bool = False) -> can.Messa
 
 
 class FarEnd:
-    """The other end of the bus: sends any frame, and hears the frames that we send."""
+    """The other end of the bus, which sends any frame and hears our frames."""
 
     def __init__(self, channel: str) -> None:
         self._bus = can.Bus(channel, interface="virtual")
@@ -44,7 +44,7 @@ class FarEnd:
         self._bus.send(data_frame(frame_id, payload, extended))
 
     def trouble(self, error_id: int) -> None:
-        """Send an error frame, as SocketCAN makes for troubles of its controller."""
+        """Send an error frame like SocketCAN's report of a controller's trouble."""
         data = bytes(8)
         self._bus.send(can.Message(arbitration_id=error_id, is_error_frame=True, data=data, dlc=8))
 
@@ -53,7 +53,7 @@ class FarEnd:
         self._bus.send(message)
 
     def heard(self, wait_s: float = 0.0) -> list[tuple[int, str]]:
-        """Return the frames that we sent so far: (id, payload in hex)."""
+        """Return our frames so far, as (id, payload in hexadecimal digits)."""
         found = []
         while (message := self._bus.recv(wait_s)) is not None:
             found.append((message.arbitration_id, bytes(message.data).hex()))
@@ -67,7 +67,7 @@ class FarEnd:
 def bus_on(
     channel: str, clock: Callable[[], float] | None = None, *, timeout_s: float = 0.1
 ) -> CanBus:
-    """Return our bus, whose pauses follow the clock and have no jitter."""
+    """Return our bus. Its pauses follow the clock and have no jitter."""
     settings = CanSettings(socketcan="can0", timeout_s=timeout_s, scan_s=0.05)
     vendor = lambda: can.Bus(channel, interface="virtual")  # noqa: E731
     return CanBus(settings, clock or time.monotonic, lambda: 0.0, vendor)
@@ -75,8 +75,9 @@ def bus_on(
 
 @contextmanager
 def two_ends(clock: Time | None = None) -> Iterator[tuple[CanBus, FarEnd, Time]]:
-    """Yield our bus, its far end, and a clock that stands still, so a busy machine causes no
-    timeout.
+    """Yield our bus, its far end and a clock.
+
+    The clock stands still, so a busy machine causes no timeout.
     """
     name, clock = channel(), clock or Time()
     far, bus = FarEnd(name), bus_on(name, clock, timeout_s=0.05)
@@ -89,9 +90,9 @@ def two_ends(clock: Time | None = None) -> Iterator[tuple[CanBus, FarEnd, Time]]
 
 
 class Reactive(can.BusABC):
-    """A bus in virtual time: its stations answer at once, and waiting only adds to `now`.
+    """A bus in virtual time. Its stations answer at once, and a wait only adds to `now`.
 
-    `later` has frames that come only while somebody waits.
+    `later` has frames that arrive only while our side waits.
     """
 
     def __init__(self) -> None:
@@ -110,7 +111,7 @@ class Reactive(can.BusABC):
         return None
 
     def say(self, frame_id: int, payload: str = "", extended: bool = False) -> None:
-        """Let a station send this frame by itself; the payload is in hex digits."""
+        """Let a station send this frame unasked. The payload is in hexadecimal digits."""
         self.coming.append(data_frame(frame_id, payload, extended))
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
@@ -121,7 +122,7 @@ class Reactive(can.BusABC):
         return CanBus(place, lambda: self.now, lambda: 0.0, lambda: self)
 
     def shutdown(self) -> None:
-        """Keep the bus, so that the next opening finds the same one."""
+        """Keep the bus, so that the next opening finds the same bus."""
         self._is_shutdown = True
 
 

@@ -1,4 +1,4 @@
-"""The CAN bus: the listener of each frame, the signs of a silent bus, and its recovery."""
+"""The CAN bus: frames reach their listeners, a silent bus is noticed, and a lost bus recovers."""
 
 import errno
 from collections.abc import Iterator
@@ -32,7 +32,7 @@ def ends() -> Iterator[Ends]:
 
 
 def heard_by(bus: CanBus, *wanted: FrameFilter) -> list[Frame]:
-    """Return a list to which each of these frames is added on arrival."""
+    """Return a list that gets each arriving frame that a filter in `wanted` accepts."""
     heard: list[Frame] = []
     bus.listen(wanted, lambda frame, at: heard.append(frame))
     return heard
@@ -163,7 +163,7 @@ def test_pauses_grow_while_the_bus_stays_off_and_are_short_again_after_a_frame(e
     bus, far, clock = ends
 
     def pause() -> float:
-        """Return how long calls fail at once after a bus-off."""
+        """Return for how many seconds calls fail at once after a bus-off."""
         far.trouble(0x40)
         assert failure(bus.take)
         begun_at = clock()

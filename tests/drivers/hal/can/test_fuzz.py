@@ -1,4 +1,4 @@
-"""Arbitrary frames: a driver raises a DriverError or nothing, and sees no charge in noise."""
+"""Drivers and arbitrary frames: a driver raises only DriverErrors, and never sees a charge in noise."""
 
 from collections.abc import Callable
 
@@ -20,7 +20,7 @@ SERIAL = 0x1FFD0001
 
 
 def attempt(far: Reactive, step: Callable[[], object]) -> object:
-    """Take the step after all pauses; return its result, or None for a DriverError."""
+    """Take the step after all pauses, and return its result. A DriverError gives None."""
     far.now += 0.9
     try:
         return step()
@@ -65,7 +65,7 @@ WIFERION = msgspec.convert(
 
 
 def says_charging(message: can.Message) -> bool:
-    """Is this a whole status frame with one of the numbers for charging?"""
+    """Is this a whole status frame with a number that means charging?"""
     plain = not (message.is_error_frame or message.is_remote_frame)
     status = message.arbitration_id == STATUS and message.is_extended_id and len(message.data) == 8
     return plain and status and message.data[7] & 0x0F in (1, 2, 3, 4, 5)
@@ -124,7 +124,7 @@ STATE_5 = bytes.fromhex("02200a0500")
 
 
 def good(request: can.Message) -> can.Message:
-    """Return the answer of a healthy, idle RCU: 0 to every question."""
+    """Return the answer of a healthy and idle RCU, which answers 0 to every question."""
     asked = bytes(request.data)
     command = 0x4B if asked[0] == 0x40 else 0x60
     return frame(0x58A, bytes((command,)) + asked[1:4] + bytes(4))

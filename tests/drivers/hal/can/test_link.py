@@ -1,4 +1,4 @@
-"""Waiting for frames of one bus. The vendor's bus here has a file, like an interface of the kernel."""
+"""Waiting for frames of one bus. The bus here has a file descriptor, like the kernel's interfaces."""
 
 import socket
 from typing import Any
@@ -14,8 +14,9 @@ HOUR_S = 3600.0
 
 
 class Interface(can.BusABC):
-    """A bus with a file, in which a byte is a frame's id. `waits` has the times that `recv` waited
-    (s).
+    """A bus with a file descriptor. Each byte in the file is the id of a frame.
+
+    `waits` has the length (s) of each wait in `recv`.
     """
 
     def __init__(self) -> None:
@@ -30,11 +31,11 @@ class Interface(can.BusABC):
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         self.waits.append(timeout)
         if timeout:
-            return None, False  # the clock measures this wait
+            return None, False  # the test's clock shows how long this wait is
         return can.Message(arbitration_id=self._near.recv(1)[0], is_extended_id=False), False
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        """Do nothing: no test here sends."""
+        """Do nothing, because no test here sends."""
 
     def shutdown(self) -> None:
         """Close both ends."""

@@ -1,4 +1,4 @@
-"""A CANopen node: answers that count, and signs that the node lives."""
+"""A CANopen node: which answers count, and which frames show that the node lives."""
 
 import struct
 from collections.abc import Callable
@@ -17,12 +17,13 @@ Answer = Callable[[bytes], list[str]]
 
 
 def value(request: bytes, number: int, command: int = 0x4B) -> str:
-    """Return the reply to a read: an expedited number of two octets."""
+    """Return the reply to a read, which carries a number of two octets (expedited transfer)."""
     return (bytes((command,)) + request[1:4] + struct.pack("<I", number)).hex()
 
 
 class Node:
-    """Answers requests to node 10; each answer is a list of payloads in hex."""
+    """A far end that answers requests to node 10. An answer is a list of payloads in hexadecimal
+    digits."""
 
     def __init__(self, far: Reactive) -> None:
         self.answer: Answer = lambda request: [value(request, 5)]
@@ -149,7 +150,7 @@ def test_a_node_that_owes_an_answer_is_asked_nothing(side: Side) -> None:
     ours, node, far, _ = side
     node.answer = lambda request: []
     assert failure(lambda: ours.read(*STATE))
-    ours._sdo_pause.mended()  # end the pause, which would keep us from asking
+    ours._sdo_pause.mended()  # end the pause, in which no request would be sent
     assert failure(lambda: ours.read(*STATE)) == (f"{NAME}, read 0x2002:0A: no reply within 0.05 s")
     assert len(node.asked) == 1
     far.now += 0.2
@@ -195,8 +196,9 @@ def test_a_heartbeat_that_stays_away_is_a_loss_and_its_return_ends_it(side: Side
 
 
 def test_a_node_that_was_lost_counts_as_restarted(side: Side) -> None:
-    """A boot-up frame may have come while nobody listened, so a node that is back gets all orders
-    again.
+    """The bus may have missed a boot-up frame while the node was lost.
+
+    So a node that is back must get all orders again.
     """
     ours, _, far, _ = side
     far.say(0x70A, "05")

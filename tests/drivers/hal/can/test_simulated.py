@@ -1,4 +1,4 @@
-"""`run --simulate` without the daemon: the chargers of `config/` on CAN, each behind an adapter."""
+"""The far side of `run --simulate`: the chargers of `config/` on CAN, each behind an adapter."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -40,7 +40,7 @@ class Site:
         assert self._caller.say(text.format(self.name)) == "ok"
 
     def sees(self, activity: Activity, outputs: ChargerOutputs) -> bool:
-        """Run one scan; does the driver read this activity?"""
+        """Run one scan, and return whether the driver reads this activity."""
         try:
             found = self.driver.read().activity
             self.driver.write(outputs)

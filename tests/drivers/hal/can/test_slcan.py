@@ -1,4 +1,4 @@
-"""An slcan adapter on a pseudo-terminal: frames on a serial port, and failures of a port."""
+"""An slcan adapter on a pseudo-terminal: CAN frames on a serial port, and the port's failures."""
 
 import os
 import threading
@@ -30,11 +30,11 @@ class Echo:
         send(message)
 
     def tick(self, now: float, send: Send) -> None:
-        """Do nothing: the station sends nothing by itself."""
+        """Do nothing, because the station only answers."""
 
 
 class Desk:
-    """Our bus at an adapter, and the frames heard on it."""
+    """Our bus at an adapter, and the frames that the bus has heard."""
 
     def __init__(self) -> None:
         self.echo = Echo()
@@ -51,7 +51,7 @@ class Desk:
         return CanBus(CanSettings(slcan=place, timeout_s=0.3), self.clock, lambda: 0.0)
 
     def passes(self) -> bool:
-        """Does a frame come back?"""
+        """Send a frame, and return whether the station's answer arrives."""
         self.clock.now += 60
         self.heard.clear()
         if failure(self.bus.take) or failure(lambda: self.bus.send(Frame(0x123, b"\1"))):
@@ -61,7 +61,7 @@ class Desk:
         )
 
     def text(self) -> str:
-        """Return why the bus does not work, or ""."""
+        """Return the reason why the bus does not work, or ""."""
         return failure(self.bus.take)
 
     def close(self) -> None:

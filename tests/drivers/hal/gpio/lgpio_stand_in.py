@@ -1,4 +1,4 @@
-"""A module in place of lgpio that records every call, and answers as lgpio 0.2.2 does."""
+"""A stand-in for lgpio that records every call and answers as lgpio 0.2.2 does."""
 
 from types import ModuleType
 from typing import Any
@@ -8,7 +8,7 @@ HANDLE = 7
 
 
 class error(Exception):
-    """An error that prints like lgpio's, with quotes."""
+    """An error whose text has quotes, as lgpio's errors do."""
 
     def __init__(self, value: str) -> None:
         super().__init__(value)
@@ -30,7 +30,11 @@ class Callback:
 
 
 class StandIn(ModuleType):
-    """`chips`: number -> label; `holders`: gpio -> its holder; `levels`: gpio -> level for a read."""
+    """The stand-in module.
+
+    `chips` is number -> label, `holders` is gpio -> its holder, and `levels` is gpio -> the level to
+    read.
+    """
 
     SET_PULL_UP, SET_PULL_DOWN, SET_PULL_NONE = 32, 64, 128
     RISING_EDGE, FALLING_EDGE, BOTH_EDGES = 1, 2, 3
@@ -53,7 +57,7 @@ class StandIn(ModuleType):
             raise error("broken")
 
     def claims(self) -> list[Call]:
-        """Return the calls without mere queries."""
+        """Return all recorded calls except queries."""
         asking = ("gpio_get_mode", "gpio_get_chip_info", "gpio_get_line_info")
         return [call for call in self.calls if call[0] not in asking]
 

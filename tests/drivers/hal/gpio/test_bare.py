@@ -1,4 +1,7 @@
-"""Pins of a process that only switches off: the same calls as the daemon's pins, without gpiozero."""
+"""The pins of a process that only switches off.
+
+The process makes the same lgpio calls as the daemon's pins, but without gpiozero.
+"""
 
 import pytest
 

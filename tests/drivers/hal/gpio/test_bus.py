@@ -1,4 +1,4 @@
-"""The GPIO bus on gpiozero's mock pins, wired to a plant of contacts and relays alone."""
+"""The GPIO bus on gpiozero's mock pins, with a plant that has contacts and relays and no physics."""
 
 from collections.abc import Iterator, Sequence
 
@@ -35,7 +35,7 @@ class Contacts(WiredPlant):
 
 
 class Bench:
-    """A header with a plant behind it; `now` is the time of both."""
+    """A header with a plant behind it. Both follow the time `now`."""
 
     def __init__(self) -> None:
         self.now = 0.0

@@ -1,4 +1,4 @@
-"""The factory for real hardware, call by call, on a stand-in that records lgpio's calls."""
+"""The pin factory for real hardware, call by call, on a stand-in that records lgpio's calls."""
 
 import os
 import sys
@@ -97,7 +97,7 @@ def test_an_edge_wakes_whoever_asked(lgpio: StandIn) -> None:
     bus = header()
     lines = bus.lines({"BCM4": "down"}, {})
     lines.claim()
-    lgpio.edges[4](0, 4, 1, 0)  # nobody listens: nothing happens
+    lgpio.edges[4](0, 4, 1, 0)  # without a listener nothing happens
     woken = []
     bus.on_edge(lambda: woken.append("woken"))
     lgpio.edges[4](0, 4, 0, 1)
@@ -121,7 +121,7 @@ def test_a_claim_that_fails_half_way_lets_go_of_all_and_can_be_tried_again(lgpio
     lgpio.holders[23] = "gpiomon"
     bus = header()
     lines = bus.lines({"BCM4": "down"}, {"BCM22": False, "BCM23": True})
-    with pytest.raises(HalError) as refused:  # kept, so that no half-made object is collected
+    with pytest.raises(HalError) as refused:  # `refused` keeps the half-made object alive
         lines.claim()
     with pytest.raises(HalError, match="BCM4 = J8:7 is not claimed"):
         lines.read()

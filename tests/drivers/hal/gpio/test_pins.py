@@ -1,4 +1,4 @@
-"""Names of pins, and impossible wires of pins."""
+"""Names of pins, and wirings of pins that are impossible."""
 
 import re
 from typing import Any

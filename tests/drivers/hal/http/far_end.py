@@ -1,4 +1,4 @@
-"""Raw servers on 127.0.0.1 that answer byte by byte as a test orders."""
+"""Raw servers on 127.0.0.1, whose answers a test gives byte by byte."""
 
 import contextlib
 import socket
@@ -9,14 +9,14 @@ Conversation = Callable[["Caller"], None]
 
 
 class Caller:
-    """One connection, seen from the server."""
+    """One connection as the server sees it."""
 
     def __init__(self, sock: socket.socket, closing: threading.Event) -> None:
         self._sock = sock
         self._closing = closing
 
     def request(self) -> bytes:
-        """Return the head of the next request, or b"" after the caller has hung up."""
+        """Return the head of the next request, or b"" if the caller has hung up."""
         head = b""
         while not head.endswith(b"\r\n\r\n"):
             byte = self._sock.recv(1)
@@ -36,14 +36,15 @@ class Caller:
             self._sock.sendall(part)
 
     def hold(self) -> None:
-        """Keep the connection in silence until the caller hangs up."""
+        """Keep the connection open and silent until the caller hangs up."""
         self._sock.recv(1)
 
 
 class FarEnd:
-    """A server; connection n gets conversation n, and further connections get the last conversation.
+    """A server with one conversation for each connection, in order.
 
-    `requests` has the heads of all requests, `connections` the number of connections.
+    Further connections get the last conversation. `requests` has the heads of all requests, and
+    `connections` is the number of connections.
     """
 
     def __init__(self, *conversations: Conversation) -> None:
@@ -114,7 +115,7 @@ def always(*parts: bytes) -> Conversation:
 
 
 def once(*parts: bytes) -> Conversation:
-    """Return a conversation that answers one request with these parts and hangs up."""
+    """Return a conversation that answers one request with these parts and then hangs up."""
 
     def talk(caller: Caller) -> None:
         caller.request()

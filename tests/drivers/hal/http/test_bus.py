@@ -30,13 +30,13 @@ TIMEOUT_S = 0.3
 
 
 class Clock:
-    """A test's time, for the bus's pauses after failures."""
+    """A clock for the bus's pauses after failures."""
 
     def __init__(self) -> None:
         self.now = 0.0
 
     def __call__(self) -> float:
-        self.now += 1000.0  # so each call of the bus comes long after its last failure
+        self.now += 1000.0  # so no pause is left at the next call
         return self.now
 
 
@@ -46,7 +46,7 @@ def bus_to(port: int, timeout_s: float = 5.0, **more: Any) -> HttpBus:
 
 
 def failure(talk: Conversation, timeout_s: float = 5.0) -> str:
-    """Return the error text of a GET to this server."""
+    """Return the error text of a GET to a server with this conversation."""
     with FarEnd(talk) as far:
         bus = bus_to(far.port, timeout_s)
         with pytest.raises(HalError) as caught:
@@ -152,7 +152,7 @@ def _answers_twice(caller: Caller) -> None:
 
 
 def _answers_the_last_one_late(caller: Caller) -> None:
-    """Send the second reply only after the next request has arrived."""
+    """Send each second reply only after the next request has arrived."""
     if caller.request():
         caller.send(answer(b'{"state": 1}'))
     if caller.request():
@@ -389,7 +389,7 @@ def test_a_refused_connection_says_so() -> None:
 
 @contextlib.contextmanager
 def full_server() -> Iterator[Any]:
-    """Yield the address of a server that accepts no further connection and refuses none."""
+    """Yield the address of a server that neither accepts nor refuses a further connection."""
     with contextlib.ExitStack() as opened:
         full = opened.enter_context(socket.create_server(("127.0.0.1", 0), backlog=0))
         for _ in range(4):
@@ -449,7 +449,7 @@ def test_a_lookup_that_has_answered_does_not_keep_the_next_call_waiting() -> Non
     ended = threading.Event()
 
     class Lingering(list[Any]):
-        """Results of a lookup, whose thread lives on until the test ends."""
+        """The results of a lookup. The lookup's thread lives until the test ends."""
 
     def resolve(*_: Any, **__: Any) -> Any:
         return []
@@ -484,7 +484,7 @@ def test_a_failure_to_connect_is_not_remembered_as_the_next_calls_reason() -> No
 
 @pytest.fixture
 def dns() -> Iterator[threading.Event]:
-    """Yield an event; name servers answer after it is set."""
+    """Yield an event. The name servers answer only after the event is set."""
     event = threading.Event()
     yield event
     event.set()

@@ -1,4 +1,4 @@
-"""The fake HTTP charger: a real server in each of its failures, read by the real driver."""
+"""The fake HTTP charger, a real server. The real driver reads the server in each of its failures."""
 
 import contextlib
 import json
@@ -45,7 +45,7 @@ class Fake:
         self.plant.press(signal, asserted, time.monotonic())
 
     def read_until(self, activity: Activity) -> set[int | str]:
-        """Poll until the station shows this activity; return all numbers seen on the way."""
+        """Poll until the station shows this activity, and return all numbers seen before."""
         seen: set[int | str] = set()
 
         def says_so() -> bool:

@@ -1,4 +1,4 @@
-"""A user and password: digest against a server that checks it (RFC 7616), basic, and refusals."""
+"""Logins with user and password: digest at a server that checks it (RFC 7616), basic, and refusals."""
 
 import hashlib
 import re
@@ -25,8 +25,11 @@ def hashed(*parts: str) -> str:
 
 
 class DigestServer(ThreadingHTTPServer):
-    """Answers signed requests. `nonce`: the nonce that is valid now. `done`: the accepted requests,
-    with the counter of their nonce."""
+    """A server that answers signed requests.
+
+    `nonce` is the nonce that is valid now. `done` has the accepted requests, each with the counter of
+    its nonce.
+    """
 
     daemon_threads = True
 

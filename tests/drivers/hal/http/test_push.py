@@ -1,4 +1,7 @@
-"""A controller's WebSocket: a message wakes the daemon; none of its failures makes a reading wrong."""
+"""A controller's WebSocket.
+
+A message wakes the daemon, and no failure of the WebSocket makes a reading wrong.
+"""
 
 import json
 import threading
@@ -23,7 +26,7 @@ from tests.waiting import wait_until
 
 
 class Wakes:
-    """Counts calls, from any thread."""
+    """A counter of calls from any thread."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -53,7 +56,10 @@ def listening(port: int, **more: Any) -> Iterator[tuple[http.HttpBus, Wakes]]:
 def pushing(
     talk: Callable[[ServerConnection], None], port: int = 0
 ) -> Iterator[tuple[int, list[str]]]:
-    """A server whose every connection is this talk. Yields its port, and the Authorization headers."""
+    """Yield a server's port and the Authorization headers that it received.
+
+    The server holds this talk on every connection.
+    """
     asked: list[str] = []
 
     def handle(connection: ServerConnection) -> None:
@@ -75,7 +81,7 @@ def test_a_message_wakes_the_daemon_and_the_state_is_read_by_a_request() -> None
     plant = world.plants["lift"]
     server = HttpServer([FakeHttpLift(plant, settings)], "", 0.5, "/ws")
     with listening(server.replace["api_base"].rpartition(":")[2]) as (bus, wakes):  # type: ignore[attr-defined]
-        wakes.more_than(1)  # after the connection, and for the first state
+        wakes.more_than(1)  # one for the connection, one for the state
         lift = create("lift", settings, bus)
         assert not lift.read().hazards
         before = wakes.count

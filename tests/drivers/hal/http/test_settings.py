@@ -1,4 +1,5 @@
-"""The `http` bus in a YAML: good addresses, and the problems of bad ones."""
+"""The `http` bus in a YAML file: good addresses, and the problems that `check` finds in bad
+addresses."""
 
 import msgspec
 import pytest

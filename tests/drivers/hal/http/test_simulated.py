@@ -1,4 +1,5 @@
-"""The HTTP charger of `--simulate`: a child process that a test commands by its control socket."""
+"""The HTTP charger of `--simulate`, a child process. The test commands it through its control
+socket."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""An HTTP bus with TLS: the trusted authorities, and the one deadline of a call, which TLS keeps."""
+"""An HTTP bus with TLS: the trusted authorities, and the deadline of a call, which includes TLS."""
 
 import ssl
 import threading
@@ -15,7 +15,7 @@ from drivers.hal.http import HttpBus, HttpSettings
 
 
 class Answers(BaseHTTPRequestHandler):
-    """Answers each request, and notes its path and key."""
+    """A handler that answers each request, and notes its path and key."""
 
     def do_GET(self) -> None:
         server: Any = self.server
@@ -29,11 +29,11 @@ class Answers(BaseHTTPRequestHandler):
         self.wfile.write(body)
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Log nothing: nobody reads the server's log."""
+        """Log nothing, because nobody reads the server's log."""
 
 
 class Site:
-    """A server with a certificate for 127.0.0.1, and the authority's file."""
+    """A server with a certificate for 127.0.0.1, and the file of the authority that signed it."""
 
     def __init__(self, tmp_path: Path) -> None:
         authority = trustme.CA()

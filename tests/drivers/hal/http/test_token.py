@@ -1,5 +1,7 @@
-"""A bearer token from a file: read for each call, refused if others can read or write it, never
-shown.
+"""A bearer token from a file.
+
+The bus reads the file for each call, and refuses a file that others can read or write. The bus never
+shows the token.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""Modules and buses that are closed after each test."""
+"""Fixtures that close modules and buses after each test."""
 
 from collections.abc import Iterator
 
@@ -10,7 +10,7 @@ from tests.drivers.hal.modbus.module import Module, opened
 
 @pytest.fixture
 def module() -> Iterator[Module]:
-    """Yield a module that answers as the specification says."""
+    """Yield a module that answers as the Modbus specification says."""
     started = Module()
     yield started
     started.close()
@@ -18,7 +18,7 @@ def module() -> Iterator[Module]:
 
 @pytest.fixture(params=[Module, SerialModule], ids=["tcp", "rtu"])
 def either(request: pytest.FixtureRequest) -> Iterator[Module]:
-    """Yield a module on TCP and, in another run of the test, a module on a serial line."""
+    """Yield a module. Each test runs twice: on TCP and on a serial line."""
     started: Module = request.param()
     yield started
     started.close()

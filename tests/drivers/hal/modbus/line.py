@@ -1,6 +1,6 @@
 """A serial line in sixty lines on a pseudo-terminal, written from the Modbus specification.
 
-The line's units answer as in `module.py`, in RTU frames, at once and without wire time.
+The units answer as in `module.py`, in RTU frames. A frame takes no time on the wire.
 """
 
 import os
@@ -16,7 +16,7 @@ from tests.drivers.hal.modbus.module import Module, Reply
 
 
 def crc(frame: bytes) -> bytes:
-    """Return the CRC of Modbus over Serial Line V1.02, 6.2.2: bit by bit, low byte first."""
+    """Return the CRC of a frame, low byte first (Modbus over Serial Line V1.02, 6.2.2)."""
     value = 0xFFFF
     for byte in frame:
         value ^= byte
@@ -26,15 +26,15 @@ def crc(frame: bytes) -> bytes:
 
 
 def rtu(frame: str) -> bytes:
-    """Return a frame with its CRC from the frame's hexadecimal digits."""
+    """Return the frame with these hexadecimal digits and its CRC."""
     return bytes.fromhex(frame) + crc(bytes.fromhex(frame))
 
 
 class SerialModule(Module):
-    """A module on a line. `reply` gets and returns frames with a TCP header, as in the base class.
+    """A module on a line.
 
-    `on_wire`, if set, answers instead of `reply`: from a request's frame it makes every byte that
-    follows
+    `reply` gets and returns frames with a TCP header, as in the base class. If `on_wire` is set, it
+    answers instead of `reply`. `on_wire` gets the bytes of a request, and returns all bytes that follow
     on the wire. `frames` has each request as it was on the wire.
     """
 

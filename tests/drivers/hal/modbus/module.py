@@ -1,6 +1,6 @@
 """An I/O module in fifty lines of sockets, written from the Modbus specification, not from pymodbus.
 
-`asked` has the bytes of each request. A test can let the module answer anything.
+`asked` has the bytes of each request. A test can give the module any answer.
 """
 
 import socket
@@ -19,13 +19,14 @@ from drivers.hal.points import HalError
 from tests.waiting import at_last
 
 Reply = Callable[[bytes], bytes | None]
-"""From a request's bytes to the answer's bytes; None hangs up."""
+"""A function from a request's bytes to the answer's bytes. None hangs up."""
 
 
 class Module:
-    """Units with coils and inputs behind one listening socket. A test may replace `reply`.
+    """A module whose units have coils and inputs, behind one listening socket.
 
-    `hangs_up`: the module hangs up after each reply. `where` is the module's name in the bus's texts.
+    A test may replace `reply`. With `hangs_up` the module hangs up after each reply. `where` is the
+    module's name in the bus's texts.
     """
 
     def __init__(self, reply: Reply | None = None) -> None:
@@ -46,7 +47,7 @@ class Module:
         self._threads = [self._started(self._accept)]
 
     def functions(self) -> list[int]:
-        """Return the function of each request so far."""
+        """Return the function code of each request so far."""
         return [request[7] for request in self.asked]
 
     def units_asked(self) -> list[int]:
@@ -54,8 +55,9 @@ class Module:
         return [request[6] for request in self.asked]
 
     def answer(self, request: bytes) -> bytes:
-        """Return the answer by Modbus Application Protocol V1.1b3, 6.1, 6.2 and 6.5; other requests get
-        silence.
+        """Return the answer by Modbus Application Protocol V1.1b3, 6.1, 6.2 and 6.5.
+
+        Other requests get no answer.
         """
         unit, function, address, value = struct.unpack(">BBHH", request[6:12])
         if unit not in self.units:
@@ -118,7 +120,7 @@ class Module:
 
 
 def frame(request: bytes, pdu: bytes) -> bytes:
-    """Return a reply to this request: its MBAP header with the right length, and this PDU."""
+    """Return a reply to this request: an MBAP header with the right length, and this PDU."""
     return request[:4] + struct.pack(">H", len(pdu) + 1) + request[6:7] + pdu
 
 
@@ -159,7 +161,10 @@ def serial(port: str, ignore_echo: bool = False) -> Serial:
 def proven(
     module: Module, clock: Time | None = None, *, timeout_s: float = 2.0, retries: int = 1
 ) -> ModbusBus:
-    """Return a bus whose unit 1 has answered once and so gets its retries; `asked` is empty again."""
+    """Return a bus whose unit 1 has answered once, because only then the bus retries.
+
+    `asked` is empty again.
+    """
     door(module)
     bus = bus_to(module.port, clock, timeout_s=timeout_s, retries=retries)
     read = bus.lines({"unit 1 discrete input 0": None}, {}).read
@@ -169,7 +174,7 @@ def proven(
 
 
 opened: list[ModbusBus] = []
-"""Buses made by `bus_to`; the conftest closes them after each test."""
+"""The buses from `bus_to`. The conftest closes them after each test."""
 
 
 def bus_to(
@@ -181,7 +186,7 @@ def bus_to(
     ignore_echo: bool = False,
     module_watchdog: dict[str, Any] | None = None,
 ) -> ModbusBus:
-    """Return a bus to this port of this machine, whose pauses follow the clock and have no jitter."""
+    """Return a bus to this port of this machine. Its pauses follow the clock and have no jitter."""
     settings = ModbusSettings(
         tcp=Tcp(host="127.0.0.1", port=port) if isinstance(port, int) else None,
         serial=serial(port, ignore_echo) if isinstance(port, str) else None,

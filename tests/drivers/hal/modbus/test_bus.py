@@ -1,4 +1,4 @@
-"""The Modbus bus on TCP: connections that are refused, break or stay half open, and foreign frames."""
+"""The Modbus bus on TCP: refused, broken and half-open connections, and frames of other requests."""
 
 import socket
 

@@ -1,6 +1,6 @@
-"""The Modbus bus against our own module, on TCP and on a serial line: the same contract.
+"""The contract of the Modbus bus, with our own module on TCP and on a serial line.
 
-Stories about TCP alone are in `test_bus.py`, stories about the line alone in `test_rtu.py`.
+Stories about TCP alone are in `test_bus.py`, and stories about the line alone in `test_rtu.py`.
 """
 
 import pytest
@@ -181,7 +181,7 @@ def test_one_dead_unit_costs_the_other_its_tries_and_then_one_a_pause(either: Mo
         assert alive.read() == {IN0: False}
         fails(bus, "unit 2 discrete input 0")
     assert either.units_asked().count(1) == 30
-    assert either.units_asked().count(2) <= 2 + 1 + 1  # at 0.1 s, and after each pause
+    assert either.units_asked().count(2) <= 2 + 1 + 1  # at 0.1 s, and once after each pause
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Recorded replies of modules: each is believed or refused, as the corpus says."""
+"""Recorded replies of modules. The corpus says whether the driver must believe or refuse each reply."""
 
 from itertools import chain, repeat
 from pathlib import Path
@@ -24,7 +24,7 @@ OUTCOMES = {
 
 
 class Recorded(NamedTuple):
-    """One line of the corpus. `replies`: one for each request, in hexadecimal."""
+    """One line of the corpus. `replies` has one reply for each request, in hexadecimal digits."""
 
     outcome: str
     replies: tuple[str, ...]
@@ -32,7 +32,7 @@ class Recorded(NamedTuple):
 
 
 def recorded(framing: str) -> list[Recorded]:
-    """Return the corpus of one framing."""
+    """Return the corpus of one framing, which is the name of its file."""
     text = (Path(__file__).parent / "corpus" / f"{framing}.txt").read_text("utf-8")
     lines = [line.split("|") for line in text.splitlines() if not line.startswith("#")]
     return [
@@ -46,7 +46,7 @@ def _bytes(reply: str, request: bytes = b"") -> bytes:
 
 
 def _check(module: Module, case: Recorded) -> None:
-    """Check the driver's reading of a recorded reply, and of a healthy module afterwards."""
+    """Check how the driver reads a recorded reply, and then a healthy module."""
     clock = Time()
     bus = bus_to(module.port, clock, timeout_s=0.05 if case.outcome == "lost" else 2.0, retries=0)
     driver = create("door", DOOR, bus)

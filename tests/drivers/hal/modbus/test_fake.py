@@ -1,4 +1,4 @@
-"""The real driver and bus against the fake gateway or line: each failure, and the door afterwards."""
+"""The real driver and bus at the fake gateway or line, during each failure and after it."""
 
 from collections.abc import Iterator
 
@@ -68,7 +68,7 @@ class Site:
         }
 
     def patiently(self, name: str) -> DoorSample | str:
-        """Return the sample after all pauses, or the error's text."""
+        """Return the sample after all pauses, or the text of the error."""
         self.clock.now += 60.0
         try:
             return self.doors[name].read()
@@ -76,7 +76,7 @@ class Site:
             return str(error)
 
     def reads(self, name: str) -> DoorSample:
-        """Return a reading, as the daemon's next scan would get."""
+        """Return a reading, as in the daemon's next scan."""
         return at_last(self.doors[name].read, "the door is read", self.a_moment)
 
     def write(self, name: str, outputs: DoorOutputs) -> None:
@@ -84,7 +84,7 @@ class Site:
         at_last(lambda: self.doors[name].write(outputs), "the outputs are written", self.a_moment)
 
     def a_moment(self) -> None:
-        """Let time pass, but less than the pause of a silent unit."""
+        """Let time pass, but less than the bus's pause after a silent unit."""
         self.clock.now += 1.0
 
     def close(self) -> None:
@@ -108,7 +108,7 @@ SERIAL = {
 @pytest.fixture(params=SERIAL)
 def site(request: pytest.FixtureRequest) -> Iterator[Site]:
     built = Site(SERIAL[request.param])
-    for door in built.doors.values():  # a unit that has never answered gets one try at a time
+    for door in built.doors.values():  # the bus retries only at a unit that has answered
         at_last(door.open, "the driver opens", built.a_moment)
     yield built
     built.close()
@@ -168,7 +168,7 @@ WAYS: dict[str, dict[FailureMode, tuple[str, ...]]] = {
         "garbage": ("half a frame", "CRC of "),
     },
 }
-"""Error texts for each failure of the whole far side."""
+"""The error texts for each failure of the whole far side."""
 
 
 @pytest.mark.parametrize("mode", ["wrong", "garbage"])

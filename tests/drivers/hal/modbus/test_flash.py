@@ -1,4 +1,4 @@
-"""Pulses that the module times itself: frames byte for byte, one frame for each pulse, and a door."""
+"""Pulses that the module times: the frames byte for byte, one frame for each pulse, and a door."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -37,7 +37,7 @@ SCAN_S = 0.125
 
 
 def pulsed(on_s: float = 0.7, every_s: float = 3.0) -> DryContactDoorSettings:
-    """Return a door whose operator is triggered by pulses, at relay 0 of unit 1."""
+    """Return a door whose operator needs pulses. The pulses are on relay 0 of unit 1."""
     plain = {
         "inputs": {
             "opened": {"point": "unit 1 discrete input 0", "active": "high"},
@@ -50,7 +50,7 @@ def pulsed(on_s: float = 0.7, every_s: float = 3.0) -> DryContactDoorSettings:
 
 
 def claimed(module: Module, **settings: Any) -> DryContactDoor:
-    """Return an opened driver; `asked` of the module is empty again."""
+    """Return a driver that has been opened. The module's `asked` is empty again."""
     door(module)
     driver = create("door", pulsed(), bus_to(module.port, **settings))
     driver.open()
@@ -66,12 +66,12 @@ def writes(module: Module) -> list[str]:
 
 
 def loses_replies(module: Module) -> None:
-    """Let the module obey writes, but lose its answers to them."""
+    """Let the module obey writes, but lose the answers to writes."""
     module.reply = lambda request: b"" if request[7] == 5 else module.answer(request)
 
 
 def answers(driver: DryContactDoor, clock: Time) -> bool:
-    """Can the door be read after all pauses?"""
+    """Can the driver read the door after all pauses?"""
     clock.now += 60.0
     try:
         driver.read()
@@ -81,10 +81,9 @@ def answers(driver: DryContactDoor, clock: Time) -> bool:
 
 
 def held(module: Module, *, lost_at: float | None = None) -> list[tuple[float, str]]:
-    """Return each write while RMF opens a door at 1 s and closes it at 6 s, in scans of core and
-    driver.
+    """Return (s, PDU) of each write while RMF opens a door at 1 s and closes the door at 6 s.
 
-    `lost_at` is the time of the scan in which no reply to a write arrives.
+    Core and driver are scanned as by the loop. In the scan at `lost_at` no reply to a write arrives.
     """
     clock, settings = Time(), pulsed()
     driver = claimed(module, clock=clock, timeout_s=1.0)
@@ -118,7 +117,8 @@ def held(module: Module, *, lost_at: float | None = None) -> list[tuple[float, s
 def test_a_flash_has_the_frames_of_the_makers_manual(
     line: SerialModule, relay: int, on_s: float, told: str
 ) -> None:
-    """Waveshare Modbus RTU Relay, "flash on": relay 0 for 700 ms, relay 1 for 800 ms."""
+    """The manual of the Waveshare Modbus RTU Relay has "flash on" for relay 0, 700 ms, and relay 1, 800
+    ms."""
     line.on_wire = lambda heard: heard
     coil = f"unit 1 coil {relay}"
     lines = bus_to(line.port).lines({}, {coil: False})
@@ -245,7 +245,7 @@ def test_a_pulse_whose_failure_the_core_has_heard_of_is_not_repeated_either(
 
 @contextmanager
 def site(serial: modbus.Serial | None, on_s: float) -> Iterator[tuple[DryContactDoor, DoorPlant]]:
-    """Yield the driver in front of the fake module with a quick door."""
+    """Yield a driver at the fake module, and the quick door behind the module."""
     settings = pulsed(on_s, every_s=600.0)
     plant = DoorPlant("door", wires(settings), open_s=0.05, close_s=0.05, auto_close_s=0.05)
     world = RealTime({"door": plant})

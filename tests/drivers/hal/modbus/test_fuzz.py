@@ -1,4 +1,5 @@
-"""Arbitrary replies on TCP and on a line: only HalErrors, no false open door, no false pulse."""
+"""Arbitrary replies on TCP and on a line cause only HalErrors, no false open door and no false
+pulse."""
 
 import itertools
 from collections.abc import Callable, Iterator
@@ -32,7 +33,7 @@ DOOR = msgspec.convert(
 )
 
 Spoil = Callable[[bytes, bytes], bytes | None]
-"""From a request and its good reply to the bytes that are sent instead."""
+"""A function from a request and its good reply to the bytes that are sent instead."""
 
 
 def _flipped(good: bytes, at: int, mask: int) -> bytes:
@@ -65,7 +66,8 @@ def one_module() -> Iterator[Module]:
 
 
 class Spoiled:
-    """Answers for a closed door, each spoiled by the next spoil; hangs up after the last spoil."""
+    """A closed door's answers on TCP. Each spoil changes one answer, and after the last spoil it hangs
+    up."""
 
     def __init__(self, module: Module, spoils: list[Spoil]) -> None:
         module.inputs.update({(1, 0): False, (1, 1): True})
@@ -142,7 +144,7 @@ def one_line() -> Iterator[SerialModule]:
 
 
 class SpoiledLine:
-    """Answers for a closed door, spoiled by each spoil in turn, over and over."""
+    """A closed door's answers on a line. The spoils change the answers in turn, over and over."""
 
     def __init__(self, line: SerialModule, spoils: list[Spoil]) -> None:
         line.inputs.update({(1, 0): False, (1, 1): True})
@@ -216,7 +218,7 @@ def test_a_register_reads_as_what_was_sent_or_not_at_all(sort: type[Module], pdu
         good = b"\x01\x03\x02" + pdu[2:4]
         if sort is Module:
             assert b"\x01" + pdu == good
-        else:  # a whole frame with its CRC came first; later bytes are noise of the line
+        else:  # the first bytes were a whole frame with its CRC, and the later bytes are noise
             assert (b"\x01" + pdu + crc(b"\x01" + pdu)).startswith(good + crc(good))
 
 
@@ -235,7 +237,7 @@ def test_a_pulse_is_requested_once_and_only_its_echo_proves_it(
                 bus.flash(Point(1, "coil", 0x200), 0.7)
                 assert pdu.hex() == "0502000007"
             except HalError as error:
-                if "no Modbus TCP connection" in str(error):  # so slow is a busy machine
+                if "no Modbus TCP connection" in str(error):  # the machine is too busy
                     return False
             wait_until(lambda: module.asked, "the module has received the request")
             asked.extend(module.asked)

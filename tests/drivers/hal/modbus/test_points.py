@@ -1,4 +1,4 @@
-"""The spelling of Modbus points, impossible wires, and points that are read together."""
+"""The spelling of Modbus points, impossible wirings, and points that one request reads together."""
 
 import re
 

@@ -1,5 +1,6 @@
-"""A second master writes our coil: the error names it, our writes grow rarer, but off is written at
-once.
+"""A second master writes our coil.
+
+The error names the second master. Our writes grow rarer, but off is written at once.
 """
 
 import itertools
@@ -32,7 +33,7 @@ NAMED = "another master writes unit 1 coil 0 too: its readings contradict the wr
 
 
 class Door:
-    """A door with the loop's scans, and a second master that may write after each scan."""
+    """A door that is scanned as by the loop. A second master may write after each scan."""
 
     def __init__(self, module: Module) -> None:
         module.inputs.update({(1, 0): False, (1, 1): True})
@@ -52,7 +53,7 @@ class Door:
         return decision.outputs
 
     def scan(self) -> str:
-        """Run one scan; return its error, or ""."""
+        """Run one scan, and return its error or ""."""
         fault = ""
         try:
             outputs = self.decide(Sampled(self.driver.read()))

@@ -24,7 +24,8 @@ def coils(bus: ModbusBus, count: int) -> list[int]:
 
 
 def test_the_frames_are_those_of_the_makers_manual(line: SerialModule) -> None:
-    """Waveshare Modbus RTU Relay: relay 0 on and off, and the states of all eight relays."""
+    """The manual of the Waveshare Modbus RTU Relay has frames for relay 0 on, relay 0 off, and all
+    states."""
     said = {
         "01050000ff008c3a": "01050000ff008c3a",
         "010500000000cdca": "010500000000cdca",
@@ -39,7 +40,7 @@ def test_the_frames_are_those_of_the_makers_manual(line: SerialModule) -> None:
 
 
 def test_sixteen_coils_come_lowest_address_in_the_lowest_bit(line: SerialModule) -> None:
-    """The example of Modbus Application Protocol V1.1b3, 6.1, cut to 16 coils: CD 6B."""
+    """Modbus Application Protocol V1.1b3, 6.1, has this example. It is cut to 16 coils here: CD 6B."""
     said = {"010100000010" + crc(bytes.fromhex("010100000010")).hex(): rtu("010102cd6b")}
     line.on_wire = lambda frame: said[frame.hex()]
     high = [i for i, level in enumerate(coils(bus_to(line.port), 16)) if level]
@@ -112,7 +113,7 @@ def test_the_late_reply_of_another_unit_is_dropped_and_ours_is_waited_for(
 
     def both(frame: bytes) -> bytes:
         line.say(rtu("02020101"))
-        later.wait(0.05)  # the silence between two frames
+        later.wait(0.05)  # the pause between two frames
         return IS_0
 
     line.on_wire = both
@@ -127,9 +128,9 @@ def test_a_fault_says_which_other_unit_was_heard(line: SerialModule) -> None:
 
 
 def test_the_late_reply_to_one_question_never_answers_another(line: SerialModule) -> None:
-    """A unit is one reply behind: each reply looks like an answer, but belongs to the last question.
+    """A unit is one reply behind. Each reply looks like an answer, but belongs to the question before.
 
-    The unit's last reply comes when the unit is asked again, otherwise a little later.
+    The unit sends its last reply when it is asked again, or otherwise a little later.
     """
     owed: list[bytes] = []
 
@@ -222,7 +223,7 @@ def test_a_port_that_vanishes_is_found_again_by_its_path(line: SerialModule) -> 
     text = f"no serial port {line.port}: the port is not there; is the adapter plugged in?"
     assert fails(bus, IN0).startswith(text)
     line.plug()
-    assert fails(bus, "unit 2 coil 0").startswith(text)  # the whole bus pauses
+    assert fails(bus, "unit 2 coil 0").startswith(text)  # the pause holds for all units
     clock.now += 0.5
     assert lines.read() == {IN0: False}
 

@@ -1,5 +1,7 @@
-"""The module's own watchdog: armed before any output is on, refreshed by scans, armed again after a
-trip.
+"""The module's own watchdog.
+
+The bus arms the watchdog before any output is on, refreshes it at each scan, and arms it again after
+the watchdog has tripped.
 """
 
 import json
@@ -39,7 +41,7 @@ from tests.drivers.hal.modbus.module import Time
 from tests.waiting import wait_until
 
 SLOW = 600
-"""A time (x 100 ms) within which every test finishes."""
+"""A watchdog time (x 100 ms) that is longer than any test."""
 
 
 def at(address: int) -> Point:
@@ -47,7 +49,7 @@ def at(address: int) -> Point:
 
 
 def habits(time: int) -> dict[str, Any]:
-    """Return the profile's watchdog with another time (x 100 ms)."""
+    """Return the profile's watchdog, but with this time (x 100 ms)."""
     plain: dict[str, Any] = msgspec.to_builtins(PROFILE.load("wago-750"))
     plain["arm"][0]["value"] = time
     plain["armed"][0]["values"] = [time]
@@ -55,7 +57,7 @@ def habits(time: int) -> dict[str, Any]:
 
 
 class Site:
-    """A door at a module with a watchdog; after `restart` the bus is another daemon's."""
+    """A door at a module with a watchdog. `restart` makes the bus of a new daemon."""
 
     def __init__(self, time: int = SLOW, units: tuple[int, ...] = (1,)) -> None:
         self.settings = dry(("unit 1 discrete input 0", "unit 1 discrete input 1", "unit 1 coil 0"))
@@ -81,7 +83,7 @@ class Site:
         return self.dead_men[0].get(at(address), 0.0)
 
     def scan(self) -> str:
-        """Read, write and end the scan, like the loop; return the error's text, or ""."""
+        """Read, write and end the scan, as the loop does. Return the text of the error, or ""."""
         self.bench.clock.now += 60.0
         try:
             self.bench.driver.read()
@@ -133,7 +135,7 @@ def test_without_scans_the_module_lets_go_by_itself() -> None:
         site.bench.driver.open()
         site.bench.driver.write(HOLD)
         wait_until(lambda: site.bench.relay() == [True, False], "the module drops its outputs")
-    except DriverError:  # the watchdog was faster than the test
+    except DriverError:  # the watchdog tripped before the read
         assert site.register(STATE) == TRIPPED
     finally:
         site.close()
@@ -181,7 +183,7 @@ def test_a_module_that_an_earlier_daemon_left_tripped_is_armed_again(site: Site)
 def test_a_watchdog_that_runs_already_is_left_running(site: Site) -> None:
     site.bench.driver.open()
     site.restart()
-    site.bench.driver.open()  # setting the watchdog's time while it runs would be refused
+    site.bench.driver.open()  # a running watchdog refuses a new time
     assert site.register(STATE) == RUNNING
 
 

@@ -1,4 +1,4 @@
-"""A broker, a bus to it, and a device's side of the wire, for the tests of the bus."""
+"""A broker, a bus, and the client of a device, for the tests of the `mqtt` bus."""
 
 import threading
 import time
@@ -47,7 +47,8 @@ def bus_to(
 
 
 class FarDevice:
-    """A client of the broker on the far side. `taken`: the messages that it has received."""
+    """A device's client at the broker. `taken` has (topic, payload, retained) of each received
+    message."""
 
     def __init__(self, port: int, *topics: str, **options: Any) -> None:
         self.taken: list[tuple[str, bytes, bool]] = []
@@ -63,7 +64,7 @@ class FarDevice:
         assert self.ready.wait(30)
 
     def says(self, topic: str, payload: bytes | str, retain: bool = False) -> None:
-        """Publish, and wait until the broker has the message."""
+        """Publish a message, and wait until the broker has it."""
         info = self.client.publish(topic, payload, qos=1, retain=retain)
         info.wait_for_publish(30)
 
@@ -74,7 +75,7 @@ class FarDevice:
 
 
 def reason(bus: MqttBus, topic: str, stale_after_s: float = 60.0) -> str:
-    """Return why the topic's last message is no fact; "" if it is one."""
+    """Return why the topic's last message does not count as a fact, or "" if it counts."""
     try:
         bus.fresh(topic, stale_after_s)
     except HalError as error:
@@ -83,6 +84,6 @@ def reason(bus: MqttBus, topic: str, stale_after_s: float = 60.0) -> str:
 
 
 def hears(bus: MqttBus, topic: str) -> bytes:
-    """Wait until the topic's message is a fact; return it."""
+    """Wait until the topic's message counts as a fact, and return its payload."""
     wait_until(lambda: not reason(bus, topic), f"a live message on {topic}")
     return bus.fresh(topic, 60.0).payload

@@ -1,4 +1,4 @@
-"""Bad input from broker and devices: each is a fault by its name, and nothing is told as fact."""
+"""Bad input from broker and devices. Each sort of input has its own fault, and never becomes a fact."""
 
 import socket
 import threading
@@ -31,7 +31,7 @@ def point(**keys: Any) -> MqttPoint:
 
 
 def fault(found: MqttPoint, payload: bytes) -> str:
-    """Return the fault in this payload; "" if the point decodes it."""
+    """Return the fault in this payload, or "" if the point can decode the payload."""
     try:
         found.asserted(payload)
     except HalError as error:
@@ -190,7 +190,7 @@ def test_a_server_that_speaks_anything_is_an_error_by_its_name(noise: bytes) -> 
 
 
 def test_an_old_session_that_the_broker_has_kept_is_refused() -> None:
-    """A CONNACK with "session present" (MQTT 5.0, 3.2.2.1.1) answers no clean start."""
+    """A CONNACK with "session present" (MQTT 5.0, 3.2.2.1.1) is not a valid answer to a clean start."""
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def talk() -> None:

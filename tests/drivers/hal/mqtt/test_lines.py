@@ -31,7 +31,10 @@ POINTS: dict[str, Any] = {
 
 
 class Site:
-    """A relay that obeys and publishes its state, unless `obeys` is false."""
+    """A relay that obeys commands and publishes its state.
+
+    Without `obeys` the relay ignores commands.
+    """
 
     def __init__(self, broker: Mosquitto, bus: MqttBus) -> None:
         self.now = 0.0
@@ -60,7 +63,7 @@ class Site:
         self.device.says("contact/state", "true" if closed else "false")
 
     def until_read(self) -> dict[str, bool]:
-        """Read as soon as the states have arrived."""
+        """Wait until the states have arrived, and return the reading."""
         found: list[dict[str, bool]] = []
 
         def read() -> bool:
@@ -74,7 +77,7 @@ class Site:
         return found[0]
 
     def hears(self, state: bytes) -> None:
-        """Wait until the relay has published this state."""
+        """Wait until the relay has published this state and the bus has heard it."""
 
         def heard() -> bool:
             found = self.bus.heard(STATE)
@@ -107,7 +110,7 @@ def site() -> Iterator[Site]:
 
 
 def opened(site: Site) -> Site:
-    """Claim the relay, with a closed contact."""
+    """Claim the relay while the contact is closed."""
     bus = site.bus
     bus.up()
     site.contact(closed=True)
@@ -245,7 +248,7 @@ def test_a_device_that_is_asked_and_does_not_listen_is_named(site: Site) -> None
 
 
 def test_a_silent_device_delays_no_other(site: Site) -> None:
-    """The silent device's reading fails from what was heard: no call goes out for it."""
+    """The reading fails at once, because the last state is too old. The bus sends no request for it."""
     opened(site).until_read()
     other = Points([Wire("closed", "in", "contact", "high")], site.bus)
     site.now = 100.0

@@ -1,4 +1,4 @@
-"""Who may speak with whom: TLS, our certificate, user and password, and rights at the broker."""
+"""Secrets and rights: TLS, our certificate, user and password, and permissions at the broker."""
 
 import subprocess
 from collections.abc import Callable, Iterator
@@ -14,7 +14,7 @@ from tests.waiting import wait_until
 
 
 class Authority:
-    """An authority's files in a folder."""
+    """A certificate authority with its files in a folder."""
 
     def __init__(self, folder: Path) -> None:
         folder.mkdir()
@@ -29,7 +29,7 @@ class Authority:
         return str(path)
 
     def issue(self, name: str) -> tuple[str, str]:
-        """Return the files with the certificate and key of this host or user."""
+        """Return the paths of the certificate and of the key for this host or user."""
         found = self._ca.issue_cert(name)
         chain = self.file(f"{name}.pem", *found.cert_chain_pems)
         return chain, self.file(f"{name}.key", found.private_key_pem)
@@ -40,7 +40,7 @@ Start = Callable[..., Mosquitto]
 
 @pytest.fixture
 def start() -> Iterator[Start]:
-    """Start brokers that end with the test."""
+    """Yield a function that starts brokers. The brokers end with the test."""
     brokers: list[Mosquitto] = []
 
     def started(*lines: str) -> Mosquitto:
@@ -71,7 +71,7 @@ def test_a_broker_with_a_certificate_of_our_authority_is_believed(
 
 
 PAHO_LEAVES_A_SOCKET = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-"""After a failed handshake paho leaves its socket to the garbage collector."""
+"""A filter for a warning: after a failed handshake paho leaves its socket to the garbage collector."""
 
 
 @PAHO_LEAVES_A_SOCKET
@@ -123,7 +123,7 @@ def test_a_missing_file_is_named(authority: Authority) -> None:
 
 @pytest.fixture
 def guarded(start: Start, tmp_path: Path) -> Mosquitto:
-    """Return a broker where the user `door` has the password `sesame`, and may only write."""
+    """Return a broker at which the user `door` has the password `sesame` and may only write."""
     names, rights = tmp_path / "names", tmp_path / "rights"
     subprocess.run(["mosquitto_passwd", "-b", "-c", names, "door", "sesame"], check=True)
     rights.write_text("user door\ntopic write relay/#\n")

@@ -1,4 +1,4 @@
-"""The `mqtt` bus in a YAML: what `check` refuses, with its place, and what it warns of."""
+"""The `mqtt` bus in a YAML file: refusals of `check` with their places, and warnings of `check`."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""A door whose latch is released, and whose one contact sees the door shut: a driver in one file."""
+"""A door driver in one file: an output releases the latch, and one contact sees the door shut."""
 
 from bridges.kinds.door.settings import DoorSettings
 from bridges.kinds.door.signals import DoorOutputs, DoorSample

@@ -1,4 +1,4 @@
-"""A door that takes questions and commands in words."""
+"""A driver for a door that takes questions and commands as lines of text."""
 
 from typing import Protocol
 
@@ -9,14 +9,14 @@ from drivers.driver_type import DriverType
 
 
 class Asks(Protocol):
-    """A bus that takes questions in words."""
+    """A bus that sends a question as text and returns the answer."""
 
     def ask(self, question: str) -> str:
-        """Return one answer. Raises HalError."""
+        """Return the answer to a question. Raises HalError."""
 
 
 class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A door, by the door's name on the line."""
+    """The settings of a door. The door has a name on the line."""
 
     called: Name
 
@@ -33,7 +33,7 @@ class LineDoor:
         self.make_safe()
 
     def read(self) -> DoorSample:
-        """Read both limits."""
+        """Read both limit switches."""
         where = self._bus.ask(f"{self._name} where")
         return DoorSample(opened=where == "open", closed=where == "closed")
 
@@ -46,7 +46,7 @@ class LineDoor:
         self._bus.ask(f"{self._name} release")
 
     def close(self) -> None:
-        """Do nothing: the connections are closed already."""
+        """Do nothing, because each question has its own connection."""
 
 
 DRIVER = DriverType(

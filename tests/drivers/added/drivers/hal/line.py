@@ -1,4 +1,4 @@
-"""A controller that answers lines of text on TCP, one connection for each line."""
+"""A bus to a controller that answers lines of text on TCP. Each line has its own connection."""
 
 import socket
 from typing import Annotated
@@ -24,7 +24,7 @@ class LineBus(Bus):
         self._address = (settings.host, settings.port)
 
     def ask(self, question: str) -> str:
-        """Send a line; return the answering line."""
+        """Send a line, and return the answering line."""
         try:
             with socket.create_connection(self._address, 1.0) as wire:
                 wire.sendall(f"{question}\n".encode())

@@ -1,4 +1,4 @@
-"""A hatch moves as a door does."""
+"""A hatch that moves like a door."""
 
 from hal_fakes.plants import door
 

@@ -1,4 +1,4 @@
-"""Hatches: doors for RMF, with their own section of the YAML."""
+"""Hatches, which are doors for RMF but have their own section in the YAML file."""
 
 from msgspec.structs import replace
 
