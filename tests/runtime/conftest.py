@@ -1,4 +1,4 @@
-"""An I/O module, with a door's YAML for it, and RMF's end of the graph."""
+"""Fixtures: an I/O module, the YAML file of a door on that module, and RMF's side of the graph."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,7 +25,7 @@ def graph(module: Module) -> Iterator[Graph]:
 
 @pytest.fixture
 def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return a machine with services and users; systemd names no directories for them."""
+    """Return a machine with services and users, on which systemd gives no directories to a daemon."""
     for name in ("RUNTIME_DIRECTORY", "STATE_DIRECTORY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(directories, "SERVICE_RUN", tmp_path / "run")

@@ -1,4 +1,4 @@
-"""Doors on one bus, scanned in rounds in virtual time."""
+"""Doors on one bus, scanned round by round in virtual time."""
 
 from collections.abc import Callable, Sequence
 
@@ -18,7 +18,7 @@ SCAN_S = 0.25
 
 
 class Door:
-    """A door's driver; each reading calls `during`. A `lost` door cannot be switched off."""
+    """A door's driver. Each reading calls `during`, and a `lost` door cannot be switched off."""
 
     def __init__(self, name: str, log: Callable[[str], None]) -> None:
         self.during: Callable[[], None] = lambda: None
@@ -66,7 +66,8 @@ class Wires(Bus):
 
 
 class Corridor:
-    """Two doors on one bus, or the given doors. `story` has each event with its time (s)."""
+    """A loop with two doors on one bus, or with the named doors. `story` has each event as (s,
+    event)."""
 
     def __init__(
         self, debounce: dict[str, float] | None = None, doors: Sequence[str] = ("ward", "lab")
@@ -93,14 +94,14 @@ class Corridor:
         self.story.append((self.now, what))
 
     def round(self, at: float) -> list[str]:
-        """Run a round at this time; return its events."""
+        """Run a round at this time, and return the events of the round."""
         self.now = at
         before = len(self.story)
         self.loop.round()
         return [what for _, what in self.story[before:]]
 
     def falls_silent(self, door: str, timeout_s: float) -> None:
-        """Let each further reading of this door end in a timeout."""
+        """Let each further reading of this door end with a timeout."""
 
         def waits() -> None:
             self.now += timeout_s
@@ -110,5 +111,5 @@ class Corridor:
         self.doors[door].during = waits
 
     def asks(self, door: str) -> None:
-        """Request the door as RMF does."""
+        """Let RMF request that this door opens."""
         self.loop.inbox.put(door, OpenRequested("a"))

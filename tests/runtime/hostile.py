@@ -26,12 +26,15 @@ for path in sys.argv[1:]:
 print("waits", flush=True)
 sys.stdin.read()
 """
-"""Opens the readable files among these, and waits for the lock of each."""
+"""A program that opens each given file that is readable, and waits for the lock of each file."""
 
 
 @contextmanager
 def group_member(folder: Path) -> Iterator[list[str]]:
-    """Let a user of the directory's group wait for all locks there; yield the files he opened."""
+    """Let a member of the directory's group wait for all locks in the directory.
+
+    Yield the files that the member could open.
+    """
     files = sorted(str(path) for path in folder.iterdir() if path.is_file())
     with subprocess.Popen(
         [sys.executable, "-c", WAITS, *files],
@@ -45,12 +48,13 @@ def group_member(folder: Path) -> Iterator[list[str]]:
 
 
 def unit(run: Path, invocation: str) -> dict[str, str]:
-    """Return the environment that systemd gives to one run of a unit."""
+    """Return the environment variables that systemd sets for one run of a unit."""
     return {"RUNTIME_DIRECTORY": str(run), "INVOCATION_ID": invocation, **SERVICE}
 
 
 def with_a_dead_bus_first(yaml: str, port: int, timeout_s: float = 1.5) -> str:
-    """Return a door's YAML with another door before it, on a bus at this port that never answers."""
+    """Return a door's YAML with a second door before it. The second door's bus at `port` never
+    answers."""
     bus = f"{{type: modbus, tcp: {{host: 127.0.0.1, port: {port}}}, timeout_s: {timeout_s}}}"
     door = yaml.partition("doors:\n")[2]
     far = door.replace("ward_door:", "far_door:\n    bus: dead")

@@ -1,4 +1,4 @@
-"""A door on a real Modbus TCP connection: the real daemon on one side, a fake module on the other."""
+"""A door on a real Modbus TCP connection between the real daemon and a fake module."""
 
 import json
 import os
@@ -20,10 +20,14 @@ from tests.waiting import PATIENCE_S, wait_until
 
 ROOT = Path(__file__).parents[2]
 SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
-"""A service starts no guard; a guard would try for minutes after the module is gone."""
+"""The environment of a service. A service starts no guard process.
+
+A guard would go on for minutes after the test's module has gone.
+"""
 PATIENT = "stale_after_s: 30"
-"""A long limit, so a busy machine that delays the scans does not make the door stale. For the same
-reason the module has 1.5 s to answer, in place of the usual 0.3 s.
+"""A limit so long that the door does not become stale when a busy machine delays the scans.
+
+For the same reason the module has 1.5 s to answer, instead of 0.3 s.
 """
 YAML = """
 kind: door
@@ -43,7 +47,7 @@ doors:
 
 
 class Module:
-    """The I/O module and the door behind it, in this process; the module outlives every daemon."""
+    """The I/O module and the door behind it, in this process. The module outlives every daemon."""
 
     text = YAML
 
@@ -84,7 +88,7 @@ class Module:
             control.order(" ".join(words))
 
     def hang(self) -> None:
-        """Let the module answer nobody, with its relay unchanged."""
+        """Let the module stop answering. Its relay does not change."""
         self.tell("fail", "ward_door", "server", "stuck")
 
     def go_on(self) -> None:
@@ -98,7 +102,7 @@ class Module:
 
 
 def shipped(name: str, directory: Path, transport: str) -> Path:
-    """Copy a shipped YAML for this transport, without its `ros_setup`; return the copy."""
+    """Copy a shipped YAML file, set this transport, and remove `ros_setup`. Return the copy."""
     text = (ROOT / "config" / name).read_text()
     text = re.sub(r" *ros_setup: .*\n", "", text)
     file = directory / name
@@ -110,19 +114,21 @@ BRIDGE = ("bridges.cli",)
 
 
 def command(*arguments: str | Path, program: Sequence[str] = BRIDGE) -> list[str]:
-    """Return the command line of `rmf-bridge …`; `program` is the module and its first arguments."""
+    """Return the command line of `rmf-bridge …`. `program` is a Python module with its first
+    arguments."""
     return [sys.executable, "-m", *program, *map(str, arguments)]
 
 
 def environment(**more: str) -> dict[str, str]:
-    """Return this process's environment without a service's variables, plus the given variables."""
+    """Return this process's environment with the variables in `more`, and without a service's
+    variables."""
     units = ("RMF_", "NOTIFY", "WATCHDOG", "RUNTIME_DIR", "STATE_DIR", "SERVICE_RESULT")
     own = {name: value for name, value in os.environ.items() if not name.startswith(units)}
     return own | more
 
 
 class Daemon:
-    """`rmf-bridge run`, with its log."""
+    """A running `rmf-bridge run` with its log."""
 
     def __init__(
         self,
@@ -142,7 +148,7 @@ class Daemon:
             )
 
     def wait_for(self, text: str) -> None:
-        """Wait until this text is in the log; fail at once if the daemon ends without the text."""
+        """Wait until this text is in the log. Fail at once if the daemon ends without it."""
 
         def said() -> bool:
             ended = self.process.poll() is not None
@@ -153,7 +159,7 @@ class Daemon:
         wait_until(said, f"{text!r} in {self.log}")
 
     def end(self, number: int) -> int:
-        """Send a signal and return the exit code."""
+        """Send a signal to the daemon, and return its exit code."""
         self.process.send_signal(number)
         return self.process.wait(PATIENCE_S)
 
@@ -162,7 +168,7 @@ class Daemon:
 def daemon(
     file: Path, runtime_dir: Path, *options: str, program: Sequence[str] = BRIDGE, **env: str
 ) -> Iterator[Daemon]:
-    """Yield a daemon that does not outlive its test."""
+    """Yield a running daemon, and end it with the test."""
     started = Daemon(file, runtime_dir, *options, program=program, **env)
     try:
         yield started
@@ -187,7 +193,7 @@ def hold_open(module: Module, graph: "Graph", running: Daemon) -> None:
 
 
 class Graph:
-    """RMF's end of the graph: requests the door, and hears its states."""
+    """RMF's side of the graph, which requests the door and hears its states."""
 
     def __init__(self, domain: int) -> None:
         self.states: list[DoorState] = []
@@ -196,17 +202,17 @@ class Graph:
         self.heard = self.transport.subscribe(DOOR_STATES, self.states.append)
 
     def ask(self, mode: DoorModeValue) -> None:
-        """Send a request once the node has matched."""
+        """Send a request as soon as the door's node is found."""
         wait_until(self._requests.matched, "the node listens")
         self.request(mode)
 
     def request(self, mode: DoorModeValue) -> None:
-        """Send a request without waiting for a listener."""
+        """Send a request, even if no node listens."""
         request = DoorRequest(
             door_name="ward_door", requester_id="r", requested_mode=DoorMode(int(mode))
         )
         self._requests.publish(request)
 
     def last(self) -> DoorModeValue | None:
-        """Return the mode in the door's last state."""
+        """Return the mode in the door's last state, or None before the first state."""
         return DoorModeValue(self.states[-1].current_mode.value) if self.states else None

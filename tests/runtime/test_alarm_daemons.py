@@ -1,4 +1,7 @@
-"""A panel and a door as two real daemons, each at its own fake module, and a fleet adapter's ears."""
+"""Two real daemons, of a panel and of a door, each with its own fake module.
+
+A subscriber stands in for a fleet adapter.
+"""
 
 import signal
 import subprocess
@@ -50,7 +53,7 @@ doors:
 
 
 class Place:
-    """A daemon's file and its module, which outlives the daemon."""
+    """A daemon's YAML file and its module. The module outlives the daemon."""
 
     def __init__(self, directory: Path, name: str, text: str, device: str, domain: int) -> None:
         self.file, self.device = directory / f"{name}.yaml", device
@@ -75,7 +78,7 @@ class Place:
         self._caller.order(f"press {self.device} fire {'on' if on else 'off'}")
 
     def state(self) -> str:
-        """Return the alarm's state in the status file; "" without such a file."""
+        """Return the alarm's state in the status file, or "" if the file is missing."""
         try:
             status = (self._directory / f"run-{self._name}" / "status.json").read_bytes()
             found = msgspec.json.decode(status, type=dict[str, Any])
@@ -87,7 +90,7 @@ class Place:
         wait_until(lambda: self.state() == state, f"{self._name} is {state}: {self.file}")
 
     def reset(self) -> None:
-        """Reset as a person does, until the alarm has taken it: the cause may be over only now."""
+        """Reset as a person does, until the daemon accepts the reset. Its cause may end only now."""
 
         def is_reset() -> bool:
             run = self._directory / f"run-{self._name}"
@@ -110,7 +113,7 @@ def places(tmp_path: Path, domain: int) -> Iterator[tuple[Place, Place]]:
 
 
 def heard_late(domain: int) -> list[bool]:
-    """Return what a fleet adapter hears that starts now, until it hears an alarm."""
+    """Start a fleet adapter's subscriber now, and return the values that it hears up to an alarm."""
     found: list[Bool] = []
     late = join("late", domain)
     late.subscribe(FIRE_ALARM_TRIGGER, found.append)

@@ -1,4 +1,4 @@
-"""A daemon that is suspended, deaf or hung: what RMF sees, and what systemd hears."""
+"""Daemons that are suspended, deaf or hung: the states that RMF gets and the messages to systemd."""
 
 import argparse
 import os
@@ -21,7 +21,7 @@ HURT = "tests.runtime.hurt"
 
 
 class Systemd:
-    """The messages of a daemon to systemd."""
+    """A socket that receives a daemon's messages to systemd."""
 
     def __init__(self, path: Path) -> None:
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -29,7 +29,7 @@ class Systemd:
         self.socket.setblocking(False)
 
     def heard(self) -> list[bytes]:
-        """Return all messages since the last call."""
+        """Return the messages since the last call."""
         found: list[bytes] = []
         try:
             while True:
@@ -40,7 +40,7 @@ class Systemd:
 
 @contextmanager
 def systemd(directory: Path) -> Iterator[Systemd]:
-    """Yield a listener on the socket `notify`."""
+    """Yield a listener on the socket `notify`, which stands in for systemd's socket."""
     listening = Systemd(directory / "notify")
     yield listening
     listening.socket.close()
@@ -60,7 +60,10 @@ def test_after_sigstop_no_earlier_state_is_shown_as_new(
         pid = running.process.pid
 
         def suspended() -> bool:
-            """Suspend the daemon while the door leaves OPEN; return False if the stop met a scan."""
+            """Suspend the daemon, and let the door leave OPEN meanwhile.
+
+            Return False if the daemon was stopped in the middle of a scan.
+            """
             module.tell("fail", "ward_door", "opened", "ok")
             wait_until(lambda: graph.last() is DoorModeValue.MODE_OPEN, "the door shows OPEN")
             shown = len(graph.states)
@@ -115,7 +118,7 @@ def test_a_transport_that_cannot_be_restarted_ends_the_daemon_with_the_relay_off
 
         def ended() -> bool:
             heard.extend(manager.heard())
-            graph.request(DoorModeValue.MODE_OPEN)  # the message wakes the reader, which fails
+            graph.request(DoorModeValue.MODE_OPEN)  # the message wakes the reader
             return running.process.poll() is not None
 
         wait_until(ended, "the daemon has ended")
@@ -149,14 +152,17 @@ def test_the_watchdog_is_not_fed_while_a_call_of_the_bus_hangs(
         _status_written(run, 5)
         assert manager.heard() == []
         assert module.relay() == [True]
-        assert running.end(signal.SIGABRT) == -signal.SIGABRT  # as systemd does then
+        assert running.end(signal.SIGABRT) == -signal.SIGABRT  # the signal that systemd sends then
     off = command("outputs-off", module.file, "--runtime-dir", run)
     assert subprocess.run(off, env=environment()).returncode == 0
     wait_until(lambda: module.relay() == [True, False], "the relay is off")
 
 
 def _status_written(run: Path, times: int) -> None:
-    """Wait for so many rounds of the daemon's main thread, which feeds the watchdog."""
+    """Wait until the daemon's main thread has written the status `times` times.
+
+    The main thread also feeds the watchdog.
+    """
     for _ in range(times):
         before = (run / "status.json").stat().st_ino
         wait_until(lambda: _inode(run) not in (None, before), "the status is written")  # noqa: B023
@@ -172,7 +178,7 @@ def _inode(run: Path) -> int | None:
 def test_a_reset_during_the_start_does_no_harm(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
-    """`rmf-bridge reset` runs again and again, from before the process begins to its service."""
+    """The test repeats `rmf-bridge reset` from before the daemon's start until the daemon serves."""
     run = tmp_path / "run"
     asked = argparse.Namespace(file=module.file, runtime_dir=str(run))
     codes: list[tuple[bool, int]] = []

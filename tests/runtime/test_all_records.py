@@ -1,4 +1,4 @@
-"""`outputs-off --all-records` switches relays off after a power cut, before a daemon starts."""
+"""The command `outputs-off --all-records` after a power cut: it runs before any daemon starts."""
 
 import socket
 import subprocess
@@ -18,13 +18,14 @@ from tests.waiting import wait_until
 
 COIL_OFF = bytes.fromhex("0001 0000 0006 01 05 0000 0000")
 COIL_ON = bytes.fromhex("0001 0000 0006 01 05 0000 ff00")
-"""Modbus TCP: transaction 1, unit 1, write single coil 0."""
+"""A Modbus TCP request: transaction 1, unit 1, write single coil 0 on."""
 
 
 def died(state: Path, file: Path, later: bytes = b"") -> Path:
-    """Write the record that this file's daemon left at the power cut; return its path.
+    """Write the record that a daemon with this file had when the power failed. Return the record's
+    path.
 
-    `later` is an addition of a later version to the YAML.
+    `later` is text that a later version added to the YAML file.
     """
     left = record.of(load(file))
     if later:
@@ -42,7 +43,7 @@ def module(tmp_path: Path, domain: int) -> Iterator[Module]:
     made = Module(tmp_path, domain)
     with socket.create_connection(("127.0.0.1", port(made.file))) as wire:
 
-        def is_on() -> bool:  # again and again: the follower may have missed the first edge
+        def is_on() -> bool:  # repeated, because the first edge may come too early
             for frame in (COIL_OFF, COIL_ON):
                 wire.sendall(frame)
                 assert wire.recv(64)
@@ -61,7 +62,8 @@ def port(file: Path) -> int:
 
 
 def booted(state: Path) -> subprocess.CompletedProcess[str]:
-    """Run the unit's command with the state directories of this user's daemons."""
+    """Run the command of the unit that runs at boot, with the state directories of this user's
+    daemons."""
     code = (
         "import pathlib, sys; from bridges.runtime.all_records import switch_off_all;"
         f"sys.exit(switch_off_all(pathlib.Path({str(state / 'rmf-bridge')!r}), 20, 20))"

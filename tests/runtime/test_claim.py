@@ -1,4 +1,7 @@
-"""Switching off uses the settings in the record; only if these do not decode, it uses the YAML."""
+"""A process that switches off uses the settings in the record.
+
+If these settings cannot be decoded, the process uses the YAML text in the record.
+"""
 
 import subprocess
 import sys
@@ -23,7 +26,7 @@ BUILD = "r1.gabcdef0"
 
 @pytest.fixture(autouse=True)
 def _built(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Set the build of a package; a checkout has no known build."""
+    """Set the build number of a package, because a checkout has no build number."""
     monkeypatch.setattr(record, "BUILD", BUILD)
     texts.give({})
     yield
@@ -56,7 +59,7 @@ def of_file(file: Path) -> tuple[Config, ClaimRecord, ClaimedSettings]:
 @pytest.mark.parametrize("file", DEVICES, ids=lambda file: file.stem)
 def test_the_settings_in_a_record_are_those_of_its_yaml(file: Path) -> None:
     config, written, _ = of_file(file)
-    # without the YAML, which is spoiled here
+    # The second record has a spoiled YAML text, so only its decoded settings can give the result.
     assert claimed(msgspec.structs.replace(written, yaml=config.text).config()) == claimed(config)
     spoiled = msgspec.structs.replace(written, yaml=b"kind: [").config()
     assert claimed(spoiled)[1:] == claimed(config)[1:]

@@ -1,7 +1,8 @@
-"""A controller that takes a call and clears its place is no other master; another master is told.
+"""A controller may take a call and clear the call's register or coil. Such a controller is no rival.
 
-Everything is real but the lift: the daemon's service with its clock, a Modbus line, and the other
-master's own connection. On RS-485 the other master uses the module's network port.
+A second master that writes there is a rival, and the daemon's log must name it. Everything is real
+except the lift: the daemon's service with its clock, a Modbus line, and the second master's own
+connection. On RS-485 the second master uses the module's network port.
 """
 
 import logging
@@ -43,7 +44,7 @@ TIMEOUT_S: Final = 2.0
 
 
 class Site:
-    """One lift with its daemon, and RMF. `another`: another master's bus to the same units."""
+    """One lift with its daemon, and RMF. `another` is a second master's bus to the same units."""
 
     def __init__(self, config: Config, clears_s: float | None, rtu: bool, held: ExitStack) -> None:
         self.states: list[LiftState] = []
@@ -90,7 +91,7 @@ class Site:
         self._requests.publish(asked)
 
     def rides(self, floor: str) -> None:
-        """Ride to a floor in AGV mode, until its door is open there."""
+        """Ride to a floor in AGV mode, and wait until the door is open at that floor."""
 
         def there() -> bool:
             self.request(floor)
@@ -103,12 +104,12 @@ class Site:
         wait_until(there, f"the lift stands open at {floor}")
 
     def modes(self) -> list[int]:
-        """Return the modes, from the first in which the lift was in service."""
+        """Return the modes in order, from the moment the lift was first in service."""
         modes = [mode for mode, _ in groupby(state.current_mode for state in self.states)]
         return modes[modes.index(LiftMode.MODE_HUMAN) :]
 
     def called(self) -> bool:
-        """Ask for L3; has the lift been called there?"""
+        """Ask for L3, and return whether the lift has been called to L3."""
         self.request("L3")
         return bool(self.relay("call_L3"))
 
@@ -149,7 +150,7 @@ def spoken(caplog: pytest.LogCaptureFixture) -> list[str]:
 
 
 def is_told(point: Point, caplog: pytest.LogCaptureFixture) -> bool:
-    """Is another master named as a cause, although the place has not cleared itself?"""
+    """Does a `device_lost` line in the log name another master that writes this point?"""
     lost = [text for text in spoken(caplog) if text.startswith("device_lost")]
     return any("another master writes" in text and str(point) in text for text in lost)
 
@@ -233,8 +234,8 @@ def test_another_master_that_switches_our_command_off_is_told(
     held: ExitStack,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    """The other master writes 0 twice a second, beside a controller that keeps its calls, or clears
-    them."""
+    """The second master writes 0 twice a second. The controller keeps its calls, or clears its
+    calls."""
     point = SERVED[what][example]
     site = Site(configured(example, tmp_path), clears_s, rtu, held)
     site.plant.fail("car", "slow")

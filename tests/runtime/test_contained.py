@@ -1,4 +1,4 @@
-"""A defect in a driver: its device goes offline and off; the other devices stay in service."""
+"""A defect in a driver takes its device offline and off. The other devices stay in service."""
 
 import pytest
 
@@ -13,7 +13,7 @@ def breaks(error: Exception) -> None:
 
 
 def held() -> Corridor:
-    """Return a corridor in which RMF holds the ward's door."""
+    """Return a corridor in which RMF holds the door `ward` open."""
     corridor = Corridor()
     corridor.round(0.0)
     corridor.asks("ward")

@@ -1,4 +1,7 @@
-"""Outputs go off after every death: a door's daemon on a real Modbus module, with its relay on."""
+"""After every death of a daemon the outputs go off.
+
+The daemon of a door on a real Modbus module dies while its relay is on.
+"""
 
 import os
 import pty
@@ -40,7 +43,7 @@ from tests.waiting import PATIENCE_S, wait_until
 def wall(
     module_domain: int, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[tuple[Module, Graph]]:
-    """Yield a module and an RMF for all tests; daemons come and go."""
+    """Yield one module and one RMF for all tests. Each test starts its own daemons."""
     standing = Module(tmp_path_factory.mktemp("wall"), module_domain)
     joined = Graph(standing.domain)
     yield standing, joined
@@ -55,7 +58,7 @@ def graph(wall: tuple[Module, Graph]) -> Graph:
 
 @pytest.fixture
 def module(wall: tuple[Module, Graph]) -> Module:
-    """Return the module in its first state: relay off, history forgotten."""
+    """Return the module in its first state: the relay is off, and the history is empty."""
     standing, joined = wall
     standing.go_on()
     standing.file.write_text(standing.yaml)
@@ -106,9 +109,9 @@ def test_the_rule_leaves_out_crashes_and_signals_that_end_nothing_by_default() -
 
 
 USUAL = [signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP, signal.SIGRTMAX]
-"""Signals of `make test`; test_process.py has SIGINT and SIGTERM."""
+"""The signals in `make test`. test_process.py has SIGINT and SIGTERM."""
 EVERY = [n for n in ENDING if n < signal.SIGRTMIN or n in (signal.SIGRTMIN, signal.SIGRTMAX)]
-"""Signals of `make deep`, with the first and the last realtime signal only."""
+"""The signals in `make deep`. Of the realtime signals only the first and the last are included."""
 
 
 @pytest.mark.parametrize(
@@ -403,7 +406,7 @@ def test_where_a_live_daemon_cannot_be_ruled_out_only_execstoppost_switches_off(
 
 
 def _runs_for_others() -> bool:
-    """May another user run this Python? Not if it is below root's home."""
+    """May another user run this Python? The other user may not if this Python is below root's home."""
     try:
         return subprocess.run([sys.executable, "-c", ""], user=65534).returncode == 0
     except PermissionError:
@@ -489,7 +492,8 @@ def test_missing_lgpio_or_permission_is_reported_in_one_line(tmp_path: Path) -> 
 def test_a_bus_that_cannot_be_opened_leaves_nothing_to_switch_off(
     domain: int, tmp_path: Path
 ) -> None:
-    """Nothing was claimed, so no record may stay: without this hardware nobody could clear it."""
+    """No output was claimed, so no record may stay. Nobody could clear a record without the
+    hardware."""
     file = shipped("lift_dry_contact.yaml", tmp_path, wire())
     text = file.read_text()
     text = text.replace("domain_id: 0", f"domain_id: {domain}\n  network: localhost")

@@ -1,4 +1,4 @@
-"""The message on `/diagnostics`, which a real daemon sends each second."""
+"""The messages on `/diagnostics`, one each second, from a real daemon."""
 
 from pathlib import Path
 

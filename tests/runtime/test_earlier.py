@@ -1,6 +1,7 @@
-"""Files of earlier versions stay readable; files of later versions are read, or refused with a reason.
+"""Files of earlier versions stay readable. Files of later versions are read, or refused with a reason.
 
-`earlier/<date>` has the files of that day's program; tests/blackbox/earlier has rings and recordings.
+`earlier/<date>` has files that the program of that day wrote. tests/blackbox/earlier has rings and
+recordings.
 """
 
 import logging
@@ -32,7 +33,7 @@ def _forgotten() -> Iterator[None]:
 
 
 def left(folder: Path, **later: object) -> tuple[Path, Records, str]:
-    """Write a record with a later version's fields; return its path, the records and the YAML."""
+    """Write a record that has a later version's fields. Return its path, the records and the YAML."""
     (source,) = EARLIER[-1].glob(PATTERN)
     content = msgspec.json.decode(source.read_bytes()) | later
     path = folder / source.name

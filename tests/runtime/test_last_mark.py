@@ -1,4 +1,7 @@
-"""A last mark spares `outputs-off` its work, but only after the clean stop that the mark names."""
+"""A mark of the daemon's last run says that its outputs are off, and spares `outputs-off` its work.
+
+The mark counts only after the clean stop of the same run.
+"""
 
 import signal
 import subprocess

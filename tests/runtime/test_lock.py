@@ -1,4 +1,7 @@
-"""Readers, and processes that wait for the lock, keep no relay on; no run switches another off."""
+"""Processes that read the lock file or wait for the lock keep no relay on.
+
+No run of a daemon switches another run's outputs off.
+"""
 
 import fcntl
 import os
@@ -23,7 +26,7 @@ from tests.waiting import wait_until
 
 @pytest.fixture
 def public() -> Iterator[Path]:
-    """Yield a directory that other users can reach, unlike pytest's directories."""
+    """Yield a directory that other users can reach. Pytest's own directories are private."""
     with tempfile.TemporaryDirectory(dir="/tmp") as folder:
         yield Path(folder)
 

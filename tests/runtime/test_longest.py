@@ -1,4 +1,4 @@
-"""Ten megabytes in any string of any message that a kind hears are not kept."""
+"""Ten megabytes in a string of a message are not kept, in any message that a kind hears."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -20,7 +20,7 @@ from bridges.settings.load import load
 CONFIG = Path(__file__).parents[2] / "config"
 HUGE = "x" * 10_000_000
 KEPT_MOST = 20_000
-"""The limit of characters kept of one message."""
+"""The limit of the characters that may be kept of one message."""
 
 ROBOT = d.RobotState(
     name="AMR01", task_id="t", mode=d.RobotMode(int(d.RobotModeValue.MODE_CHARGING))
@@ -63,7 +63,10 @@ HEARD: dict[str, dict[Topic[Any], Message]] = {
 
 
 def taker(name: str, topic: Topic[Any]) -> Callable[[Message], object]:
-    """Return a function that makes an event of such a message, with this shipped YAML's settings."""
+    """Return a function that makes an event of a message on this topic.
+
+    The function uses the settings of the shipped YAML file `name`.
+    """
     config = load(CONFIG / f"{name}.yaml")
     kind = kind_called(config.kind)
     if isinstance(kind, GraphKind):
@@ -74,7 +77,7 @@ def taker(name: str, topic: Topic[Any]) -> Callable[[Message], object]:
 
 
 def with_huge(value: Any) -> Iterator[Any]:
-    """Yield a copy of the value for each string in it, with that string huge."""
+    """Yield a copy of the value for each of its strings. In each copy that string is huge."""
     if isinstance(value, str):
         yield HUGE
     elif isinstance(value, tuple):

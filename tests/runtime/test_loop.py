@@ -1,4 +1,4 @@
-"""A bus and its devices in rounds, in virtual time: the order of scans, and the end."""
+"""A bus with its devices in virtual time: the order of scans in a round, and the loop's end."""
 
 import pytest
 
@@ -60,7 +60,8 @@ def test_one_device_that_cannot_be_switched_off_keeps_no_other_on_and_is_reporte
 
 
 def test_after_a_suspension_nothing_is_shown_that_was_only_true_before_it() -> None:
-    """The suspension (SIGSTOP, or a laptop's sleep) is shorter than the permitted age of a reading."""
+    """The suspension, by SIGSTOP or by a laptop's sleep, is shorter than a reading's greatest permitted
+    age."""
     corridor = Corridor(debounce={"opened": 0.1, "closed": 0.1})
     for i in range(7):
         corridor.round(SCAN_S * i)
@@ -97,7 +98,8 @@ def test_a_slow_bus_does_not_count_as_a_suspension(caplog: pytest.LogCaptureFixt
 
 
 def test_each_device_that_is_scanned_and_each_call_of_the_bus_shows_that_the_loop_lives() -> None:
-    """Thirty silent units make one long round of thirty timeouts, which must not look like a hang."""
+    """Thirty silent units cause a round of thirty timeouts. Such a long round must not look like a
+    hang."""
     corridor = Corridor()
     counts: list[int] = []
     corridor.doors["ward"].during = lambda: counts.append(corridor.loop.finished)

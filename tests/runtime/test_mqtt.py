@@ -1,4 +1,4 @@
-"""A door behind a broker: its real daemon is killed, its broker is killed and returns."""
+"""A door behind a broker. The tests kill the door's real daemon, and kill and restart the broker."""
 
 import signal
 import subprocess
@@ -13,7 +13,7 @@ from tests.waiting import wait_until
 
 
 class Shelly(Module):
-    """A broker with a relay and two inputs, and the door behind them."""
+    """A broker, a relay with two inputs at the broker, and the door behind them."""
 
     text = """
 kind: door

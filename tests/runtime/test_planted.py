@@ -1,4 +1,4 @@
-"""Directories that somebody else made, or put in a daemon's way, are neither read nor written."""
+"""Directories that another user made or put in a daemon's way. They are neither read nor written."""
 
 import json
 import os
@@ -62,7 +62,7 @@ def a_directory(to: Path, place: Path) -> None:
 
 
 def a_link_within(to: Path, place: Path) -> None:
-    """Make somebody's own directory, with a link to one of our directories inside."""
+    """Make another user's own directory that has a link to one of our directories inside."""
     a_directory(to, place)
     (place / "rmf-bridge").unlink()
     (place / "rmf-bridge").mkdir()
@@ -74,7 +74,8 @@ PLANTED = [a_link, a_directory, a_link_within]
 
 @pytest.fixture
 def victim(machine: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return an attacker's target: a directory of root with files that have a daemon's file names."""
+    """Return the target of an attack: a directory of root, whose files are named like a daemon's
+    files."""
     for name in ("XDG_RUNTIME_DIR", "XDG_STATE_HOME"):
         monkeypatch.delenv(name)
     monkeypatch.setenv("HOME", "none")
@@ -97,7 +98,7 @@ def files(folder: Path) -> dict[str, str]:
 def test_what_anybody_plants_below_tmp_is_neither_read_nor_written(
     victim: Path, machine: Path, plant: Callable[[Path, Path], None], where: str
 ) -> None:
-    """`where` is the runtime directory of a daemon that root starts by hand, or its state directory."""
+    """A daemon that root starts by hand has its runtime directory or its state directory at `where`."""
     before = files(victim)
     plant(victim.parents[1], machine / "tmp" / where)
     with pytest.raises(Distrusted):

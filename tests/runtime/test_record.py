@@ -1,4 +1,4 @@
-"""A record has all data for switching off, whatever happens to the disk later."""
+"""A record has all data for switching off, even if files on the disk change later."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -59,7 +59,7 @@ def test_a_profile_that_is_gone_from_the_disk_is_found_in_the_record() -> None:
 
 
 class Silent:
-    """A device that answers at the third try."""
+    """A device that answers only at the third try."""
 
     def __init__(self) -> None:
         self.called: list[str] = []

@@ -1,4 +1,7 @@
-"""`ros_setup:`: the daemon sources ROS's setup file and goes on as if started from a prepared shell."""
+"""The key `ros_setup:` in the YAML file.
+
+The daemon sources ROS's setup file, and goes on as if it was started from a prepared shell.
+"""
 
 import logging
 import os

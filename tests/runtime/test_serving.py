@@ -1,4 +1,4 @@
-"""The thread of a service, with rounds written by the test."""
+"""The thread of a service. The test provides the rounds that the thread runs."""
 
 import threading
 import time
@@ -14,7 +14,7 @@ CLOCK = Clock(time.monotonic, time.time)
 
 
 class Rounds:
-    """Rounds that fail once `works` is False. Their end returns `safe`, and waits for `after`."""
+    """Rounds that fail once `works` is False. `end` waits for `after`, and then returns `safe`."""
 
     name = "rounds"
 

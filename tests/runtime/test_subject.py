@@ -1,4 +1,4 @@
-"""The log lines, the status and the counts of a subject."""
+"""A subject's lines in the log, its status and its counts."""
 
 import logging
 
@@ -14,7 +14,7 @@ from bridges.runtime.subject import Subject, SubjectCore
 
 
 class Seen(msgspec.Struct, frozen=True):
-    """A report of a number; the news is whether the number is even."""
+    """A report of a number. The report is news when the number changes between even and odd."""
 
     number: int
     faults: tuple[Fault, ...] = ()

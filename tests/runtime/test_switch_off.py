@@ -1,4 +1,4 @@
-"""Switching off from a new process: silent devices keep no relay of another device on."""
+"""A new process switches off. Silent devices must not keep another device's relay on."""
 
 import threading
 from collections.abc import Iterator
@@ -18,10 +18,10 @@ SILENT = 30
 
 @pytest.fixture
 def module() -> Iterator[Module]:
-    """Yield a module on which only the last of many units answers, with its relay on.
+    """Yield a module on which only the last of many units answers. The relay of that unit is on.
 
-    Some threads still ask silent units when the time is up. They end once the module is closed, so wait
-    for them.
+    At the time limit some threads still wait for silent units. These threads end when the module is
+    closed, so the fixture waits for them.
     """
     before = set(threading.enumerate())
     standing = Module()

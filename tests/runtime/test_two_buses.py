@@ -1,4 +1,7 @@
-"""A dead bus that is listed first keeps no relay of another bus on, whatever ends the daemon."""
+"""A dead bus is listed first in the YAML file. It must not keep a relay of another bus on.
+
+The daemon ends in several ways.
+"""
 
 import os
 import signal
@@ -23,12 +26,12 @@ from tests.waiting import wait_until
 HURT = "tests.runtime.hurt"
 SIGNALS = [signal.SIGTERM, *depth([], [signal.SIGINT, signal.SIGHUP, signal.SIGTSTP])]
 PARTS = ["loop", "reader", "watch"]
-"""Parts that fail (`hurt.py`): the thread of a bus, the transport, the thread that watches both."""
+"""The parts that fail (`hurt.py`): a bus's thread, the transport, and the thread that watches both."""
 
 
 @pytest.fixture
 def two(module: Module) -> Iterator[Path]:
-    """Yield the door's YAML with another door before it, on a connected bus that never answers."""
+    """Yield the door's YAML file with a second door before it. The second door's bus never answers."""
     with socket.create_server(("127.0.0.1", 0)) as hole:
         module.file.write_text(with_a_dead_bus_first(module.yaml, hole.getsockname()[1]))
         yield module.file
@@ -56,7 +59,7 @@ def test_a_part_that_dies_switches_the_live_bus_off_while_the_dead_one_is_still_
         hurt.touch()
 
         def ended() -> bool:
-            graph.request(DoorModeValue.MODE_OPEN)  # the message wakes the reader, which fails
+            graph.request(DoorModeValue.MODE_OPEN)  # the message wakes the reader
             return running.process.poll() is not None
 
         wait_until(ended, "the daemon has ended")
@@ -85,7 +88,8 @@ def test_after_a_kill_the_live_bus_is_switched_off_while_the_dead_one_is_still_t
 def test_what_several_dead_daemons_left_on_shares_the_time_of_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """systemd kills ExecStopPost after TimeoutStopSec; the last record must have its turn before."""
+    """systemd kills ExecStopPost after TimeoutStopSec. Even the last record must have its turn before
+    that."""
     file, given = tmp_path / "lift.yaml", list[float]()
     claims = Records(Directories(tmp_path, tmp_path), file)
     for name in ("lift_dry_contact", "lift_relay_board", "lift_one_hot"):

@@ -1,4 +1,4 @@
-"""systemd's watchdog must not take a single call of a bus for a hang."""
+"""A single call of a bus must be so short that systemd's watchdog does not take it for a hang."""
 
 import re
 from pathlib import Path

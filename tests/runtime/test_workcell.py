@@ -1,4 +1,4 @@
-"""A dispenser's daemon as a process, killed with SIGKILL at each stage, on a PLC that outlives it."""
+"""A dispenser's daemon as a process, which SIGKILL ends at each stage. Its PLC goes on."""
 
 import signal
 from collections.abc import Callable, Iterator
@@ -64,13 +64,13 @@ class Site:
         self._now = 0.0
 
     def ask(self, guid: str) -> None:
-        """Let RMF begin a phase; forget what was heard before."""
+        """Let RMF begin a phase, and forget the messages before it."""
         self.heard.clear()
         self._taken = 0
         self.phase = WorkcellPhase(_request(guid), self._now)
 
     def look(self) -> None:
-        """Let RMF hear, and repeat its request."""
+        """Let RMF take its messages and repeat its request."""
         for message in self.heard[self._taken :]:
             self._taken += 1
             self.phase.hear(message, self._now)
@@ -80,7 +80,7 @@ class Site:
             self._requests.publish(message)
 
     def until(self, is_so: Callable[[], bool], what: str) -> None:
-        """Let RMF go on until this is so."""
+        """Let RMF go on until the condition holds."""
 
         def looked() -> bool:
             self.look()
@@ -89,7 +89,7 @@ class Site:
         wait_until(looked, what)
 
     def outcome(self) -> str:
-        """Return the outcome of RMF's phase; "" while it is active."""
+        """Return the outcome of RMF's phase, or "" if the phase is still active."""
         return self.phase.outcome
 
     def is_offline(self) -> bool:
@@ -98,11 +98,11 @@ class Site:
         return bool(states) and states[-1].mode == d.WorkcellMode.OFFLINE
 
     def mode(self, mode: d.WorkcellMode) -> bool:
-        """Has any state this mode?"""
+        """Has a state shown this mode?"""
         return any(isinstance(m, d.DispenserState) and m.mode == mode for m in self.heard)
 
     def says(self, status: d.WorkcellStatus) -> bool:
-        """Has any result this status?"""
+        """Has a result had this status?"""
         return any(isinstance(m, d.DispenserResult) and m.status == status for m in self.heard)
 
 

@@ -1,8 +1,7 @@
-"""RMF's graph in virtual time: parties, the network between them, and kinds as the daemon serves them.
+"""RMF's graph in virtual time: its parties, the network between them, and our kinds without hardware.
 
-Each message crosses a network that may lose, delay, repeat and reorder messages. A kind without
-hardware runs on the product's own runtime (`GraphNode`); its rounds are called when they are due. There
-are no threads.
+The network may lose, delay, repeat and reorder each message. A kind without hardware runs on the
+product's own runtime (`GraphNode`). Its rounds are called when they are due. No threads run.
 """
 
 import heapq
@@ -22,11 +21,13 @@ from workbench.rmf_model import Party as RmfParty
 from workbench.rmf_model import Said
 
 EPOCH = 2.0**30
-"""Wall time when the world's clock shows 0; a power of two, so that sums of times stay exact."""
+"""The wall time (s) when the world's clock shows 0. It is a power of two, so sums of times are
+exact."""
 NEVER = float("inf")
 
 Route = Callable[[str, str], Sequence[float]]
-"""The delays of a message from one party to another (s): one for each copy that arrives."""
+"""A function from sender and receiver to the delays of a message (s). Each delay is one arriving
+copy."""
 
 
 class Party(Protocol):
@@ -38,10 +39,10 @@ class Party(Protocol):
         """Take a message that has arrived."""
 
     def wake_at(self) -> float:
-        """Return the time of the next call of `wake`."""
+        """Return the time (s) of the next call of `wake`."""
 
     def wake(self) -> None:
-        """Act at the time of `wake_at`."""
+        """Act at the time that `wake_at` gave."""
 
 
 def at_once(sender: str, receiver: str) -> Sequence[float]:
@@ -57,9 +58,10 @@ def in_order(sender: str, receiver: str) -> Sequence[float]:
 class World:
     """All parties and the messages between them.
 
-    `sent` has every message as (s, sender, topic, message); `watch` is called before each message goes
-    out. `publishers` has by topic the parties that declared a publisher. `hears_others` has (topic,
-    party) of each party that does not hear its own messages there.
+    - `sent` has every message as (s, sender, topic, message).
+    - `watch` is called before each message goes out.
+    - `publishers` has, by topic, the parties that declared a publisher.
+    - `hears_others` has (topic, party) if the party does not hear its own messages on the topic.
     """
 
     def __init__(self, route: Route = at_once) -> None:
@@ -76,7 +78,7 @@ class World:
         self._numbers = 0
 
     def add(self, party: Party, *topics: Topic[Any]) -> None:
-        """Let a party that hears these topics join, in place of any party with its name."""
+        """Let a party join that hears these topics. It replaces a party with the same name."""
         self.parties[party.name] = party
         for topic in topics:
             self.hearers[topic.name].add(party.name)
@@ -101,14 +103,14 @@ class World:
                 self._arrives_after(delay, receiver, topic, message)
 
     def replay(self, receiver: str) -> None:
-        """Deliver all retained messages, as a new subscriber gets them."""
+        """Deliver all retained messages to the receiver, as to a new subscriber."""
         for sender in sorted(self.retained):
             for topic, message in self.retained[sender]:
                 if receiver in self.hearers[topic.name]:
                     self._arrives_after(0.05, receiver, topic, message)
 
     def run(self, until: float, done: Callable[[], bool] = lambda: False) -> None:
-        """Run all events until this time, or until `done` is true."""
+        """Run all events up to this time, or until `done` returns True."""
         wakes = {name: party.wake_at() for name, party in self.parties.items()}
         while not done():
             at = min(wakes.values(), default=NEVER)
@@ -126,14 +128,14 @@ class World:
                 break
             self.now = max(self.now, at)
             next(party for name, party in self.parties.items() if wakes[name] == at).wake()
-            # The woken party may restart, add or remove others.
+            # The woken party may restart, add or remove other parties.
             wakes = {name: party.wake_at() for name, party in self.parties.items()}
         else:
             return
         self.now = until
 
     def said_on(self, topic: Topic[Any]) -> list[tuple[float, str, Any]]:
-        """Return every message on this topic: (s, sender, message)."""
+        """Return every message on this topic as (s, sender, message)."""
         return [(at, who, message) for at, who, on, message in self.sent if on == topic]
 
     def _arrives_after(
@@ -177,7 +179,7 @@ class WorldTransport:
     lives = True
 
     def sender(self) -> None:
-        """None: in the world no daemon asks."""
+        """Return None, because no daemon in the world asks for a sender."""
 
     def faults(self) -> list[tuple[str, str]]:
         return []
@@ -200,11 +202,11 @@ class _End:
         self._node.world.send(self._node.name, self._topic, message)
 
     def matched(self) -> int:
-        """Return how many publishers other nodes have on the topic."""
+        """Return the number of publishers that other nodes have on the topic."""
         return len(self.senders())
 
     def senders(self) -> list[str]:
-        """Return the nodes with these publishers."""
+        """Return the names of the other nodes that publish on the topic."""
         others = self._node.world.publishers[self._topic.name] - {self._node.name}
         return sorted(f"/{name}" for name in others)
 
@@ -214,7 +216,10 @@ class _End:
 
 @dataclass
 class Disk:
-    """The state directory, which outlives the daemon. `written` counts writes; if `full`, they fail."""
+    """The state directory, which outlives the daemon.
+
+    `written` counts the writes. If `full` is set, writes fail.
+    """
 
     kept: bytes | None = None
     written: int = 0
@@ -230,7 +235,7 @@ class Disk:
 
 
 class Served:
-    """A kind without hardware, served as by the daemon."""
+    """A kind without hardware that runs as in its daemon."""
 
     def __init__(
         self,
@@ -250,7 +255,7 @@ class Served:
         self.restart()
 
     def restart(self) -> None:
-        """Start a new daemon, which knows only its memory on disk and all retained messages."""
+        """Start a new daemon. It has only the memory on its disk, and hears all retained messages."""
         self.transport.close()
         self.world.add(self)
         self.transport = WorldTransport(self.world, self.name)
@@ -266,7 +271,7 @@ class Served:
         self.world.remove(self.name)
 
     def reset(self) -> None:
-        """Reset the node as an operator does, so that latched faults may clear."""
+        """Reset the node as an operator does. Latched faults may then clear."""
         self.node.reset()
         self.node.round()
 
@@ -282,11 +287,12 @@ class Served:
 
     @property
     def subjects(self) -> list[str]:
-        """Return the known lifts or doors."""
+        """Return the names of the lifts or doors that the node knows."""
         return list(self.node.devices())
 
     def faults(self) -> dict[str, list[str]]:
-        """Return, by lift or door, the faults in the status, if there are any."""
+        """Return the faults in the status by lift or door. A lift or door without faults is left
+        out."""
         shown = {name: status["faults"] for name, status in self.node.devices().items()}
         return {
             name: [f"{fault['code']}: {fault['detail']}" for fault in faults]
@@ -296,7 +302,7 @@ class Served:
 
 
 class Ticking:
-    """A node with subscriptions and a timer, which calls `tick` every `every_s` seconds."""
+    """A node with subscriptions and a timer. The timer calls `tick` every `every_s` seconds."""
 
     def __init__(self, world: World, name: str, every_s: float, tick: Callable[[], None]) -> None:
         self.name = name
@@ -317,7 +323,7 @@ class Ticking:
 
 
 class StandIn:
-    """One of RMF's parties, played by its rules; `new` makes the party."""
+    """A stand-in for one of RMF's parties, which follows RMF's rules. `new` makes the party."""
 
     def __init__(
         self, world: World, new: Callable[[], RmfParty], name: str, publishes: Topic[Any]
@@ -329,7 +335,7 @@ class StandIn:
         self.restart()
 
     def restart(self) -> None:
-        """Start a new party, which remembers nothing and hears all retained messages again."""
+        """Start a new party. It remembers nothing and hears all retained messages again."""
         self.party = self._new()
         self.world.add(self, *self.party.subscribes)
         self.world.publishers[self._publishes.name].add(self.name)
