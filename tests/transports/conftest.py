@@ -25,7 +25,8 @@ ROS2 = pytest.param("ros2", marks=pytest.mark.ros)
 
 @pytest.fixture(params=["memory", DDS, "zenoh", ROS2])
 def join(request: pytest.FixtureRequest) -> Iterator[Join]:
-    """Yield one graph for the test, on each transport in turn; its nodes leave at the end."""
+    """Yield one graph for the test. The test runs on each transport in turn, and its nodes then
+    leave."""
     network = MemoryNetwork()
     on: dict[str, Join] = {
         "memory": lambda name: MemoryTransport(network, name),
@@ -38,13 +39,13 @@ def join(request: pytest.FixtureRequest) -> Iterator[Join]:
 
 @pytest.fixture(params=[DDS, "zenoh", ROS2])
 def join_any_wire(request: pytest.FixtureRequest) -> Iterator[Join]:
-    """Yield one graph for the test, on each transport that has a wire."""
+    """Yield one graph for the test. The test runs on each transport that has a wire."""
     yield from _graph(joining(request.param, domain_of_this_run()))
 
 
 @pytest.fixture(params=["dds", ROS2])
 def join_wire(request: pytest.FixtureRequest) -> Iterator[Join]:
-    """Yield one graph for the test, on each transport whose wire is DDS."""
+    """Yield one graph for the test. The test runs on each transport whose wire is DDS."""
     yield from _graph(joining(request.param, domain_of_this_run()))
 
 
@@ -62,13 +63,14 @@ def join_zenoh() -> Iterator[Join]:
 
 @pytest.fixture
 def join_ros() -> Iterator[Join]:
-    """Yield one graph for the test, on ROS; for tests marked for ROS."""
+    """Yield one graph for the test, on ROS. Only tests that are marked for ROS may use it."""
     yield from _graph(joining("ros2", domain_of_this_run()))
 
 
 @pytest.fixture
 def observer(join_dds: Join) -> Iterator[Any]:
-    """Yield a DDS participant from outside this project, in the same process and domain."""
+    """Yield a plain DDS participant in the same process and domain, which uses no code of this
+    project."""
     join_dds("keeps_the_domain")
     from cyclonedds.domain import DomainParticipant
 

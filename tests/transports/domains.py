@@ -1,4 +1,4 @@
-"""The DDS domain of a test run."""
+"""The DDS domain of one run of the tests."""
 
 from functools import cache
 
@@ -7,5 +7,5 @@ from hal_fakes.domain import free_domain
 
 @cache
 def domain_of_this_run() -> int:
-    """Return the domain that tests of this process share unless a test needs its own."""
+    """Return the domain of this process's tests. A test may have its own domain instead."""
     return free_domain()

@@ -1,9 +1,8 @@
-"""RMF's messages written for cyclonedds by hand, independent of `bridges/transports/dds/idl.py`.
+"""RMF's messages written for cyclonedds by hand, without `bridges/transports/dds/idl.py`.
 
-Typed from the .msg files of rmf_internal_msgs 3d4df02, std_msgs and builtin_interfaces, as another
-node would see the wire. This file has no `from __future__ import annotations`, because cyclonedds
-cannot
-read such annotations.
+The messages come from the .msg files of rmf_internal_msgs 3d4df02, std_msgs and builtin_interfaces. So
+they look as on the wire of another node. This file has no `from __future__ import annotations`, because
+cyclonedds cannot read such annotations.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Opens nodes on loopback, by the name of a transport."""
+"""Functions that open nodes on loopback, by the name of a transport."""
 
 import importlib
 from collections.abc import Callable
@@ -11,26 +11,28 @@ from bridges.transports.transport import Transport
 from bridges.transports.zenoh.transport import ZenohTransport
 
 RELEASE = NEWEST if missing_of_ros() else installed()
-"""The release of the tests' messages: if ROS is installed, its release, on every wire."""
+"""The release of the tests' messages on every wire. If ROS is installed, it is the release of ROS."""
 
 Join = Callable[[str], Transport]
 """A function that opens a node of this name on one graph."""
 
 
 def on_fast_dds() -> bool:
-    """ROS may be missing"""
-    utilities = importlib.import_module("rclpy.utilities")  # there may be no ROS
+    """Does ROS use Fast DDS? Raises ImportError without ROS."""
+    utilities = importlib.import_module(
+        "rclpy.utilities"
+    )  # imported here, because ROS may be missing
     return bool(utilities.get_rmw_implementation_identifier() == "rmw_fastrtps_cpp")
 
 
 ZENOH = {"zenoh": Zenoh(), "zenoh_ros2dds": Zenoh(keys="ros2dds")}
-"""The two namings on zenoh."""
+"""The two key formats on zenoh."""
 
 
 def joining(
     transport: str, domain: int, release: Release | None = RELEASE, *, loopback: bool = True
 ) -> Join:
-    """Return a function that opens nodes of this transport and domain, normally on loopback."""
+    """Return a function that opens nodes of this transport in this domain, by default on loopback."""
 
     def join(name: str) -> Transport:
         if transport.startswith("zenoh"):

@@ -1,9 +1,10 @@
-"""A DDS node with Cyclone's own settings, like RMF's nodes: nothing limits its samples.
+"""A DDS node with Cyclone's own settings, like RMF's nodes, so that its samples have no size limit.
 
-`python -m tests.transports.long_samples DOMAIN BYTES SECONDS` sends names of that many bytes on every
-topic that a daemon hears, and prints the number of samples. With DOMAIN alone it answers each state of
-a
-door with a request of the same time, until its stdin ends.
+`python -m tests.transports.long_samples DOMAIN BYTES SECONDS` sends on every topic that a daemon hears.
+The names in its messages have that many bytes. It prints the number of samples.
+
+With DOMAIN alone it answers each state of a door until its stdin ends. The answer is a request with the
+same time.
 """
 
 import sys
@@ -26,7 +27,7 @@ from bridges.transports.cyclone import FOUND_AGAIN, INTERNAL, LOOPBACK
 from bridges.transports.dds.idl import sample_type
 
 AS_RMF: Final = LOOPBACK.replace(INTERNAL, "").replace(FOUND_AGAIN, "")
-"""Loopback with Cyclone's defaults, as RMF's own nodes have them."""
+"""A configuration for loopback. All other settings are Cyclone's defaults, as in RMF's own nodes."""
 RELIABLE: Final = (
     Policy.Reliability.Reliable(1_000_000_000),
     Policy.History.KeepLast(20),
@@ -52,7 +53,7 @@ def main(domain: int, length: int, seconds: float) -> None:
     while time.monotonic() < until:
         for writer, message in pairs:
             if writer.get_matched_subscriptions():
-                with suppress(DDSException):  # after a wait of 1 s the history is full
+                with suppress(DDSException):  # a full history makes a write fail after 1 s
                     writer.write(message)
                     sent += 1
         time.sleep(0.001)
@@ -61,7 +62,7 @@ def main(domain: int, length: int, seconds: float) -> None:
 
 
 def echo(domain: int) -> None:
-    """Answer each DoorState until stdin ends."""
+    """Answer each DoorState with a request until stdin ends."""
     kept = Domain(domain, AS_RMF)
     participant = DomainParticipant(domain)
     state, request = sample_type(DoorState), sample_type(DoorRequest)

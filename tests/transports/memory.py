@@ -1,8 +1,10 @@
-"""The `memory` transport: nodes of one process, for tests in virtual time.
+"""The `memory` transport between nodes of one process, for tests in virtual time.
 
-The transport has no thread, and reads only the wall clock. A message is delivered before `publish`
-returns, in the order in which the subscriptions were made. Ends match as in DDS: same name, same type,
-and a subscription that wants retained messages hears only publishers that retain messages.
+The transport has no thread, and the only clock that it reads is the wall clock. `publish` delivers a
+message before it returns, in the order in which the subscriptions were made.
+
+Ends match as in DDS, if name and type are the same. A subscription that wants retained messages hears
+only publishers that retain messages.
 """
 
 import time
@@ -19,7 +21,7 @@ from bridges.transports.transport import M, Receive, TransportError, any_type
 
 
 class MemoryNetwork:
-    """The network of one test: the publishers and subscriptions of all its nodes, by topic."""
+    """The network of one test. It has the publishers and subscriptions of all nodes, by topic."""
 
     def __init__(self) -> None:
         self.publishers: dict[str, list[_Publisher]] = defaultdict(list)
@@ -58,7 +60,7 @@ class MemoryTransport:
         return subscription
 
     def sender(self) -> Sender | None:
-        """The publisher of the message that is being delivered."""
+        """Return the publisher of the message that is now being delivered."""
         return self.heard_from
 
     @property
@@ -67,7 +69,7 @@ class MemoryTransport:
         return not self._closed
 
     def faults(self) -> list[tuple[str, str]]:
-        """Return no fault: all nodes are of one process and one release."""
+        """Return no fault, because all nodes have one process and one release."""
         return []
 
     def wall(self) -> float:
@@ -75,7 +77,7 @@ class MemoryTransport:
         return time.time()
 
     def close(self) -> None:
-        """Leave the network; messages that this node retained are gone."""
+        """Leave the network. The messages that this node retained are then lost."""
         self._closed = True
         for ends in self._network.publishers.values():
             ends[:] = [end for end in ends if end.node is not self]
@@ -97,7 +99,7 @@ class _Publisher:
         self._heard_by = network.subscriptions[topic.name]
 
     def publish(self, message: Message) -> None:
-        """Deliver at once. Raises CdrError for a message that no wire could carry."""
+        """Deliver a message at once. Raises CdrError for a message that no wire could carry."""
         if self not in self._ends:
             raise TransportError(f"topic {self.topic.name}: the node has left the graph")
         cdr.encode(self.topic.type, message, self.node.release)
@@ -108,11 +110,11 @@ class _Publisher:
                 subscription.hand_on(message, self.sender)
 
     def matched(self) -> int:
-        """Return the number of subscriptions reached; 0 after close."""
+        """Return the number of matched subscriptions, or 0 after close."""
         return sum(end.hears(self) for end in self._heard_by) if self in self._ends else 0
 
     def close(self) -> None:
-        """Take this end off the graph."""
+        """Remove this publisher from the graph."""
         if self in self._ends:
             self._ends.remove(self)
 
@@ -134,7 +136,7 @@ class _Subscription:
         self._others_only = others_only
 
     def hears(self, publisher: _Publisher) -> bool:
-        """Would DDS match the two ends, which have the same topic name?"""
+        """Would DDS match this publisher and this subscription, whose topic names are equal?"""
         theirs, ours = publisher.topic, self.topic
         return (
             theirs.type == ours.type
@@ -144,7 +146,7 @@ class _Subscription:
         )
 
     def hand_on(self, message: Message, sender: Sender) -> None:
-        """Deliver a message. As on a wire, a subscriber's exception does not reach the publisher."""
+        """Deliver a message. A subscriber's exception does not reach the publisher, as on a wire."""
         self.node.heard_from = sender
         notices.hand_on(self.node.dropped, self.topic, self.received, message)
 
@@ -158,10 +160,10 @@ class _Subscription:
                     self.hand_on(message, publisher.sender)
 
     def matched(self) -> int:
-        """Return the number of publishers heard; 0 after close."""
+        """Return the number of matched publishers, or 0 after close."""
         return len(self.senders())
 
     def senders(self) -> list[str]:
-        """Return the nodes of the publishers heard."""
+        """Return the names of the nodes with matched publishers."""
         heard = self._hears if self in self._ends else []
         return [f"/{end.node.name}" for end in heard if self.hears(end)]

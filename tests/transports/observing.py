@@ -1,4 +1,5 @@
-"""Sees announced ends through a DDS participant from outside this project."""
+"""Tools to read the ends that nodes announce, through a DDS participant without code of this
+project."""
 
 from typing import Any
 
@@ -13,11 +14,11 @@ SUBSCRIPTION = builtin.BuiltinTopicDcpsSubscription
 
 
 def seen(observer: Any, kind: Any, topic: Topic[Any]) -> Any:
-    """Return the only announced end of a topic."""
+    """Return the announced end of a topic, which must be the only one."""
     found: list[Any] = []
 
     def look() -> bool:
-        reader = BuiltinReader(observer, kind)  # a new reader sees the present ends
+        reader = BuiltinReader(observer, kind)  # a new reader gets all present ends
         found[:] = [end for end in reader.take(100) if end.topic_name == f"rt/{topic.name}"]
         return len(found) == 1
 

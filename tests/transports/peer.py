@@ -1,8 +1,7 @@
 """Another process on the graph: `python -m tests.transports.peer WHAT DOMAIN TRANSPORT`.
 
-The process ends when its stdin ends. `echo` sends each message of `ping_<topic>` back on
-`pong_<topic>`,
-for every topic. `hostile` is a lying node: its LiftRequests are forged samples.
+The process ends when its stdin ends. `echo` returns each message of `ping_<topic>` on `pong_<topic>`,
+for every topic. `hostile` is a node that sends forged samples as LiftRequests.
 """
 
 import socket
@@ -41,7 +40,7 @@ def running(what: str, domain: int, transport: str = "dds") -> Iterator[None]:
 
 
 def echo(domain: int, transport: str) -> None:
-    """Send back every message of every topic, under another name."""
+    """Send every message of every topic back, on the topic's other name."""
     node = joining(transport, domain)("echo")
     for topic in TOPICS.values():
         back = node.publisher(topic.named(f"pong_{topic.name}"))
@@ -51,7 +50,10 @@ def echo(domain: int, transport: str) -> None:
 
 
 def sent(publisher: Publisher[Any], message: Any) -> bool:
-    """Publish, and return False: for a condition that fails until the peer finds this publisher."""
+    """Publish the message, and return False.
+
+    As a condition this repeats the message until the peer finds the publisher.
+    """
     publisher.publish(message)
     return False
 
@@ -60,7 +62,7 @@ GOOD = bytes.fromhex(
     "00010000 06000000 4c696674 3100 0000 05000000 06000000"
     "0c000000 666c6565 742f726f 626f7400 01 000000 03000000 4c330002"
 )
-"""LiftRequest("Lift1", Time(5, 6), "fleet/robot", 1, "L3", 2) in CDR."""
+"""The CDR bytes of LiftRequest("Lift1", Time(5, 6), "fleet/robot", 1, "L3", 2)."""
 
 DECODED_BY_NOBODY = {
     "cut short": GOOD[:20],
@@ -76,15 +78,14 @@ COUNTED_AS_DROPPED = {
     "more than a LiftRequest": GOOD + b"\1\2\3\4\5\6\7\x08",
     "another encoding": b"\0\x07" + GOOD[2:],
 }
-"""Samples that pass Cyclone's library, and that our decoder refuses."""
+"""Samples that Cyclone's C library accepts and our decoder refuses."""
 
 
 def hostile(domain: int, transport: str) -> None:
-    """Match like an honest node, then put forged samples on the wire under the writer's own id.
+    """Match like an honest node, then send forged samples under the writer's own id.
 
-    Forged samples use up sequence numbers of the writer's next own samples, so only later ones of its
-    fifty
-    good samples arrive.
+    Forged samples use up sequence numbers of the writer's next samples. So only the later ones of its
+    fifty good samples arrive.
     """
     if transport == "zenoh":
         zenoh_hostile.main(*zenoh_hostile.arguments(domain))
@@ -105,7 +106,7 @@ def hostile(domain: int, transport: str) -> None:
     writer = DataWriter(participant, topic, qos=qos)
     wait_until(writer.get_matched_subscriptions, "somebody listens")
     writer.write(idl_types.LiftRequest("before", idl_types.Time(0, 0), "", 0, "", 0))
-    writer.wait_for_acks(10_000_000_000)  # now the other side knows this writer
+    writer.wait_for_acks(10_000_000_000)  # now the other side knows the writer
     forged = [GOOD, *DECODED_BY_NOBODY.values(), *COUNTED_AS_DROPPED.values()]
     for number, sample in enumerate(forged, start=2):
         _send_raw(domain, _data_packet(writer.guid.bytes, number, sample))
@@ -123,7 +124,7 @@ def _data_packet(guid: bytes, number: int, sample: bytes) -> bytes:
 
 
 def _send_raw(domain: int, packet: bytes) -> None:
-    """Send to the unicast data port of each of the domain's first processes."""
+    """Send the packet to the unicast data port of each of the domain's first four processes."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         for index in range(4):
             sender.sendto(packet, ("127.0.0.1", 7400 + 250 * domain + 11 + 2 * index))

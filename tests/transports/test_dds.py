@@ -1,4 +1,4 @@
-"""Properties of `dds` alone: noise on its ports, its place on the ROS graph, its configuration."""
+"""Properties of `dds` alone: noise on its ports, its node in ROS's graph, and its configuration."""
 
 import random
 import socket
@@ -51,7 +51,7 @@ def test_noise_on_our_ports_disturbs_nobody(domain: int, join_dds: Join, echo: N
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         for _ in range(300):
             packet = b"RTPS" * noise.randint(0, 1) + noise.randbytes(noise.randint(0, 200))
-            for port in (10, 11, 12, 13):  # discovery and data of the two processes in the domain
+            for port in (10, 11, 12, 13):  # the discovery and data ports of both processes
                 sender.sendto(packet, ("127.0.0.1", 7400 + 250 * domain_of_this_run() + port))
     after = d.LiftState(lift_name="after")
     publisher.publish(after)
@@ -75,7 +75,7 @@ def test_a_peer_with_another_type_is_named_once(
 def test_an_end_that_is_declared_while_rmfs_release_changes_has_the_new_release(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A fleet adapter of another release than our default is found just then."""
+    """During the subscription a fleet adapter appears, whose release is not our default."""
     create, heard = (
         DdsSubscription.create,
         Announced(
@@ -92,7 +92,7 @@ def test_an_end_that_is_declared_while_rmfs_release_changes_has_the_new_release(
             node._peers.seen("an adapter", heard)
             thread = threading.Thread(target=node._follow_release)
             thread.start()
-            thread.join(timeout=0.2)  # it ends before us only if it need not wait for us
+            thread.join(timeout=0.2)  # the thread ends early only if it need not wait
             return create(*given)
 
         monkeypatch.setattr(DdsSubscription, "create", found_meanwhile)

@@ -1,4 +1,4 @@
-"""A stranger who can send datagrams cannot fill the log."""
+"""A stranger who sends datagrams cannot fill the log."""
 
 import os
 import socket

@@ -1,4 +1,4 @@
-"""The certificates and the access control of docs/how-to/harden.md, on 127.0.0.1."""
+"""The certificates and the access control of docs/how-to/harden.md, tried on 127.0.0.1."""
 
 import json
 import logging
@@ -24,14 +24,15 @@ DOMAIN = 7
 
 
 def block(language: str) -> str:
-    """Return the page's code block in this language; it has one."""
+    """Return the page's code block in this language. The page has exactly one."""
     (found,) = re.findall(rf"^```{language}\n(.*?)^```$", PAGE, re.M | re.S)
     return str(found)
 
 
 @pytest.fixture(scope="module")
 def papers(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Make the certificates by the page's commands, for hosts on this machine."""
+    """Make the certificates with the page's commands, for hosts on this machine. Return their
+    folder."""
     folder = tmp_path_factory.mktemp("papers")
     commands = re.sub(r"[\w-]+\.hospital\.lan", "localhost", block("sh"))
     subprocess.run(["sh", "-e", "-c", commands], cwd=folder, check=True, capture_output=True)
@@ -39,7 +40,7 @@ def papers(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def flat(config: dict[str, Any], path: tuple[str, ...] = ()) -> Iterator[tuple[str, Any]]:
-    """Yield a configuration as `a__b`, value; access control stays whole."""
+    """Yield (`a__b`, value) for each setting of a configuration. Access control stays one value."""
     for key, value in config.items():
         if isinstance(value, dict) and key != "access_control":
             yield from flat(value, (*path, key))
@@ -60,7 +61,7 @@ def router(papers: Path) -> Iterator[Router]:
 
 @pytest.fixture
 def nodes(router: Router, papers: Path) -> Iterator[dict[str, ZenohTransport]]:
-    """Return a node of each name, as a client of the router."""
+    """Yield three nodes by name, each a client of the router."""
     opened = {name: node(router, papers, name) for name in ("rmf", "lift", "viewer")}
     yield opened
     for each in opened.values():
@@ -68,7 +69,7 @@ def nodes(router: Router, papers: Path) -> Iterator[dict[str, ZenohTransport]]:
 
 
 def node(router: Router, papers: Path, name: str, own: bool = True) -> ZenohTransport:
-    """Open a node. `own`: with its certificate."""
+    """Open a node. With `own` the node has its own certificate."""
     tls = ZenohTls(
         ca=str(papers / "ca.pem"),
         certificate=str(papers / f"{name}.pem") if own else None,
@@ -81,11 +82,11 @@ def node(router: Router, papers: Path, name: str, own: bool = True) -> ZenohTran
 def test_only_rmf_may_ask_and_only_the_lift_may_answer(
     nodes: dict[str, ZenohTransport],
 ) -> None:
-    heard: set[tuple[str, str, str]] = set()  # the listener, the speaker, the topic
+    heard: set[tuple[str, str, str]] = set()  # (listener, speaker, topic)
 
     def listen(listener: str, topic: AnyTopic) -> Subscription:
         def note(message: Any) -> None:
-            if message.session_id != listener:  # a node hears itself without the router
+            if message.session_id != listener:  # a node's own messages bypass the router
                 heard.add((listener, message.session_id, topic.name))
 
         return nodes[listener].subscribe(topic, note)
@@ -97,7 +98,7 @@ def test_only_rmf_may_ask_and_only_the_lift_may_answer(
     ears = [listen(name, topic) for name in nodes for topic in topics]
     mouths = [
         (nodes[name].publisher(topic), made(lift_name="Lift1", session_id=name))
-        for name in ("viewer", "lift", "rmf")  # the forbidden speak first
+        for name in ("viewer", "lift", "rmf")  # nodes without permission come first
         for topic, made in topics.items()
     ]
     wanted = {

@@ -1,4 +1,7 @@
-"""A node whose type has the name of our type and other fields: another release of RMF, or a liar."""
+"""A node with a type that has the name of our type but other fields.
+
+Such a node has another release of RMF, or lies.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -28,7 +31,7 @@ class LiftRequest(IdlStruct, typename="rmf_lift_msgs.msg.dds_.LiftRequest_"):
 
 
 class Lift:
-    """The node that obeys requests, and the requests that it has heard."""
+    """A node that hears requests, with the list of these requests."""
 
     def __init__(self, domain: int) -> None:
         self.domain = domain

@@ -1,4 +1,4 @@
-"""A machine whose network comes, goes and changes, and ROS's variables that name peers."""
+"""A machine whose network comes, goes and changes, and ROS's environment variables that name peers."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -73,27 +73,28 @@ def test_on_loopback_a_node_has_the_same_settings() -> None:
 
 
 class Machine:
-    """The machine's addresses, as the test sets them."""
+    """The machine's network addresses, which the test sets."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self._monkeypatch = monkeypatch
         self.addresses: addresses.Addresses = frozenset({(2, "10.0.0.7")})
 
     def goes_down(self) -> None:
-        """Take the network away: Cyclone finds no interface, Fast DDS no peer, rclpy no middleware."""
+        """Take the network away. Cyclone then finds no interface, Fast DDS no peer, and rclpy no
+        middleware."""
         self._monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK.replace('"lo"', '"no-such-interface"'))
         self._monkeypatch.setenv("ROS_STATIC_PEERS", "no such host")
         self.addresses = frozenset()
 
     def comes_back(self) -> None:
-        """Bring the network back: loopback."""
+        """Bring the network back, which is loopback."""
         self._monkeypatch.delenv("ROS_STATIC_PEERS", raising=False)
         self._monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
 
 
 @pytest.fixture
 def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
-    """Yield a machine whose nodes follow its made-up addresses, but really stay on loopback."""
+    """Return a machine with made-up addresses. Its nodes follow the addresses, but stay on loopback."""
     made = Machine(monkeypatch)
     monkeypatch.setattr(addresses, "addresses", lambda: made.addresses)
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")  # for Fast DDS
@@ -114,7 +115,7 @@ class Echoed:
         self.alarm = self.node.publisher(ALARM)
 
     def comes_back(self, number: int) -> bool:
-        """Has a state, which is sent again and again, come back?"""
+        """Send this state, and return whether it has come back."""
         state = d.DoorState(d.Time(number), "ward")
         with suppress(TransportError):
             self.states.publish(state)

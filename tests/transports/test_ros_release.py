@@ -1,4 +1,4 @@
-"""The release that `ros2` takes from installed packages and from ROS's graph; ROS is a stand-in."""
+"""The release of RMF that `ros2` finds in installed packages or on ROS's graph. ROS is a stand-in."""
 
 import sys
 from dataclasses import dataclass, field
@@ -47,7 +47,7 @@ def test_a_message_that_the_release_lacks_is_named(monkeypatch: pytest.MonkeyPat
 
 @dataclass
 class Info:
-    """The parts of rclpy's TopicEndpointInfo that our code reads."""
+    """A TopicEndpointInfo of rclpy with only the parts that our code reads."""
 
     topic_type: str
     topic_type_hash: object
@@ -55,7 +55,7 @@ class Info:
 
 
 class Graph:
-    """An rclpy node that sees one publisher of fleet_states."""
+    """An rclpy node that sees exactly one publisher of fleet_states."""
 
     def __init__(self, hashed: str) -> None:
         self.infos = [Info("rmf_fleet_msgs/msg/FleetState", hashed)]

@@ -1,6 +1,7 @@
-"""Duties of a transport between two processes of a machine, on every wire in turn.
+"""Duties of a transport between two processes of one machine. The tests run on every wire in turn.
 
-`ros2` runs where ROS is installed (make test-ros), `zenoh` without a router and in both namings.
+`ros2` runs where ROS is installed (make test-ros). `zenoh` runs without a router and with both key
+formats.
 """
 
 from collections.abc import Callable, Iterator
@@ -18,7 +19,7 @@ from tests.transports.values import repeatable, values
 from tests.waiting import LEASE_S, wait_until
 
 Pair = tuple[str, str]
-"""(our transport, the other process's transport)"""
+"""(our transport, the transport of the other process)"""
 PAIRS = [
     pytest.param(("dds", "dds"), marks=pytest.mark.dds),
     *(
@@ -31,7 +32,7 @@ RETAINED = {"EMERGENCY_SIGNAL", "FIRE_ALARM_TRIGGER", "ADAPTER_LIFT_REQUESTS"} &
 
 
 class Here:
-    """Our node in its own domain, and the transport of the other process."""
+    """Our node in its own domain. `theirs` is the transport of the other process."""
 
     def __init__(self, pair: Pair, domain: int) -> None:
         (self.ours, self.theirs), self.domain = pair, domain
@@ -103,7 +104,7 @@ def test_what_a_supervisor_retained_is_not_replayed_to_a_lift_that_starts_later(
         wait_until(
             lambda: after in received or peer.sent(publisher, after), "a new message comes back"
         )
-    # Fast DDS asks Cyclone for earlier messages, and gets them: docs/how-to/ros.md.
+    # Fast DDS asks Cyclone for earlier messages, and Cyclone sends them: docs/how-to/ros.md.
     replays = (here.ours, here.theirs) == ("dds", "ros2") and on_fast_dds()
     assert set(received) - ({before} if replays else set()) == {after}
 
@@ -115,7 +116,7 @@ def test_a_process_that_leaves_is_gone_at_once_for_the_others(here: Here) -> Non
         wait_until(
             lambda: publisher.matched() and subscription.matched(), "the other process is found"
         )
-    # Without a farewell the process would be missed only after its lease. Fast DDS misses Cyclone's
+    # A process that says no farewell is missed only after its lease. Fast DDS does not hear Cyclone's
     # farewell.
     unheard = (here.ours, here.theirs) == ("ros2", "dds") and on_fast_dds()
     wait_until(

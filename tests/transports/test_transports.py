@@ -137,7 +137,7 @@ def test_others_only_leaves_out_the_nodes_own_messages(join: Join) -> None:
     assert sorted(numbers(echoed)) == [1, 2]
     assert numbers(from_others) == [2]
     our_voice.publish(numbered(3))
-    other_voice.publish(numbered(3))  # equal text, but from the other node
+    other_voice.publish(numbered(3))  # the same text, but another node
     wait_until(lambda: len(echoed) == 4 and len(from_others) == 2, "all messages have arrived")
     assert numbers(from_others) == [2, 3]
     assert (everything.matched(), others_only.matched()) == (2, 1)
@@ -173,7 +173,7 @@ def test_a_listener_may_ask_who_published_a_message_of_two_that_say_the_same(joi
 
     wait_until(named, "discovery has told the nodes")
     if ours.speaks == "ros2":
-        assert heard == [None] * 4  # rclpy (Jazzy) does not tell
+        assert heard == [None] * 4  # rclpy (Jazzy) does not name the sender
     else:
         assert [sender and sender.node for sender in heard] == [f"/{one.name}", f"/{two.name}"] * 2
         assert len(set(heard)) == 2

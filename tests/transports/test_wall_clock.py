@@ -1,4 +1,4 @@
-"""A wall clock that steps: `dds` and `ros2` join again at the right times."""
+"""Steps of the wall clock: `dds` and `ros2` join the graph again, but only at steps that need it."""
 
 import logging
 from contextlib import suppress
@@ -53,7 +53,8 @@ def test_a_node_whose_clock_is_set_back_joins_again_with_all_its_ends(
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    """On loopback the node's thread waits for messages without a limit, so the step must wake it."""
+    """On loopback the node's thread waits for messages without a time limit. So the step must wake
+    it."""
     caplog.set_level(logging.INFO)
     ahead = [0.0]
     monkeypatch.setattr(threaded, "ahead_s", lambda: ahead[-1])
@@ -65,7 +66,7 @@ def test_a_node_whose_clock_is_set_back_joins_again_with_all_its_ends(
 
     def comes_back(number: int) -> bool:
         state = d.DoorState(d.Time(number), "ward")
-        with suppress(TransportError):  # while it joins
+        with suppress(TransportError):  # during the join
             states.publish(state)
         return state in heard
 

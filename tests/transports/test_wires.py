@@ -1,4 +1,4 @@
-"""Duties of transports whose wire is DDS: `dds` everywhere, `ros2` where ROS is (make test-ros)."""
+"""Duties of transports whose wire is DDS. `ros2` needs an installed ROS (make test-ros)."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -33,7 +33,7 @@ def test_forged_samples_are_dropped_and_the_good_ones_after_them_arrive(
         wait_until(lambda: received[-1:] == [d.LiftRequest("after")], "a good message arrives")
     names = [request.lift_name for request in received]
     assert names[names.index("Lift1") :] == ["Lift1"] + ["after"] * names.count("after")
-    # cyclonedds refuses some samples before they reach us; rclpy hands on every sample.
+    # cyclonedds refuses some samples before our code gets them. rclpy gives us every sample.
     by_us, first = {
         "DdsTransport": (4, "a string is not UTF-8: 'utf-8' codec can't decode byte 0xff"),
         "Ros2Transport": (8, "cut short: unpack_from requires a buffer of at least 24 bytes"),
@@ -46,7 +46,7 @@ def test_forged_samples_are_dropped_and_the_good_ones_after_them_arrive(
 @annotations.final
 @dataclass
 class OtherLiftRequest(IdlStruct, typename="rmf_lift_msgs.msg.dds_.LiftRequest_"):  # type: ignore[misc, call-arg]
-    """Another definition under RMF's name."""
+    """Another type under the name of RMF's LiftRequest."""
 
     number: uint32
     lift_name: str

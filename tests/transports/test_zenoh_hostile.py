@@ -13,10 +13,16 @@ from tests.transports.zenoh_hostile import FLOOD, GOOD, arguments
 from tests.waiting import wait_until
 
 BY_HAND = 8
-"""One without an attachment, two with malformed ones, one cut short, one empty, two of 10 MB, a
-deletion.
+"""The number of forged samples before the flood that must be counted.
 
-Then come a wrong hash, which makes another key, and a wildcard, which is counted too.
+- One has no attachment.
+- Two have malformed attachments.
+- One is cut short, and one is empty.
+- Two have 10 MB each.
+- One is a deletion.
+
+After these come a sample under a wrong hash, which is another key, and one under a wildcard, which is
+counted too.
 """
 
 
@@ -41,15 +47,15 @@ def test_forged_samples_are_dropped_and_counted_and_the_good_ones_after_them_arr
     finally:
         node.close()
     assert set(map(repr, received)) == {repr(GOOD)}
-    # Of a flood the newest hundred samples wait for our thread; the others are dropped unread.
+    # The newest hundred samples of the flood wait for our thread. The other samples are dropped unread.
     assert BY_HAND + 1 < node.dropped["lift_requests"] <= BY_HAND + 1 + FLOOD
-    # The log notes the flood once. On a busy machine the first forged samples may have left the queue.
+    # The log has one line about the flood. On a busy machine the first forged samples may be missing.
     (said,) = caplog.messages
     assert said.startswith("sample_dropped topic=lift_requests reason=")
 
 
 def test_nothing_forged_is_taken_for_a_message(domain: int) -> None:
-    """A key with a wrong hash, or with a wildcard, is not one of our keys."""
+    """A key with a wrong hash is none of our keys, and a key with a wildcard is none either."""
     received: list[d.LiftRequest] = []
     node = ZenohTransport("listener", domain, loopback=True)
     liar = ZenohTransport("liar", domain, loopback=True)

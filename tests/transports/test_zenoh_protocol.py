@@ -1,6 +1,6 @@
 """Keys, tokens, attachments and caches, as an independent program sees them (rmw_zenoh_reader.py).
 
-That program was written from the documents of rmw_zenoh and zenoh-bridge-ros2dds.
+That program follows the documents of rmw_zenoh and zenoh-bridge-ros2dds.
 """
 
 import time
@@ -54,7 +54,7 @@ def bridged() -> Iterator[ZenohTransport]:
 
 
 def session_of(tokens: list[str], at: int) -> str:
-    """Return the session's id, the same in all these tokens."""
+    """Return the session's id, which is the same in all these tokens at the position `at`."""
     (session,) = {token.split("/")[at] for token in tokens}
     assert int(session, 16) > 0
     return session
@@ -148,7 +148,10 @@ def test_what_we_retain_reaches_a_late_subscriber_of_rmw_zenoh_as_deep_as_it_wan
 def heard_from(
     node: ZenohTransport, topic: Any, key: str, token: str, message: Any, depth: str = ""
 ) -> list[Any]:
-    """Return the messages that our subscription hears of a program that speaks as this token says."""
+    """Return the messages that our subscription hears.
+
+    Another program publishes under this key, and its token describes its publisher.
+    """
     received: list[Any] = []
     subscription = node.subscribe(topic, received.append)
     order = f"say {key} {token} {encode(type(message), message).hex()} {depth}".strip()

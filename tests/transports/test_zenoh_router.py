@@ -1,4 +1,4 @@
-"""`zenoh` with routers that come, go and demand credentials. All on 127.0.0.1."""
+"""The transport `zenoh` with routers that come, go or demand credentials, all on 127.0.0.1."""
 
 import logging
 import os
@@ -27,7 +27,7 @@ DOMAIN = 7
 
 
 class Site:
-    """Routers and nodes of one test."""
+    """The routers and nodes of one test."""
 
     def __init__(self) -> None:
         self.routers: list[Router] = []
@@ -58,7 +58,7 @@ def site() -> Iterator[Site]:
 
 
 class Talk:
-    """States of a lift from one node to another."""
+    """A lift's states, which one node sends and another node hears."""
 
     def __init__(self, speaker: ZenohTransport, listener: ZenohTransport) -> None:
         self.heard: list[str] = []
@@ -68,14 +68,14 @@ class Talk:
         self.publisher = speaker.publisher(LIFT_STATES)
 
     def arrives(self, text: str) -> bool:
-        """Has a state, which is sent again and again, arrived?"""
+        """Send this state, and return whether it has arrived."""
         with suppress(TransportError):
             self.publisher.publish(d.LiftState(lift_name=text))
         return text in self.heard
 
 
 def linked(caplog: pytest.LogCaptureFixture, node: str) -> list[str]:
-    """Return the log events of this node's link."""
+    """Return the log events about this node's link to a router."""
     return [text.split(" ")[0] for text in caplog.messages if f"linked node={node} " in text]
 
 
@@ -91,9 +91,7 @@ def test_a_node_that_starts_before_its_router_is_there_as_soon_as_it_is(
     lift, rmf = site.node("lift", endpoint, mode=mode), site.node("rmf", endpoint, mode=mode)
     talk = Talk(lift, rmf)
     alarm = lift.publisher(FIRE_ALARM_TRIGGER)
-    with suppress(
-        TransportError
-    ):  # a client reports that it has no session, but retains the message
+    with suppress(TransportError):  # a client reports a missing session, but keeps the message
         alarm.publish(d.Bool(True))
     rang: list[d.Bool] = []
     rmf.subscribe(FIRE_ALARM_TRIGGER, rang.append)
@@ -156,7 +154,7 @@ def test_with_two_routers_each_message_comes_once_and_one_of_them_is_enough(site
 
 
 class Machine:
-    """The machine's addresses, as the test sets them."""
+    """The machine's network addresses, which the test sets."""
 
     def __init__(self) -> None:
         self.addresses: addresses.Addresses = frozenset({(2, "10.0.0.7")})
@@ -169,7 +167,7 @@ def test_a_node_on_zenoh_joins_another_address_and_what_was_retained_goes_out_ag
     machine = Machine()
     monkeypatch.setattr(addresses, "addresses", lambda: machine.addresses)
     router = site.router()
-    # For the kernel 0.0.0.0 is this machine; our code does not know that 0.0.0.0 is loopback.
+    # The kernel takes 0.0.0.0 for this machine. Our code does not count 0.0.0.0 as loopback.
     anywhere = router.endpoint.replace("127.0.0.1", "0.0.0.0")
     lift = site.node("lift", anywhere)
     rmf = site.node("rmf", router.endpoint, mode="client")
@@ -213,7 +211,7 @@ def test_nobody_of_one_domain_is_heard_in_another(site: Site) -> None:
 
 
 class Papers:
-    """An authority, a router's certificate and a daemon's, as files."""
+    """The files of an authority, and the certificates of a router and of a daemon."""
 
     def __init__(self, directory: Path) -> None:
         authority = trustme.CA()
@@ -352,7 +350,7 @@ def test_a_node_on_loopback_takes_no_notice_of_the_settings_and_opens_no_other_a
 
 
 def listening(pid: int) -> set[tuple[str, str]]:
-    """Return (address, port), in hexadecimal, of each TCP socket on which a process listens."""
+    """Return each TCP socket on which a process listens, as (address, port) in hexadecimal digits."""
     inodes = set()
     for descriptor in Path(f"/proc/{pid}/fd").iterdir():
         with suppress(OSError):

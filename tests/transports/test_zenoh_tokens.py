@@ -1,4 +1,4 @@
-"""Floods of liveliness tokens, panics of the library, and causes that must not disturb a session."""
+"""Floods of liveliness tokens, panics of the library, and events that must not disturb a session."""
 
 import json
 import logging
@@ -22,7 +22,7 @@ from tests.waiting import wait_until
 
 
 class Stranger:
-    """A session of another program, which declares tokens for ends that it does not have."""
+    """A session of another program. It declares tokens for publishers that it does not have."""
 
     def __init__(self, domain: int) -> None:
         config = zenoh.Config()
@@ -171,11 +171,11 @@ def test_many_ends_that_do_not_fit_are_one_line(
 
 
 class PanicException(BaseException):
-    """An exception like pyo3's for a panic."""
+    """An exception like the one that pyo3 raises for a panic in Rust."""
 
 
 class Panics:
-    """An end whose library panics at each call."""
+    """An end of a topic whose library panics at each call."""
 
     def put(self, *sample: object, **more: object) -> None:
         raise PanicException("called `Result::unwrap()` on an `Err` value")
@@ -229,7 +229,7 @@ def test_samples_bear_no_time_of_zenohs_clock_which_panics_before_1970(
 
 
 class BusyThread(RmwZenoh):
-    """Keys that hold the thread on which zenoh hands over present tokens, until `go_on` is set."""
+    """Keys that block the thread on which zenoh delivers present tokens, until `go_on` is set."""
 
     def __init__(self, domain: int) -> None:
         super().__init__(domain, "", "lift")

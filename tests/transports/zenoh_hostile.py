@@ -1,7 +1,7 @@
-"""A lying program: `python -m tests.transports.zenoh_hostile ENDPOINT KEY GOOD TOKEN`.
+"""A hostile program: `python -m tests.transports.zenoh_hostile ENDPOINT KEY GOOD TOKEN`.
 
-Under KEY it sends samples that no ROS node sends, then ten thousand more as fast as it can, then, as a
-ROS node does, GOOD (in hexadecimal) until its stdin ends.
+Under KEY it first sends samples that no ROS node sends. Then it sends ten thousand more, as fast as it
+can. In the end it sends GOOD (in hexadecimal digits) as a ROS node does, until its stdin ends.
 """
 
 import json
@@ -22,7 +22,7 @@ GOOD = d.LiftRequest("Lift1", d.Time(5, 6), "fleet/robot", 1, "L3", 2)
 
 
 def arguments(domain: int) -> tuple[str, str, str, str]:
-    """Return the arguments for lying to the lifts of a domain on this machine."""
+    """Return the program's arguments for an attack on the lifts of a domain on this machine."""
     kind = f"rmf_lift_msgs::msg::dds_::LiftRequest_/{type_hash(d.LiftRequest)}"
     token = f"@ros2_lv/{domain}/5e/0/7/MP/%/%/liar/%lift_requests/{kind}/::,10:,:,:,,"
     good = encode(d.LiftRequest, GOOD).hex()
@@ -41,7 +41,7 @@ def main(endpoint: str, key: str, text: str, token: str) -> None:
         publisher = session.declare_publisher(key, congestion_control=zenoh.CongestionControl.BLOCK)
         while not publisher.matching_status:
             time.sleep(0.01)
-        publisher.put(good)  # without attachment
+        publisher.put(good)  # without an attachment
         publisher.put(good, attachment=attached[:-1])
         publisher.put(good, attachment=attached[:16] + b"\x11" + attached[17:])
         publisher.put(good[:20], attachment=attached)

@@ -1,4 +1,4 @@
-"""Other programs on zenoh for the tests, in their own processes on 127.0.0.1."""
+"""Other programs on zenoh. Each program runs in its own process, on 127.0.0.1."""
 
 import json
 import socket
@@ -28,19 +28,19 @@ def free_port() -> int:
 
 
 class Written:
-    """The output of a program, line by line."""
+    """The output lines of a program."""
 
     def __init__(self) -> None:
         self.lines: list[dict[str, Any]] = []
 
     def values(self, key: str) -> list[Any]:
-        """Return the values of this key in each line that has the key."""
+        """Return the value of this key from each line that has the key."""
         return [line[key] for line in self.lines if key in line]
 
 
 @contextmanager
 def reading(endpoint: str, *orders: str) -> Iterator[Written]:
-    """Run the reader that shares no code with us, until the end of the block."""
+    """Run the reader in rmw_zenoh_reader.py until the end of the block."""
     written = Written()
     command = [sys.executable, str(READER), endpoint, *orders]
     with subprocess.Popen(
@@ -64,7 +64,7 @@ def _collect(lines: Any, written: Written) -> None:
 
 
 class Router:
-    """A zenoh router from this library, in a process that can be killed and started again.
+    """A zenoh router of the zenoh library, in a process that can be killed and started again.
 
     `config` has further settings besides the endpoint.
     """
@@ -81,7 +81,7 @@ class Router:
         self._child: subprocess.Popen[str] | None = None
 
     def start(self) -> None:
-        """Start it, and wait until it listens."""
+        """Start the router, and wait until it listens."""
         command = [
             sys.executable,
             "-m",
@@ -95,7 +95,7 @@ class Router:
         assert self._child.stdout.readline() == "listening\n"
 
     def leave(self) -> None:
-        """End the router with a farewell, as an operator does."""
+        """End the router with a farewell to its peers, as an operator does."""
         if self._child:
             assert self._child.stdin is not None
             assert self._child.stdout is not None
@@ -105,14 +105,14 @@ class Router:
             self._child = None
 
     def die(self) -> None:
-        """Kill the program."""
+        """Kill the router's process."""
         if self._child:
             self._child.kill()
         self.leave()
 
 
 def route(config: dict[str, Any]) -> None:
-    """Be a router until stdin ends."""
+    """Run a router until stdin ends."""
     import zenoh
 
     made = zenoh.Config()
