@@ -152,7 +152,7 @@ def test_the_watchdog_is_not_fed_while_a_call_of_the_bus_hangs(
         _status_written(run, 5)
         assert manager.heard() == []
         assert module.relay() == [True]
-        assert running.end(signal.SIGABRT) == -signal.SIGABRT  # the signal that systemd sends then
+        assert running.end(signal.SIGABRT) == -signal.SIGABRT  # systemd would send this signal
     off = command("outputs-off", module.file, "--runtime-dir", run)
     assert subprocess.run(off, env=environment()).returncode == 0
     wait_until(lambda: module.relay() == [True, False], "the relay is off")

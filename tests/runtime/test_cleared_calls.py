@@ -1,8 +1,9 @@
 """A controller may take a call and clear the call's register or coil. Such a controller is no rival.
 
-A second master that writes there is a rival, and the daemon's log must name it. Everything is real
-except the lift: the daemon's service with its clock, a Modbus line, and the second master's own
-connection. On RS-485 the second master uses the module's network port.
+A second master that writes the same register or coil is a rival. The daemon's log must name the rival.
+
+Everything is real except the lift: the daemon's service with its clock, a Modbus line, and the rival's
+own connection. On RS-485 the rival uses the module's network port.
 """
 
 import logging

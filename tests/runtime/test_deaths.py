@@ -406,7 +406,7 @@ def test_where_a_live_daemon_cannot_be_ruled_out_only_execstoppost_switches_off(
 
 
 def _runs_for_others() -> bool:
-    """May another user run this Python? The other user may not if this Python is below root's home."""
+    """May another user run this Python? No other user may, if this Python is below root's home."""
     try:
         return subprocess.run([sys.executable, "-c", ""], user=65534).returncode == 0
     except PermissionError:

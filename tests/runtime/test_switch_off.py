@@ -20,8 +20,8 @@ SILENT = 30
 def module() -> Iterator[Module]:
     """Yield a module on which only the last of many units answers. The relay of that unit is on.
 
-    At the time limit some threads still wait for silent units. These threads end when the module is
-    closed, so the fixture waits for them.
+    At the time limit some threads wait for silent units. The threads end when the module is closed, and
+    the fixture waits for them.
     """
     before = set(threading.enumerate())
     standing = Module()

@@ -25,8 +25,7 @@ ROS2 = pytest.param("ros2", marks=pytest.mark.ros)
 
 @pytest.fixture(params=["memory", DDS, "zenoh", ROS2])
 def join(request: pytest.FixtureRequest) -> Iterator[Join]:
-    """Yield one graph for the test. The test runs on each transport in turn, and its nodes then
-    leave."""
+    """Yield one graph for the test. The test runs on each transport in turn."""
     network = MemoryNetwork()
     on: dict[str, Join] = {
         "memory": lambda name: MemoryTransport(network, name),

@@ -1,7 +1,7 @@
 """The type and QoS of each of our topics, typed by hand and without `bridges/messages/topics.py`.
 
-A row is (type, publisher's QoS, subscriber's QoS). Line numbers are those of rmf_ros2 9dedd0f
-(2026-05), unless a comment names another version.
+A row is (type, publisher's QoS, subscriber's QoS). Line numbers belong to rmf_ros2 9dedd0f (2026-05),
+or to a version that the comment names.
 """
 
 from collections.abc import Mapping

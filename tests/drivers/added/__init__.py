@@ -1,1 +1,2 @@
-"""Example files that the tests add to a copy of the project. The tests edit no existing file there."""
+"""Example files that the tests add to a copy of the project. No file of the project itself is
+edited."""

@@ -217,8 +217,7 @@ def _is_unknown(sample: ChargerSample) -> bool:
 
 
 class MovingPadContract(Contract[Bench]):
-    """The contract of a driver that reads two facts: is the pad at its height, and is a robot in
-    range?"""
+    """The contract of a driver that reads the pad's height and whether a robot is in range."""
 
     celsius: ClassVar[tuple[str, ...]] = ()
     """The temperatures that the driver reads, by name."""

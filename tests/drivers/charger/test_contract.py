@@ -91,7 +91,7 @@ class ContactBench(Bench):
 
 
 class TestContactsAtAModule(ChargerContract):
-    """A relay at a module; the module drops the relay when the daemon is gone."""
+    """A relay at a module. The module drops the relay when the daemon has gone."""
 
     link: ClassVar = "unit"
     measures: ClassVar = False

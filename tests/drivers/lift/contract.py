@@ -43,7 +43,7 @@ class Bench(benches.Bench[LiftSample, LiftOutputs]):
         return seen
 
     def rides(self) -> list[LiftSample]:
-        """Ride to landing 1 in AGV mode, and hold the door open there.
+        """Ride to landing 1 in AGV mode, and hold the door open at that landing.
 
         Return all readings since the call.
         """

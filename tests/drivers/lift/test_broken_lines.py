@@ -1,4 +1,4 @@
-"""A code with one cut or shorted line must never read as a state that is safer than the true state."""
+"""A code with one cut or shorted line must never read as a safer state than the true state."""
 
 from typing import Any
 

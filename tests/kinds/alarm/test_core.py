@@ -1,4 +1,4 @@
-"""Stories of one alarm panel, in virtual time: the causes that the core reports after each reading."""
+"""Stories of one alarm panel in virtual time. They show which causes of an alarm the core reports."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The charger's decision core: whole histories in virtual time, one poll a second."""
+"""The charger's decision core in whole histories, in virtual time, with one poll a second."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Several stations in one daemon: a fault of one station does not disturb the others."""
+"""Several stations in one daemon. A fault of one station does not disturb the other stations."""
 
 import json
 from collections.abc import Callable, Iterator

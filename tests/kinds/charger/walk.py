@@ -189,7 +189,7 @@ def waited(world: World, seconds: float, limits: ChargerLimits, seen: Seen) -> W
 
 
 def decided(world: World, event: Event, now: float, limits: ChargerLimits, seen: Seen) -> World:
-    """Let the core decide at `now`; return the world with the time set to 0 again."""
+    """Let the core decide at `now`. Return the world with its time set to 0 again."""
     decision = decide(world.memory, event, now, limits)
     ledger = noted(world, event, now, limits, decision)
     sample = event.sample if isinstance(event, Sampled) else world.seen

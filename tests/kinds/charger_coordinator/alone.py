@@ -35,7 +35,7 @@ class Alone(alone.Alone[SiteMemory, Event, SiteLimits, SiteReport]):
         super().__init__(core.initial("site", 0.0), core.decide, SiteLimits.of(SETTINGS), True)
 
     def words(self, message: d.Message) -> str:
-        """Return messages to stations in words, and "" for other messages."""
+        """Return a message to a station in words, and "" for any other message."""
         match message:
             case d.ChargerRequest():
                 return f"{message.charger_name}: {message.robot_name}"
@@ -48,7 +48,7 @@ class Alone(alone.Alone[SiteMemory, Event, SiteLimits, SiteReport]):
         return [str(fault) for fault in self.report.faults]
 
     def run(self, seconds: int) -> list[tuple[float, str]]:
-        """Let time pass, second by second; return the messages of that time."""
+        """Let time pass, second by second. Return the messages of that time."""
         said = len(self.sent)
         for _ in range(seconds):
             self.now += 1.0

@@ -1,4 +1,4 @@
-"""The coordinator's rules one by one: tests give events to the core, in virtual time."""
+"""The coordinator's rules, each tested alone. Tests give events to the core, in virtual time."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Rules that hold in every history, checked in all short histories and in randomly drawn long ones.
+"""Rules that hold in every history, checked in all short histories and in random long histories.
 
 The walk takes all histories of three moves, and `make deep` takes all 10^4 histories of four moves. Two
 moves are at least a second apart. Two robots and two stations behave as RMF's charger messages say.
@@ -143,7 +143,7 @@ class Ledger:
             self._check(message)
 
     def passes(self) -> None:
-        """Let STEP_S pass; the stations and the fleet then show their states."""
+        """Let STEP_S pass. Then let the stations and the fleet show their states."""
         self.now += STEP_S
         for name, node in self.nodes.items():
             self.hears(node.shown(name))
@@ -153,8 +153,7 @@ class Ledger:
         self.hears(Woken())
 
     def check_all_are_charged_in_the_end(self) -> None:
-        """Mend everything, let time pass, and fail unless every robot that wants to charge is
-        charged."""
+        """Mend everything and let time pass. Fail if a robot that wants to charge is not charged."""
         if not self.speaks:
             self.hears(MaySpeak(True))
         before = dict(self.charged)

@@ -239,7 +239,7 @@ class Yard:
         return self.world.now
 
     def run(self, until: float) -> list[tuple[float, str]]:
-        """Let time pass; return the events of that time."""
+        """Let time pass up to this time. Return the events of that time."""
         told = len(self.story)
         self.world.run(until)
         return self.story[told:]

@@ -37,7 +37,7 @@ class Phase(msgspec.Struct, frozen=True):
     """RMF's phase.
 
     `deaf` says that its node hears nothing. `stamped` says that the phase has heard a message with a
-    stamp, so that a state with the stamp 0 counts as older.
+    stamp. After such a message a state with the stamp 0 counts as older.
     """
 
     asks: bool = False
@@ -175,7 +175,7 @@ TIMES = (0.5, 2.0, 8.0, 512.0)
 
 
 def moved(world: World, move: Move, seen: Callable[[Any], None]) -> World:
-    """Return the state after a move and the scan after it."""
+    """Return the state after a move and one scan."""
     world, event = move(world)
     return _scanned(world, event or reading(world), 0.0, seen)
 

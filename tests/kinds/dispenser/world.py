@@ -232,7 +232,7 @@ class World:
 
 
 class _Mortal:
-    """A driver whose daemon may die just before or after each switched output."""
+    """A driver whose daemon may die immediately before or after each switched output."""
 
     def __init__(self, driver: Any, around: Callable[[str], None]) -> None:
         self._driver = driver

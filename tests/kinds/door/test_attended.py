@@ -1,4 +1,4 @@
-"""DOOR-2: a door whose supervisor has gone stays held open, unless the site limits that time."""
+"""DOOR-2: a door whose supervisor has gone stays held open. A site may limit that time."""
 
 from bridges.kinds.shared.decision import Attended
 from tests.kinds.door.virtual import OBSTRUCTION, Door

@@ -42,7 +42,7 @@ def path(*steps: str | float, limits: DoorLimits = PLAIN) -> World:
 
 
 class Scan:
-    """One more scan of a state, which is checked by the rules; the scan has the core's decision."""
+    """One more scan of a state. The rules are checked, and the scan has the core's decision."""
 
     def __init__(self, world: World, limits: DoorLimits) -> None:
         self._steps: list[Step] = []

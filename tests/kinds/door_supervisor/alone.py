@@ -50,8 +50,7 @@ class Alone(alone.Alone[SupervisedDoor, Event, DoorSupervisorLimits, DoorHoldRep
         return round(self.stamped(aged) * SECOND_NS)
 
     def shows(self, mode: str, until: float | None = None) -> None:
-        """Let a DoorState arrive. With `until`, let a DoorState arrive each second from now until
-        then."""
+        """Let a DoorState arrive. With `until`, let a DoorState arrive each second up to that time."""
         self.hears(DoorStateHeard(DoorModeValue[f"MODE_{mode}"]))
         while until is not None and self.now + 1.0 <= until:
             self.until(self.now + 1.0)

@@ -1,4 +1,4 @@
-"""The door supervisor's rules one by one, each with all its messages to the door's node."""
+"""The door supervisor's rules, each tested alone, with all messages to the door's node."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""All histories to a depth, and drawn ones, checked by rules that do not use the core's code.
+"""All histories to a depth, and random histories, checked by rules that do not use the core's code.
 
 The first walk has all 4^7 = 16384 histories of seven steps, 0.75 s apart. In these histories two
 requesters open and close, with stamps in order. The second walk has all 6^5 = 7776 histories of late
@@ -167,8 +167,8 @@ def told(history: list[tuple[float, Any]]) -> Ledger:
 def _would_be_believed(ledger: Ledger, event: Any) -> bool:
     """Would the core accept this old request?
 
-    An old stamp counts again long after the requester's last request. By then the requester's clock was
-    set back, or the core has forgotten the requester. test_core has stories of both cases.
+    An old stamp counts again long after the requester's last request. A clock may have been set back,
+    or the core may have forgotten the requester. test_core has stories of both cases.
     """
     if not isinstance(event, RequesterOpens | RequesterCloses) or event.stamp >= ledger.newest.get(
         event.requester, 0

@@ -71,9 +71,14 @@ def outputs_make_sense(step: Step) -> None:
 
 
 def nothing_is_driven_when_forbidden(step: Step) -> None:
-    """Require all outputs off, at once, in four cases.
+    """Require all outputs off, at once, whenever driving is forbidden.
 
-    The cases are a hazard, another node of this name, no fresh reading, and HUMAN mode.
+    These facts forbid driving:
+    - a hazard except overload, or a latched fire,
+    - a second node of this name,
+    - no fresh reading,
+    - HUMAN mode,
+    - a fault of the session that waits for a retry.
     """
     memory, now = step.decision.memory, step.now
     session = memory.session

@@ -1,7 +1,7 @@
-"""Each wire and each part of the lift breaks in turn while RMF rides: node, driver, wires and plant.
+"""Each wire and each part of the lift breaks in turn while RMF's robots ride.
 
-While a part is broken a robot may wait for ever, but OPEN is shown only if the door is truly open.
-After the repair the robot gives up, and the next ride completes.
+Node, driver, wires and plant take part. While a part is broken a robot may wait for ever, but OPEN must
+not be shown for a closed door. After the repair the robot gives up, and the next ride completes.
 """
 
 from dataclasses import dataclass

@@ -156,8 +156,8 @@ def test_a_car_that_a_call_has_brought_is_not_called_again_because_its_floor_is_
 
 
 def test_a_car_at_its_destination_is_called_again_when_agv_mode_has_ended_by_itself() -> None:
-    """With `by_call`: an overload ended the hold, the floor was not seen, and so all outputs were
-    off."""
+    """With `by_call`: an overload ended the hold. All outputs were off, because the floor was not
+    seen."""
     alone = Alone(by_call=True)
     below, gone = replace(CLOSED, level="L2"), replace(CLOSED, level=None)
     readings = [

@@ -37,7 +37,7 @@ MODES = [
 
 
 def waiting(**options: object) -> Story:
-    """Return a story in which A waits outside at L1. The car stands there, closed, with its door
+    """Return a story in which A waits outside at L1. The car stands closed at L1, with its door
     held."""
     story = Story(Building(CLOSED_AT_L1), door_timeout_s=600, **options)  # type: ignore[arg-type]
     story.run(1.0)

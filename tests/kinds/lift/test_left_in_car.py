@@ -1,8 +1,8 @@
-"""LIFT-2: RMF's supervisor ends a session while its robot is in the car, or a robot is left in the car.
+"""LIFT-2: RMF's supervisor ends a session while its robot is in the car, or leaves a robot in the car.
 
 The first stories follow RMF's own rules (rmf_ros2, lift_supervisor/Node.cpp). A starting supervisor
-sends END for the session that the lift shows, and takes the first session that asks. A starting fleet
-adapter sends END for its robot's session (RobotContext.cpp, _check_lift_state).
+sends END for the session that the lift shows. It then takes the first session that asks. A starting
+fleet adapter sends END for its robot's session (RobotContext.cpp, _check_lift_state).
 """
 
 import pytest

@@ -106,7 +106,7 @@ def test_the_log_has_one_line_when_a_device_is_lost_and_one_when_it_is_back(
         lines = [r.getMessage().split()[0] for r in caplog.records]
         assert (lines.count("device_lost"), lines.count("device_back")) == (1, 1)
         assert (lines.count("fault"), lines.count("fault_over")) == (1, 1)
-        assert len(lines) == 6  # the other two lines give the state, lost and restored
+        assert len(lines) == 6  # lost and restored are two more lines
 
 
 def test_a_new_daemon_finds_the_lift_in_agv_mode_and_waits_to_be_asked() -> None:

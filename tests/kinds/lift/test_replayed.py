@@ -17,8 +17,7 @@ OPEN_FOR_A = "AGV, open at L2, fleet/a to L2"
 
 
 def on_its_threshold(rides_before: int) -> tuple[World, RobotContext]:
-    """Return a world whose robot is entering the car at L3. The robot made `rides_before` rides just
-    before."""
+    """Return a world whose robot is entering the car at L3, after this number of earlier rides."""
     robot = RobotContext(A)
     rmf = world(robot)
     for _ in range(rides_before):

@@ -55,7 +55,7 @@ def test_defect_c_a_call_that_timed_out_stayed_on() -> None:
 
 
 def test_defect_d_a_request_blocked_everything_until_the_car_had_come() -> None:
-    """In this project a request takes no time. A hazard just after the request counts in the next
+    """In this project a request takes no time. A hazard right after the request counts in the next
     scan."""
     story = Story(Controller())
     story.run(1.0)

@@ -290,8 +290,10 @@ def _forgotten(forgotten: ForgottenSession, by: float) -> ForgottenSession:
 
 
 def _robot(robot: OwnWords, by: float) -> OwnWords:
-    """Return the requests of the robot's adapter with moved times. A robot that was never heard stays
-    so."""
+    """Return the requests of the robot's adapter with moved times.
+
+    If the adapter was never heard, its time stays AGES_AGO.
+    """
     heard = robot.asked_at > AGES_AGO
     asked_at = max(_at(robot.asked_at, by), -7.0) if heard else AGES_AGO
     ended_at = round(robot.ended_at + by, 6)

@@ -1,4 +1,4 @@
-"""The lift supervisor's rules one by one, each with all its messages to the lift's node."""
+"""The lift supervisor's rules, each tested alone, with all messages to the lift's node."""
 
 import math
 
@@ -207,7 +207,7 @@ def test_a_state_from_before_the_end_was_sent_confirms_nothing() -> None:
     desk = Alone()
     desk.asks("a")
     desk.until(0.05)
-    desk.ends("a")  # the END must wait, because a message was just sent
+    desk.ends("a")  # the pause after the last message delays the END
     desk.shows("", "L1")
     desk.asks("b")
     assert desk.report.holder == "a"

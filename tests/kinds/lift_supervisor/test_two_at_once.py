@@ -18,7 +18,7 @@ STEP_S = 0.05
 
 
 class Late:
-    """A subscription that learns of a publisher, or of its end, DISCOVERY_S late, as on a real
+    """A subscription that notices a publisher's start and end DISCOVERY_S late, as on a real
     network."""
 
     def __init__(self, end: Subscription) -> None:

@@ -1,8 +1,8 @@
-"""All histories to a depth: each request for a lift is passed on, or the report says why not.
+"""All histories to a depth. Each request for a lift is passed on, or the report says why not.
 
-The nine moves: two robots ask, one robot ends, the lift shows states, the permission to publish
-changes, and silence. `make deep` has all 9^5 = 59,049 histories of five moves. `make test` has all 9^4
-= 6,561 histories of four moves. The test judges the sent messages and the report.
+There are nine moves. Two robots ask, one robot ends, the lift shows four states, the permission to
+publish changes, or time passes. `make deep` has all 9^5 = 59,049 histories of five moves. `make test`
+has all 9^4 = 6,561 histories of four moves. The test judges the sent messages and the report.
 """
 
 from collections.abc import Callable
@@ -40,7 +40,7 @@ def after(one: Alone, move: Move) -> Alone:
 
 
 def check(one: Alone) -> None:
-    """Require a reason in the report unless the last message sent was the robot's request."""
+    """Require a reason in the report whenever a robot's request is not the last message sent."""
     last = one.sent[-1][1] if one.sent else ""
     unserved = [c for c in one.memory.claims if last != f"AGV {c.session} {c.target.floor}"]
     assert bool(one.report.waits) >= bool(unserved), one.report

@@ -130,7 +130,7 @@ def bits_reply(request: bytes, packed: bytes) -> bytes:
 
 
 class Time:
-    """A clock that stands still until a test sets it."""
+    """A clock that shows the same time until a test sets it."""
 
     def __init__(self) -> None:
         self.now = 0.0

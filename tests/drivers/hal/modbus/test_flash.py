@@ -81,7 +81,7 @@ def answers(driver: DryContactDoor, clock: Time) -> bool:
 
 
 def held(module: Module, *, lost_at: float | None = None) -> list[tuple[float, str]]:
-    """Return (s, PDU) of each write while RMF opens a door at 1 s and closes the door at 6 s.
+    """Let RMF open a door at 1 s and close the door at 6 s. Return (s, PDU) of each write.
 
     Core and driver are scanned as by the loop. In the scan at `lost_at` no reply to a write arrives.
     """
@@ -117,8 +117,7 @@ def held(module: Module, *, lost_at: float | None = None) -> list[tuple[float, s
 def test_a_flash_has_the_frames_of_the_makers_manual(
     line: SerialModule, relay: int, on_s: float, told: str
 ) -> None:
-    """The manual of the Waveshare Modbus RTU Relay has "flash on" for relay 0, 700 ms, and relay 1, 800
-    ms."""
+    """The frames are in the manual of the Waveshare Modbus RTU Relay: "flash on", 700 ms and 800 ms."""
     line.on_wire = lambda heard: heard
     coil = f"unit 1 coil {relay}"
     lines = bus_to(line.port).lines({}, {coil: False})

@@ -66,8 +66,8 @@ def one_module() -> Iterator[Module]:
 
 
 class Spoiled:
-    """A closed door's answers on TCP. Each spoil changes one answer, and after the last spoil it hangs
-    up."""
+    """A closed door's answers on TCP. Each spoil changes one answer. After the last spoil the door
+    hangs up."""
 
     def __init__(self, module: Module, spoils: list[Spoil]) -> None:
         module.inputs.update({(1, 0): False, (1, 1): True})

@@ -1,7 +1,7 @@
 """The module's own watchdog.
 
-The bus arms the watchdog before any output is on, refreshes it at each scan, and arms it again after
-the watchdog has tripped.
+The bus arms the watchdog before any output is on, and refreshes it at each scan. The bus arms the
+watchdog again after a trip.
 """
 
 import json

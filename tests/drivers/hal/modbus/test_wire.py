@@ -1,4 +1,4 @@
-"""The connection: reasons why there is none, its cost in memory, and its settings in a YAML file."""
+"""The connection to a module: its failures, its cost in memory, and its settings in a YAML file."""
 
 import errno
 import re
