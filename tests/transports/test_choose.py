@@ -179,7 +179,7 @@ def test_auto_opens_dds_without_ros_and_says_why(
 def test_auto_opens_zenoh_where_neither_ros_nor_cyclonedds_is_and_says_why(
     no_ros: None, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setitem(sys.modules, "cyclonedds", None)  # as on arm64, without a wheel
+    monkeypatch.setitem(sys.modules, "cyclonedds", None)  # as on arm64
     monkeypatch.delitem(sys.modules, "cyclonedds.core", raising=False)
     caplog.set_level(logging.INFO)
     domain = domain_of_this_run()

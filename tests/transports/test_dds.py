@@ -92,7 +92,7 @@ def test_an_end_that_is_declared_while_rmfs_release_changes_has_the_new_release(
             node._peers.seen("an adapter", heard)
             thread = threading.Thread(target=node._follow_release)
             thread.start()
-            thread.join(timeout=0.2)  # the thread ends early only if it need not wait
+            thread.join(timeout=0.2)  # the thread ends early only if it does not wait
             return create(*given)
 
         monkeypatch.setattr(DdsSubscription, "create", found_meanwhile)

@@ -1,4 +1,4 @@
-"""Steps of the wall clock: `dds` and `ros2` join the graph again, but only at steps that need it."""
+"""Steps of the wall clock. When the clock is set back, `dds` and `ros2` join the graph again."""
 
 import logging
 from contextlib import suppress

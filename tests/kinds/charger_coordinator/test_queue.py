@@ -1,4 +1,4 @@
-"""COORDINATOR-2: the queue gives stations first come, first served, to permitted robots only."""
+"""COORDINATOR-2: the queue gives stations to permitted robots only, first come, first served."""
 
 from msgspec.structs import replace
 

@@ -1,4 +1,7 @@
-"""DOOR-1: the grace after CLOSE limits how often the relay switches. It never refuses a hold."""
+"""DOOR-1: the grace after CLOSE limits how often the relay switches.
+
+The grace may lengthen a hold, but never refuses a hold.
+"""
 
 import pytest
 

@@ -28,7 +28,7 @@ LONG_S = 32.0
 `stale_after_s`."""
 
 DURATIONS: dict[str, float] = {"stale_after_s": 60.0, "max_hold_s": 30.0}
-"""Changed defaults (s). A longer `stale_after_s` saves scans, and `max_hold_s` permits its alarm."""
+"""Changed defaults (s). A long `stale_after_s` saves scans, and `max_hold_s` turns on its alarm."""
 
 
 def limits_of(durations: dict[str, float] | None = None, **facts: Any) -> DoorLimits:

@@ -277,8 +277,10 @@ def test_a_door_that_falls_silent_is_forgotten() -> None:
 
 
 def doorway(*, rival: bool = False, quiet_s: float = 3.0) -> Site:
-    """Return a site in which the door's node and our supervisor died while a silent robot was in the
-    door."""
+    """Return a site after the deaths of the door's node and our supervisor.
+
+    A silent robot stands in the doorway.
+    """
     site = Site([(10.0, 60.0)], quiet_start_s=quiet_s)
     site.world.run(25.0)
     assert site.walkers[0].passing

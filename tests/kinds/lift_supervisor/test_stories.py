@@ -185,7 +185,7 @@ def test_a_supervisor_that_restarts_with_a_robot_in_the_car_moves_no_relay(
 def test_rmfs_own_supervisor_restarted_in_the_same_way_ends_the_ride_and_asks_for_it_again() -> (
     None
 ):
-    """The lift's node has a grace after END because of RMF's supervisor. Ours never needs the grace."""
+    """The lift's node has a grace after END for RMF's supervisor. Our supervisor never needs it."""
     world = World()
     supervisor = RmfsSupervisor(world)
     lift, robot = LiftNode(world), Rider(world, A, UP)

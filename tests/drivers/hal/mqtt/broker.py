@@ -69,7 +69,7 @@ class FarDevice:
         info.wait_for_publish(30)
 
     def close(self) -> None:
-        """Leave the broker."""
+        """Disconnect from the broker."""
         self.client.disconnect()
         self.client.loop_stop()
 
