@@ -4,7 +4,7 @@ A driver is the file `drivers/<kind>/<driver>.py`, named after the YAML's `kind:
 with a `DRIVER` (`drivers/driver_type.py`); the rest of the code uses nothing else of the file.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Protocol, TypeVar, runtime_checkable
 
 Sample = TypeVar("Sample", covariant=True)
@@ -44,3 +44,12 @@ class OnContacts(Protocol):
 
     def contacts(self) -> Mapping[str, bool]:
         """Return signal -> asserted, as last read or written, for each known signal."""
+
+
+@runtime_checkable
+class TakesInputs(Protocol):
+    """A driver that can take inputs from other buses than its own."""
+
+    def take_inputs(self, elsewhere: Callable[[], Mapping[str, bool]]) -> None:
+        """Read the inputs on other buses by `elsewhere`, which raises DriverError while they are not
+        known."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from drivers.hal.points import Points
+from drivers.hal.points import Points, Readings
 
 
 class OnPoints:
@@ -10,6 +10,10 @@ class OnPoints:
 
     def __init__(self, points: Points) -> None:
         self._points = points
+
+    def take_inputs(self, elsewhere: Readings) -> None:
+        """Read the contacts on other buses by `elsewhere`."""
+        self._points.take_inputs(elsewhere)
 
     def open(self) -> None:
         """Claim every relay, switched off, and every contact."""

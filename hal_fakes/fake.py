@@ -91,14 +91,14 @@ def _plant(config: Config, name: str) -> Plant:
 
 
 def stations_on(config: Config, bus: str, plants: Mapping[str, Plant]) -> list[Any]:
-    """Return this bus's stations, with the devices' plants behind them."""
-    return [_station(config, bus, name, plants[name]) for name in config.devices_on(bus)]
+    """Return this bus's stations: the devices on it, and contacts of devices on other buses."""
+    return [_station(config, bus, name, plants[name]) for name in config.devices_at(bus)]
 
 
 def _station(config: Config, bus: str, name: str, plant: Plant) -> object:
     station = _fake(config, name).station
     if station is None:
-        return PlantWiring(plant, config.wires(name), config.bus_type(bus).canonical)
+        return PlantWiring(plant, config.wires_on(bus, name), config.bus_type(bus).canonical)
     return station(plant, config.devices[name])
 
 

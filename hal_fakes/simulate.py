@@ -1,7 +1,9 @@
 """The hardware of `rmf-bridge run FILE --simulate`: a plant for each device behind its bus.
 
 If possible, a far side is a child process on 127.0.0.1 (`hal_fakes/__main__.py`), and the real bus is
-pointed there. GPIO pins cannot leave a process, so their fake lives in the daemon's.
+pointed there. GPIO pins cannot leave a process, so their fake lives in the daemon's. If a device has
+inputs on another bus, its plant stands behind both, so the far sides of all buses of the file live in the
+daemon's process.
 
 Each bus has a control socket in the runtime directory: `plant.sock`, or `plant-<bus>.sock` where
 the file has several buses.
@@ -49,6 +51,9 @@ class Simulation:
         self._file = str(Path(config.path).resolve())
         self._runtime_dir = runtime_dir.resolve()
         self._open = contextlib.ExitStack()
+        self._shared = (
+            self._world(*config.buses) if any(map(config.other_buses, config.devices)) else None
+        )
         self._children = {
             name: self._start(name) for name in config.buses if self._has_process(name)
         }
@@ -83,16 +88,26 @@ class Simulation:
     def _has_process(self, name: str) -> bool:
         """Has the bus's fake a process? This is found without importing the fake and its libraries."""
         bus_type = self._config.bus_type(name)
-        return bool(bus_type.fake) and not bus_type.fake_inside
+        return bool(bus_type.fake) and not bus_type.fake_inside and self._shared is None
+
+    def _world(self, *buses: str) -> RealTime:
+        """Start the plants of the devices on these buses in this process."""
+        plants = [one for bus in buses for one in plants_on(self._config, bus).items()]
+        world = RealTime(dict(plants))
+        self._open.callback(world.close)
+        return world
 
     def _inside(self, name: str) -> Bus:
         far = far_side(self._config, name)
-        assert isinstance(far, Inside)
-        world = RealTime(plants_on(self._config, name))
-        self._open.callback(world.close)
-        self._open.callback(Control(self.socket_path(name), world.plants).close)
+        world = self._shared or self._world(name)
+        plants = {device: world.plants[device] for device in self._config.devices_on(name)}
+        self._open.callback(Control(self.socket_path(name), plants).close)
         stations = stations_on(self._config, name, world.plants)
-        return far.open_bus(self._config.buses[name], stations, world)
+        if isinstance(far, Inside):
+            return far.open_bus(self._config.buses[name], stations, world)
+        server = far.serve(self._config.buses[name], stations)
+        self._open.callback(server.close)
+        return self._config.bus_type(name).open_bus(self._pointed(name, server.replace))
 
     def _start(self, name: str) -> "subprocess.Popen[bytes]":
         socket = self.socket_path(name)
@@ -115,9 +130,12 @@ class Simulation:
         return child
 
     def _pointed_at_child(self, name: str) -> msgspec.Struct:
-        settings: msgspec.Struct = self._config.buses[name]
         child = self._children.pop(name) if name in self._children else self._start(name)
-        found = {**msgspec.to_builtins(settings), **_first_line(child, name)}
+        return self._pointed(name, _first_line(child, name))
+
+    def _pointed(self, name: str, replace: dict[str, object]) -> msgspec.Struct:
+        settings: msgspec.Struct = self._config.buses[name]
+        found = {**msgspec.to_builtins(settings), **replace}
         if "timeout_s" in found:
             found["timeout_s"] = max(found["timeout_s"], PATIENCE_S)
         return msgspec.convert(found, type(settings))

@@ -1,6 +1,7 @@
 """The loop: one bus and the devices on it.
 
-RMF's callbacks put events into the inbox, and GPIO edges wake the loop. A round scans each device that
+RMF's callbacks put events into the inbox, and GPIO edges wake the loop. A change of an
+input on a device's other bus wakes the loop too. A round scans each device that
 is due, has events, or may have changed. First come the devices that answered last time, then the other
 devices, the longest overdue first. A round ends after one silent device. So a live device's reading is
 never older than its period plus one silent device's timeout, even in the first rounds. When a device
@@ -15,6 +16,7 @@ from bridges.kinds.shared.durations import AGES_AGO, NEVER
 from bridges.runtime.clock import Clock
 from bridges.runtime.device import AnyNode
 from bridges.runtime.inbox import Inbox
+from bridges.runtime.other_bus import InputReader
 from bridges.runtime.ring_writer import NOBODY, NoWriter
 from bridges.runtime.serving import LEAST_GAP_S
 from bridges.system.log import pairs
@@ -33,7 +35,7 @@ class Loop:
         self,
         bus_name: str,
         bus: Bus,
-        nodes: Sequence[AnyNode],
+        nodes: Sequence[AnyNode | InputReader],
         scan_s: float,
         clock: Clock,
         writer: NoWriter = NOBODY,
@@ -46,11 +48,11 @@ class Loop:
         self._scan_s = scan_s
         self._clock = clock
         self._writer = writer
-        self._due = dict.fromkeys((node.name for node in nodes), AGES_AGO)
+        self._due = {node.name: node.wake_at for node in nodes}
         self._edge = False
         self._ran_at = NEVER
         self._scans = 0
-        bus.on_edge(self._on_edge)
+        bus.on_edge(self.stir)
 
     @property
     def wake_at(self) -> float:
@@ -109,24 +111,25 @@ class Loop:
                 if not node.answers and self._bus.calls > calls:
                     return
 
-    def _in_turn(self) -> list[AnyNode]:
+    def _in_turn(self) -> list[AnyNode | InputReader]:
         """Return the nodes in their order: first the nodes that answer, in the YAML's order, then the
         other nodes, the longest overdue first."""
         others = [node for node in self.nodes if not node.answers]
         others.sort(key=lambda node: self._due[node.name])
         return [node for node in self.nodes if node.answers] + others
 
-    def _scan(self, node: AnyNode) -> None:
+    def _scan(self, node: AnyNode | InputReader) -> None:
         started = self._clock.monotonic()
         node.scan(self.inbox.take_for(node.name))
         self._scans += 1
         next_at = min(node.wake_at, started + self._scan_s)
         self._due[node.name] = max(next_at, started + LEAST_GAP_S)
 
-    def _is_due(self, node: AnyNode) -> bool:
+    def _is_due(self, node: AnyNode | InputReader) -> bool:
         return self._clock.monotonic() >= self._due[node.name]
 
-    def _on_edge(self) -> None:
+    def stir(self) -> None:
+        """Make every device due, because an input may have changed. For any thread."""
         self._edge = True
         self.inbox.wake()
 

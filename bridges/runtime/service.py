@@ -7,7 +7,7 @@ import logging
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 from bridges.kinds import kind_called
 from bridges.kinds.shared.alarming import alarm_topics
@@ -30,6 +30,7 @@ from bridges.runtime.fleet_alarm import FleetAlarmNode, node_for
 from bridges.runtime.graph_node import AnyGraphNode, GraphNode
 from bridges.runtime.keeper import MemoryStore
 from bridges.runtime.loop import Loop
+from bridges.runtime.other_bus import Handover, InputReader, taken
 from bridges.runtime.outlet import Named, Outlet
 from bridges.runtime.predecessor import SafeFirst
 from bridges.runtime.ring_writer import NOBODY, NoWriter
@@ -38,9 +39,14 @@ from bridges.runtime.subject import Status
 from bridges.settings.load import Config
 from bridges.system.log import pairs
 from bridges.transports.transport import Subscription, Transport
+from drivers import TakesInputs
 from drivers.hal import Bus
+from drivers.hal.points import Points
 
 log = logging.getLogger(__name__)
+
+FIRST_S: Final = 0.5
+"""How long (s) a device's first scan waits for the first reading of its other bus."""
 
 OpenBus = Callable[[str], Bus]
 
@@ -166,10 +172,17 @@ class Devices:
         self._outlet.open(self._topics())
         self._hears: dict[str, Subscription] = {}
         self._attended: bool | None = None
+        self._handovers = {
+            (device, bus): Handover(bus, config.lasts_s(bus), clock)
+            for device in config.devices
+            for bus in config.other_buses(device)
+        }
+        self._placed: dict[str, tuple[AnyNode, Loop]] = {}
         self._loops = [self._loop(name, open_bus) for name in config.buses]
         served: list[Rounds] = [*self._loops, *([alarm] if alarm else [])]
         self.loops = [Serving(each, clock) for each in served]
-        self._placed = {node.name: (node, loop) for loop in self._loops for node in loop.nodes}
+        for (device, _), handover in self._handovers.items():
+            handover.changed = self._placed[device][1].stir
 
     def subscribe(self) -> None:
         """Subscribe to requests, to topics that are only recorded, and to states of our devices that
@@ -236,21 +249,40 @@ class Devices:
         settings = self._config.buses[bus_name]
         bus = open_bus(bus_name)
         nodes = [self._node(name, bus) for name in self._config.devices_on(bus_name)]
-        return Loop(bus_name, bus, nodes, settings.scan_s, self._clock, self._writer)
+        readers = [
+            self._reader(device, bus_name, bus, handover)
+            for (device, name), handover in self._handovers.items()
+            if name == bus_name
+        ]
+        both = [*nodes, *readers]
+        loop = Loop(bus_name, bus, both, settings.scan_s, self._clock, self._writer)
+        self._placed.update({node.name: (node, loop) for node in nodes})
+        return loop
+
+    def _reader(self, device: str, bus_name: str, bus: Any, to: Handover) -> InputReader:
+        points = Points(self._config.wires_on(bus_name, device), bus)
+        return InputReader(device, bus_name, points, to, self._clock)
 
     def _node(self, name: str, bus: Bus) -> AnyNode:
         device = self._config.devices[name]
         driver_type = self._config.driver_type(name)
-        limits = self._kind.limits(device, driver_type.debounce(device))
+        limits = self._kind.limits(device, self._config.debounce(name))
         driver = driver_type.create(name, device, bus)
+        handovers = [one for (owner, _), one in self._handovers.items() if owner == name]
+        if handovers:
+            assert isinstance(driver, TakesInputs)  # only contacts have `bus` in the YAML
+            driver.take_inputs(partial(taken, handovers))
         if name in self._unsafe:
             driver = SafeFirst(name, driver)
         out, clock, writer = self._outlet, self._clock, self._writer
         tell = self._alarm.tell if self._alarm and alarm_topics(device) else None
-        return Node(
+        node: AnyNode = Node(
             name, self._kind, device, limits, driver, out.publish, clock, writer, out.failed, tell,
             self._memories,
         )  # fmt: skip
+        if handovers:
+            node.wake_at = clock.monotonic() + FIRST_S
+        return node
 
     def _to_inbox(
         self, topic: Topic[Message], accept: Callable[[Any, Any], object]

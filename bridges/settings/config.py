@@ -2,9 +2,10 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from msgspec import Struct, field
+from msgspec.structs import replace
 
 from bridges.kinds import kind_called
 from bridges.kinds.shared.graph_kind import GraphKind
@@ -15,6 +16,9 @@ from bridges.yaml.problems import Problem
 from drivers.driver_type import AnyDriver
 from drivers.hal import AnyBus, Bus
 from drivers.hal.points import Wire
+
+LATE_S: Final = 0.1
+"""How late (s) a reading of another bus may be before it no longer counts as present."""
 
 
 class Config(Struct, frozen=True):
@@ -57,6 +61,11 @@ class Config(Struct, frozen=True):
         """Return the names of the devices on this bus."""
         return [name for name in self.devices if self.bus_of(name) == bus]
 
+    def devices_at(self, bus: str) -> list[str]:
+        """Return the names of the devices on this bus, and of devices that have inputs there."""
+        guests = [name for name in self.devices if bus in self.other_buses(name)]
+        return [*self.devices_on(bus), *guests]
+
     def driver_type(self, device_name: str) -> AnyDriver:
         """Return the driver of a device: its own, or the file's."""
         own: str | None = self.devices[device_name].driver
@@ -65,6 +74,30 @@ class Config(Struct, frozen=True):
     def wires(self, device_name: str) -> list[Wire]:
         """Return a device's wiring table; empty if its driver has no wires."""
         return list(self.driver_type(device_name).wires(self.devices[device_name]))
+
+    def wires_on(self, bus: str, device_name: str) -> list[Wire]:
+        """Return the part of a device's wiring table that is on this bus, as a table for this bus."""
+        wires = ((wire, wire.bus or self.bus_of(device_name)) for wire in self.wires(device_name))
+        return [replace(wire, bus="") for wire, name in wires if name == bus]
+
+    def other_buses(self, device_name: str) -> list[str]:
+        """Return the buses, beside the device's own, that have inputs of the device."""
+        return list(dict.fromkeys(wire.bus for wire in self.wires(device_name) if wire.bus))
+
+    def lasts_s(self, bus: str) -> float:
+        """Return the greatest age (s) at which a reading of a device's other bus counts as present."""
+        scan_s: float = self.buses[bus].scan_s
+        return scan_s + LATE_S
+
+    def debounce(self, device_name: str) -> dict[str, float]:
+        """Return signal or group -> how long a change must last (s).
+
+        The inputs of two buses fit together only to within the age of a reading of the other bus. The
+        debounce of every input is longer by that age, so no single reading passes for two.
+        """
+        late_s = max(map(self.lasts_s, self.other_buses(device_name)), default=0.0)
+        found = self.driver_type(device_name).debounce(self.devices[device_name])
+        return {signal: own_s + late_s for signal, own_s in found.items()}
 
     def bus_type(self, name: str) -> AnyBus:
         """Return the type of the bus with this name."""

@@ -114,21 +114,22 @@ def _claims(config: Config, one_machine: bool) -> Iterator[ExclusiveUse]:
         yield ExclusiveUse(config, f"the {what} '{name}'{of}", (kind.devices_key, name))
     for bus, where in _buses(config):
         if one_machine or not where.local:
-            for device in config.devices_on(bus):
+            for device in config.devices:
                 for place, path in _places(config, bus, device):
                     what = f"{place} of {where.text}"
                     yield ExclusiveUse(config, what, (kind.devices_key, device, *path))
 
 
 def _places(config: Config, bus: str, device: str) -> Iterator[tuple[str, Path]]:
-    """Yield every point and exclusive place of a device, in the canonical spelling of its bus."""
+    """Yield every point and exclusive place of a device on this bus, as the bus spells it."""
     hal = config.bus_type(bus)
-    for wire in config.wires(device):
+    for wire in config.wires_on(bus, device):
         flash = [("flash", wire.flash.point)] if wire.flash is not None else []
         for key, point in [("point", wire.point), *flash]:
             if what := hal.place(config.buses[bus], hal.canonical(point)):
                 yield what, (*wire.path, key)
-    yield from config.driver_type(device).claims(config.devices[device])
+    if bus == config.bus_of(device):
+        yield from config.driver_type(device).claims(config.devices[device])
 
 
 def _shared(pair: tuple[ExclusiveUse, ExclusiveUse], claims: Sequence[ExclusiveUse]) -> Problem:

@@ -15,6 +15,7 @@ sections against each other. The daemon takes nothing else from the file, and ch
 """
 
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Final
 
@@ -32,7 +33,7 @@ from bridges.settings import names as named
 from bridges.settings.alarms import note_alarms
 from bridges.settings.buses import BusRead, read_bus
 from bridges.settings.config import Config
-from bridges.settings.plausible import milliseconds, out_of_step
+from bridges.settings.plausible import milliseconds
 from bridges.settings.renamed_keys import read_as_renamed
 from bridges.settings.top import MAPPING, keys_below, owner, top_keys, word
 from bridges.settings.wiring import Use, WiringCheck, note_conflicts, note_unknown_signals
@@ -98,6 +99,7 @@ class _DeviceReading:
         self._buses: dict[str, BusRead] = {}
         self._devices: dict[str, DeviceSettings] = {}
         self._uses: list[Use] = []
+        self._others: dict[str, set[str]] = {}
         self._written: dict[str, list[str]] = {}
         self._warnings: list[Problem] = []
         self._notes: list[Problem] = []
@@ -239,7 +241,11 @@ class _DeviceReading:
                 if settings is not BROKEN:
                     self._devices[entry.name] = settings
         for name in self._buses:
-            if entries and name not in buses and None not in buses:
+            if (
+                entries
+                and name not in {*buses, *chain(*self._others.values())}
+                and None not in buses
+            ):
                 text = (
                     f"no device uses the bus '{name}': delete it, or name it in a device's 'bus:'"
                 )
@@ -288,18 +294,18 @@ class _DeviceReading:
     ) -> DeviceSettings | Broken:
         """Read a device's settings, and check its wires."""
         spot = Spot(entry.value, entry.key, entry.spot().label)
-        hal = self._buses[bus].hal if bus else None
-        wiring = WiringCheck(self._page, entry.name, bus or "", hal)
+        wiring = WiringCheck(self._page, entry, bus or "", self._buses, driver.buses)
         values = Values(self._page, wiring.checks, partial(owner, self._kind_name))
         before = len(self._page.problems)
         settings = values.make(driver.settings, spot)
+        self._others[entry.name] = wiring.others
         if settings is BROKEN:
             wiring.parts(values.structs, spot)
         else:
             wires = list(driver.wires(settings))
             self._check_signals(settings, wires, spot, wiring, driver)
-            self._check_pace(settings, spot, bus)
-            wiring.reach(self._buses[bus].settings if bus else BROKEN)
+            wiring.pace(settings, spot)
+            wiring.reach()
             self._written.setdefault(bus or "", []).extend(wiring.written)
             if len(self._page.problems) == before:
                 self._collect_warnings(settings, spot, driver)
@@ -324,11 +330,6 @@ class _DeviceReading:
         signals = [*(wire.signal for wire in wires), *driver.unwired(settings)]
         note_unknown_signals(self._page, settings.accept_unsafe, signals, spot)
 
-    def _check_pace(self, settings: DeviceSettings, spot: Spot, bus: str | None) -> None:
-        read = self._buses[bus].settings if bus else BROKEN
-        for path, text in () if read is BROKEN else out_of_step(settings, read):
-            self._page.note(locate(spot, path).where(), text)
-
     def _collect_warnings(self, settings: DeviceSettings, spot: Spot, driver: AnyDriver) -> None:
         """Collect the warnings about a valid device."""
         for signal, reason in settings.accept_unsafe.items():
@@ -346,7 +347,8 @@ class _DeviceReading:
         for name, bus in () if self._page.problems else self._buses.items():
             assert bus.hal
             unwatched = bus.hal.unwatched(bus.settings, self._written.get(name, ()))
-            devices = [one for one in self._devices.values() if one.bus in (name, None)]
+            named = ((one, {one.bus, *self._others[d]}) for d, one in self._devices.items())
+            devices = [one for one, buses in named if buses & {name, None}]
             points = [use.point for use in self._uses if use.bus == name]
             paced = bus.hal.paced(bus.settings, devices, points)
             for path, text in (*unwatched.warnings, *paced):

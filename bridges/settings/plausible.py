@@ -38,10 +38,14 @@ def _clock(seconds: float) -> str:
     return f"{hours:.1f} hours" if hours >= 1 else f"{seconds / 60:.0f} minutes"
 
 
-def out_of_step(device: DeviceSettings, bus: object) -> Remarks:
-    """Yield the problems of a device whose bus is too slow: late readings and late commands."""
+def out_of_step(device: DeviceSettings, bus: object, others: Iterable[object] = ()) -> Remarks:
+    """Yield the problems of a device whose bus is too slow: late readings and late commands.
+
+    `others`: the settings of its other buses. Settings that are no valid struct count as fast.
+    """
     scan_s = getattr(bus, "scan_s", 0.0)
-    yield from _stale_readings(device, scan_s)
+    slowest_s = max(scan_s, *(getattr(other, "scan_s", 0.0) for other in others), 0.0)
+    yield from _stale_readings(device, slowest_s)
     if renewed := device.off_after():
         off_s, path = renewed
         lost_s = RENEWED * scan_s + getattr(bus, "timeout_s", 0.0)

@@ -4,15 +4,18 @@ The bus type knows the spelling of its points and the impossible wires (`canonic
 of its `BUS` in `drivers/hal/`).
 """
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping
 from typing import Literal
 
 from msgspec import Struct
 from yaml import Node
 
+from bridges.kinds.shared.fields import DeviceSettings
+from bridges.settings.buses import BusRead
+from bridges.settings.plausible import out_of_step
 from bridges.yaml.parsing import YamlFile
-from bridges.yaml.positions import Spot, below, locate
-from bridges.yaml.spelling import unknown
+from bridges.yaml.positions import MappingEntry, Spot, below, is_none, locate
+from bridges.yaml.spelling import either, unknown
 from bridges.yaml.values import BROKEN, Check
 from drivers.hal import AnyBus
 from drivers.hal.points import Input, Output, Wire
@@ -32,36 +35,71 @@ class Use(Struct, frozen=True):
 class WiringCheck:
     """Collects and checks a device's points, first while its settings are read, and again as wires.
 
-    `written`: the points that the daemon itself must switch off again.
+    `bus`: the device's own; "" if unknown. `buses`: all buses of the file. `usable`: the types that the
+    device's driver can use. `others`: the other buses that have inputs of the device. `written`: the
+    points that the daemon itself must switch off again.
     """
 
-    def __init__(self, page: YamlFile, device: str, bus: str, hal: AnyBus | None) -> None:
+    def __init__(
+        self,
+        page: YamlFile,
+        device: MappingEntry,
+        bus: str,
+        buses: Mapping[str, BusRead],
+        usable: Collection[str],
+    ) -> None:
         self._page = page
-        self._device = device
+        self._device = device.name
+        self._spot = device.spot()
         self._bus = bus
-        self._hal = hal
+        self._buses = buses
+        self._usable = usable
         self.uses: list[Use] = []
+        self.others: set[str] = set()
         self.written: list[str] = []
-        self.checks: dict[str, Check] = {"point": self._point}
+        self.checks: dict[str, Check] = {"point": self._point, "other bus": self._other_bus}
+
+    def _hal(self, bus: str) -> AnyBus | None:
+        """Return the type of a wire's bus, or of the device's own for ""; None if unknown."""
+        found = self._buses.get(bus or self._bus)
+        return found.hal if found else None
 
     def _point(self, text: str, spot: Spot) -> str | None:
-        return self._use(text, spot.path[:-1], spot.node)
+        path = spot.path[:-1]
+        bus = below(locate(self._spot, path).value, "bus")
+        named = str(bus.value.value) if bus and not is_none(bus.value) else ""
+        return self._use(text, path, spot.node, named)
+
+    def _other_bus(self, name: str, spot: Spot) -> str | None:
+        """Return the problem of the name after an input's `bus:`; None if there is none."""
+        if name not in self._buses:
+            return unknown("bus", name, self._buses)
+        if name == self._bus:
+            return f"'{name}' is the own bus of '{self._device}': leave 'bus' out here"
+        self.others.add(name)
+        kind = self._buses[name].type
+        if kind is None or kind in self._usable:
+            return None
+        types = either(self._usable)
+        return f"the bus '{name}' is '{kind}' and has no contacts: name a bus of type {types}"
 
     def _use(
         self,
         point: str,
         path: tuple[str, ...],
         node: Node,
+        bus: str = "",
         direction: Literal["in", "out"] | None = None,
     ) -> str | None:
-        if self._hal is None:
+        hal = self._hal(bus)
+        if hal is None:
             return None
         try:
-            name = self._hal.canonical(point)
+            name = hal.canonical(point)
         except ValueError as error:
             return str(error)
         user = f"{self._device} {'.'.join(path)}"
-        self.uses.append(Use(self._bus, name, point, user, node, direction))
+        self.uses.append(Use(bus or self._bus, name, point, user, node, direction))
         return None
 
     def wires(self, wires: Iterable[Wire], spot: Spot) -> None:
@@ -74,15 +112,16 @@ class WiringCheck:
             stands = [self._stands(wire, key, text, spot) for key, text in places]
             if all(stands):
                 self._judge(wire, spot)
-                if wire.direction == "out" and wire.flash is None and self._hal:
-                    self.written.append(self._hal.canonical(wire.point))
+                hal = self._hal("")
+                if wire.direction == "out" and wire.flash is None and hal:
+                    self.written.append(hal.canonical(wire.point))
 
     def _stands(self, wire: Wire, key: str, text: str, spot: Spot) -> bool:
         """Record the wire's use of this point; return False if the point is invalid."""
         entry = locate(spot, wire.path)
         point = below(entry.value, key)
         node = point.value if point else entry.where()
-        reason = self._use(text, wire.path or (wire.signal,), node, wire.direction)
+        reason = self._use(text, wire.path or (wire.signal,), node, wire.bus, wire.direction)
         if reason:
             self._page.note(node, reason)
         return reason is None
@@ -90,7 +129,8 @@ class WiringCheck:
     def warnings(self, wires: Iterable[Wire], spot: Spot) -> Iterable[tuple[Node, str]]:
         """Yield (node, text) for wires that are legal but may be a mistake."""
         for wire in wires:
-            for text in self._hal.wire_warnings(wire) if self._hal else ():
+            hal = self._hal(wire.bus)
+            for text in hal.wire_warnings(wire) if hal else ():
                 yield locate(spot, wire.path).where(), f"'{wire.signal}': {text}"
 
     def claims(self, places: Iterable[tuple[str, tuple[str, ...]]], spot: Spot) -> None:
@@ -100,30 +140,39 @@ class WiringCheck:
             self.uses.append(Use(self._bus, text, text, user, locate(spot, path).where()))
             self.written.append(text)
 
-    def reach(self, bus: object) -> None:
-        """Note the points that a bus with these settings does not have. `bus`: BROKEN if unknown."""
-        for use in self.uses if self._hal and bus is not BROKEN else ():
-            assert self._hal
-            reason = self._hal.unreachable(bus, use.point)
+    def reach(self) -> None:
+        """Note the points that a bus with these settings does not have."""
+        for use in self.uses:
+            bus = self._buses.get(use.bus)
+            if bus is None or bus.hal is None or bus.settings is BROKEN:
+                continue
+            reason = bus.hal.unreachable(bus.settings, use.point)
             if not reason and use.direction:
-                reason = self._hal.unfit(bus, use.point, use.direction)
+                reason = bus.hal.unfit(bus.settings, use.point, use.direction)
             if reason:
                 self._page.note(use.node, reason)
+
+    def pace(self, settings: DeviceSettings, spot: Spot) -> None:
+        """Note limits of the device that are too short for its buses."""
+        others = [self._buses[name].settings for name in self.others]
+        own = self._buses[self._bus].settings if self._bus else BROKEN
+        for path, text in out_of_step(settings, own, others):
+            self._page.note(locate(spot, path).where(), text)
 
     def parts(self, structs: Iterable[tuple[tuple[str, ...], object]], spot: Spot) -> None:
         """Check the wires of a device whose other settings are invalid, so that it has no wiring
         table."""
         for path, struct in structs:
             if isinstance(struct, Input):
-                pull, debounce_s = struct.pull, struct.debounce_s
-                wire = Wire(path[-1], "in", struct.point, struct.active, pull, debounce_s, path)
+                wire = struct.wire(path[-1], path, struct.debounce_s)
                 self._judge(wire, spot)
             elif isinstance(struct, Output):
                 wire = Wire(path[-1], "out", struct.point, struct.active, path=path)
                 self._judge(wire, spot)
 
     def _judge(self, wire: Wire, spot: Spot) -> None:
-        for text in self._hal.wire_problems(wire) if self._hal else ():
+        hal = self._hal(wire.bus)
+        for text in hal.wire_problems(wire) if hal else ():
             name = wire.path[-1] if wire.path else wire.signal
             self._page.note(locate(spot, wire.path).key, f"'{name}': {text}")
 

@@ -8,6 +8,7 @@ lines. The structs, with their bounds and units, are the only description of a f
 from collections.abc import Callable, Hashable, Mapping
 from enum import Enum
 from functools import cache
+from types import MappingProxyType
 from typing import Final, NamedTuple, TypeVar, overload
 
 import msgspec
@@ -139,11 +140,13 @@ class Values:
         spot: Spot,
         fields: Mapping[str, str | None],
         elsewhere: Mapping[str, str] | None = None,
+        refused: Mapping[str, str] = MappingProxyType({}),
     ) -> dict[str, MappingEntry]:
         """Return the entries of `fields`: key -> form of its value, or None if the key is optional.
 
         A key that is missing is not reported if an unknown key resembles it, so that one slip is one
-        problem. `elsewhere`: key of another place -> the section to which it belongs.
+        problem. `elsewhere`: key of another place -> the section to which it belongs. `refused`: key ->
+        the reason why it cannot stand here.
         """
         found = {e.name: e for e in entries}
         near = {nearest(name, fields) for name in found if name not in fields}
@@ -154,7 +157,8 @@ class Values:
                     cut.add(before.name)  # a comma has cut this number: its value is not meant
                 self._page.note(
                     entry.key,
-                    misplaced(entry, before, elsewhere or {})
+                    refused.get(entry.name)
+                    or misplaced(entry, before, elsewhere or {})
                     or self._too_deep(entry)
                     or self._owned(entry, spot, fields)
                     or unknown("key", entry.name, fields),
@@ -271,7 +275,8 @@ class Values:
         before = len(self._page.problems)
         fitting = {**dict.fromkeys(besides), **known}
         entries = self.entries(spot)
-        found = self.known(entries, spot, fitting, sections_of(wanted))
+        refused = getattr(wanted.cls, "refused", {})
+        found = self.known(entries, spot, fitting, sections_of(wanted), refused)
         broken = len(self._page.problems) > before
         self._around.append(
             _Around(spot, known, entries[0].key.start_mark.column if entries else 0)

@@ -6,9 +6,9 @@ inputs of a Modbus I/O module are treated alike.
 """
 
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Annotated, Literal, Protocol, runtime_checkable
+from typing import Annotated, ClassVar, Literal, Protocol, runtime_checkable
 
 import msgspec
 
@@ -19,6 +19,8 @@ Active = Literal["high", "low"]
 Pull = Literal["up", "down", "none"]
 Point = Annotated[str, msgspec.Meta(extra={"check": "point"})]
 """A contact's address. The bus's `canonical` checks it while the YAML is read."""
+OtherBus = Annotated[str, msgspec.Meta(extra={"check": "other bus"})]
+"""The name of a bus that is not the device's. `bridges/settings/wiring.py` checks the name."""
 DebounceSeconds = Annotated[float, msgspec.Meta(ge=0, le=10, extra={"unit": "s"})]
 
 
@@ -36,15 +38,25 @@ class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         DebounceSeconds | None,
         tells("how long a change must last; the kind's default when absent."),
     ] = None
+    bus: Annotated[
+        OtherBus | None,
+        tells("""the bus that has this contact, if it is not the device's `bus`. While that bus is not
+        read, the device is not read either."""),
+    ] = None
 
     def wire(self, signal: str, path: tuple[str, ...], debounce_s: float | None) -> "Wire":
         """Return the input's row of the wiring table; `debounce_s` is the default."""
         own_s = debounce_s if self.debounce_s is None else self.debounce_s
-        return Wire(signal, "in", self.point, self.active, self.pull, own_s, path)
+        bus = self.bus or ""
+        return Wire(signal, "in", self.point, self.active, self.pull, own_s, path, bus=bus)
 
 
 class Output(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One relay or line that is driven. Its safe level is always not asserted."""
+
+    refused: ClassVar[Mapping[str, str]] = {
+        "bus": "an output is always on the device's own bus: wire the relay there, and delete 'bus'"
+    }
 
     point: Annotated[
         Point, tells("the address: `BCM18` or `J8:12` on GPIO, `unit 1 coil 0` on Modbus.")
@@ -114,6 +126,8 @@ class Wire(msgspec.Struct, frozen=True):
     read_back: bool = True
     clearing: Clearing | None = None
     """An output that the controller may clear by itself."""
+    bus: str = ""
+    """The bus of an input that is not on the device's own bus."""
 
     def level(self, asserted: bool) -> bool:
         """Return the electrical level (True is high) for this meaning."""
@@ -208,10 +222,23 @@ class HalError(DriverError):
     """The bus failed: no such chip, connection refused, timeout, exception reply, bad frame."""
 
 
+Readings = Callable[[], Mapping[str, bool]]
+"""Returns signal -> asserted for inputs on other buses. Raises DriverError if one is not known now."""
+
+
+def _not_read() -> Mapping[str, bool]:
+    raise DriverError("the inputs on its other bus are not read here")
+
+
 class Points:
-    """The signals of one device on its bus, as asserted or not."""
+    """The signals of one device, as asserted or not.
+
+    The outputs are on `bus`, the device's own. `take_inputs` says how inputs on other buses are read.
+    """
 
     def __init__(self, wires: Sequence[Wire], bus: PointsBus) -> None:
+        self._elsewhere = _not_read if any(wire.bus for wire in wires) else dict[str, bool]
+        wires = [wire for wire in wires if not wire.bus]
         self._in = {w.signal: (w, bus.canonical(w.point)) for w in wires if w.direction == "in"}
         self._out = {w.signal: (w, bus.canonical(w.point)) for w in wires if w.direction == "out"}
         self._lines = bus.lines(
@@ -223,18 +250,27 @@ class Points:
         self._read: dict[str, bool] = {}
         self._written: dict[str, bool] | None = None
 
+    def take_inputs(self, elsewhere: Readings) -> None:
+        """Read the inputs on other buses by `elsewhere` from now on."""
+        self._elsewhere = elsewhere
+
     def open(self) -> None:
         """Claim every line, outputs not asserted."""
         self._written = None
         self._lines.claim()
 
     def read(self) -> dict[str, bool]:
-        """Read signal -> asserted for each input. After a failure the outputs are written again."""
+        """Read signal -> asserted for each input. After a failure of the device's own bus the outputs
+        are written again.
+
+        Raises DriverError also while the inputs of another bus are not known.
+        """
         written, self._written = self._written, None
         levels = self._lines.read()
         kept = (written or {}).items()
         self._written = {s: on for s, on in kept if self._out[s][1] not in levels}
-        self._read = {s: w.asserted(levels[point]) for s, (w, point) in self._in.items()}
+        here = {s: w.asserted(levels[point]) for s, (w, point) in self._in.items()}
+        self._read = {**here, **self._elsewhere()}
         return self._read
 
     def last_known(self) -> dict[str, bool]:

@@ -119,7 +119,7 @@ class ReplayedCores:
             )
         if subject not in config.devices:
             return None
-        debounce = config.driver_type(subject).debounce(config.devices[subject])
+        debounce = config.debounce(subject)
         limits = kind.limits(config.devices[subject], debounce)
         if kind.section:  # a fleet's limits hold RMF's files, whose texts the recording has
             limits = limits_of(config, subject, debounce)

@@ -144,8 +144,9 @@ def _devices(config: Config) -> list[Part]:
 
 def _device(config: Config, name: str) -> Part:
     settings, bus, driver = config.devices[name], config.bus_of(name), config.driver_type(name)
-    point = config.bus_type(bus).describe
-    wires = tuple(_row(wire, point(wire.point)) for wire in config.wires(name))
+    debounce = config.debounce(name)
+    late_s = max(map(config.lasts_s, config.other_buses(name)), default=0.0) if debounce else 0.0
+    wires = tuple(_row(config, bus, wire, late_s) for wire in config.wires(name))
     meanings = tuple(driver.describe(settings, config.buses[bus]))
     tables = [
         Table(WIRES, HEADINGS, wires),
@@ -163,12 +164,17 @@ def _settings(settings: object) -> Table:
     return Table("settings", SETTINGS, tuple(rows))
 
 
-def _row(wire: Wire, point: str) -> tuple[str, ...]:
-    """Return a wire's row. `point`: the bus's description of the point; the row adds the YAML's
-    spelling."""
+def _row(config: Config, bus: str, wire: Wire, late_s: float) -> tuple[str, ...]:
+    """Return a wire's row: the bus's description of the point, the YAML's spelling, and the meaning.
+
+    `bus`: the device's own. `late_s`: the time (s) by which the debounce of each input is longer.
+    """
+    point = config.bus_type(wire.bus or bus).describe(wire.point)
     spelled = point if f" {wire.point} " in f" {point} " else f"{wire.point} = {point}"
     if wire.flash is not None:
         spelled += f", {wire.flash.on_s:g} s by the module at {wire.flash.point}"
+    if wire.bus:
+        spelled += f" on bus {wire.bus}"
     is_input = wire.direction == "in"
     return (
         wire.signal,
@@ -176,13 +182,13 @@ def _row(wire: Wire, point: str) -> tuple[str, ...]:
         wire.direction,
         wire.active,
         wire.pull or "-",
-        _debounce(wire) if is_input else "-",
+        _debounce(wire, late_s) if is_input else "-",
         "-" if is_input else ("high" if wire.level(False) else "low"),
         BROKEN[wire.broken_reads()],
     )
 
 
-def _debounce(wire: Wire) -> str:
+def _debounce(wire: Wire, late_s: float) -> str:
     if wire.debounce_s is None:
         return "default"
-    return f"{wire.debounce_s:g} s" if wire.debounce_s else "none"
+    return f"{wire.debounce_s + late_s:g} s" if wire.debounce_s + late_s else "none"

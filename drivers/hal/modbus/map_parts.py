@@ -3,7 +3,7 @@
 The maps of lifts, doors and chargers, and of modules' watchdogs, consist of these parts.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import Annotated, ClassVar
 
 import msgspec
@@ -18,6 +18,10 @@ class Placed(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """A part with a place. `TABLES`: its allowed tables."""
 
     TABLES: ClassVar[Collection[str]] = tuple(TABLES)
+    refused: ClassVar[Mapping[str, str]] = {
+        "bus": "a map is read from its device's own bus: only contacts (driver: dry_contact) can be on"
+        " another bus"
+    }
 
     at: Annotated[
         Place, tells("`input register N`, `holding register N`, `coil N` or `discrete input N`.")

@@ -16,6 +16,7 @@ from bridges.settings.load import Config
 from bridges.system.log import plain
 from drivers import DriverError
 from drivers.hal import Bus, HalError
+from drivers.hal.points import Points
 from workbench.commissioning.doctor.finding import Finding, note, ok, warning, wrong
 
 TRIES: Final = 3
@@ -68,12 +69,11 @@ def unarmed(settings: msgspec.Struct) -> msgspec.Struct:
 
 def readings(config: Config, bus_name: str, bus: Any, subject: str) -> Iterator[Finding]:
     """Yield the answer of each device on this bus, decoded by its driver."""
-    devices = config.devices_on(bus_name)
-    drivers = {n: config.driver_type(n).create(n, config.devices[n], bus) for n in devices}
+    reads = {name: _reading(config, bus_name, name, bus) for name in config.devices_at(bus_name)}
     _listened(bus)
-    for name, driver in drivers.items():
+    for name, read in reads.items():
         try:
-            sample = _read(driver.read, bus)
+            sample = _read(read, bus)
         except DriverError as error:
             means = f"{name} cannot be served: for RMF it is out of order"
             yield wrong(
@@ -84,6 +84,14 @@ def readings(config: Config, bus_name: str, bus: Any, subject: str) -> Iterator[
             do = "compare codes: with the lines, in rmf-bridge walk"
             yield warning(subject, f"{name}: {fault}", "RMF gets no floor", do)
         yield ok(subject, f"{name} answers: {plain(sample)}")
+
+
+def _reading(config: Config, bus_name: str, name: str, bus: Any) -> Callable[[], Any]:
+    """Return how to read a device: by its driver, or by this bus's contacts alone if it has two buses."""
+    if config.other_buses(name):
+        return Points(config.wires_on(bus_name, name), bus).read
+    read: Callable[[], Any] = config.driver_type(name).create(name, config.devices[name], bus).read
+    return read
 
 
 def _read(read: Callable[[], Any], bus: Bus) -> Any:
@@ -210,10 +218,10 @@ def _scanned(
 
 def numbers(config: Config, bus_name: str, what: str) -> Iterator[int]:
     """Return the units or nodes that the file names on this bus."""
-    for name in config.devices_on(bus_name):
+    for name in config.devices_at(bus_name):
         settings, driver = config.devices[name], config.driver_type(name)
         claimed = [place for place, _ in driver.claims(settings)]
-        places = [*(wire.point for wire in driver.wires(settings)), *claimed]
+        places = [*(wire.point for wire in config.wires_on(bus_name, name)), *claimed]
         for place in places:
             yield from map(int, re.findall(rf"^{what} (\d+)\b", place.lower()))
         if isinstance(number := getattr(settings, what, None), int):

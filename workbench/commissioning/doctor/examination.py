@@ -113,8 +113,8 @@ def _gpio(
     chip_number = config.buses[name].chip
     yield from gpio.gpio(machine, chip_number, who)
     chip = gpio.header(machine, chip_number)
-    for device in config.devices_on(name):
-        wires = config.wires(device)
+    for device in config.devices_at(name):
+        wires = config.wires_on(name, device)
         if chip is not None and not now.busy:
             yield from gpio.lines(machine, chip, wires)
         yield from gpio.boot(machine, wires, config.devices[device].accept_unsafe)
