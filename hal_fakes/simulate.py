@@ -2,8 +2,7 @@
 
 If possible, a far side is a child process on 127.0.0.1 (`hal_fakes/__main__.py`), and the real bus is
 pointed there. GPIO pins cannot leave a process, so their fake lives in the daemon's. If a device has
-inputs on another bus, its plant stands behind both, so the far sides of all buses of the file live in the
-daemon's process.
+inputs on another bus, its plant stands behind both: then all far sides live in the daemon's process.
 
 Each bus has a control socket in the runtime directory: `plant.sock`, or `plant-<bus>.sock` where
 the file has several buses.

@@ -87,7 +87,7 @@ def readings(config: Config, bus_name: str, bus: Any, subject: str) -> Iterator[
 
 
 def _reading(config: Config, bus_name: str, name: str, bus: Any) -> Callable[[], Any]:
-    """Return how to read a device: by its driver, or by this bus's contacts alone if it has two buses."""
+    """Return how to read a device: by its driver; by this bus's contacts alone if it has two buses."""
     if config.other_buses(name):
         return Points(config.wires_on(bus_name, name), bus).read
     read: Callable[[], Any] = config.driver_type(name).create(name, config.devices[name], bus).read
