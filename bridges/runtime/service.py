@@ -254,7 +254,7 @@ class Devices:
             for (device, name), handover in self._handovers.items()
             if name == bus_name
         ]
-        both = [*nodes, *readers]
+        both: list[AnyNode | InputReader] = [*nodes, *readers]
         loop = Loop(bus_name, bus, both, settings.scan_s, self._clock, self._writer)
         self._placed.update({node.name: (node, loop) for node in nodes})
         return loop

@@ -1,0 +1,116 @@
+"""One device with inputs on another bus, on the daemon's own service in virtual time.
+
+The device's bus is `gateway`, its other bus `header`. A bus may be down (each call fails at once, as in a
+backoff) or hang (its thread waits for an answer and runs no round).
+"""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from bridges.kinds import kind_called
+from bridges.kinds.shared.kind import Kind
+from bridges.runtime.clock import Clock
+from bridges.runtime.loop import Loop
+from bridges.runtime.service import Devices, named_by
+from bridges.settings.load import load
+from drivers.hal import Bus
+from hal_fakes.fake import plants_on
+from tests.drivers.far import PointsFar
+from tests.transports.memory import MemoryNetwork, MemoryTransport
+
+DOOR: Final = """
+kind: door
+driver: dry_contact
+buses:
+  gateway: {type: modbus, tcp: {host: 127.0.0.1}, scan_s: 0.1, without_watchdog: {1: a test}}
+  header: {type: gpio, scan_s: 0.05}
+doors:
+  D:
+    bus: gateway
+    on_fire: release
+    limits: {stale_after_s: 1.0, hazard_clear_s: 0.5, close_grace_s: 0}
+    inputs:
+      opened: {point: "unit 1 discrete input 0", active: high}
+      closed: {point: "unit 1 discrete input 1", active: high}
+      fire: {bus: header, point: BCM4, active: low, pull: down}
+    outputs:
+      hold_open: {point: "unit 1 coil 0", active: high}
+"""
+
+
+class FarBus(PointsFar, Bus):
+    """The far side of one bus. `read_at`: the time of the last successful reading (s). `shown`: the
+    levels of that reading."""
+
+    def __init__(self, clock: Any, plant: Any, wires: Any) -> None:
+        super().__init__(clock, plant, wires)
+        self.read_at = float("-inf")
+        self.shown: Mapping[str, bool] = {}
+        self.wake: Callable[[], None] = lambda: None
+        self._now = lambda: float(clock.now)
+
+    def on_edge(self, wake: Callable[[], None]) -> None:
+        self.wake = wake
+
+    def levels(self) -> dict[str, bool]:
+        self.shown = super().levels()
+        self.read_at = self._now()
+        return dict(self.shown)
+
+
+class OnTwoBuses:
+    """The service of one device. `states`: (s, message). `after_round` is called with the bus's name."""
+
+    def __init__(self, file: Path) -> None:
+        self.now = 0.0
+        self.config = load(file)
+        (self.device,) = self.config.devices
+        self.hanging: set[str] = set()
+        self.states: list[tuple[float, Any]] = []
+        self.after_round: Callable[[str], None] = lambda bus: None
+        (self.plant,) = plants_on(self.config, "gateway").values()
+        self.far = {
+            bus: FarBus(self, self.plant, self.config.wires_on(bus, self.device))
+            for bus in self.config.buses
+        }
+        network = MemoryNetwork()
+        self.rmf = MemoryTransport(network, "rmf")
+        kind = kind_called(self.config.kind)
+        assert isinstance(kind, Kind)
+        self.rmf.subscribe(kind.states, lambda state: self.states.append((self.now, state)))
+        clock = Clock(lambda: self.now, lambda: 1e6 + self.now)
+        self.served = Devices(
+            self.config,
+            kind,
+            MemoryTransport(network, "bridge"),
+            self.far.__getitem__,
+            lambda topic: named_by(self.config, topic),
+            clock,
+        )
+        self.served.subscribe()
+        self.loops: dict[str, Loop] = dict(zip(self.config.buses, self.served._loops, strict=True))
+
+    def run(self, for_s: float) -> None:
+        """Run the rounds of both threads, in the order in which they are due."""
+        until = self.now + for_s
+        while (due := self._due()) and due[0] <= until:
+            self.now = max(self.now, due[0])
+            self.loops[due[1]].round()
+            self.after_round(due[1])
+        self.now = until
+
+    def _due(self) -> tuple[float, str] | None:
+        running = [bus for bus in self.loops if bus not in self.hanging]
+        woken = [(self.now, bus) for bus in running if self.loops[bus].inbox.wait(0.0)]
+        due = [(self.loops[bus].wake_at, bus) for bus in running]
+        return min((*woken, *due), default=None)
+
+    def relays(self) -> list[str]:
+        """Return the relays that are on."""
+        levels = self.far["gateway"]._levels
+        wires = self.config.wires_on("gateway", self.device)
+        return [w.signal for w in wires if w.direction == "out" and levels.get(w.point)]
+
+    def press(self, signal: str, on: bool) -> None:
+        self.plant.press(signal, on, self.now)
