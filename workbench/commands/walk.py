@@ -11,6 +11,7 @@ import logging
 import os
 import sys
 import time
+from collections.abc import Mapping
 from contextlib import ExitStack
 from datetime import datetime
 from pathlib import Path
@@ -21,7 +22,7 @@ from bridges.runtime.completers import completed_by, device_names
 from bridges.settings.load import Config, SettingsError, load
 from bridges.system import log
 from drivers.hal import Bus, HalError
-from workbench.commissioning.manual_control import guarded
+from workbench.commissioning.manual_control import buses_of, driver_on, guarded
 from workbench.graph.which_device import NoDevice, device_of
 
 NOT_OFF = 1
@@ -98,9 +99,10 @@ def _walk(
 
             simulation = Simulation(config, held.path)
             stack.callback(simulation.close)
-            return _on(args, config, device, simulation.open_bus(config.bus_of(device)), path, end)
-        bus, all_off = guarded(config, device, held, guard.command(args.file, args.runtime_dir))
-        code = _on(args, config, device, bus, path, end)
+            buses = {name: simulation.open_bus(name) for name in buses_of(config, device)}
+            return _on(args, config, device, buses, path, end)
+        buses, all_off = guarded(config, device, held, guard.command(args.file, args.runtime_dir))
+        code = _on(args, config, device, buses, path, end)
         if code != NOT_OFF:
             all_off()
         return code
@@ -114,7 +116,12 @@ def _record_path(args: argparse.Namespace, device: str) -> Path:
 
 
 def _on(
-    args: argparse.Namespace, config: Config, device: str, bus: Bus, path: Path, end: signals.End
+    args: argparse.Namespace,
+    config: Config,
+    device: str,
+    buses: Mapping[str, Bus],
+    path: Path,
+    end: signals.End,
 ) -> int:
     from workbench.commissioning.walk import signed
     from workbench.commissioning.walk.bench import Bench, ContactReading
@@ -122,12 +129,15 @@ def _on(
     from workbench.commissioning.walk.steps import OFF, steps
     from workbench.commissioning.walk.tap import Tap
 
-    settings, driver_type = config.devices[device], config.driver_type(device)
-    tap = Tap(bus)
-    wires = config.wires(device)
-    inputs = [ContactReading(w, tap.canonical(w.point)) for w in wires if w.direction == "in"]
-    tried = steps(config, device)
-    bench = Bench(driver_type.create(device, settings, tap), tap, inputs, tried, OFF[config.kind])
+    taps = {name: Tap(bus) for name, bus in buses.items()}
+    inputs = [
+        ContactReading(wire, tap.canonical(wire.point), tap.levels)
+        for name, tap in taps.items()
+        for wire in config.wires_on(name, device)
+        if wire.direction == "in"
+    ]
+    tried, tap = steps(config, device), taps[config.bus_of(device)]
+    bench = Bench(driver_on(config, device, taps), tap, inputs, tried, OFF[config.kind])
     begun = datetime.now()
     by = args.by or getpass.getuser()
 
@@ -162,7 +172,8 @@ def _on(
         how = f"interrupted: {error.strerror}"  # the terminal is gone
     finally:
         off = "every output verified off" if bench.verified_off else "outputs NOT verified off"
-        bus.close()
+        for bus in buses.values():
+            bus.close()
     code, told = 0, f"{path}.md and .json"
     try:
         note(f"{how}; {off}")

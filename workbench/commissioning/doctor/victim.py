@@ -14,7 +14,7 @@ from bridges.runtime import guard, runtime_directory, signals
 from bridges.settings.load import Config, SettingsError, load
 from drivers import Driver, DriverError
 from drivers.hal import Bus
-from workbench.commissioning.manual_control import guarded, not_off
+from workbench.commissioning.manual_control import driver_on, guarded, not_off
 from workbench.commissioning.walk.core import WalkStep
 from workbench.commissioning.walk.steps import steps
 
@@ -43,11 +43,11 @@ def _held(
     switches_off: list[str],
 ) -> int:
     try:
-        bus, all_off = guarded(config, device, held, switches_off)
+        buses, all_off = guarded(config, device, held, switches_off)
     except DriverError as error:
         return _say(f"{error}")
     try:
-        driver = config.driver_type(device).create(device, config.devices[device], bus)
+        driver, bus = driver_on(config, device, buses), buses[config.bus_of(device)]
         off = _on_for_a_while(driver, bus, step_called(config, device, step))
     except DriverError as error:
         return _say(f"{error}")

@@ -5,8 +5,8 @@ off.
 import threading
 import time
 from collections import deque
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 from bridges.system.log import plain
@@ -29,10 +29,12 @@ SCAN_S: Final = 0.05
 
 @dataclass(slots=True)
 class ContactReading:
-    """One contact's latest reading. `seen`: the meanings (on, off) seen so far."""
+    """One contact's latest reading. `levels`: the levels read on its bus, by point. `seen`: the
+    meanings (on, off) seen so far."""
 
     wire: Wire
     point: str
+    levels: Mapping[str, int] = field(default_factory=dict)
     level: int | None = None
     changed_at: float | None = None
     seen: frozenset[bool] = frozenset()
@@ -120,7 +122,7 @@ class Bench:
             return InputsLost(str(error))
         now = time.monotonic()
         for one in self.inputs:
-            level = self._bus.levels.get(one.point)
+            level = one.levels.get(one.point)
             if level is not None and level != one.level:
                 one.level, one.changed_at = level, now
                 one.seen |= {one.wire.asserted(level)}
