@@ -67,8 +67,8 @@ class WiringCheck:
     def _point(self, text: str, spot: Spot) -> str | None:
         path = spot.path[:-1]
         bus = below(locate(self._spot, path).value, "bus")
-        named = str(bus.value.value) if bus and not is_none(bus.value) else ""
-        return self._use(text, path, spot.node, named)
+        named = str(bus.value.value) if bus and not is_none(bus.value) else self._bus
+        return self._use(text, path, spot.node, named) if named in self._buses else None
 
     def _other_bus(self, name: str, spot: Spot) -> str | None:
         """Return the problem of the name after an input's `bus:`; None if there is none."""

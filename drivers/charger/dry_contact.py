@@ -121,6 +121,9 @@ def warnings(settings: DryContactChargerSettings) -> Remarks:
                 wire.path,
                 "a cut wire reads as no charge: check the wire if a charge never begins",
             )
+        if wire.bus:
+            text = f"while the bus '{wire.bus}' is not read, the relay stays as it is: a charge goes on"
+            yield (*wire.path, "bus"), f"{text}, and '{wire.signal}' cannot end it"
     if settings.inputs.fault is None:
         yield ("inputs",), "without a fault contact a station that is out of order reads idle"
     yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)

@@ -1,7 +1,7 @@
 """One device with inputs on another bus, on the daemon's own service in virtual time.
 
-The device's bus is `gateway`, its other bus `header`. A bus may be down (each call fails at once, as in a
-backoff) or hang (its thread waits for an answer and runs no round).
+The device's bus is `gateway`, its other bus `header`. A bus may be down (each call fails at once, as
+in a backoff) or hang (its thread waits for an answer and runs no round).
 """
 
 from collections.abc import Callable, Mapping
@@ -60,7 +60,7 @@ class FarBus(PointsFar, Bus):
 
 
 class OnTwoBuses:
-    """The service of one device. `states`: (s, message). `after_round` is called with the bus's name."""
+    """The service of one device. `states`: (s, message). `after_round(bus)` is called after rounds."""
 
     def __init__(self, file: Path) -> None:
         self.now = 0.0

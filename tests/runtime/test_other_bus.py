@@ -21,7 +21,7 @@ from tests.runtime.on_two_buses import DOOR, OnTwoBuses
 LIFT: Final = Path(__file__).parents[2] / "config" / "lift_two_buses.yaml"
 STALE_S: Final = 1.0
 LATEST_S: Final = STALE_S + 0.15 + 0.1
-"""stale_after_s, the time for which a reading of the header counts (0.05 + 0.1 s), a scan of the gateway."""
+"""stale_after_s; how long a reading of the header counts (0.05 + 0.1 s); a scan of the gateway."""
 SEEN_S: Final = 0.05 + 0.15 + 0.1 + 0.05
 """The debounce of a fire contact, longer by the age of a reading; a scan of each bus."""
 
