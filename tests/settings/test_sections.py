@@ -188,7 +188,7 @@ def test_points_are_judged_in_a_device_that_is_otherwise_wrong(file: Path) -> No
     assert problems_of(file, text) == [
         "10:23: '17' is not a pin: write A1",
         "10:27: unknown key 'actve': did you mean 'active'? known here: "
-        "point, active, pull, debounce_s",
+        "point, active, pull, debounce_s, bus",
         "13:21: A1 is used by north inputs.closed on line 11: "
         "north outputs.hold needs a point of its own",
     ]

@@ -6,7 +6,7 @@ import pytest
 
 from tests.settings.reading import RIGHT, changed, config_of, problems_of
 
-INPUT = "point, active, pull, debounce_s"
+INPUT = "point, active, pull, debounce_s, bus"
 
 
 def test_an_unknown_key_is_reported_with_the_one_that_was_meant(file: Path) -> None:

@@ -53,7 +53,7 @@ if the text is meant, write "~" in quotes
 12:29: item 5 of 'lanes' is the number 1e3: if the text is meant, write "1e3" in quotes
 14:23: '17' is not a pin: write A1
 14:35: 'active' is 'hgh': write high or low (did you mean 'high'?)
-14:40: unknown key 'pul': did you mean 'pull'? known here: point, active, pull, debounce_s
+14:40: unknown key 'pul': did you mean 'pull'? known here: point, active, pull, debounce_s, bus
 15:52: 'debounce_s' is 20: write a number from 0 to 10 s; for 20 milliseconds write 0.02
 16:7: the key 'closed' is already on line 15: delete one of the two
 17:22: 1A (A1) is used by north inputs.closed on line 15: north inputs.other needs a point of its own
