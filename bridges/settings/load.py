@@ -99,7 +99,7 @@ class _DeviceReading:
         self._buses: dict[str, BusRead] = {}
         self._devices: dict[str, DeviceSettings] = {}
         self._uses: list[Use] = []
-        self._others: dict[str, set[str]] = {}
+        self._on: dict[str, set[str | None]] = {}
         self._written: dict[str, list[str]] = {}
         self._warnings: list[Problem] = []
         self._notes: list[Problem] = []
@@ -234,6 +234,7 @@ class _DeviceReading:
         entries = self._names(spot, (self._kind.name if self._kind else ""))
         entries = self._without_sections(entries)
         buses = [self._bus_name(entry) for entry in entries]
+        self._on = {entry.name: {bus} for entry, bus in zip(entries, buses, strict=True)}
         for entry, bus in zip(entries, buses, strict=True):
             driver = self._driver_of(entry.name)
             if driver and self._can_stand(entry, bus, driver):
@@ -241,11 +242,7 @@ class _DeviceReading:
                 if settings is not BROKEN:
                     self._devices[entry.name] = settings
         for name in self._buses:
-            if (
-                entries
-                and name not in {*buses, *chain(*self._others.values())}
-                and None not in buses
-            ):
+            if entries and name not in chain(*self._on.values()) and None not in buses:
                 text = (
                     f"no device uses the bus '{name}': delete it, or name it in a device's 'bus:'"
                 )
@@ -298,7 +295,7 @@ class _DeviceReading:
         values = Values(self._page, wiring.checks, partial(owner, self._kind_name))
         before = len(self._page.problems)
         settings = values.make(driver.settings, spot)
-        self._others[entry.name] = wiring.others
+        self._on[entry.name] |= wiring.others
         if settings is BROKEN:
             wiring.parts(values.structs, spot)
         else:
@@ -347,8 +344,7 @@ class _DeviceReading:
         for name, bus in () if self._page.problems else self._buses.items():
             assert bus.hal
             unwatched = bus.hal.unwatched(bus.settings, self._written.get(name, ()))
-            named = ((one, {one.bus, *self._others[d]}) for d, one in self._devices.items())
-            devices = [one for one, buses in named if buses & {name, None}]
+            devices = [one for device, one in self._devices.items() if name in self._on[device]]
             points = [use.point for use in self._uses if use.bus == name]
             paced = bus.hal.paced(bus.settings, devices, points)
             for path, text in (*unwatched.warnings, *paced):

@@ -5,13 +5,20 @@ in a backoff) or hang (its thread waits for an answer and runs no round).
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
+from bridges import __version__
+from bridges.blackbox.entries import Head
+from bridges.blackbox.ring import Ring
 from bridges.kinds import kind_called
 from bridges.kinds.shared.kind import Kind
+from bridges.kinds.shared.recording_section import RecordingSettings
+from bridges.messages.releases import NEWEST
 from bridges.runtime.clock import Clock
 from bridges.runtime.loop import Loop
+from bridges.runtime.ring_writer import NOBODY, RingWriter
 from bridges.runtime.service import Devices, named_by
 from bridges.settings.load import load
 from drivers.hal import Bus
@@ -62,7 +69,8 @@ class FarBus(PointsFar, Bus):
 class OnTwoBuses:
     """The service of one device. `states`: (s, message). `after_round(bus)` is called after rounds."""
 
-    def __init__(self, file: Path) -> None:
+    def __init__(self, file: Path, ring: Path | None = None) -> None:
+        """`ring`: the folder of the ring that the service records; None for none."""
         self.now = 0.0
         self.config = load(file)
         (self.device,) = self.config.devices
@@ -87,9 +95,16 @@ class OnTwoBuses:
             self.far.__getitem__,
             lambda topic: named_by(self.config, topic),
             clock,
+            writer=self._recorded(ring, clock) if ring else NOBODY,
         )
         self.served.subscribe()
         self.loops: dict[str, Loop] = dict(zip(self.config.buses, self.served._loops, strict=True))
+
+    def _recorded(self, folder: Path, clock: Clock) -> RingWriter:
+        file, config = str(self.config.path), self.config
+        about = RecordingSettings()
+        head = Head("r", 1, __version__, config.kind, file, config.text, {}, True, {}, about)
+        return RingWriter(partial(Ring, folder, head, 4_000_000), clock, lambda: NEWEST)
 
     def run(self, for_s: float) -> None:
         """Run the rounds of both threads, in the order in which they are due."""

@@ -9,6 +9,7 @@ from typing import Final
 
 import pytest
 
+from bridges.blackbox.ring import RingContent
 from bridges.messages.constants import LiftMode, LiftRequestDoor, LiftRequestType
 from bridges.messages.definitions import DoorMode, DoorModeValue, DoorRequest, LiftRequest
 from bridges.messages.topics import DOOR_REQUESTS, LIFT_REQUESTS
@@ -17,6 +18,7 @@ from bridges.runtime.other_bus import Handover, OtherReading
 from drivers import DriverError
 from tests.depth import depth
 from tests.runtime.on_two_buses import DOOR, OnTwoBuses
+from workbench.replay.replayed import Replay, ReplayedCores, of_head
 
 LIFT: Final = Path(__file__).parents[2] / "config" / "lift_two_buses.yaml"
 STALE_S: Final = 1.0
@@ -173,6 +175,30 @@ def test_a_reading_counts_from_before_it_was_asked_for_and_not_longer_than_its_t
     now = 10.21
     with pytest.raises(DriverError, match=r"bus header: not read for 0\.2 s"):
         handover.take()
+
+
+def test_what_was_decided_on_two_buses_is_decided_again_from_its_recording(tmp_path: Path) -> None:
+    """The recorded sample has the values of both buses, and the debounce comes from the YAML."""
+    file = tmp_path / "door.yaml"
+    file.write_text(DOOR)
+    on = OnTwoBuses(file, ring=tmp_path)
+    on.run(1.0)
+    hold(on)
+    on.run(3.0)
+    on.press("fire", True)
+    on.run(1.0)
+    down("header", "no answer")(on)
+    on.run(2.0)
+    down("header", "")(on)
+    on.press("fire", False)
+    on.run(2.0)
+    for loop in on.loops.values():
+        loop.end()
+    read = RingContent(tmp_path / "ring")
+    replay = Replay(read.entries(), ReplayedCores(of_head(read.head)))
+    assert list(replay.differences()) == []
+    assert (replay.course.subjects, replay.course.unusable) == ({"D"}, 0)
+    assert replay.course.decisions > 20
 
 
 # ---- walks: every order of a few events

@@ -16,6 +16,7 @@ from bridges.messages.definitions import DoorMode, DoorModeValue, DoorRequest, D
 from bridges.messages.topics import DOOR_REQUESTS, DOOR_STATES
 from bridges.runtime.service import service
 from bridges.runtime.serving import stop
+from bridges.runtime.switch_off import outputs_off
 from bridges.settings.load import Config, load
 from drivers.hal import Bus, gpio, modbus
 from hal_fakes.gpio import WiredFactory
@@ -202,3 +203,26 @@ def test_a_failed_own_bus_does_not_keep_the_other_bus_from_being_read(
     site.goes_on("panel")
     site.plants["ward"].fail("server", None)
     wait_until(lambda: site.are("CLOSED", "CLOSED"), "both are back")
+
+
+def test_outputs_off_needs_the_own_bus_alone(tmp_path: Path) -> None:
+    """Nobody listens at the panel's address; its bus is not even opened."""
+    bus, fire = PANELS["modbus"]
+    file = tmp_path / "doors.yaml"
+    file.write_text(YAML.replace("PANEL", bus).replace("FIRE", fire))
+    config = load(file)
+    plants = {name: DoorPlant(name, config.wires(name)) for name in config.devices}
+    for plant in plants.values():
+        plant.drive("hold_open", True, 0.0)
+    far = [
+        PlantWiring(p, config.wires_on("gateway", n), modbus.canonical) for n, p in plants.items()
+    ]
+    server = ModbusServer(far, slow_s=1.0)
+    port: Any = server.replace
+    text = file.read_text().replace("tcp: {host: 127.0.0.1}", f"tcp: {port['tcp']}")
+    file.write_text(text.replace("'", ""))
+    try:
+        assert outputs_off(load(file), 30.0) == {"ward", "lab"}
+    finally:
+        server.close()
+    assert [p.edges[-1].value for p in plants.values()] == [False, False]

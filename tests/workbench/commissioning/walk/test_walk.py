@@ -13,6 +13,7 @@ from bridges.settings.load import load
 from bridges.system.directories import Directories
 from tests.commands.terminal import Terminal
 from tests.processes import running
+from tests.runtime.on_two_buses import DOOR
 from tests.runtime.site import Module, daemon, environment
 from tests.waiting import wait_until
 
@@ -108,3 +109,16 @@ def test_without_a_terminal_it_switches_nothing(
 ) -> None:
     assert cli.main(["walk", str(module.file)]) == os.EX_USAGE
     assert "walk needs a terminal" in capsys.readouterr().err
+
+
+def test_a_walk_shows_the_contacts_of_both_buses(tmp_path: Path) -> None:
+    file = tmp_path / "door.yaml"
+    file.write_text(DOOR)
+    words = ("--simulate", "--runtime-dir", tmp_path / "run", "--record", tmp_path / "record")
+    terminal = Terminal("walk", file, *words, environ=environment())
+    terminal.wait_for("closed yes")
+    terminal.type("\rq")
+    terminal.wait_for("every output verified off")
+    assert terminal.end() == 0
+    inputs = json.loads((tmp_path / "record.json").read_text())["inputs"]
+    assert {one["signal"]: one["seen"] for one in inputs}["fire"] == "off"
