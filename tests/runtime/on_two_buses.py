@@ -86,6 +86,7 @@ class OnTwoBuses:
         self.rmf = MemoryTransport(network, "rmf")
         kind = kind_called(self.config.kind)
         assert isinstance(kind, Kind)
+        assert kind.states
         self.rmf.subscribe(kind.states, lambda state: self.states.append((self.now, state)))
         clock = Clock(lambda: self.now, lambda: 1e6 + self.now)
         self.served = Devices(
