@@ -55,14 +55,14 @@ class FarBus(PointsFar, Bus):
         self.read_at = float("-inf")
         self.shown: Mapping[str, bool] = {}
         self.wake: Callable[[], None] = lambda: None
-        self._now = lambda: float(clock.now)
+        self._far_clock = clock
 
     def on_edge(self, wake: Callable[[], None]) -> None:
         self.wake = wake
 
     def levels(self) -> dict[str, bool]:
         self.shown = super().levels()
-        self.read_at = self._now()
+        self.read_at = self._far_clock.now
         return dict(self.shown)
 
 
