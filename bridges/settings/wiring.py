@@ -5,6 +5,7 @@ of its `BUS` in `drivers/hal/`).
 """
 
 from collections.abc import Collection, Iterable, Mapping
+from contextlib import suppress
 from typing import Literal
 
 from msgspec import Struct
@@ -97,10 +98,19 @@ class WiringCheck:
         try:
             name = hal.canonical(point)
         except ValueError as error:
-            return str(error)
+            return f"{error}{self._where(point)}"
         user = f"{self._device} {'.'.join(path)}"
         self.uses.append(Use(bus or self._bus, name, point, user, node, direction))
         return None
+
+    def _where(self, point: str) -> str:
+        """Return a hint at another bus of the file that could have this point; "" if there is none."""
+        for name, bus in self._buses.items():
+            if name != self._bus and bus.hal and bus.type in self._usable:
+                with suppress(ValueError):
+                    bus.hal.canonical(point)
+                    return f"; or, for an input on the bus '{name}': bus: {name}"
+        return ""
 
     def wires(self, wires: Iterable[Wire], spot: Spot) -> None:
         """Check a driver's wires, which replace the points collected while the settings were read."""

@@ -80,6 +80,13 @@ def problems(path: Path, old: str, new: str, text: str = TWO) -> list[str]:
             "22:3: stale_after_s is 1, but its bus is read every 2 s (scan_s): readings would always be"
             " stale; raise stale_after_s above 2, or lower scan_s",
         ),
+        (
+            FIRE,
+            FIRE.replace("bus: header, ", ""),
+            "26:27: 'BCM4' is not a Modbus point: write 'unit 1 coil 0', 'unit 1 discrete input 0' or"
+            " 'unit 1 holding register 0 bit 0'; addresses begin at 0; or, for an input on the bus"
+            " 'header': bus: header",
+        ),
         (FIRE, FIRE.replace("header", '""'), "26:25: unknown bus '': known here: gateway, header"),
         (FIRE, FIRE.replace("header", "[header]"), "26:20: 'bus' is a list: write text"),
     ],
