@@ -15,6 +15,7 @@ one unit, or the server with all units, is
 
 import asyncio
 import itertools
+import logging
 import random
 import sys
 import threading
@@ -55,6 +56,9 @@ def serve(settings: ModbusSettings, stations: Sequence[FarSide]) -> "ModbusServe
         slow_s = (settings.retries + 1.2) * settings.timeout_s
         return RtuLine(devices, settings.serial, slow_s)
     return ModbusServer(devices, slow_s=1.5 * settings.timeout_s)
+
+
+logging.getLogger("pymodbus").setLevel(logging.WARNING)  # a daemon's log may be in this process
 
 
 class ModbusServer:

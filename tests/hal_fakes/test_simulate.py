@@ -14,7 +14,8 @@ from hal_fakes.caller import Caller
 from hal_fakes.plants import lift as lift_plant
 from hal_fakes.simulate import Simulation
 from tests.hal_fakes.virtual_lift import SHIPPED
-from tests.waiting import PATIENCE_S
+from tests.waiting import PATIENCE_S, at_last, wait_until
+from workbench.commissioning.manual_control import driver_on
 
 CONFIG = SHIPPED.parent
 
@@ -115,5 +116,31 @@ def test_each_of_several_buses_has_a_socket_of_its_own(tmp_path: Path) -> None:
     for caller in callers:
         caller.close()
     for bus in buses:
+        bus.close()
+    simulation.close()
+
+
+def test_a_lift_on_two_buses_is_one_plant_behind_both(tmp_path: Path) -> None:
+    """Its relays are at a real Modbus server, its floor lines on pins, all in the daemon's process."""
+    config = load(CONFIG / "lift_two_buses.yaml")
+    simulation = Simulation(config, tmp_path)
+    buses = {name: simulation.open_bus(name) for name in config.buses}
+    driver = driver_on(config, "Lift1", buses)
+    driver.open()
+    caller = Caller(simulation.socket_path("gateway"))
+
+    def until(what: str, reached: Callable[[LiftSample], bool]) -> None:
+        wait_until(lambda: reached(at_last(driver.read, what)), what)
+
+    until("the car stands at L1", lambda seen: seen.level == "L1")
+    at_last(lambda: driver.write(LiftOutputs(agv_request=True)), "AGV mode is requested")
+    until("AGV mode", lambda seen: seen.agv is True)
+    at_last(lambda: driver.write(LiftOutputs(agv_request=True, call="L2")), "L2 is called")
+    until("the car is at L2", lambda seen: seen.level == "L2")
+    assert caller.say("press Lift1 fire_alarm on") == "ok"
+    until("the alarm on a pin", lambda seen: seen.hazards == {Hazard.FIRE})
+    caller.close()
+    driver.close()
+    for bus in buses.values():
         bus.close()
     simulation.close()
