@@ -50,7 +50,8 @@ def split(name: str, folder: Path) -> Config:
     """Load this file with every input on another bus of the same type."""
     content = yaml.safe_load((CONFIG / name).read_text())
     (own,) = content["buses"]
-    content["buses"]["other"] = BESIDE[content["buses"][own]["type"]]
+    settings = content["buses"][own]
+    content["buses"]["other"] = BESIDE.get(settings["type"], {**settings, "host": "192.168.1.11"})
     key = next(key for key in content if key not in ("kind", "driver", "rmf", "buses", "recording"))
     for device in content[key].values():
         moved(device)

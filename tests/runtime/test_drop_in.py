@@ -60,6 +60,7 @@ SHIPPED = {
     "lift_one_hot": GPIO,
     "lift_relay_board": GPIO,
     "lift_supervisor": GRAPH,
+    "lift_two_buses": GPIO,
 }
 
 
