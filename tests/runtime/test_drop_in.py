@@ -61,6 +61,8 @@ SHIPPED = {
     "lift_relay_board": GPIO,
     "lift_supervisor": GRAPH,
     "lift_two_buses": GPIO,
+    "robots_http": NET,
+    "robots_vda5050": NET,
 }
 
 
