@@ -1,7 +1,8 @@
-"""Drivers: the meaning of a controller's signals. One file for each way of connecting a device.
+"""Drivers, which give a controller's signals their meaning. Each way of connecting a device has a file.
 
-A driver is the file `drivers/<kind>/<driver>.py`, named after the YAML's `kind:` and `driver:`. It ends
-with a `DRIVER` (`drivers/driver_type.py`); the rest of the code uses nothing else of the file.
+A driver is the file `drivers/<kind>/<driver>.py`, named after `kind:` and `driver:` in the YAML. Its
+last statement defines `DRIVER` (`drivers/driver_type.py`). The rest of the code uses only this
+`DRIVER`.
 """
 
 from collections.abc import Callable, Mapping
@@ -12,30 +13,32 @@ Outputs = TypeVar("Outputs", contravariant=True)
 
 
 class DriverError(Exception):
-    """The controller did not answer, or its answer makes no sense. The text says what to check."""
+    """The error of a controller that does not answer, or answers nonsense. Its text says what to
+    check."""
 
 
 class Driver(Protocol[Sample, Outputs]):
-    """One device on one bus. Only the thread that owns the bus calls it.
+    """One device on one bus. Only the thread that owns the bus calls the methods.
 
     No call blocks longer than the bus's I/O timeout. Every method may raise DriverError and nothing
-    else; the next call tries again, with the HAL's backoff.
+    else. After an error the next call tries again, unless the bus's backoff still runs.
     """
 
     def open(self) -> None:
-        """Claim every output at its safe level. Called once, and again after a DriverError."""
+        """Claim every output at its safe level. The loop calls `open` at the start and after each
+        DriverError."""
 
     def read(self) -> Sample:
-        """Read and decode every input once. Returns only fresh values. Raises DriverError."""
+        """Read and decode every input once. Return only values of this reading. Raises DriverError."""
 
     def write(self, outputs: Outputs) -> None:
-        """Set every output to this level. Cheap when nothing has changed since the last write."""
+        """Set every output to its level in `outputs`. The call is cheap if no level has changed."""
 
     def make_safe(self) -> None:
-        """Switch every output off, even one believed off, and verify it where possible."""
+        """Switch every output off, even an output that is believed off. Verify each where possible."""
 
     def close(self) -> None:
-        """Switch every output off and release it. Does not raise."""
+        """Switch every output off, and release the outputs. Does not raise."""
 
 
 @runtime_checkable

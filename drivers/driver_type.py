@@ -23,21 +23,21 @@ class DriverType(msgspec.Struct, Generic[Settings, Sample, Outputs], frozen=True
     """One driver.
 
     `settings`: a struct that derives from the kind's (`bridges.kinds.lift.settings.LiftSettings`…)
-    and adds the wiring. `buses`: the bus types that it works on, as the names of files in
-    `drivers/hal/`. `create(name, settings, bus)`: makes the driver of one device; it sends nothing
-    before `open`.
+    and adds the wiring. `buses`: the bus types that the driver works on, as names of files in
+    `drivers/hal/`. `create(name, settings, bus)` makes the driver of one device. The driver sends
+    nothing before `open`.
 
     The fields below are optional:
     `wires(settings)`: the wiring table that an electrician checks (`drivers/hal/points.py`).
     `debounce(settings)`: signal or group -> how long a change must last (s).
-    `describe(settings, bus's settings)`: rows for `check` (subject, meaning) if there are no wires.
-    `tables(settings)`: codes, pulses and frames, for `check` (`bridges/kinds/shared/table.py`).
-    `claims(settings)`: (place, path) of each exclusive place besides the wires' points.
+    `describe(settings, bus's settings)`: rows (subject, meaning) for `check` if there are no wires.
+    `tables(settings)`: codes, pulses and frames for `check` (`bridges/kinds/shared/table.py`).
+    `claims(settings)`: (place, path) of each exclusive place. The wires' points are claimed anyway.
     `warnings(settings)`: (path, text) of valid settings that may be a mistake.
-    `notes(settings)`: (path, text) of intended settings with effects to know about.
-    `unwired(settings)`: signals without a wire that `accept_unsafe` may name too.
+    `notes(settings)`: (path, text) of intended settings whose effects the site should know.
+    `unwired(settings)`: signals that have no wire, but that `accept_unsafe` may name.
     `fake`: the name of the module that stands in for the hardware in `run --simulate`
-    (`hal_fakes/fake.py`). Without a name, the kind's plant is at the far end of the wires.
+    (`hal_fakes/fake.py`). Without a name, the kind's simulated plant is at the far end of the wires.
     """
 
     settings: type[Settings]
@@ -55,4 +55,4 @@ class DriverType(msgspec.Struct, Generic[Settings, Sample, Outputs], frozen=True
 
 
 AnyDriver: TypeAlias = DriverType[Any, Any, Any]
-"""A driver of any kind; the kind determines its settings, sample and outputs."""
+"""A driver of any kind. The kind determines the types of settings, sample and outputs."""

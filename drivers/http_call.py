@@ -1,4 +1,4 @@
-"""Commands over HTTP: their settings in the YAML, and the driver's use of them."""
+"""Commands over HTTP: their settings in the YAML, and their use by drivers."""
 
 import re
 from typing import Annotated, Protocol
@@ -37,31 +37,31 @@ class Calls(Protocol):
     def send(
         self, path: str, method: http.Method = "POST", body: str | None = None, safe: bool = False
     ) -> None:
-        """Send one request, without retry. `safe`: the request switches an output off. Raises
-        HalError.
-        """
+        """Send one request once. `safe`: the request switches an output off. Raises HalError."""
 
 
 class InsistentCalls(Calls, Protocol):
-    """An HTTP bus that can also skip its backoff, for the last command before the daemon ends."""
+    """An HTTP bus that can also skip its backoff. The last command before the daemon's end needs
+    this."""
 
     def insist(self) -> None:
-        """Send the next request at once, without waiting for the backoff."""
+        """Let the next request skip the backoff."""
 
 
 def send(bus: Calls, call: Call | None, safe: bool = False) -> None:
-    """Send this command; None sends nothing. Raises HalError."""
+    """Send this command. If the command is None, send nothing. Raises HalError."""
     if call:
         bus.send(call.path, call.method, call.body, safe)
 
 
 def claim(call: Call) -> str:
-    """Return the command as a claim: no other device of this bus may send it."""
+    """Return the command as a claim. A claim forbids the command to all other devices of this bus."""
     return f"{call.method} {call.path}{f' {call.body}' if call.body else ''}"
 
 
 def timer_unseen(call: Call, off_s: float) -> str:
-    """Describe a command without the number of the relay's timer, in seconds or in ms; "" with it."""
+    """Describe a command in which the timer's number (s or ms) cannot be found; "" if the number is
+    there."""
     written = f"{call.path} {call.body or ''}".strip()
     numbers = re.findall(r"[0-9]+(?:\.[0-9]+)?", written)
     if {off_s, 1000 * off_s}.intersection(map(float, numbers)):
@@ -72,5 +72,5 @@ def timer_unseen(call: Call, off_s: float) -> str:
 
 
 def described(call: Call, api: http.Base) -> str:
-    """Describe the command for `check`: method, address and body."""
+    """Describe the command for `check`, with its method, address and body."""
     return f"{call.method} {api.url(call.path)}{f' {call.body}' if call.body else ''}"

@@ -1,6 +1,8 @@
-"""Reads typed values from one JSON object: a field is addressed by names with dots (`pad.receiver.id`).
+"""Reads typed values from one JSON object. Names with dots between them address a field
+(`pad.receiver.id`).
 
-For any JSON, a value has the type that the caller asks for, or a DriverError names the field.
+Each function returns a value of the type that its caller wants. For any other JSON it raises a
+DriverError that names the field.
 """
 
 import math
@@ -28,13 +30,15 @@ Field = Annotated[
 
 
 Value = bool | int | float | str
-"""A value that a field may hold: true, 3, 0.5 or a word."""
+"""A value that a field may hold, such as true, 3, 0.5 or a word."""
 
 
 class JsonFlag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A yes or no in the answer."""
+    """The place of a yes or no in the answer."""
 
-    field: Annotated[Field, tells("the field that holds it: names with dots between them.")]
+    field: Annotated[
+        Field, tells("the field that holds the value, as names with dots between them.")
+    ]
     when: Annotated[
         list[Value],
         tells("""the values that mean yes; every other value means no. Without it the field must be
@@ -43,9 +47,9 @@ class JsonFlag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class JsonNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A measurement."""
+    """The place of a measurement in the answer."""
 
-    field: Annotated[Field, tells("the field of the answer that holds it.")]
+    field: Annotated[Field, tells("the field of the answer that holds the number.")]
     scale: Annotated[float, tells("the factor from the maker's unit to ours (0.001 for mV).")] = 1.0
 
 
@@ -62,32 +66,32 @@ def flag(answer: Mapping[str, object], place: JsonFlag) -> bool:
 
 
 def flag_if(answer: Mapping[str, object], place: JsonFlag | None) -> bool | None:
-    """Return the flag; None without a place. Raises DriverError as `flag` does."""
+    """Return the flag as `flag` does; None without a place. Raises DriverError."""
     return None if place is None else flag(answer, place)
 
 
 def certain(answer: Mapping[str, object], place: JsonFlag | None) -> bool:
-    """Return the flag of a danger; False without a place. Raises DriverError as `flag` does, and for
-    null, which is no knowledge."""
+    """Return the flag of a danger; False without a place. Raises DriverError as `flag` does. Raises it
+    for null too, because null says nothing about the danger."""
     if place and needed(answer, place.field) is None:
         raise wrong(place.field, None, "yes or no")
     return place is not None and flag(answer, place)
 
 
 def place_text(place: JsonFlag | JsonNumber) -> str:
-    """Describe the place for `check`: its field, and the values that mean yes or the scale."""
+    """Describe the place for `check`. Give its field, and the values that mean yes, or the scale."""
     if isinstance(place, JsonNumber):
         return place.field if place.scale == 1.0 else f"{place.field} x {place.scale:g}"
     return f"{place.field} is {', '.join(map(value_text, place.when)) or 'true'}"
 
 
 def value_text(value: Value) -> str:
-    """Return a value as JSON has it, a text without its quotes."""
+    """Return a value as JSON writes it, but a text without its quotes."""
     return clean(str(value).lower() if isinstance(value, bool) else str(value), 40)
 
 
 def same(value: object, given: Value) -> bool:
-    """Are both the same JSON value? true differs from 1; 1.0 equals 1."""
+    """Are both the same JSON value? The value true differs from 1, and 1.0 equals 1."""
     return isinstance(value, bool) == isinstance(given, bool) and value == given
 
 
@@ -113,7 +117,8 @@ def found(answer: object, field: str) -> object:
 
 
 def needed(answer: Mapping[str, object], field: str) -> object:
-    """Return the field's value. Raises DriverError, with the present fields, if it is absent."""
+    """Return the field's value. If the field is absent, raise a DriverError that lists the present
+    fields."""
     value = found(answer, field)
     if value is ABSENT:
         names = ", ".join(clean(name) for name in list(answer)[:5]) or "nothing"
@@ -148,7 +153,7 @@ def number(answer: Mapping[str, object], field: str, scale: float) -> float | No
 
 
 def name(answer: Mapping[str, object], field: str) -> str:
-    """Return an id as text; "" for null. Raises DriverError if the field is absent or no id."""
+    """Return an id as text; "" for null. Raises DriverError if the field is absent or not an id."""
     value = needed(answer, field)
     if value is None:
         return ""
@@ -158,7 +163,7 @@ def name(answer: Mapping[str, object], field: str) -> str:
 
 
 def wrong(field: str, value: object, wanted: str) -> DriverError:
-    """Return an error with the field, its value as JSON has it, and the expected value."""
+    """Return an error with the field, its value as JSON writes it, and the expected value."""
     words = {"True": "true", "False": "false", "None": "null"}
     shown = reprlib.repr(value)
     return DriverError(
@@ -167,7 +172,7 @@ def wrong(field: str, value: object, wanted: str) -> DriverError:
 
 
 def clean(said: str, longest: int = TEXT_MAX) -> str:
-    """Make a text printable, on one line and cut to `longest`, for messages and the log."""
+    """Make a text from a device printable, on one line and at most `longest` characters long."""
     said = "".join(c if c.isprintable() else " " for c in said[: 4 * longest])
     said = " ".join(said.split())
     return said if len(said) <= longest else f"{said[: longest - 1]}…"

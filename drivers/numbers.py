@@ -1,4 +1,4 @@
-"""Bits, and checks of number tables: for registers, frames and fields of an answer."""
+"""Bits, and checks of number tables, for registers, CAN frames and JSON fields."""
 
 from collections.abc import Collection, Mapping
 from typing import Annotated, Final
@@ -8,7 +8,7 @@ import msgspec
 from bridges.kinds.shared.remarks import Remarks
 
 BITS: Final = 16
-"""The bits of a register."""
+"""The number of bits in a register."""
 Bit = Annotated[int, msgspec.Meta(ge=0, le=BITS - 1)]
 """A bit of a register; 0 is the least significant."""
 LongBit = Annotated[int, msgspec.Meta(ge=0, le=2 * BITS - 1)]
@@ -21,7 +21,8 @@ def bits_on(number: int) -> list[int]:
 
 
 def listed_twice(lists: Mapping[str, Collection[int]]) -> Remarks:
-    """Yield a problem for each number listed twice, in one list or in two. `lists`: by YAML key."""
+    """Yield a problem for each number that is listed twice, in one list or in two. `lists` is YAML key
+    -> numbers."""
     first: dict[int, str] = {}
     for key, numbers in lists.items():
         for i, number in enumerate(numbers):

@@ -1,4 +1,4 @@
-"""The common part of every driver on contacts; each driver adds `read` and `write`."""
+"""The common part of all drivers on contacts. Each driver adds `read` and `write`."""
 
 from collections.abc import Mapping
 
@@ -16,7 +16,7 @@ class OnPoints:
         self._points.take_inputs(elsewhere)
 
     def open(self) -> None:
-        """Claim every relay, switched off, and every contact."""
+        """Claim every relay and every contact. All relays are off afterwards."""
         self._points.open()
 
     def contacts(self) -> Mapping[str, bool]:
@@ -24,7 +24,7 @@ class OnPoints:
         return self._points.last_known()
 
     def make_safe(self) -> None:
-        """Switch every relay off and verify it where possible."""
+        """Switch every relay off, and verify each where possible."""
         self._points.make_safe()
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Finds the readings of a code on several lines with one broken wire, for checks and their tables."""
+"""Finds how a code on several lines reads when one wire is broken, for checks and their tables."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -9,15 +9,16 @@ Lines = Mapping[str, bool]
 
 
 def lines_on(shown: Lines) -> str:
-    """Return the asserted signals: `floor_bit0, floor_bit2`."""
+    """Return the names of the asserted signals: `floor_bit0, floor_bit2`."""
     return ", ".join(signal for signal, on in shown.items() if on) or "none"
 
 
 def breaks(shown: Lines, wires: Mapping[str, Wire]) -> Iterator[tuple[str, str, dict[str, bool]]]:
-    """Yield the reading of the code with each line broken: (signal, `cut` or `shorted`, the lines).
+    """Yield (signal, `cut` or `shorted`, lines) for each line that may break. The lines are the code's
+    reading.
 
-    A cut line's reading depends on its wiring (`Wire.broken_reads`); a shorted line, or a line with a
-    stuck contact, reads the opposite. A cut line that floats (`pull: none`) may read either way.
+    The reading of a cut line depends on its wiring (`Wire.broken_reads`). A shorted line, or a line
+    with a stuck contact, reads the opposite. A cut line that floats (`pull: none`) may read either way.
     """
     for signal, on in shown.items():
         how = "shorted" if wires[signal].broken_reads() is on else "cut"
@@ -25,12 +26,12 @@ def breaks(shown: Lines, wires: Mapping[str, Wire]) -> Iterator[tuple[str, str, 
 
 
 def one_cut(shown: Lines, wires: Mapping[str, Wire]) -> Iterator[tuple[str, dict[str, bool]]]:
-    """Yield each signal whose wire, if cut, changes the reading, with the changed reading."""
+    """Yield (signal, changed reading) of each wire whose cut changes the reading."""
     return ((signal, then) for signal, how, then in breaks(shown, wires) if how == "cut")
 
 
 def told_of_cuts(readings: Sequence[tuple[str, str]]) -> str:
-    """Join (signal, reading with it cut) to one text: `L1: floor_bit1; a fault: floor_bit0`."""
+    """Join pairs (signal, its reading when cut) to one text: `L1: floor_bit1; a fault: floor_bit0`."""
     by_reading: dict[str, list[str]] = {}
     for signal, reading in readings:
         by_reading.setdefault(reading, []).append(signal)

@@ -1,8 +1,9 @@
 """An alarm panel on contacts or registers: each source is one point of the header, of a Modbus module,
 or of a controller's registers.
 
-A fire panel's contact is wired normally closed: a cut loop reads as an alarm. A wiring that reads a cut
-as clear is refused unless `accept_unsafe` accepts it. A bit of a register has no cable of its own.
+A fire panel's contact is wired normally closed, so that a cut loop reads as an alarm. The daemon
+refuses a wiring whose cut reads as clear, unless `accept_unsafe` accepts the wiring. A bit of a
+register has no cable of its own, so this check leaves bits out.
 """
 
 from collections.abc import Iterator, Mapping
@@ -64,13 +65,14 @@ def debounce(settings: DryContactPanelSettings) -> Mapping[str, float]:
 
 
 def warnings(settings: DryContactPanelSettings) -> Remarks:
-    """Yield valid settings to review before the panel goes into service: (path, text)."""
+    """Yield a warning (path, text) for each valid setting to review before the panel goes into
+    service."""
     yield from slow_alarms(w for w in wires(settings) if w.signal != DRILL)
     yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
 
 
 def tables(settings: DryContactPanelSettings) -> Iterator[Table]:
-    """Yield what each source does, and what a cut loop and a silent panel do."""
+    """Yield a table of the sources' effects, of cut loops, and of a panel that falls silent."""
     fleets = ", ".join(settings.fleets) or "every fleet"
     reads = {None: "anything", True: "an alarm", False: "clear"}
     rows = [
@@ -86,7 +88,7 @@ def tables(settings: DryContactPanelSettings) -> Iterator[Table]:
 
 
 def create(name: str, settings: DryContactPanelSettings, bus: PointsBus) -> "DryContactPanel":
-    """Make the panel's driver on its bus; it touches nothing before `open`."""
+    """Make the panel's driver on its bus. The driver touches nothing before `open`."""
     return DryContactPanel(Points(wires(settings), bus))
 
 

@@ -1,6 +1,6 @@
-"""An alarm panel behind a controller that speaks HTTP and JSON: each source is a field of one answer.
+"""An alarm panel behind a controller that speaks HTTP and JSON. Each source is a field of one answer.
 
-A field has no cable of its own: a loop that is cut behind the controller is that controller's affair.
+A field has no cable of its own. Only the controller can notice a cut loop behind it.
 """
 
 from collections.abc import Iterator, Mapping
@@ -22,7 +22,7 @@ from drivers.json_fields import JsonFlag
 
 
 class HttpPanelSettings(PanelSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A panel and its controller. The path follows the bus's `api_base`."""
+    """A panel and its controller. Every path is relative to the bus's `api_base`."""
 
     state_path: Annotated[http.Path, tells("the path that GET reads the sources from.")]
     sources: Annotated[
@@ -39,7 +39,7 @@ class HttpPanelSettings(PanelSettings, frozen=True, kw_only=True, forbid_unknown
 
 
 def describe(settings: HttpPanelSettings, bus: http.HttpSettings) -> Iterator[tuple[str, str]]:
-    """Yield rows for `check`: the reading, and the field of each source."""
+    """Yield rows for `check` about the reading and about each source's field."""
     api = http.base(bus.api_base)
     yield "state", f"GET {api.url(settings.state_path)} every {bus.scan_s:g} s"
     for name, place in settings.sources.items():
@@ -57,7 +57,7 @@ class HttpPanel:
         self._bus = bus
 
     def open(self) -> None:
-        """Check that the controller gives every source. Raises DriverError."""
+        """Check that the controller's answer has every source. Raises DriverError."""
         self.read()
 
     def read(self) -> PanelSample:
@@ -77,7 +77,8 @@ class HttpPanel:
 
 
 def _flag(answer: Mapping[str, object], place: JsonFlag) -> bool:
-    """Return yes or no. Raises DriverError for null too: an unknown source is not a clear one."""
+    """Return yes or no. Raises DriverError for null too, because an unknown source is not a clear
+    source."""
     if json_fields.found(answer, place.field) is None:
         raise json_fields.wrong(place.field, None, "a value")
     return json_fields.flag(answer, place)

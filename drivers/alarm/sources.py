@@ -1,4 +1,4 @@
-"""Checks of a panel's sources and its drill that hold for every wiring."""
+"""Checks of a panel's sources and of its drill, for every wiring."""
 
 from collections.abc import Collection
 from typing import Final
@@ -9,12 +9,13 @@ from bridges.kinds.shared.remarks import Remarks
 
 PURPOSE: Final = (
     "purpose",
-    "it informs robots; it is no part of the building's alarm, which works without it",
+    "this device informs robots; the building's alarm works without this device",
 )
 
 
 def drill_problems(settings: PanelSettings, sources: Collection[str], drills: bool) -> Remarks:
-    """Yield sources with a reserved name, and a drill without a duration or without a contact."""
+    """Yield a problem for each source with a reserved name, and for a drill without a duration or a
+    contact."""
     for name in sorted({SILENT, DRILL}.intersection(sources)):
         yield ("sources", name), f"'{name}' is a word of the panel itself: take another name"
     if drills and settings.drill_s is None:

@@ -1,9 +1,12 @@
-"""A wireless charger on CAN with its maker's own frames: it broadcasts, and needs periodic frames.
+"""A wireless charger on CAN with its maker's own frames. It broadcasts frames, and needs periodic
+frames.
 
-A map gives the frames' meanings (`can_map.py`). The charger charges while it receives the frames of the
-map at the map's periods, and stops by itself when they cease. So each frame is sent from a scan, never
-by a cyclic sender: when the daemon hangs, the frames cease. While the charger's own frames are missing,
-the driver sends only the frames for power off, and the map's wake frames, if there are any.
+A map gives the frames' meanings (`can_map.py`). The charger charges only while it receives the map's
+frames at the map's periods. When these frames cease, the charger stops by itself. So a scan sends each
+frame, and no cyclic sender does: when the daemon hangs, the frames cease.
+
+While the charger's own frames are missing, the driver sends only the frames for power off and the map's
+wake frames, if the map has any.
 """
 
 import functools
@@ -56,12 +59,12 @@ class FrameChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_un
             yield from _setpoint_problems(self)
 
     def can_stop(self) -> bool:
-        """Always True: a frame stops the charger, and the charger also stops without frames."""
+        """Return True. A frame stops the charger, and the charger also stops when our frames cease."""
         return True
 
 
 def frame_map(settings: FrameChargerSettings) -> FrameMap:
-    """Return the YAML's map, or else the profile's map."""
+    """Return the YAML's map, or the profile's map if the YAML has no map."""
     return PROFILE.chosen(settings.profile, settings.map)
 
 
@@ -92,7 +95,7 @@ def _beyond(setpoints: Mapping[str, float]) -> Remarks:
 
 
 def _impossible(settings: FrameChargerSettings, found: FrameMap) -> Remarks:
-    """Yield a problem for a setpoint outside the range of its signal."""
+    """Yield a problem for each setpoint outside the range of its signal in the DBC file."""
     frames = dbc.load(found.dbc)
     for sent in found.send:
         for signal, name in sent.setpoints.items():
@@ -113,10 +116,10 @@ def _encoding_problems(settings: FrameChargerSettings, sent: Sent, on: bool) -> 
 
 
 def claims(settings: FrameChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of the frames that no other device may use; nothing while the map has
+    """Yield (place, path) of each frame that no other device may use. Yield nothing while the map has
     problems.
 
-    CANopen's NMT frame is shared by all devices.
+    CANopen's NMT frame is left out, because all devices share it.
     """
     if any(PROFILE.problems(settings.profile, settings.map)):
         return
@@ -133,7 +136,7 @@ def claims(settings: FrameChargerSettings) -> Iterator[tuple[str, tuple[str, ...
 def describe(
     settings: FrameChargerSettings, bus_settings: can.CanSettings
 ) -> list[tuple[str, str]]:
-    """Return rows that `check` prints instead of a wiring table: (subject, meaning)."""
+    """Return the rows (subject, meaning) that `check` prints instead of a wiring table."""
     found = frame_map(settings)
     stops_s = settings.limits.peer_internal_timeout_s
     after = "a time to be asked of the maker" if stops_s is None else f"{stops_s:g} s"
@@ -146,12 +149,12 @@ def describe(
 
 
 def frame_tables(settings: FrameChargerSettings) -> Iterator[Table]:
-    """Yield the frames as bytes."""
+    """Yield tables of the frames' bytes."""
     return tables(frame_map(settings), settings.setpoints)
 
 
 def warnings(settings: FrameChargerSettings) -> Remarks:
-    """Yield valid settings that deserve a second look: (path, text)."""
+    """Yield a warning (path, text) for each valid setting that may be a mistake."""
     yield from PROFILE.warnings(settings.profile, "watch the first charge")
     found = frame_map(settings)
     if found.receiver is None and settings.receivers:
@@ -164,7 +167,7 @@ def warnings(settings: FrameChargerSettings) -> Remarks:
 
 
 def create(name: str, settings: FrameChargerSettings, bus: can.CanBus) -> "FrameDriver":
-    """Make the charger's driver; before the first reading it sends only wake frames."""
+    """Make the charger's driver. Before the first reading the driver sends only wake frames."""
     return FrameDriver(settings, bus)
 
 
@@ -183,7 +186,8 @@ class FrameDriver:
         self._touched = False
 
     def open(self) -> None:
-        """Check that scans are frequent enough for each period; send nothing. Raises DriverError."""
+        """Check that the scans are frequent enough for each frame's period. Send nothing. Raises
+        DriverError."""
         for sent in self._map.send:
             self._frames.check_pace(sent.frame, sent.every_s)
         for wake in self._map.wake:
@@ -197,9 +201,10 @@ class FrameDriver:
         return sample
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Send each due frame, for power on or off. Raises DriverError.
+        """Send each frame that is due, for power on or for power off. Raises DriverError.
 
-        While the charger's frames are missing, the frames for power off are sent, even for power on.
+        While the charger's own frames are missing, send the frames for power off even if power on is
+        wanted.
         """
         if outputs.power is not None:
             self._power = outputs.power
@@ -207,13 +212,14 @@ class FrameDriver:
             self._feed(self._power and self._seen)
 
     def make_safe(self) -> None:
-        """Send the frames for power off at once; the other frames cease. Raises DriverError."""
+        """Send the frames for power off at once, and stop sending all other frames. Raises
+        DriverError."""
         self._power, self._sent_on = False, None
         self._feed(on=False)
         self._touched = False
 
     def close(self) -> None:
-        """Switch the power off, if it was ever on. Does not raise."""
+        """Switch the power off, if this driver ever switched it on. Does not raise."""
         if self._touched:
             try:
                 self.make_safe()
@@ -221,7 +227,8 @@ class FrameDriver:
                 return  # our frames cease, so the charger stops by itself
 
     def _read(self) -> Values:
-        """Return the values of fresh frames. Without any, send a due wake frame. Raises HalError."""
+        """Return the values of fresh frames. If there are none, send each wake frame that is due.
+        Raises HalError."""
         try:
             return self._frames.read()
         except HalError:
@@ -268,8 +275,8 @@ def _meant(found: FrameMap, values: Values) -> Meant:
 def _errors(found: FrameMap, values: Values, activity: Activity) -> Found:
     """Return the errors in the received frames, in any state.
 
-    The signal of `out_of_range` is an error only in an error state; in other states it shows the
-    robot's position.
+    The signal `out_of_range` counts as an error only in an error state. In other states the signal
+    shows the robot's position.
     """
     position = "" if activity is Activity.ERROR else found.out_of_range
     return found.errors.found(lambda at: 0 if at == position else values.get(at))
@@ -277,7 +284,8 @@ def _errors(found: FrameMap, values: Values, activity: Activity) -> Found:
 
 def _measured(found: FrameMap, frames: dbc.Dbc, values: Values) -> Measured:
     def is_valid(signal: str) -> bool:
-        """Is the value within the DBC file's [min|max]? A value outside is no reading."""
+        """Is the value within the DBC file's [min|max]? A value outside this range is not a
+        measurement."""
         low, high = frames.bounds(*signal.split("."))
         return low <= values[signal] <= high
 
@@ -298,9 +306,10 @@ def _measured(found: FrameMap, frames: dbc.Dbc, values: Values) -> Measured:
 
 
 def _sequel(found: FrameMap) -> Sequel:
-    """Return the error frames to wait for, because they may follow the frame of the state.
+    """Return the error frames to wait for. The charger may send them after the frame of its state.
 
-    An error without a known side would count as the station's and take it out of service.
+    Without the error frames the error has no known side. It would count as the station's error, and RMF
+    would lose the station.
     """
     return Sequel(
         first=found.state_frames()[0],
@@ -311,7 +320,8 @@ def _sequel(found: FrameMap) -> Sequel:
 
 
 def _said(found: FrameMap, frames: dbc.Dbc) -> dict[str, Said]:
-    """Return the frames to receive. A reading needs the frames of the state and of the pad."""
+    """Return the frames to receive. No reading is possible without the frames of the state and of the
+    pad."""
     state = found.state_frames()
     pad = (found.receiver, found.range_ok, found.at_height)
     needed = {*state, *(signal.split(".")[0] for signal in pad if signal)}
@@ -339,7 +349,7 @@ def _flag(values: Values, signal: str | None) -> bool | None:
 
 
 def _rounded(value: float | None) -> float | None:
-    """Round to 3 decimals, which removes the float error of scaling by 0.1."""
+    """Round to 3 decimals, to remove the floating-point error of scaling by 0.1."""
     return None if value is None else round(value, 3)
 
 

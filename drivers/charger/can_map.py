@@ -1,6 +1,7 @@
-"""The map of a charger's CAN frames: a DBC file defines the signals, the map gives each a purpose.
+"""The map of a charger's CAN frames. A DBC file defines the signals, and the map gives each signal a
+purpose.
 
-The map is in a device YAML as `map:`, or in a file of `drivers/profiles/`.
+The map is under `map:` in a device YAML, or in a file of `drivers/profiles/`.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -38,7 +39,7 @@ Frames = dbc.Dbc
 
 
 class State(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The charger's state, as one number."""
+    """The charger's state as one number."""
 
     at: Annotated[Signal, tells("the state's signal.")]
     codes: Annotated[Codes, tells("the meanings of the signal's numbers.")]
@@ -74,7 +75,8 @@ class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
             yield (), "is never sent: give on, or off, or both"
 
     def values(self, on: bool, setpoints: Mapping[str, float]) -> dict[str, float] | None:
-        """Return signal -> value for power on or off (`on`); None if the frame is not sent then."""
+        """Return signal -> value for power on (`on`) or off; None if the frame is not sent at this
+        level."""
         if not on:
             return self.off
         if self.on is None:
@@ -91,7 +93,7 @@ class Wake(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A make's frames."""
+    """The map of one make's frames."""
 
     dbc: Annotated[Name, tells("the DBC file, in drivers/profiles/ or by its absolute path.")]
     masks: Annotated[
@@ -144,7 +146,8 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = []
 
     def problems(self) -> Remarks:
-        """Yield problems: an unreadable DBC file; a frame or signal that the file lacks."""
+        """Yield a problem for an unreadable DBC file, and for each frame or signal that the file
+        lacks."""
         try:
             found = dbc.load(self.dbc)
         except ValueError as error:
@@ -166,7 +169,7 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield from self._wake_problems(found, ("wake", str(n)), wake)
 
     def _wake_problems(self, found: Frames, path: tuple[str, ...], wake: Wake) -> Remarks:
-        """Yield a problem for a wake frame that `send` has too, or that cannot be encoded."""
+        """Yield a problem for a wake frame that is also in `send`, or that cannot be encoded."""
         if wake.frame in (sent.frame for sent in self.send):
             yield (
                 (*path, "frame"),
@@ -183,7 +186,7 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
                 yield (*path, "says"), str(error)
 
     def signals(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """Yield each signal that is read: (path in the map, Frame.Signal)."""
+        """Yield (path in the map, Frame.Signal) of each signal that is read."""
         if self.state:
             yield ("state", "at"), self.state.at
         for key in ("volts", "amps", "receiver", "out_of_range", "range_ok", "at_height"):
@@ -201,7 +204,8 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return {signal.split(".")[0] for _, signal in self.errors.places()}
 
     def state_frames(self) -> list[str]:
-        """Return the frames of the state: the frame of its number, and the frames of the rules."""
+        """Return the frames that give the state: the frame of the state's number, and the frames in
+        rules."""
         signals = [self.state.at] if self.state else []
         signals += [signal for _, signal in by_rules.places(self.rules)]
         return list(dict.fromkeys(signal.split(".")[0] for signal in signals))
@@ -226,7 +230,7 @@ def _lacks(found: dbc.Dbc, path: tuple[str, ...], frame: str, signal: str = "") 
 
 
 def rows(found: FrameMap) -> Iterator[tuple[str, str]]:
-    """Yield rows for `check`: the signals that are read: (subject, meaning)."""
+    """Yield rows (subject, meaning) for `check` about the signals that are read."""
     frames = dbc.load(found.dbc)
     yield "frames", str(dbc.path(found.dbc))
     for path, signal in found.signals():
@@ -243,7 +247,8 @@ def rows(found: FrameMap) -> Iterator[tuple[str, str]]:
 
 
 def tables(found: FrameMap, setpoints: Mapping[str, float]) -> Iterator[Table]:
-    """Yield the frames as bytes, to compare with `candump`: sent frames, and samples of read frames."""
+    """Yield tables of the frames as bytes, to compare with `candump`. They show sent frames, and
+    samples of read frames."""
     frames = dbc.load(found.dbc)
     sent = [_sent(frames, sent, on, setpoints) for sent in found.send for on in (True, False)]
     woken = [_row(frames, w.frame, "charger silent", w.every_s, w.says) for w in found.wake]
@@ -275,7 +280,7 @@ def _row(
 
 
 def _samples(found: FrameMap, frames: dbc.Dbc) -> Iterator[tuple[str, ...]]:
-    """Yield sample values of each signal read, to show its scale, byte order and meaning."""
+    """Yield sample values of each read signal, to show its scale, byte order and meaning."""
     shown = set()
     for path, at in found.signals():
         if path[0] == "rules" and at in shown:

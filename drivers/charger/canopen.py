@@ -1,7 +1,8 @@
-"""Xnergy's receiver (`xnergy.py`) on CANopen: its objects, read and written by SDO.
+"""Xnergy's receiver (`xnergy.py`) on CANopen. The driver reads and writes its objects by SDO.
 
-The maker's defaults are 250 kbit/s and node id 10. The node sends a heartbeat (operational) every
-100 ms; the driver does not read a node without a heartbeat. Old firmware sends no heartbeat.
+The maker's defaults are 250 kbit/s and node id 10. The node sends a heartbeat (operational) every 100
+ms. The driver does not read a node whose heartbeat is missing. Receivers with old firmware send no
+heartbeat; for such a receiver write `heartbeat: none`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -23,7 +24,7 @@ BeatTimeout = Annotated[float, msgspec.Meta(ge=0.15, le=10, extra={"unit": "s"})
 
 
 class Object(msgspec.Struct, frozen=True):
-    """An unsigned little-endian CANopen object, read by SDO; `octets` is its width."""
+    """An unsigned little-endian CANopen object, read by SDO. `octets` is its width in bytes."""
 
     index: int
     subindex: int
@@ -66,14 +67,14 @@ class CanOpenChargerSettings(
 
 
 def claims(settings: CanOpenChargerSettings) -> Iterable[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of the node, which no other device of the bus may use."""
+    """Yield (place, path) of the node. No other device of the bus may use the node."""
     yield f"node {settings.node}", ("node",)
 
 
 def describe(
     settings: CanOpenChargerSettings, bus_settings: can.CanSettings
 ) -> list[tuple[str, str]]:
-    """Return rows that `check` prints instead of a wiring table: (subject, meaning)."""
+    """Return the rows (subject, meaning) that `check` prints instead of a wiring table."""
     rows = [("bus", f"{can.describe(bus_settings)}; node {settings.node}")]
     if settings.heartbeat == "required":
         lost = f"lost after {settings.heartbeat_timeout_s:g} s"
@@ -82,7 +83,7 @@ def describe(
 
 
 def warnings(settings: CanOpenChargerSettings) -> Remarks:
-    """Yield valid settings that deserve a second look: (path, text)."""
+    """Yield a warning (path, text) for each valid setting that may be a mistake."""
     found = list(xnergy.warnings(settings, "CAN"))
     if settings.heartbeat == "none":
         found.append(
@@ -92,13 +93,13 @@ def warnings(settings: CanOpenChargerSettings) -> Remarks:
 
 
 def create(name: str, settings: CanOpenChargerSettings, bus: can.CanBus) -> xnergy.Receiver:
-    """Make the receiver's driver on its bus; it sends nothing before the first reading."""
+    """Make the receiver's driver on its bus. The driver sends nothing before the first reading."""
     return xnergy.Receiver(settings, Objects(settings, bus))
 
 
 class Objects:
-    """`xnergy.ReceiverAccess` on the objects of one node. The maker publishes no objects for its
-    temperatures."""
+    """Access to the objects of one node (`xnergy.ReceiverAccess`). Temperatures are missing, because
+    the maker publishes no objects for them."""
 
     reads = xnergy.ALWAYS
 
@@ -110,13 +111,14 @@ class Objects:
         self.now = bus.now
 
     def alive(self) -> bool:
-        """Check the heartbeat; True if the node restarted since the last call. Raises HalError."""
+        """Check the heartbeat; return True if the node has restarted after the last call. Raises
+        HalError."""
         self._node.alive()
         before, self._starts = self._starts, self._node.starts
         return before != self._starts
 
     def read(self, names: Iterable[str]) -> dict[str, int]:
-        """Read these objects, with one SDO request each. Raises HalError."""
+        """Read these objects with one SDO request for each object. Raises HalError."""
         objects = ((name, OBJECTS[name]) for name in names)
         return {name: self._node.read(o.index, o.subindex, o.octets) for name, o in objects}
 

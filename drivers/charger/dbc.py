@@ -1,7 +1,7 @@
-"""DBC files, by cantools: a maker's frames and the signals in them.
+"""DBC files, read by cantools. They describe a maker's frames and the signals in the frames.
 
-Frames and signals have their names in the file. Values are physical: scaled, in the signal's unit. The
-value of an enumerated signal is its number.
+Frames and signals are named as in the file. Values are physical: they are scaled to the signal's unit.
+The value of an enumerated signal is its number.
 """
 
 import functools
@@ -22,7 +22,7 @@ SIZE_MAX: Final = 4 << 20
 
 
 class Dbc:
-    """One DBC file. Raises ValueError with the problem if the file is invalid."""
+    """One DBC file. An invalid file raises ValueError with the problem."""
 
     def __init__(self, text: str) -> None:
         import cantools
@@ -62,7 +62,7 @@ class Dbc:
             found = self._messages[frame].decode(payload, decode_choices=False)
         except (Error, ValueError, KeyError) as error:
             raise DriverError(f"{frame} {payload.hex(' ')} cannot be decoded: {error}") from None
-        assert isinstance(found, dict)  # a list would be frames within frames, which DBC lacks
+        assert isinstance(found, dict)  # a list would mean nested frames, which DBC lacks
         return {
             name: value
             for name, value in found.items()
@@ -70,7 +70,7 @@ class Dbc:
         }
 
     def encode(self, frame: str, values: Mapping[str, float]) -> bytes:
-        """Encode these values, of every signal, as the payload. Raises ValueError."""
+        """Encode the payload from a value for every signal. Raises ValueError."""
         from cantools.database.errors import Error
 
         try:
@@ -83,15 +83,14 @@ class Dbc:
         return str(self._messages[frame].get_signal_by_name(signal).unit or "")
 
     def bounds(self, frame: str, signal: str) -> tuple[float, float]:
-        """Return the file's minimum and maximum for a signal."""
+        """Return a signal's minimum and maximum in the file."""
         found = self._messages[frame].get_signal_by_name(signal)
         low, high = found.minimum, found.maximum
         return -math.inf if low is None else low, math.inf if high is None else high
 
     def sample(self, frame: str, signal: str, value: float) -> bytes | None:
-        """Encode a frame with this value in one signal and 0 in all other signals; None if
-        impossible.
-        """
+        """Encode a frame with this value in one signal and 0 in all other signals. Return None if the
+        frame cannot hold the value."""
         from cantools.database.errors import Error
 
         message = self._messages[frame]
@@ -103,7 +102,8 @@ class Dbc:
 
 
 def path(name: str) -> Path:
-    """Return the path of a DBC file: `name` if it is absolute, else a file of drivers/profiles/."""
+    """Return the path of a DBC file. A `name` that is not an absolute path is a file of
+    drivers/profiles/."""
     return texts.FOLDER / name
 
 

@@ -1,7 +1,7 @@
-"""A charging station on dry contacts: a relay enables charging, contacts show the station's state.
+"""A charging station on dry contacts. A relay enables charging, and contacts show the station's state.
 
-They are on the GPIO header or on a Modbus I/O module (coils and discrete inputs). The relay is off
-whenever the daemon does not run, so a charge ends with the daemon.
+Relay and contacts are on the GPIO header or on a Modbus I/O module (coils and discrete inputs). The
+relay is off whenever the daemon does not run, so a charge ends with the daemon.
 """
 
 import itertools
@@ -33,7 +33,8 @@ CUT_MUST_READ: Final = {
     "at_height": (False, "a lowered pad reads as raised, and is energised"),
     "range_ok": (False, "a badly placed robot reads in range, and is energised"),
 }
-"""Signal -> (the safe level of a cut wire, the consequence of the other level)."""
+"""Signal -> the safe reading of a cut wire (asserted or not), and the danger of the opposite
+reading."""
 ENABLE: Final = "enable"
 
 
@@ -51,7 +52,8 @@ class ChargerInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unkno
         no power; a loss of the signal while current flows is a fault."""),
     ] = None
     range_ok: Annotated[
-        Input | None, tells("the robot stands where it can be charged. If not, there is no power.")
+        Input | None,
+        tells("the robot stands where charging is possible. Otherwise the relay stays off."),
     ] = None
 
 
@@ -90,7 +92,8 @@ def _unsafe(settings: DryContactChargerSettings) -> Iterator[Unsafe]:
 
 
 def tables(settings: DryContactChargerSettings) -> Iterator[Table]:
-    """Tabulate each combination of contacts, with its readings after a cut, and the relay's drive."""
+    """Yield tables of the contacts and of the relay. They show each combination, also with a wire
+    cut."""
     table = {wire.signal: wire for wire in wires(settings) if wire.direction == "in"}
     rows = []
     for on in itertools.product((False, True), repeat=len(table)):
@@ -105,13 +108,15 @@ def tables(settings: DryContactChargerSettings) -> Iterator[Table]:
 
 
 def _means(shown: Mapping[str, bool]) -> str:
-    """Describe the contacts' meaning with the relay off, and with the relay on if that differs."""
+    """Describe the meaning of the contacts with the relay off. Add the meaning with the relay on if it
+    differs."""
     off, on = (str(decode(shown, enabled).activity) for enabled in (False, True))
     return off if off == on else f"{off} ({on} while enabled)"
 
 
 def warnings(settings: DryContactChargerSettings) -> Remarks:
-    """Yield valid settings to review before the station goes into service: (path, text)."""
+    """Yield a warning (path, text) for each valid setting to review before the station goes into
+    service."""
     for wire in wires(settings):
         if wire.debounce_s:
             text = "contacts of a charger are not debounced: the next scan corrects a bounce"
@@ -131,7 +136,7 @@ def warnings(settings: DryContactChargerSettings) -> Remarks:
 
 
 def create(name: str, settings: DryContactChargerSettings, bus: PointsBus) -> "DryContactCharger":
-    """Make the station's driver on its bus; it touches nothing before `open`."""
+    """Make the station's driver on its bus. The driver touches nothing before `open`."""
     return DryContactCharger(Points(wires(settings), bus))
 
 
@@ -147,7 +152,7 @@ class DryContactCharger(OnPoints):
         return decode(self._points.read(), self._enabled)
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Set the relay; None leaves it unchanged. Contacts have no clear and no range check."""
+        """Set the relay; None leaves it unchanged. Contacts cannot carry a clear or a range check."""
         if outputs.power is not None:
             self._enabled = outputs.power
         self._points.write({ENABLE: self._enabled})
@@ -159,7 +164,7 @@ class DryContactCharger(OnPoints):
 
 
 def decode(shown: Mapping[str, bool], enabled: bool) -> ChargerSample:
-    """Decode the contacts; `enabled`: the relay is on."""
+    """Decode the contacts. `enabled` is True while the relay is on."""
     activity, text = Activity.IDLE, ""
     side: FaultSide = ""
     if shown.get("fault"):

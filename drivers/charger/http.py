@@ -1,13 +1,15 @@
 """A charging station that speaks HTTP and JSON.
 
-The interface of the first station (a wall-mounted transmitter, TPU):
+The defaults are the interface of the first station (a wall-mounted transmitter, TPU):
 
     GET  http://{api_base}/state        ->  200 {"state": 238, "error_msg": "foreign object"}
     POST http://{api_base}/clear_error  ->  2xx
 
-It has no start, no stop and no receiver id, so it can only be observed: the station itself decides
-which robot it charges. For other makes the YAML gives paths and fields. `codes` gives the meanings of
-the maker's states; an unlisted state is an error. A maker's state is never passed on as an RMF state.
+This interface has no start, no stop and no receiver id. So the driver can only observe the station, and
+the station itself decides which robot it charges. For other makes the YAML gives paths and fields.
+
+`codes` gives the meanings of the maker's states. An unlisted state counts as an error. A maker's state
+is never passed on as an RMF state.
 """
 
 from collections.abc import Iterator, Mapping
@@ -25,7 +27,7 @@ from drivers.http_call import Call, Calls, claim, described, send, timer_unseen
 class HttpChargerSettings(
     JsonChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True
 ):
-    """One station. The paths follow the bus's `api_base`."""
+    """One station. Every path is relative to the bus's `api_base`."""
 
     state_path: Annotated[http.Path, tells("the path that GET reads the state from.")] = "/state"
     clear_error_path: Annotated[
@@ -38,7 +40,7 @@ class HttpChargerSettings(
     ] = None
 
     def command(self, name: StationCommand) -> Call | None:
-        """Return this command; None where the station has none."""
+        """Return the call for this command; None if the station has no such command."""
         if name == "clear_error":
             return Call(path=self.clear_error_path) if self.clear_error_path else None
         found: Call | None = getattr(self, name)
@@ -46,7 +48,7 @@ class HttpChargerSettings(
 
 
 class HttpStationCalls:
-    """A station's answer and commands as calls (`drivers.charger.json_station.JsonStation`)."""
+    """Access to a station by HTTP calls (`drivers.charger.json_station.JsonStation`)."""
 
     def __init__(self, settings: HttpChargerSettings, bus: Calls) -> None:
         self._settings = settings
@@ -62,12 +64,12 @@ class HttpStationCalls:
 
 
 def create(name: str, settings: HttpChargerSettings, bus: Calls) -> JsonCharger:
-    """Make the station's driver on its bus; it sends nothing before the first reading."""
+    """Make the station's driver on its bus. The driver sends nothing before the first reading."""
     return JsonCharger(settings, HttpStationCalls(settings, bus))
 
 
 def claims(settings: HttpChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of the station's own state and commands: no other charger may use them."""
+    """Yield (place, path) of the station's state and of its commands. No other charger may use them."""
     yield f"{settings.fields.state} of {settings.state_path}", ("state_path",)
     for name in ("start", "stop"):
         if call := getattr(settings, name):
@@ -77,7 +79,7 @@ def claims(settings: HttpChargerSettings) -> Iterator[tuple[str, tuple[str, ...]
 def describe(
     settings: HttpChargerSettings, bus_settings: http.HttpSettings
 ) -> list[tuple[str, str]]:
-    """Return rows that `check` prints instead of a wiring table: (subject, meaning)."""
+    """Return the rows (subject, meaning) that `check` prints instead of a wiring table."""
     api = http.base(bus_settings.api_base)
     rows = [("state", f"GET {api.url(settings.state_path)} every {bus_settings.scan_s:g} s")]
     for what in ("start", "stop", "range_check"):
@@ -91,7 +93,8 @@ def describe(
 
 
 def warnings(settings: HttpChargerSettings) -> Remarks:
-    """Yield (path, text) for missing abilities, and for settings that deserve a second look."""
+    """Yield a warning (path, text) for each missing ability, and for each valid setting that may be a
+    mistake."""
     off_s, unseen = settings.switches_off_after_s, []
     if settings.start and off_s is not None and (text := timer_unseen(settings.start, off_s)):
         unseen = [(("start", "path"), text)]

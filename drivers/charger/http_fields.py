@@ -21,7 +21,7 @@ WEEK_S: Final = 7 * 86400
 
 
 class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The fields of the answer to `state_path`: names with dots between them."""
+    """The fields of the answer to `state_path`. A field is a path of names with dots between them."""
 
     state: Annotated[Field, tells("the station's state; `codes` has the meanings.")] = "state"
     error_text: Annotated[
@@ -60,7 +60,8 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ] = {}
 
     def code(self, answer: Answer, words: Mapping[str, int]) -> int | str:
-        """Return the maker's number for its state, or its word if `words` does not list the word.
+        """Return the maker's number for its state. If `words` does not list the station's word, return
+        the word.
 
         Raises DriverError for any other value.
         """
@@ -75,13 +76,15 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         return code
 
     def error(self, answer: Answer) -> tuple[str, FaultSide]:
-        """Return the station's text for its error, and the error's side. Raises DriverError."""
+        """Return the text of the station's error, and the side that has the error. Raises
+        DriverError."""
         said = json_fields.text(answer, self.error_text)
         means = self.error_texts.get(said)
         return ("", "") if means == "none" else (said, means or "")
 
     def measured(self, answer: Answer) -> Measured:
-        """Return the receiver and the measurements. A null flag is false. Raises DriverError."""
+        """Return the receiver's id and the measurements. A null flag counts as false. Raises
+        DriverError."""
         celsius = ((name, _number(answer, at)) for name, at in self.temperatures.items())
         return Measured(
             receiver_id=self.receiver_id and json_fields.name(answer, self.receiver_id),
@@ -96,7 +99,8 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         )
 
     def rows(self, has_codes: bool) -> Iterator[tuple[str, str]]:
-        """Yield rows for `check`; none if all fields are those of the first station."""
+        """Yield rows for `check`. Yield none if all fields have their defaults, which suit the first
+        station."""
         for name in self.__struct_fields__ if self != Fields() else ():
             place = getattr(self, name)
             if place and not isinstance(place, dict) and (has_codes or name != "state"):
@@ -110,7 +114,8 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 def _number(
     answer: Answer, number: JsonNumber | None, most: float = math.inf, bounds: str = ""
 ) -> float | None:
-    """Return the value in our unit. Raises DriverError, also for a value beyond its bounds."""
+    """Return the value in our unit. Raises DriverError for a value that is no number or out of
+    bounds."""
     value = json_fields.number(answer, number.field, number.scale) if number else None
     if number and value is not None and bounds and not 0 <= value <= most:
         raise json_fields.wrong(number.field, value, bounds)

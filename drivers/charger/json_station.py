@@ -1,7 +1,7 @@
-"""A charging station that answers with JSON, over HTTP or MQTT: its fields, its rules, and its driver.
+"""A charging station that answers with JSON over HTTP or MQTT: its fields, its rules, and its driver.
 
-`codes` gives the meanings of the maker's states; an unlisted state is an error. A maker's state is
-never passed on as an RMF state.
+`codes` gives the meanings of the maker's states. An unlisted state counts as an error. A maker's state
+is never passed on as an RMF state.
 """
 
 from collections.abc import Iterator, Mapping
@@ -25,7 +25,7 @@ StationCommand = Literal["start", "stop", "range_check", "clear_error"]
 
 
 class JsonChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One station. The settings of each bus add the commands."""
+    """One station. The settings of each bus type add the commands."""
 
     codes: Annotated[
         Codes | None, tells("the meanings of the maker's state numbers; not needed with `rules`.")
@@ -48,16 +48,17 @@ class JsonChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unk
     ] = None
 
     def command(self, name: StationCommand) -> Any:
-        """Return this command in the bus's own form; None where the station has none."""
+        """Return this command in the form of the bus; None if the station has no such command."""
         return getattr(self, name)
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
-        """Return the power's timer (s) and its path in the YAML; None if there is no timer."""
+        """Return the time (s) after which the power goes off by itself, and its path in the YAML.
+        Return None without such a timer."""
         path = ("switches_off_after_s",)
         return None if self.switches_off_after_s is None else (self.switches_off_after_s, path)
 
     def can_stop(self) -> bool:
-        """Can the driver switch the power off? Only if the YAML has `stop`."""
+        """Return whether the driver can switch the power off. It can only if the YAML has `stop`."""
         return self.command("stop") is not None
 
     def problems(self) -> Remarks:
@@ -86,7 +87,8 @@ def _place_problems(settings: JsonChargerSettings) -> Remarks:
 
 
 def _timer_problems(settings: JsonChargerSettings) -> Remarks:
-    """Yield problems with the timer of a relay: only the timer can act when the network is gone."""
+    """Yield problems with the relay's timer. When the network is gone, only this timer can switch the
+    power off."""
     timer = settings.switches_off_after_s
     if timer and not settings.command("start"):
         yield (
@@ -104,7 +106,7 @@ def _timer_problems(settings: JsonChargerSettings) -> Remarks:
 
 
 def rows(settings: JsonChargerSettings) -> list[tuple[str, str]]:
-    """Return rows for `check` on the fields and the meanings: (subject, meaning)."""
+    """Return rows (subject, meaning) for `check` about the fields and about the meanings of states."""
     found = [*settings.fields.rows(has_codes=settings.codes is not None)]
     found += [(f"word {word}", str(code)) for word, code in settings.state_words.items()]
     found += rules.rows(settings.rules, settings.errors)
@@ -117,16 +119,17 @@ def rows(settings: JsonChargerSettings) -> list[tuple[str, str]]:
 
 
 def power_off(settings: JsonChargerSettings, scan_s: float) -> Iterator[tuple[str, str]]:
-    """Yield the row on the power's timer, if there is one."""
+    """Yield a row about the power's timer, if the station has a timer."""
     if settings.switches_off_after_s:
         after = f"{settings.switches_off_after_s:g} s without a new start"
         yield "power off", f"by itself after {after}, sent every {scan_s:g} s"
 
 
 def warnings(settings: JsonChargerSettings, unseen_timer: Remarks = ()) -> Remarks:
-    """Yield (path, text) for missing abilities, and for settings that deserve a second look.
+    """Yield a warning (path, text) for each missing ability, and for each valid setting that may be a
+    mistake.
 
-    `unseen_timer`: the remark on a `start` that does not show the number of the timer.
+    `unseen_timer`: the warning about a `start` command that does not contain the timer's number.
     """
     missing = [name for name in ("receiver_id", "stop") if _lacks(settings, name)]
     consequences = {
@@ -168,19 +171,20 @@ def how_often(settings: JsonChargerSettings) -> str:
 
 
 class JsonStation(Protocol):
-    """The far side of a station's driver. Each call raises HalError."""
+    """The station behind a charger's driver. Each call raises HalError."""
 
     def answer(self) -> Mapping[str, object]:
         """Return the station's present state."""
 
     def send(self, name: StationCommand, safe: bool = False) -> None:
-        """Send this command once, if the station has it. `safe`: it switches the power off."""
+        """Send this command once, if the station has it. `safe`: the command switches the power off."""
 
 
 class JsonCharger:
     """`drivers.Driver` for one station.
 
-    Power is a level: `start` is repeated while the station stays idle, `stop` while it still charges.
+    The power is a level. The driver repeats `start` while the station stays idle, and `stop` while the
+    station still charges.
     """
 
     def __init__(self, settings: JsonChargerSettings, station: JsonStation) -> None:
@@ -193,7 +197,7 @@ class JsonCharger:
         self._checked = 0
 
     def open(self) -> None:
-        """Do nothing: a restart must not end a charge."""
+        """Do nothing, because a restart must not end a charge."""
 
     def read(self) -> ChargerSample:
         """Read and decode the station's state. Raises DriverError for an answer without sense."""
@@ -215,10 +219,10 @@ class JsonCharger:
         )
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Set the power, off first.
+        """Set the power. Switching off comes first.
 
-        A clear or a range check is sent once, even if its answer is lost, because it counts as done
-        before sending.
+        A clear or a range check is sent once, even if its answer is lost. The driver counts the command
+        as done before it sends the command.
         """
         if outputs.power is False:
             self._stop_if_needed()
@@ -233,12 +237,12 @@ class JsonCharger:
         self._power = outputs.power
 
     def make_safe(self) -> None:
-        """Switch the power off; with `on_death: keep` do nothing."""
+        """Switch the power off. With `on_death: keep` do nothing."""
         if self._settings.on_death == "stop":
             self._station.send("stop", safe=True)
 
     def close(self) -> None:
-        """Do nothing: the driver holds no resource."""
+        """Do nothing, because the driver holds no resource."""
 
     def _stop_if_needed(self) -> None:
         given, self._power = self._power, None

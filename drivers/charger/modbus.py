@@ -1,7 +1,7 @@
 """Xnergy's receiver (`xnergy.py`) on Modbus: its input registers and coils.
 
-The maker's defaults are unit id 16 and 9600 baud. The maker's own driver reads at most 50 of the input
-registers 0 to 100 in one request.
+The maker's defaults are unit id 16 and 9600 baud. The maker's own driver reads input registers 0 to
+100, at most 50 in one request.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -44,7 +44,7 @@ def points(settings: ModbusChargerSettings) -> dict[str, Point]:
 
 
 def claims(settings: ModbusChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of the receiver's coils, which no other device may use."""
+    """Yield (place, path) of the receiver's coils. No other device may use these coils."""
     for name in (xnergy.ENABLE, xnergy.CHECK_RANGE):
         yield str(points(settings)[name]), ("unit",)
 
@@ -52,17 +52,17 @@ def claims(settings: ModbusChargerSettings) -> Iterator[tuple[str, tuple[str, ..
 def describe(
     settings: ModbusChargerSettings, bus_settings: modbus.ModbusSettings
 ) -> list[tuple[str, str]]:
-    """Return rows that `check` prints instead of a wiring table: (subject, meaning)."""
+    """Return the rows (subject, meaning) that `check` prints instead of a wiring table."""
     return xnergy.rows(settings, {name: str(point) for name, point in points(settings).items()})
 
 
 def warnings(settings: ModbusChargerSettings) -> Remarks:
-    """Yield valid settings that deserve a second look: (path, text)."""
+    """Yield a warning (path, text) for each valid setting that may be a mistake."""
     return xnergy.warnings(settings, "bus")
 
 
 def create(name: str, settings: ModbusChargerSettings, bus: modbus.ModbusBus) -> xnergy.Receiver:
-    """Make the receiver's driver on its bus; it sends nothing before the first reading."""
+    """Make the receiver's driver on its bus. The driver sends nothing before the first reading."""
     return xnergy.Receiver(settings, Registers(settings, bus))
 
 
@@ -78,17 +78,18 @@ class Registers:
         self.now = bus.now
 
     def alive(self) -> bool:
-        """Always False: Modbus has no heartbeat. Only a read shows a lost unit."""
+        """Return False, because Modbus has no heartbeat that would show a restart. Only a read shows a
+        lost unit."""
         return False
 
     def read(self, names: Iterable[str]) -> dict[str, int]:
-        """Read these words, in as few requests as possible. Raises HalError."""
+        """Read the registers of these names in as few requests as possible. Raises HalError."""
         wanted = {name: self._points[name] for name in names}
         image = self._bus.cells(wanted.values())
         return {name: image[point] for name, point in wanted.items()}
 
     def write(self, name: str, value: int, safe: bool = False) -> None:
-        """Write, and compare the unit's echo with the request. Raises HalError."""
+        """Write a register or coil, and compare the unit's echo with the request. Raises HalError."""
         self._bus.write(self._points[name], value, safe)
 
 

@@ -1,8 +1,8 @@
-"""A charging station behind an MQTT broker, whose states are JSON or plain values on topics.
+"""A charging station behind an MQTT broker. Its states are JSON or plain values on topics.
 
-`topics` names each state topic. A field begins with that name (`status.charger.state`); the name alone
-is a plain payload. The meanings of the fields are written as for a station on HTTP. Without a live
-message on every topic, which is not stale, there is no reading.
+`topics` names each state topic. A field begins with the topic's name (`status.charger.state`). A name
+alone stands for a plain payload. The meanings of the fields are written as for a station on HTTP. A
+reading needs a live message on every topic that is not stale.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -72,7 +72,7 @@ class MqttChargerSettings(
 
 
 def _fields(settings: MqttChargerSettings) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Yield the path in the YAML and the name of each field that is read."""
+    """Yield (path in the YAML, name) of each field that is read."""
     for name in settings.fields.__struct_fields__:
         place = getattr(settings.fields, name)
         if isinstance(place, JsonFlag | JsonNumber):
@@ -88,14 +88,14 @@ def _fields(settings: MqttChargerSettings) -> Iterator[tuple[tuple[str, ...], st
 
 
 def claims(settings: MqttChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of the station's commands: no other charger may send them."""
+    """Yield (place, path) of the station's commands. No other charger may send these commands."""
     for name in COMMANDS:
         if message := settings.command(name):
             yield f"the command {message.topic} {message.payload}".rstrip(), (name, "topic")
 
 
 def describe(settings: MqttChargerSettings, bus: MqttSettings) -> list[tuple[str, str]]:
-    """Return rows that `check` prints instead of a wiring table: (subject, meaning)."""
+    """Return the rows (subject, meaning) that `check` prints instead of a wiring table."""
     rows = [
         (f"topic {name}", f"{state.topic}, unknown after {state.stale_after_s:g} s")
         for name, state in settings.topics.items()
@@ -109,7 +109,7 @@ def describe(settings: MqttChargerSettings, bus: MqttSettings) -> list[tuple[str
 
 
 class MqttStation:
-    """A station's states and commands as messages (`drivers.charger.json_station.JsonStation`)."""
+    """Access to a station by MQTT messages (`drivers.charger.json_station.JsonStation`)."""
 
     def __init__(self, settings: MqttChargerSettings, bus: MqttBus) -> None:
         self._settings = settings
@@ -121,12 +121,13 @@ class MqttStation:
                     bus.listen(place.topic)
 
     def await_first(self) -> None:
-        """Give the station time to publish its first states. Raises HalError without a broker."""
+        """Wait until the station has had time to publish its first states. Raises HalError without a
+        broker."""
         topics = [state.topic for state in self._settings.topics.values()]
         self._bus.await_first(topics, self._asks)
 
     def answer(self) -> Mapping[str, object]:
-        """Return name -> the last message of each topic."""
+        """Return name -> the last message on the topic of this name."""
         self._bus.ask(self._asks)
         return {
             name: decoded(
@@ -149,12 +150,13 @@ class MqttCharger(JsonCharger):
         self._first = station
 
     def open(self) -> None:
-        """Wait for the station's first states; a restart must not end a charge."""
+        """Wait for the station's first states. Send nothing, because a restart must not end a
+        charge."""
         self._first.await_first()
 
 
 def create(name: str, settings: MqttChargerSettings, bus: MqttBus) -> MqttCharger:
-    """Make the station's driver on its bus; it sends nothing before `open`."""
+    """Make the station's driver on its bus. The driver sends nothing before `open`."""
     return MqttCharger(settings, MqttStation(settings, bus))
 
 

@@ -1,7 +1,7 @@
 """A charging station of any make on Modbus registers, described by a register map.
 
-Power is a level: the driver writes the wanted level while the station shows a different level. The
-driver writes nothing when the daemon starts, so a restart does not end a charge.
+The power is a level. The driver writes the wanted level while the station shows a different level. At
+the daemon's start the driver writes nothing, so a restart does not end a charge.
 """
 
 from collections.abc import Iterator, Mapping
@@ -37,7 +37,7 @@ class RegisterChargerSettings(
     map: Annotated[ChargerMap | None, tells("the map, written here instead of a profile.")] = None
 
     def can_stop(self) -> bool:
-        """Can the driver switch the power off? Only if the map has `power`."""
+        """Return whether the driver can switch the power off. It can only if the map has `power`."""
         return charger_map(self).power is not None
 
     def problems(self) -> Remarks:
@@ -55,23 +55,23 @@ class RegisterChargerSettings(
 
 
 def charger_map(settings: RegisterChargerSettings) -> ChargerMap:
-    """Return the YAML's map, or else the profile's map."""
+    """Return the YAML's map, or the profile's map if the YAML has no map."""
     return PROFILE.chosen(settings.profile, settings.map)
 
 
 def cells(settings: RegisterChargerSettings) -> dict[str, list[Point]]:
-    """Return value -> its registers, or its coil or discrete input."""
+    """Return value -> the registers, coil or discrete input that hold it."""
     found: Mapping[str, RegisterNumber] = charger_map(settings).values
     return {name: [at(settings.unit, p) for p in n.places()] for name, n in found.items()}
 
 
 def orders(settings: RegisterChargerSettings) -> dict[str, Point]:
-    """Return order -> the place where the order is written."""
+    """Return command -> the place where the driver writes the command."""
     return {n: at(settings.unit, text) for n, text in charger_map(settings).orders().items()}
 
 
 def claims(settings: RegisterChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of each written place; nothing while the map has problems."""
+    """Yield (place, path) of each written place. Yield nothing while the map has problems."""
     if any(PROFILE.problems(settings.profile, settings.map)):
         return
     for name, text in charger_map(settings).orders().items():
@@ -81,7 +81,7 @@ def claims(settings: RegisterChargerSettings) -> Iterator[tuple[str, tuple[str, 
 
 
 def describe(settings: RegisterChargerSettings, bus: object) -> Iterator[tuple[str, str]]:
-    """Yield rows for `check`: each value's place, the commands, and the meanings of the numbers."""
+    """Yield rows for `check` about the places of values, the commands, and the meanings of numbers."""
     found = charger_map(settings)
     for name, points in cells(settings).items():
         number = found.values[name]
@@ -108,7 +108,7 @@ def tables(settings: RegisterChargerSettings) -> Iterator[Table]:
 
 
 def warnings(settings: RegisterChargerSettings) -> Remarks:
-    """Yield valid settings that deserve a second look: (path, text)."""
+    """Yield a warning (path, text) for each valid setting that may be a mistake."""
     yield from PROFILE.warnings(settings.profile, "watch the first charge")
     found = charger_map(settings)
     if found.power is None:
@@ -120,12 +120,13 @@ def warnings(settings: RegisterChargerSettings) -> Remarks:
 
 
 def create(name: str, settings: RegisterChargerSettings, bus: ModbusBus) -> "RegisterCharger":
-    """Make the station's driver on its bus; it sends nothing before the first reading."""
+    """Make the station's driver on its bus. The driver sends nothing before the first reading."""
     return RegisterCharger(settings, bus)
 
 
 class RegisterCharger:
-    """`drivers.Driver` for one station. `_power`: the present level; None while unknown."""
+    """`drivers.Driver` for one station. `_power` is the present level of the power, and None while
+    unknown."""
 
     def __init__(self, settings: RegisterChargerSettings, bus: ModbusBus) -> None:
         self._settings = settings
@@ -139,7 +140,7 @@ class RegisterCharger:
         self._checked = 0
 
     def open(self) -> None:
-        """Do nothing: a restart must not end a charge."""
+        """Do nothing, because a restart must not end a charge."""
 
     def read(self) -> ChargerSample:
         """Read and decode the station's values. Raises DriverError."""
@@ -157,7 +158,8 @@ class RegisterCharger:
         return decode(self._map, values)
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Set the power, off first. A clear or range check is written once when its count changes."""
+        """Set the power. Switching off comes first. A clear or a range check is written once for each
+        change of its count."""
         if outputs.power is False:
             self._switch(on=False)
         if outputs.clear_errors != self._cleared:
@@ -170,7 +172,8 @@ class RegisterCharger:
             self._switch(on=True)
 
     def make_safe(self) -> None:
-        """Switch the power off and read it back where possible; with `on_death: keep` do nothing."""
+        """Switch the power off, and read the command back where possible. With `on_death: keep` do
+        nothing."""
         if self._settings.on_death == "stop":
             self._switch(on=False, anyway=True)
             command = self._map.power
@@ -180,13 +183,14 @@ class RegisterCharger:
                     raise DriverError(f"{point} is not off after {command.stop} was written")
 
     def close(self) -> None:
-        """Make the station safe, if the power was ever written and may be on. Does not raise."""
+        """Make the station safe if the driver ever wrote the power, and the power may be on. Does not
+        raise."""
         if self._touched and self._power is not False:
             self._bus.insist()
             try:
                 self.make_safe()
             except DriverError:
-                return  # close does not raise, and the earlier make_safe has reported the failure
+                return  # `close` does not raise; `make_safe` has already reported the failure
 
     def _switch(self, on: bool, anyway: bool = False) -> None:
         command = self._map.power

@@ -1,4 +1,5 @@
-"""The register map of a charger, from a YAML or a profile: places, and meanings of the numbers."""
+"""A charger's register map, from a YAML or a profile. The map gives places, and the meanings of
+numbers."""
 
 from collections.abc import Mapping
 from typing import Annotated, Final, Literal
@@ -18,11 +19,11 @@ from drivers.profiles import Profile
 
 MEASURED: Final = ("volts", "amps", "battery_percent", "time_to_full_s")
 KNOWN: Final = ("state", "receiver", "in_range", "range_ok", "at_height", *MEASURED)
-"""The names with a fixed meaning in `values`."""
+"""The names in `values` that have a fixed meaning."""
 
 
 class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One value of the station."""
+    """One value of the station, with its place and form."""
 
     words: Annotated[Literal[1, 2], tells("the number of registers: 2 for 32 bits.")] = 1
     low_first: Annotated[bool, tells("the first of the two registers holds the low word.")] = False
@@ -33,7 +34,8 @@ class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ] = 1.0
 
     def problems(self) -> Remarks:
-        """Yield problems: an invalid place; options that do not fit the place's table or width."""
+        """Yield a problem for an invalid place, and for options that do not fit the place's table or
+        width."""
         yield from super().problems()
         of_registers = (self.words, self.signed, self.bit) != (1, False, None)
         if of_registers and self.is_in("coil", "discrete input"):
@@ -45,7 +47,7 @@ class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             yield ("low_first",), "is for two registers: words: 2"
 
     def places(self) -> list[str]:
-        """Return the number's registers, the high word's first."""
+        """Return the places of the number's registers. The high word's register comes first."""
         table, address = place(self.at)
         found = [f"{table} {address + n}" for n in range(self.words)]
         return found[::-1] if self.low_first else found
@@ -82,7 +84,7 @@ class Power(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class Order(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A command that is written once."""
+    """A command that the driver writes once for each request."""
 
     write: Annotated[Word, tells("the value that is written.")] = 1
 
@@ -121,7 +123,8 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     ] = None
 
     def problems(self) -> Remarks:
-        """Yield problems: names missing from `values`; unused names; a map without a state."""
+        """Yield a problem for names missing from `values`, for unused names, and for a map without a
+        state."""
         yield from by_rules.problems(self.rules, self.codes is not None)
         if self.codes and "state" not in self.values:
             yield ("values",), "needs 'state', because codes is given"
@@ -140,7 +143,7 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
             yield ("range_check",), "needs the value in_range, for the check's result"
 
     def orders(self) -> Mapping[str, str]:
-        """Return command -> its place, for each given command."""
+        """Return command -> its place, for each command that the map gives."""
         names = ("power", "clear_error", "range_check")
         return {name: part.at for name in names if (part := getattr(self, name)) is not None}
 

@@ -1,4 +1,4 @@
-"""Tabulates a station's values: the contents of its registers for a sample of each."""
+"""Tabulates a station's values. For a sample of each value the table shows the registers' contents."""
 
 from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
@@ -9,7 +9,7 @@ from drivers.hal.modbus.points import Point
 
 
 class ShownValue(NamedTuple):
-    """A sample that shows a value's scale and the order of its words, with its unit."""
+    """A sample with its unit. It shows the value's scale and the order of its words."""
 
     value: float
     unit: str
@@ -24,7 +24,8 @@ SAMPLES: Final = {
 
 
 def samples(found: ChargerMap, cells: Mapping[str, list[Point]]) -> Table:
-    """Tabulate each value of the map. `cells`: value -> its registers, coil or discrete input."""
+    """Tabulate each value of the map. `cells` gives for each value its registers, coil or discrete
+    input."""
     rows = (
         (name, " and ".join(map(str, points)), _held(found.values[name], points, value), means)
         for name, points in cells.items()

@@ -1,7 +1,8 @@
-"""Rules for a charger's state, and its errors as numbers and bits: for HTTP, Modbus and CAN.
+"""Rules for a charger's state, and its errors as numbers and bits, for HTTP, MQTT, Modbus and CAN.
 
-The place of a value is a field of an HTTP answer, a name in a register map's `values`, or a signal of a
-CAN frame. Rules are tried before `codes`: the first rule whose tests all hold gives the state.
+A rule tests values at places. A place is a field of a JSON answer, a name in a register map's `values`,
+or a signal of a CAN frame. The driver tries the rules before `codes`. The first rule whose tests all
+hold gives the state.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -17,7 +18,7 @@ from drivers.json_fields import Value, same
 from drivers.numbers import LongBit, bits_on
 
 Read = Callable[[str], object]
-"""Returns the value at a place; raises DriverError if there is none."""
+"""A function that returns the value at a place. It raises DriverError if the place has no value."""
 Meaning = tuple[Activity, FaultSide]
 Found = list[tuple[FaultSide, str]]
 """Errors, each with its side and its text."""
@@ -31,21 +32,21 @@ UNKNOWN: Final[Meaning] = (Activity.UNKNOWN, "")
 
 
 class Test(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A test of one value; every given condition must hold."""
+    """A test of one value. The test holds if every given condition holds."""
 
     one_of: Annotated[list[Value], tells("the value is one of these.")] = []
     above: Annotated[float | None, tells("the value is greater than this.")] = None
     below: Annotated[float | None, tells("the value is less than this.")] = None
 
     def problems(self) -> Remarks:
-        """Yield problems: a test without a condition; a test that no value passes."""
+        """Yield a problem for a test without a condition, and for a test that no value passes."""
         if not self.one_of and self.above is None and self.below is None:
             yield (), "tests nothing: give one_of, above or below"
         if self.above is not None and self.below is not None and self.above >= self.below:
             yield ("below",), "must be greater than above"
 
     def holds(self, value: object) -> bool:
-        """Does the value pass? For `above` and `below`, true and false count as 1 and 0."""
+        """Does the value pass the test? For `above` and `below`, true counts as 1 and false as 0."""
         if self.one_of and not any(same(value, given) for given in self.one_of):
             return False
         if self.above is None and self.below is None:
@@ -73,7 +74,7 @@ class Rule(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     text: Annotated[Name | None, tells("the error's text, if `means` is an error.")] = None
 
     def problems(self) -> Remarks:
-        """Yield problems: an unknown meaning; a text for a state that is not an error."""
+        """Yield a problem for an unknown meaning, and for a text on a state that is not an error."""
         if self.means not in MEANINGS:
             yield ("means",), f"is '{self.means}': write one of {', '.join(MEANINGS)}"
         elif self.text and MEANINGS[self.means][0] is not Activity.ERROR:
@@ -81,7 +82,7 @@ class Rule(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """An error as one number. An unlisted number is shown as a number."""
+    """An error as one number. `check` and the status show an unlisted number as it is."""
 
     at: Annotated[Name, tells("its place.")]
     well: Annotated[tuple[int, ...], tells("the numbers that mean no error.")] = (0,)
@@ -98,7 +99,7 @@ class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             yield ("well",), f"{number} is already an error"
 
     def errors(self, value: object) -> Found:
-        """Return the error for this number; no error for a number in `well`."""
+        """Return the error for this number. A number in `well` is no error."""
         if not isinstance(value, int | float) or value in self.well:
             return [] if isinstance(value, int | float) else [("", f"error {value}")]
         sides: tuple[tuple[FaultSide, Mapping[int, str]], ...] = (
@@ -110,7 +111,7 @@ class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 
 class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Errors as bits of one number: a flag byte or word. An unlisted bit is shown by its number."""
+    """Errors as bits of one number, such as a flag byte. An unlisted bit is shown by its number."""
 
     at: Annotated[Name, tells("its place.")]
     ignore: Annotated[list[LongBit], tells("bits that mean no error.")] = []
@@ -127,7 +128,7 @@ class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
             yield ("robot", str(bit)), f"bit {bit} is already a fault of the station"
 
     def errors(self, value: object) -> Found:
-        """Return the errors of the set bits: the station's first, the robot's last."""
+        """Return the errors of the set bits. The station's errors come first, and the robot's last."""
         if not isinstance(value, int | float) or value != int(value) or value < 0:
             return [("", f"error flags {value}")]
         on = [bit for bit in bits_on(int(value)) if bit not in self.ignore]
@@ -137,7 +138,7 @@ class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class StationErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Errors of the station or of the robot on it, in any state."""
+    """Errors of the station, or of the robot at the station. They count in any state."""
 
     station: Annotated[
         dict[Name, Name], tells("place -> text: a value other than 0 is this fault of the station.")
@@ -149,7 +150,7 @@ class StationErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     bits: Annotated[list[ErrorBits], tells("errors as the bits of a flag byte or word.")] = []
 
     def found(self, read: Read) -> Found:
-        """Return all present errors, the station's first. A value of None is unknown: no error."""
+        """Return all present errors, the station's first. A value of None is unknown, and no error."""
         sides: tuple[tuple[FaultSide, Mapping[str, str]], ...] = (
             ("station", self.station),
             ("robot", self.robot),
@@ -164,7 +165,7 @@ class StationErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         return sorted([*flags, *numbers], key=lambda error: order.index(error[0]))
 
     def places(self) -> Iterator[tuple[tuple[str, ...], str]]:
-        """Yield (path below this section, place) of each value that is read."""
+        """Yield (path, place) of each value that is read. The path begins below this section."""
         for side in ("station", "robot"):
             for at in getattr(self, side):
                 yield (side, at), at
@@ -174,7 +175,7 @@ class StationErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
 
 def places(rules: list[Rule]) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Yield (path below the rules, place) of each value that they test."""
+    """Yield (path, place) of each value that the rules test. The path begins below the rules."""
     for n, rule in enumerate(rules):
         for at in rule.when:
             yield (str(n), "when", at), at
@@ -186,10 +187,10 @@ def judge(rules: list[Rule], read: Read) -> Rule | None:
 
 
 class JudgedState(msgspec.Struct, frozen=True):
-    """The station's activity, the side of its error, its state's code (for texts), and its errors'
-    text.
+    """The station's state after rules, codes and errors.
 
-    `does`: the activity by the state alone. `activity` is ERROR whenever there is an error.
+    `activity` is ERROR whenever there is an error. `does` is the activity without regard to errors.
+    `side` has the error. `code` is the state's code for texts, and `text` holds the errors' texts.
     """
 
     activity: Activity
@@ -200,24 +201,25 @@ class JudgedState(msgspec.Struct, frozen=True):
 
     @property
     def charges(self) -> bool:
-        """Does the station charge in spite of an error?"""
+        """Return whether the station charges in spite of an error."""
         return self.activity is Activity.ERROR and self.does is Activity.CHARGING
 
 
 def judged(
     station: "StateRules", read: Read, code: int | str | None, told: FaultSide = ""
 ) -> JudgedState:
-    """Return the state from rules, codes and errors.
+    """Return the state that follows from rules, codes and errors.
 
-    `code`: the maker's state, if there are codes. `told`: the error's side by the station's own text.
-    A present entry of `errors` makes any state an error. Raises DriverError.
+    `code` is the maker's state; None without codes. `told` is the side that the station's own error
+    text gives. An error that is present in `errors` makes any state an error. Raises DriverError.
     """
     meant = meaning(station.rules, station.codes, read, code)
     return with_errors(meant, station.errors.found(read), station.codes, told)
 
 
 class Meant(NamedTuple):
-    """The state from rules and codes, its code for texts, and the text of the matching rule."""
+    """The state that follows from rules and codes. `code` is for texts; `text` is that of the matching
+    rule."""
 
     activity: Activity
     side: FaultSide
@@ -226,7 +228,7 @@ class Meant(NamedTuple):
 
 
 def meaning(rules: list[Rule], codes: Codes | None, read: Read, code: int | str | None) -> Meant:
-    """Return the state from rules and codes. Raises DriverError."""
+    """Return the state that follows from rules and codes. Raises DriverError."""
     rule = judge(rules, read)
     if rule is not None:
         return Meant(*MEANINGS[rule.means], f"rule {rules.index(rule) + 1}", rule.text or "")
@@ -238,7 +240,7 @@ def meaning(rules: list[Rule], codes: Codes | None, read: Read, code: int | str 
 def with_errors(
     meant: Meant, errors: Found, codes: Codes | None = None, told: FaultSide = ""
 ) -> JudgedState:
-    """Return the state with the errors. `told`: the error's side by the station's own text."""
+    """Combine the state with the errors. `told` is the side that the station's own error text gives."""
     wrong: Found = [(meant.side, meant.text), *errors] if meant.text else errors
     shown = Activity.ERROR if wrong else meant.activity
     side = first_side([meant.side, told, *(whose for whose, _ in wrong)])
@@ -248,7 +250,7 @@ def with_errors(
 
 
 class StateRules(Protocol):
-    """The part of a station's settings, or of its map, that defines its state."""
+    """The part of a station's settings, or of its register map, that defines its state."""
 
     @property
     def codes(self) -> Codes | None:
@@ -279,7 +281,8 @@ def rows(rules: list[Rule], errors: StationErrors) -> Iterator[tuple[str, str]]:
 
 
 def problems(rules: list[Rule], has_codes: bool) -> Remarks:
-    """Yield problems: rules that are never reached; no state. Paths are below the station."""
+    """Yield a problem for rules that are never reached, and for a missing state. Paths begin below the
+    station."""
     if not rules and not has_codes:
         yield ("codes",), "needs codes (the meanings of the maker's state numbers), or rules"
     for n, rule in enumerate(rules[:-1]):
@@ -300,5 +303,6 @@ def said(found: Found) -> str:
 
 
 def receiver_text(number: float | None) -> str | None:
-    """Return a receiver's id as text: "" for 0 (no receiver); None where the map has no such value."""
+    """Return a receiver's id as text. Return "" for 0 (no receiver), and None if the map has no such
+    value."""
     return None if number is None else str(int(number)) if number else ""

@@ -1,6 +1,6 @@
-"""The meanings of a charger's state numbers: a table in the YAML that covers every number.
+"""The meanings of a charger's state numbers. The YAML has a table that covers every number.
 
-An unlisted number is an error and is shown. A maker's number is never passed on as an RMF state.
+An unlisted number counts as an error and is shown. A maker's number is never passed on as an RMF state.
 """
 
 from collections.abc import Collection, Mapping
@@ -20,18 +20,22 @@ ROBOT_ERROR: tuple[Activity, FaultSide] = (Activity.ERROR, "robot")
 
 
 class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The meanings of the maker's state numbers. An unlisted number is an error and is shown."""
+    """The meanings of the maker's state numbers. An unlisted number counts as an error and is shown."""
 
     idle: Annotated[
         list[Code], msgspec.Meta(min_length=1), tells("nothing is on the pad: a robot may come.")
     ]
     charging: Annotated[list[Code], msgspec.Meta(min_length=1), tells("current flows.")]
-    handshake: Annotated[list[Code], tells("a robot is being recognised, no current yet.")] = []
+    handshake: Annotated[
+        list[Code], tells("the station recognises a robot; no current flows yet.")
+    ] = []
     stopping: Annotated[list[Code], tells("current still flows, ramping down.")] = []
-    released: Annotated[list[Code], tells("disconnected, not ready for another robot yet.")] = []
+    released: Annotated[
+        list[Code], tells("the robot is disconnected; the station is not ready for the next.")
+    ] = []
     error: Annotated[
         list[Code],
-        tells("out of service, also by hand. With `robot_error`, only the station's errors."),
+        tells("out of service, also by hand; with `robot_error`, only the errors of the station."),
     ] = []
     station_error: Annotated[
         list[Code],
@@ -56,14 +60,13 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return made
 
     def unnamed_side(self, code: object) -> FaultSide:
-        """Return the side of an error number without a stated side: the station if only `robot_error`
-        is given, else "".
-        """
+        """Return the side of a number in `error`. If only `robot_error` is given, the number is the
+        station's error; otherwise the side is "", unknown."""
         told_apart = self.robot_error and not self.station_error
         return "station" if told_apart and code in self.error else ""
 
     def lists(self) -> Mapping[Activity, list[Code]]:
-        """Return the states of each meaning, without `station_error` and `robot_error`."""
+        """Return meaning -> its states, without the lists `station_error` and `robot_error`."""
         return {
             Activity.IDLE: self.idle,
             Activity.HANDSHAKE: self.handshake,
@@ -91,8 +94,7 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 def first_side(sides: Collection[FaultSide]) -> FaultSide:
-    """Return the side of an error with several sources: the station if any source names the station,
-    else the robot.
-    """
+    """Return the side of an error that several sources report. The station comes before the robot; ""
+    if no source names a side."""
     known: tuple[FaultSide, ...] = ("station", "robot")
     return next((side for side in known if side in sides), "")

@@ -1,15 +1,16 @@
 """Xnergy's receiver (RCU): the meanings of its numbers and its commands, on any bus.
 
 `canopen.py` and `modbus.py` have the addresses of the numbers. The maker publishes no address for
-clearing an error: an error ends by itself, or when the receiver's power is cycled.
+clearing an error. An error ends by itself, or when somebody cycles the receiver's power.
 
-Facts: the maker's published ROS driver (`xnergy-charger-rcu`): state codes, error bits, addresses,
-scales, and the range check before a start. Not tried on the hardware. Faults of the maker's driver are
-not copied: it decodes the high error word only when it is zero, never compares an SDO reply with its
-request, and shows an RCU that does not answer as state 250, which the RCU itself never sends.
+The source is the maker's published ROS driver (`xnergy-charger-rcu`): state codes, error bits,
+addresses, scales, and the range check before a start. Nobody has tried these facts on the hardware.
+Three faults of the maker's driver are not copied. It decodes the high error word only when this word is
+zero. It never compares an SDO reply with its request. It shows an RCU that does not answer as state
+250, which the RCU itself never sends.
 
 Each error has a side. Errors of the transmitter (TPU, on the wall) and objects on the pad are the
-station's; all others are the robot's: its receiver and its position.
+station's errors. All other errors are the robot's, because they concern its receiver or its position.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -32,17 +33,18 @@ from drivers import DriverError
 ALWAYS: Final = ("state", "error_low", "error_high", "volts", "amps", "range")
 IN_ERROR: Final = ("latched_low", "latched_high")
 TEMPERATURES: Final[Mapping[str, str]] = {"device_c": "device", "coil_c": "coil"}
-"""ALWAYS is read in every scan. IN_ERROR is read too in an error state: the error that the receiver
-latched. TEMPERATURES (°C) are read in every scan where the wire has them."""
+"""Names of the numbers to read. Every scan reads ALWAYS. In an error state the scan also reads
+IN_ERROR, the error that the receiver latched. Every scan also reads TEMPERATURES (°C) on a bus that
+has them."""
 ENABLE: Final = "enable"
 CHECK_RANGE: Final = "check_range"
-"""The written values: ENABLE with 1 or 0, CHECK_RANGE with 1."""
+"""The values that the driver writes: ENABLE with 1 or 0, and CHECK_RANGE with 1."""
 
 Words = Mapping[str, int]
-"""Raw unsigned words by the names of ALWAYS and IN_ERROR."""
+"""Raw unsigned words, by their names in ALWAYS and IN_ERROR."""
 
 TICKS_PER_UNIT: Final = 128
-"""Volts and amps come in 1/128."""
+"""The scale of voltage and current: the receiver counts in 1/128 V and 1/128 A."""
 
 IDLE: Final = 0
 CODES: Final[Mapping[int, tuple[Activity, str]]] = {
@@ -67,7 +69,7 @@ CODES: Final[Mapping[int, tuple[Activity, str]]] = {
     250: (Activity.ERROR, "not connected"),
     255: (Activity.ERROR, "debug: error"),
 }
-"""The published state codes; `activity` maps every other code to UNKNOWN."""
+"""The published state codes. The function `activity` maps every other code to UNKNOWN."""
 
 ERROR_BITS: Final[Mapping[int, tuple[FaultSide, str]]] = {
     0x0000_0001: ("robot", "the receiver's flash memory is not set"),
@@ -89,7 +91,8 @@ ERROR_BITS: Final[Mapping[int, tuple[FaultSide, str]]] = {
 """The bits of the 32-bit error number, whose upper half is the high word."""
 
 IN_RANGE: Final = 1
-"""The range check's result for a robot in range (0: under way, 2: out of range, 240: failed)."""
+"""The range check's result for a robot in range. Other results: 0 under way, 2 out of range, 240
+failed."""
 
 
 def activity(code: int) -> Activity:
@@ -98,10 +101,10 @@ def activity(code: int) -> Activity:
 
 
 def sample(words: Words, settled: bool = True) -> ChargerSample:
-    """Decode one reading; never raises. `words` has at least state, error_low and error_high.
+    """Decode one reading. Never raises. `words` has at least `state`, `error_low` and `error_high`.
 
-    An error bit makes any state an error.
-    `settled`: the range result belongs to the last range check (`settled` below).
+    An error bit makes any state an error. `settled` is True if the range result belongs to the last
+    range check (function `settled` below).
     """
     found, does = errors(error_number(words)), activity(words["state"])
     return ChargerSample(
@@ -122,9 +125,9 @@ def sample(words: Words, settled: bool = True) -> ChargerSample:
 
 
 def errors(number: int) -> list[tuple[FaultSide, str]]:
-    """Return side and text of each set bit: the station's first, the robot's last.
+    """Return (side, text) of each set bit. The station's errors come first, and the robot's last.
 
-    An unpublished bit has no side.
+    A bit that the maker has not published has no side.
     """
     found = [
         ERROR_BITS.get(1 << bit, ("", f"unknown error bit {bit}"))
@@ -135,7 +138,7 @@ def errors(number: int) -> list[tuple[FaultSide, str]]:
 
 
 def error_number(words: Words) -> int:
-    """Return the current error; in an error state without a current error, the latched error."""
+    """Return the current error. In an error state without a current error, return the latched error."""
     now = words["error_high"] << 16 | words["error_low"]
     if now or activity(words["state"]) is not Activity.ERROR:
         return now
@@ -143,7 +146,8 @@ def error_number(words: Words) -> int:
 
 
 def _text(words: Words, found: list[tuple[FaultSide, str]]) -> str:
-    """Return the errors' texts, each with its side if that differs from the first error's side."""
+    """Return the errors' texts. An error of another side than the first error's has its side in
+    front."""
     if found:
         main = found[0][0]
         return "; ".join(
@@ -166,14 +170,15 @@ def _units(word: int | None) -> float | None:
 # ---- starting and stopping
 
 RANGE_SETTLE_S: Final = 1.0
-"""The time after a range check until its result is valid (s); until then the last result is read."""
+"""The time (s) from a range check until its result is valid. Until then the receiver shows the previous
+result."""
 
 
 class Written(Struct, frozen=True):
-    """The last commands written to the receiver. `enabled`: the last ENABLE; None while unknown.
+    """The last commands written to the receiver. `enabled` is the last ENABLE, and None while unknown.
 
-    `range_checks`: the number of checks requested; `asked_at`: the time of the last check (monotonic
-    s), inf while a check waits to be sent.
+    `range_checks` is the number of checks that were requested. `asked_at` is the time of the last check
+    (monotonic seconds). It is inf while a check waits to be sent.
     """
 
     enabled: bool | None = None
@@ -182,24 +187,26 @@ class Written(Struct, frozen=True):
 
 
 class Orders(Struct, frozen=True):
-    """The commands of this scan: `enable` (None: no command), and a range check if one is to start."""
+    """The commands of this scan. `enable` is None without a command; `check_range` starts a range
+    check."""
 
     enable: bool | None = None
     check_range: bool = False
 
 
 def settled(written: Written, now: float) -> bool:
-    """Does the range result belong to the last range check?"""
+    """Return whether the range result belongs to the last range check."""
     return now - written.asked_at >= RANGE_SETTLE_S
 
 
 def steer(
     written: Written, outputs: ChargerOutputs, code: int, now: float
 ) -> tuple[Written, Orders]:
-    """Return the commands for state `code`, after the new `Written`, valid once they are written.
+    """Return the new `Written`, and the commands for state `code`. The new `Written` is valid once the
+    commands are written.
 
-    A start and a range check are written only in state idle, each once. A stop is written again while
-    the receiver still charges. `power` None writes neither start nor stop.
+    The receiver gets a start and a range check only in state idle, and each only once. It gets a stop
+    again while it still charges. With `power` None it gets neither start nor stop.
     """
     ask = outputs.range_checks != written.range_checks
     if ask and code == IDLE:
@@ -228,22 +235,23 @@ class ReceiverAccess(Protocol):
 
     @property
     def reads(self) -> tuple[str, ...]:
-        """The names that are read in every scan."""
+        """The names of the numbers that every scan reads."""
 
     def alive(self) -> bool:
-        """True if the receiver has restarted since the last call. Raises DriverError if it is gone."""
+        """Return True if the receiver has restarted after the last call. Raises DriverError if it is
+        gone."""
 
     def read(self, names: Iterable[str]) -> dict[str, int]:
         """Read the words of these names now. Raises DriverError."""
 
     def write(self, name: str, value: int, safe: bool = False) -> None:
-        """Write ENABLE or CHECK_RANGE. `safe`: the write switches power off. Raises DriverError."""
+        """Write ENABLE or CHECK_RANGE. `safe`: the write switches the power off. Raises DriverError."""
 
     def insist(self) -> None:
-        """Send the next request at once, without waiting for the backoff."""
+        """Let the next request skip the backoff."""
 
     def now(self) -> float:
-        """Monotonic seconds."""
+        """Return monotonic seconds."""
 
 
 class Receiver:
@@ -257,7 +265,7 @@ class Receiver:
         self._touched = False
 
     def open(self) -> None:
-        """Do nothing: a restart must not end a charge."""
+        """Do nothing, because a restart must not end a charge."""
 
     def read(self) -> ChargerSample:
         """Read and decode the receiver's numbers. Raises DriverError."""
@@ -270,7 +278,7 @@ class Receiver:
         return sample(words, settled(self._written, self._wire.now()))
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Start, stop or check the range, whichever is due (`steer`). Raises DriverError."""
+        """Start, stop or check the range, as `steer` decides. Raises DriverError."""
         written, orders = steer(self._written, outputs, self._code, self._wire.now())
         if orders.enable is not None:
             self._enable(orders.enable)
@@ -282,18 +290,18 @@ class Receiver:
         self._written = written
 
     def make_safe(self) -> None:
-        """Stop the receiver and require its acknowledgement; with `on_death: keep` do nothing."""
+        """Stop the receiver, and require its acknowledgement. With `on_death: keep` do nothing."""
         if self._settings.on_death == "stop":
             self._enable(False)
 
     def close(self) -> None:
-        """Make the receiver safe, if it was ever driven and may be on. Does not raise."""
+        """Make the receiver safe if the driver ever commanded it, and it may be on. Does not raise."""
         if self._touched and self._written.enabled is not False:
             self._wire.insist()
             try:
                 self.make_safe()
             except DriverError:
-                return  # close does not raise, and the earlier make_safe has reported the failure
+                return  # `close` does not raise; `make_safe` has already reported the failure
 
     def _enable(self, on: bool) -> None:
         self._touched = True
@@ -303,7 +311,7 @@ class Receiver:
 
 
 def rows(settings: ChargerSettings, where: Mapping[str, str]) -> list[tuple[str, str]]:
-    """Return rows for `check`: (subject, meaning). `where`: name -> its address as text."""
+    """Return rows (subject, meaning) for `check`. `where` gives the address of each name as text."""
     return [
         *((name, f"read {where[name]}") for name in (*ALWAYS, *TEMPERATURES) if name in where),
         *((name, f"the same in an error: {where[name]}") for name in IN_ERROR),
@@ -324,7 +332,8 @@ def _state_rows() -> Iterator[tuple[str, str]]:
 
 
 def warnings(settings: ChargerSettings, wire: str) -> Remarks:
-    """Yield valid settings that deserve a second look: (path, text). `wire`: the plug in the test."""
+    """Yield a warning (path, text) for each valid setting that may be a mistake. `wire` is the cable to
+    unplug in the test."""
     text = (
         "the maker's published numbers are not tried on hardware: watch the first charge, and pull"
     )

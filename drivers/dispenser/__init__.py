@@ -1,1 +1,1 @@
-"""Drivers of dispensers, which serve ingestors too."""
+"""Drivers of dispensers, which also serve ingestors."""

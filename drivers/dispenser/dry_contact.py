@@ -1,7 +1,9 @@
-"""A dispenser or ingestor on dry contacts: a relay starts its cycle, contacts show the course.
+"""A dispenser or ingestor on dry contacts. A relay starts a cycle, and contacts show the cycle's
+course.
 
-The contacts are on the GPIO header, or coils, discrete inputs and bits of registers behind Modbus. A
-contact says no number: a request is for one item, and a relay of its own may select each sort.
+The contacts are on the GPIO header, or are coils, discrete inputs or bits of registers behind Modbus. A
+contact carries no number, so each request is for one item. To select among several sorts, each sort may
+have a relay of its own.
 """
 
 from collections.abc import Iterator, Mapping
@@ -26,7 +28,8 @@ CUT_MUST_READ: Final = {
     "ready": (False, "a workcell that is not ready is started"),
     "fault": (True, "a fault of the workcell is not seen"),
 }
-"""Signal -> (the safe level of a cut wire, the consequence of the other level)."""
+"""Signal -> the safe reading of a cut wire (asserted or not), and the danger of the opposite
+reading."""
 
 
 class WorkcellInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -34,13 +37,14 @@ class WorkcellInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unkn
 
     done: Annotated[
         Input,
-        tells("the cycle has succeeded; it is off before a cycle and comes on at its end."),
+        tells("the cycle has succeeded. The contact is off before a cycle and on at its end."),
     ]
     busy: Annotated[Input | None, tells("a cycle runs; its end without `done` is a failure.")] = (
         None
     )
     ready: Annotated[
-        Input | None, tells("a cycle may start: filled, closed, no jam. Without it always.")
+        Input | None,
+        tells("a cycle may start (filled, closed, no jam); always without this contact."),
     ] = None
     fault: Annotated[Input | None, tells("the workcell reports a fault.")] = None
 
@@ -94,13 +98,15 @@ def debounce(settings: DryContactWorkcellSettings) -> Mapping[str, float]:
 
 
 def warnings(settings: DryContactWorkcellSettings) -> Remarks:
-    """Yield valid settings to review before the workcell goes into service: (path, text)."""
+    """Yield a warning (path, text) for each valid setting to review before the workcell goes into
+    service."""
     yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
     yield from blind(settings, busy=settings.inputs.busy is not None)
 
 
 def items_table(settings: WorkcellSettings) -> Iterator[Table]:
-    """Yield what RMF may ask for; everything else is answered FAILED."""
+    """Yield a table of the requests that RMF may make. The daemon answers every other request with
+    FAILED."""
     rows = tuple(
         (name, str(one.most), ", ".join(one.compartments) or "-")
         for name, one in settings.items.items()
@@ -111,19 +117,20 @@ def items_table(settings: WorkcellSettings) -> Iterator[Table]:
 
 
 def blind(settings: WorkcellSettings, *, busy: bool) -> Remarks:
-    """Yield what no driver of this wiring can see."""
+    """Yield a warning for each fact that no driver of this wiring can see."""
     if not busy:
         text = "without busy a cycle that stops in the middle is seen after cycle_limit_s only"
         yield (), f"{text} ({settings.limits.cycle_limit_s:g} s)"
 
 
 def create(name: str, settings: DryContactWorkcellSettings, bus: PointsBus) -> "DryContactWorkcell":
-    """Make the workcell's driver on its bus; it touches nothing before `open`."""
+    """Make the workcell's driver on its bus. The driver touches nothing before `open`."""
     return DryContactWorkcell(Points(wires(settings), bus))
 
 
 class DryContactWorkcell(OnPoints):
-    """`drivers.Driver` for one dispenser or ingestor. `_selected`: the guid whose sort is selected."""
+    """`drivers.Driver` for one dispenser or ingestor. `_selected`: the guid of the request whose sort
+    is selected."""
 
     def __init__(self, points: Points) -> None:
         super().__init__(points)
@@ -135,7 +142,8 @@ class DryContactWorkcell(OnPoints):
         return WorkcellSample(read("done"), read("busy"), read("ready"), read("fault"))
 
     def write(self, outputs: WorkcellOutputs) -> None:
-        """Set the relays: at the beginning of a cycle the selected sort first, then the start."""
+        """Set the relays. At the beginning of a cycle the relay of the sort goes on before the start
+        relay."""
         relays = {f"select_{outputs.item.type_guid}": True} if outputs.guid else {}
         if outputs.guid != self._selected:
             self._points.write(relays)

@@ -1,8 +1,9 @@
-"""A dispenser or ingestor behind HTTP and JSON: `start` begins a cycle, `state_path` shows its course.
+"""A dispenser or ingestor behind HTTP and JSON. `start` begins a cycle, and `state_path` shows its
+course.
 
-The body of `start` may hold the texts $guid, $type_guid, $quantity and $compartment as values, which
-stand for those of the request. A start is sent once for each cycle, even if its answer is lost: a
-repeat could dispense twice.
+The body of `start` may contain the texts $guid, $type_guid, $quantity and $compartment as values. The
+driver replaces each text by the value of the request. A start is sent once for each cycle, even if its
+answer is lost, because a repeat could dispense twice.
 """
 
 from collections.abc import Iterator
@@ -30,17 +31,19 @@ class WorkcellInputFields(msgspec.Struct, frozen=True, kw_only=True, forbid_unkn
 
     done: Annotated[
         JsonFlag,
-        tells("the cycle has succeeded; it is off before a cycle and comes on at its end."),
+        tells("the cycle has succeeded. The flag is off before a cycle and comes on at its end."),
     ]
     busy: Annotated[
         JsonFlag | None, tells("a cycle runs; its end without `done` is a failure.")
     ] = None
-    ready: Annotated[JsonFlag | None, tells("a cycle may start. Without it always.")] = None
+    ready: Annotated[
+        JsonFlag | None, tells("a cycle may start. Without this field a cycle may always start.")
+    ] = None
     fault: Annotated[JsonFlag | None, tells("the workcell reports a fault.")] = None
 
 
 class HttpWorkcellSettings(WorkcellSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A dispenser or ingestor and its controller. The paths follow the bus's `api_base`."""
+    """A dispenser or ingestor and its controller. Every path is relative to the bus's `api_base`."""
 
     state_path: Annotated[http.Path, tells("the path that GET reads the inputs from.")]
     inputs: Annotated[WorkcellInputFields, tells("the fields of that answer.")]
@@ -79,14 +82,14 @@ def _unsafe(settings: HttpWorkcellSettings) -> Iterator[Unsafe]:
 
 
 def claims(settings: HttpWorkcellSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (command, path) of the commands, which no other device may send."""
+    """Yield (command, path) of each command. No other device may send these commands."""
     yield claim(settings.start), ("start", "path")
     if settings.stop is not None:
         yield claim(settings.stop), (STOP, "path")
 
 
 def describe(settings: HttpWorkcellSettings, bus: http.HttpSettings) -> Iterator[tuple[str, str]]:
-    """Yield rows for `check`: the reading and the commands."""
+    """Yield rows for `check` about the reading and the commands."""
     api = http.base(bus.api_base)
     yield "state", f"GET {api.url(settings.state_path)} every {bus.scan_s:g} s"
     for signal in settings.inputs.__struct_fields__:
@@ -97,19 +100,20 @@ def describe(settings: HttpWorkcellSettings, bus: http.HttpSettings) -> Iterator
 
 
 def warnings(settings: HttpWorkcellSettings) -> Remarks:
-    """Yield valid settings to review before the workcell goes into service: (path, text)."""
+    """Yield a warning (path, text) for each valid setting to review before the workcell goes into
+    service."""
     yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
     yield from blind(settings, busy=settings.inputs.busy is not None)
 
 
 def create(name: str, settings: HttpWorkcellSettings, bus: InsistentCalls) -> "HttpWorkcell":
-    """Make the workcell's driver on its bus; it sends nothing before `open`."""
+    """Make the workcell's driver on its bus. The driver sends nothing before `open`."""
     return HttpWorkcell(settings, bus)
 
 
 class HttpWorkcell:
-    """`drivers.Driver` for one dispenser or ingestor. `_sent`: the guid whose start was sent last.
-    `_on`: that cycle has not been ended."""
+    """`drivers.Driver` for one dispenser or ingestor. `_sent`: the guid of the last request whose start
+    was sent. `_on`: the cycle of this request has not ended."""
 
     def __init__(self, settings: HttpWorkcellSettings, bus: InsistentCalls) -> None:
         self._settings = settings
@@ -132,7 +136,7 @@ class HttpWorkcell:
         )
 
     def write(self, outputs: WorkcellOutputs) -> None:
-        """Start the cycle once; end it once it is over."""
+        """Send the start once for each cycle, and the stop when the cycle is over."""
         if outputs.start and outputs.guid != self._sent:
             self._sent, self._on = outputs.guid, True
             send(self._bus, filled(self._settings.start, outputs))

@@ -1,6 +1,7 @@
-"""A dispenser or ingestor behind a PLC's Modbus registers: its status as a number, and its command.
+"""A dispenser or ingestor behind a PLC's Modbus registers. A number shows its status, and a command
+starts a cycle.
 
-The numbers of the item are written first, then the start. An unlisted status is a fault.
+The driver writes the numbers of the item before the start. An unlisted status counts as a fault.
 """
 
 from collections.abc import Iterator, Mapping
@@ -27,7 +28,7 @@ Words = Annotated[list[Word], msgspec.Meta(min_length=1)]
 
 
 class WorkcellStatusWords(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The workcell's state as one number; an unlisted number is a fault."""
+    """The workcell's state as one number. An unlisted number counts as a fault."""
 
     ready: Annotated[Words, tells("numbers of a workcell at rest that may start.")]
     busy: Annotated[Words, tells("numbers of a running cycle.")]
@@ -40,7 +41,7 @@ class WorkcellStatusWords(InRegister, frozen=True, kw_only=True, forbid_unknown_
     )
 
     def problems(self) -> Remarks:
-        """Yield problems: a place that is not a register; a number with two meanings."""
+        """Yield a problem for a place that is not a register, and for a number with two meanings."""
         yield from super().problems()
         keys = ("ready", "busy", "done", "waits", "faults")
         yield from listed_twice({key: getattr(self, key) for key in keys})
@@ -57,7 +58,7 @@ class StartCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_fiel
 
 
 class ItemCode(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A name of the request as a number."""
+    """The number that stands for a name in RMF's request."""
 
     codes: Annotated[dict[Name, Word], tells("the name in RMF's request -> the number.")]
 
@@ -72,7 +73,7 @@ class WorkcellMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     compartment: Annotated[ItemCode | None, tells("the number of the compartment.")] = None
 
     def places(self) -> dict[str, str]:
-        """Return part -> its place, for each given part."""
+        """Return part -> its place, for each part that the map gives."""
         parts = {name: getattr(self, name) for name in PARTS}
         return {name: part.at for name, part in parts.items() if part is not None}
 
@@ -112,14 +113,14 @@ def points(settings: RegisterWorkcellSettings) -> dict[str, Point]:
 
 
 def claims(settings: RegisterWorkcellSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of everything written, which no other device may use."""
+    """Yield (place, path) of every written place. No other device may use these places."""
     for part, text in settings.map.places().items():
         if part != "status" and misplaced(text, WRITABLE) is None:
             yield str(at(settings.unit, text)), ("map", part, "at")
 
 
 def describe(settings: RegisterWorkcellSettings, bus: object) -> Iterator[tuple[str, str]]:
-    """Yield rows for `check`: each part of the map and its place."""
+    """Yield rows for `check` with the place of each part of the map."""
     command = settings.map.command
     for part, point in points(settings).items():
         how = f": {command.start} starts, {command.rest} rests" if part == "command" else ""
@@ -127,7 +128,7 @@ def describe(settings: RegisterWorkcellSettings, bus: object) -> Iterator[tuple[
 
 
 def tables(settings: RegisterWorkcellSettings) -> Iterator[Table]:
-    """Yield the meanings of the status numbers, and of the numbers that are written."""
+    """Yield tables of the status numbers, and of the numbers that the driver writes."""
     yield from items_table(settings)
     status, found = settings.map.status, settings.map
     keys = ("ready", "busy", "done", "waits")
@@ -141,7 +142,7 @@ def tables(settings: RegisterWorkcellSettings) -> Iterator[Table]:
 
 
 def create(name: str, settings: RegisterWorkcellSettings, bus: ModbusBus) -> "RegisterWorkcell":
-    """Make the workcell's driver on its bus; it sends nothing before `open`."""
+    """Make the workcell's driver on its bus. The driver sends nothing before `open`."""
     outputs = points(settings)
     inputs = {"status": outputs.pop("status")}
     safe = dict.fromkeys(outputs, 0) | {"command": settings.map.command.rest}
@@ -156,7 +157,7 @@ class RegisterWorkcell:
         self._lines = lines
 
     def open(self) -> None:
-        """Bring the command to rest."""
+        """Write the command's value at rest."""
         self._lines.claim()
 
     def read(self) -> WorkcellSample:
@@ -164,7 +165,8 @@ class RegisterWorkcell:
         return decode(self._map, self._lines.read()["status"])
 
     def write(self, outputs: WorkcellOutputs) -> None:
-        """Write the item first, then the start; the rest before the item changes."""
+        """Write the numbers of the item before the start. Before the item changes, write the command's
+        value at rest."""
         command = {"command": self._map.command.value(outputs.start)}
         if not outputs.start:
             self._lines.bring(command)
@@ -172,11 +174,12 @@ class RegisterWorkcell:
         self._lines.bring(command)
 
     def make_safe(self) -> None:
-        """Bring everything written to rest, and read it back."""
+        """Write the value at rest to every written place, and read it back."""
         self._lines.make_safe()
 
     def close(self) -> None:
-        """Bring everything written to rest if it was ever written. Does not raise."""
+        """Write the value at rest to every written place, if the driver ever wrote any. Does not
+        raise."""
         self._lines.close()
 
 
@@ -194,7 +197,8 @@ def decode(found: WorkcellMap, word: int) -> WorkcellSample:
 
 
 def encode(found: WorkcellMap, item: Item) -> Mapping[str, int]:
-    """Return the number to write for each part of the item; 0 for what the item does not say."""
+    """Return the number to write for each part of the item; 0 for a part that the request does not
+    give."""
     words = {}
     if found.item:
         words["item"] = found.item.codes.get(item.type_guid, 0)

@@ -1,4 +1,4 @@
-"""The row about closing, which `check` prints for every door driver."""
+"""The row about closing that `check` prints for every door driver."""
 
 from typing import Final
 

@@ -1,11 +1,12 @@
-"""A door operator on dry contacts: a relay holds it open, limit contacts show where it is.
+"""A door operator on dry contacts. A relay holds the door open, and limit contacts show its position.
 
 The contacts are on the GPIO header or on a Modbus I/O module (coils and discrete inputs).
-`drivers/hal/points.py` maps levels to signals and knows the level of a cut wire; the door core decides.
+`drivers/hal/points.py` translates levels to signals, and knows the level of a cut wire. The door core
+decides.
 
 The Modbus module may time the pulses that trigger an operator (`flash`). The driver requests each pulse
-once, because a repeat would prolong it. After a lost reply, the next try is the next pulse. The module
-ends the pulse; if the hold ends earlier, the driver switches the relay off.
+once, because a repeat would prolong the pulse. After a lost reply the driver waits until the next pulse
+is due. The module ends the pulse. If the hold ends during a pulse, the driver switches the relay off.
 """
 
 from collections.abc import Iterator, Mapping
@@ -31,11 +32,13 @@ CUT_MUST_READ: Final = {
     "obstruction": (True, "somebody in the doorway is not seen"),
     "fire": (True, "a fire alarm reads clear"),
 }
-"""Signal -> (the safe level of a cut wire, the consequence of the other level)."""
+"""Signal -> the safe reading of a cut wire (asserted or not), and the danger of the opposite
+reading."""
 
 
 class DoorInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The contacts that are read. With `feedback: estimated` a limit contact may be missing."""
+    """The contacts that are read. With `feedback: estimated` one limit contact or both may be
+    missing."""
 
     opened: Annotated[Input | None, tells("the door is fully open, by its limit contact.")] = None
     closed: Annotated[Input | None, tells("the door is closed, by its limit contact.")] = None
@@ -57,7 +60,7 @@ class Hold(Output, frozen=True, forbid_unknown_fields=True):
 
 
 class DoorOutputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The commands to the operator. No relay closes the door."""
+    """The commands to the operator. There is no relay to close the door."""
 
     hold_open: Annotated[Hold, tells("holds the door open while it is on.")]
 
@@ -121,7 +124,7 @@ def debounce(settings: DryContactDoorSettings) -> Mapping[str, float]:
 
 
 def tables(settings: DryContactDoorSettings) -> Iterator[Table]:
-    """Yield the drive of the relay."""
+    """Yield a table that shows when the relay is on."""
     pulse = settings.pulse
     driven = "on while RMF holds the door"
     if pulse is not None:
@@ -132,7 +135,8 @@ def tables(settings: DryContactDoorSettings) -> Iterator[Table]:
 
 
 def warnings(settings: DryContactDoorSettings) -> Remarks:
-    """Yield valid settings to review before the door goes into service: (path, text)."""
+    """Yield a warning (path, text) for each valid setting to review before the door goes into
+    service."""
     for wire in wires(settings):
         if wire.signal == "closed" and wire.broken_reads() is not False:
             yield (
@@ -146,14 +150,14 @@ def warnings(settings: DryContactDoorSettings) -> Remarks:
 
 
 def create(name: str, settings: DryContactDoorSettings, bus: PointsBus) -> "DryContactDoor":
-    """Make the door's driver on its bus; it touches nothing before `open`."""
+    """Make the door's driver on its bus. The driver touches nothing before `open`."""
     return DryContactDoor(
         Points(wires(settings), bus), flashes=settings.outputs.hold_open.flash is not None
     )
 
 
 class DryContactDoor(OnPoints):
-    """`drivers.Driver` for one door. `flashes`: the module times the pulses of the hold."""
+    """`drivers.Driver` for one door. `flashes`: the module times the pulses of the hold relay."""
 
     def __init__(self, points: Points, flashes: bool = False) -> None:
         super().__init__(points)
@@ -166,7 +170,7 @@ class DryContactDoor(OnPoints):
         return DoorSample(read("opened"), read("closed"), read("obstruction"), read("fire"))
 
     def write(self, outputs: DoorOutputs) -> None:
-        """Set the hold relay; a pulse that the module times is requested once."""
+        """Set the hold relay. A pulse that the module times is requested once."""
         asked, self._asked = self._asked, outputs.hold_open
         if not self._flashes or not (outputs.hold_open or outputs.between_pulses):
             self._points.write({"hold_open": outputs.hold_open})

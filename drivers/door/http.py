@@ -1,8 +1,8 @@
-"""A door behind a controller that speaks HTTP and JSON: a relay with inputs (Shelly and the like).
+"""A door behind a controller that speaks HTTP and JSON, such as a Shelly: a relay with inputs.
 
-The answer to `state_path` holds the contacts; `hold` and `release` switch the relay. If the network
+The answer to `state_path` holds the contacts. `hold` and `release` switch the relay. If the network
 fails, only the relay's own timer can release the door. So `hold` sets that timer
-(`switches_off_after_s`), and the driver sends `hold` in every scan while the door is held.
+(`switches_off_after_s`), and the driver sends `hold` in every scan while RMF holds the door.
 """
 
 from collections.abc import Iterator, Mapping
@@ -27,7 +27,8 @@ HOLD: Final = "hold_open"
 
 
 class DoorInputFields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The fields of the answer. With `feedback: estimated` `opened` or `closed` may be missing."""
+    """The fields of the answer. With `feedback: estimated` the fields `opened` and `closed` may be
+    missing."""
 
     opened: Annotated[JsonFlag | None, tells("the door is fully open.")] = None
     closed: Annotated[JsonFlag | None, tells("the door is closed.")] = None
@@ -39,7 +40,7 @@ class DoorInputFields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
 
 
 class HttpDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A door and its controller. The paths follow the bus's `api_base`."""
+    """A door and its controller. Every path is relative to the bus's `api_base`."""
 
     state_path: Annotated[http.Path, tells("the path that GET reads the inputs from.")]
     inputs: Annotated[DoorInputFields, tells("the fields of that answer.")] = DoorInputFields()
@@ -57,7 +58,8 @@ class HttpDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_f
     ] = None
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
-        """Return the relay's timer (s) and its path in the YAML; None if there is no timer."""
+        """Return the time (s) of the relay's timer, and its path in the YAML. Return None without a
+        timer."""
         path = ("switches_off_after_s",)
         return None if self.switches_off_after_s is None else (self.switches_off_after_s, path)
 
@@ -90,14 +92,15 @@ def _unsafe(settings: HttpDoorSettings) -> Iterator[Unsafe]:
 
 
 def claims(settings: HttpDoorSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (command, path) of the commands: another door's use of them would release this door."""
+    """Yield (command, path) of each command. If another door used these commands, it would release this
+    door."""
     yield claim(settings.hold), ("hold", "path")
     if settings.release != settings.hold:
         yield claim(settings.release), ("release", "path")
 
 
 def describe(settings: HttpDoorSettings, bus: http.HttpSettings) -> Iterator[tuple[str, str]]:
-    """Yield rows for `check`: the reading and the commands."""
+    """Yield rows for `check` about the reading and the commands."""
     api = http.base(bus.api_base)
     yield "state", f"GET {api.url(settings.state_path)} every {bus.scan_s:g} s"
     for signal in settings.inputs.__struct_fields__:
@@ -118,7 +121,8 @@ def _renewed(settings: HttpDoorSettings, bus: http.HttpSettings) -> str:
 
 
 def warnings(settings: HttpDoorSettings) -> Remarks:
-    """Yield valid settings to review before the door goes into service: (path, text)."""
+    """Yield a warning (path, text) for each valid setting to review before the door goes into
+    service."""
     if settings.switches_off_after_s is not None:
         text = "pull the network plug while the door is held: it must be released within this time"
         yield ("switches_off_after_s",), text
@@ -132,12 +136,13 @@ def warnings(settings: HttpDoorSettings) -> Remarks:
 
 
 def create(name: str, settings: HttpDoorSettings, bus: InsistentCalls) -> "HttpDoor":
-    """Make the door's driver on its bus; it sends nothing before `open`."""
+    """Make the door's driver on its bus. The driver sends nothing before `open`."""
     return HttpDoor(settings, bus)
 
 
 class HttpDoor:
-    """`drivers.Driver` for one door. `_told`: the relay's last commanded state; None when unknown."""
+    """`drivers.Driver` for one door. `_told`: the state that the relay was last commanded to; None if
+    unknown."""
 
     def __init__(self, settings: HttpDoorSettings, bus: InsistentCalls) -> None:
         self._settings = settings
@@ -148,9 +153,9 @@ class HttpDoor:
         self._touched = False
 
     def open(self) -> None:
-        """Check that the controller answers; the first time, release the door.
+        """Check that the controller answers. At the first call, release the door too.
 
-        After a failure it only reads: a lost answer must not release a held door.
+        After a failure `open` only reads, because a lost answer must not release a held door.
         """
         held = self._held(self._bus.get_json(self._settings.state_path))
         if not self._claimed and held is not False:
@@ -166,25 +171,25 @@ class HttpDoor:
         return sample
 
     def write(self, outputs: DoorOutputs) -> None:
-        """Hold or release the door; if the relay has a timer, send a hold in every scan."""
+        """Hold or release the door. If the relay has a timer, send the hold in every scan."""
         if outputs.hold_open != self._told or (outputs.hold_open and self._renews):
             self._send(outputs.hold_open)
 
     def make_safe(self) -> None:
-        """Release the door, and verify the release where the relay's state can be read."""
+        """Release the door. Verify the release if the relay's state can be read."""
         self._send(on=False)
         if self._settings.held and self._held(self._bus.get_json(self._settings.state_path)):
             raise DriverError("the relay is still on after it was switched off")
 
     def close(self) -> None:
-        """Release the door if it was ever driven. Does not raise."""
+        """Release the door if the driver ever held it. Does not raise."""
         if not self._touched:
             return
         self._bus.insist()
         try:
             self._send(on=False)
         except DriverError:
-            return  # the daemon is ending; the relay's timer switches it off
+            return  # the daemon ends, and the relay's timer switches the relay off
 
     def _send(self, on: bool) -> None:
         self._told, self._touched = None, True

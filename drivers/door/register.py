@@ -1,8 +1,9 @@
-"""A door operator that is read and commanded through Modbus registers.
+"""A door operator that the driver reads and commands through Modbus registers.
 
-Its status is one number. The map lists the numbers for open, closed, moving and faults; an unlisted
-number is a fault too, because the door's position is then unknown. A position value, if there is one,
-must agree with the status. The command holds the door open or releases it; nothing drives it shut.
+The operator's status is one number. The map lists the numbers for open, closed, moving and faults. An
+unlisted number is a fault too, because the door's position is then unknown. If the map has a position
+value, this value must agree with the status. The command holds the door open or releases it; no command
+drives it shut.
 """
 
 from collections.abc import Iterator, Mapping
@@ -63,7 +64,7 @@ PROFILE: Final = Profile("door_register", "map", DoorMap)
 
 
 def door_map(settings: RegisterDoorSettings) -> DoorMap:
-    """Return the YAML's map, or else the profile's map."""
+    """Return the YAML's map, or the profile's map if the YAML has no map."""
     return PROFILE.chosen(settings.profile, settings.map).changed(settings.changes)
 
 
@@ -76,7 +77,8 @@ def points(settings: RegisterDoorSettings) -> dict[str, Point]:
 
 
 def claims(settings: RegisterDoorSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of the command, which no other device may use; nothing for an invalid map."""
+    """Yield (place, path) of the command, which no other device may use. Yield nothing for an invalid
+    map."""
     if any(PROFILE.problems(settings.profile, settings.map)):
         return
     place_of_command = door_map(settings).command.at
@@ -87,7 +89,7 @@ def claims(settings: RegisterDoorSettings) -> Iterator[tuple[str, tuple[str, ...
 
 
 def describe(settings: RegisterDoorSettings, bus: object) -> Iterator[tuple[str, str]]:
-    """Yield rows for `check`: each part of the map, its place, and the meanings of its numbers."""
+    """Yield rows for `check` with the place of each part of the map and the meanings of its numbers."""
     found = door_map(settings)
     meanings = {
         "position": "0 closed to 100 open",
@@ -116,7 +118,8 @@ def tables(settings: RegisterDoorSettings) -> Iterator[Table]:
 
 
 def warnings(settings: RegisterDoorSettings) -> Remarks:
-    """Yield valid settings to review before the door goes into service: (path, text)."""
+    """Yield a warning (path, text) for each valid setting to review before the door goes into
+    service."""
     yield from PROFILE.warnings(settings.profile, "watch the door move")
     if not door_map(settings).command.read_back:
         written = _command_in(settings)
@@ -132,7 +135,7 @@ def _command_in(settings: RegisterDoorSettings) -> tuple[str, ...]:
 
 
 def create(name: str, settings: RegisterDoorSettings, bus: ModbusBus) -> "RegisterDoor":
-    """Make the door's driver on its bus; it sends nothing before `open`."""
+    """Make the door's driver on its bus. The driver sends nothing before `open`."""
     found = points(settings)
     command, outputs = door_map(settings).command, {"command": found.pop("command")}
     safe = {"command": command.release}
@@ -148,7 +151,7 @@ class RegisterDoor:
         self._lines = lines
 
     def open(self) -> None:
-        """Check that the operator answers; the first time, release the door."""
+        """Check that the operator answers. At the first call, release the door too."""
         self._lines.claim()
 
     def read(self) -> DoorSample:
@@ -165,12 +168,12 @@ class RegisterDoor:
         self._lines.make_safe()
 
     def close(self) -> None:
-        """Release the door if it was ever driven. Does not raise."""
+        """Release the door if the driver ever held it. Does not raise."""
         self._lines.close()
 
 
 def decode(found: DoorMap, words: Mapping[str, int]) -> DoorSample:
-    """Decode the register values, given by part of the map. Never raises."""
+    """Decode the register values. `words` gives a value for each part of the map. Never raises."""
     lost = _lost(found, words)
     status = words["status"]
     return DoorSample(
@@ -183,7 +186,7 @@ def decode(found: DoorMap, words: Mapping[str, int]) -> DoorSample:
 
 
 def _lost(found: DoorMap, words: Mapping[str, int]) -> str:
-    """Return the reason for an unknown position; "" if the position is known."""
+    """Return the reason why the position is unknown; "" if the position is known."""
     value, status = words["status"], found.status
     if value in status.faults:
         return f"status {value}: {status.faults[value]}"
@@ -211,11 +214,11 @@ def _address(text: str) -> int:
     try:
         return place(text)[1]
     except ValueError:
-        return 0  # the map's own check reports a misspelt place
+        return 0  # the map's own check reports an invalid place
 
 
 def _meanings(status: Status) -> list[tuple[int, str]]:
-    """Return each number with its meaning, in the order of the numbers."""
+    """Return (number, meaning) pairs, sorted by number."""
     words = [(v, word) for word in ("closed", "moving", "open") for v in getattr(status, word)]
     faults = [(v, f"not known, with the fault: {text}") for v, text in status.faults.items()]
     return sorted([*words, *faults])

@@ -1,4 +1,5 @@
-"""The register map of a door operator, from a YAML or a profile: places, and meanings of numbers."""
+"""A door operator's register map, from a YAML or a profile. It gives places, and the meanings of
+numbers."""
 
 from typing import Annotated
 
@@ -14,7 +15,7 @@ Percent = Annotated[int, msgspec.Meta(ge=0, le=100)]
 
 
 class Status(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The door's state as one number; an unlisted number is a fault."""
+    """The door's state as one number. An unlisted number counts as a fault."""
 
     open: Annotated[list[Word], msgspec.Meta(min_length=1), tells("numbers of a fully open door.")]
     closed: Annotated[list[Word], msgspec.Meta(min_length=1), tells("numbers of a closed door.")]
@@ -28,7 +29,7 @@ class Status(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
     )
 
     def problems(self) -> Remarks:
-        """Yield problems: a place that is not a register; a number with two meanings."""
+        """Yield a problem for a place that is not a register, and for a number with two meanings."""
         yield from super().problems()
         yield from listed_twice(
             {key: getattr(self, key) for key in ("open", "closed", "moving", "faults")}
@@ -36,7 +37,7 @@ class Status(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class DoorPosition(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The door's position, from 0 (closed) to 100 (open); any other number is a fault."""
+    """The door's position, from 0 (closed) to 100 (open). Any other number counts as a fault."""
 
     unknown: Annotated[
         Word | None, tells("the number for an unknown position; then only the status counts.")
@@ -49,7 +50,8 @@ class DoorPosition(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = 5
 
     def problems(self) -> Remarks:
-        """Yield problems: no register; overlapping thresholds; `unknown` within 0 to 100."""
+        """Yield a problem for a place that is no register, for overlapping thresholds, and for an
+        `unknown` within 0 to 100."""
         yield from super().problems()
         if self.unknown is not None and self.unknown <= 100:
             yield ("unknown",), "0 to 100 are positions"
@@ -58,7 +60,7 @@ class DoorPosition(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class OperatorFaults(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The faults that the operator reports. They are shown only; no decision depends on them."""
+    """The faults that the operator reports. The daemon shows them, and no decision depends on them."""
 
     bits: Annotated[
         dict[Bit, Name],
@@ -67,7 +69,7 @@ class OperatorFaults(InRegister, frozen=True, kw_only=True, forbid_unknown_field
 
 
 class HoldCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The command that holds the door open. No value drives it shut."""
+    """The command that holds the door open. No value of the command drives the door shut."""
 
     ON = "hold"
     OFF = "release"
@@ -84,7 +86,7 @@ class HoldCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_field
 
 
 class Parts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Parts that replace parts of the profile's map; each is given in full."""
+    """Parts that replace parts of the profile's map. Each given part replaces the whole part."""
 
     status: Annotated[Status | None, tells("the door's state as one number.")] = None
     position: Annotated[DoorPosition | None, tells("the door's position.")] = None
@@ -108,6 +110,6 @@ class DoorMap(Parts, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return msgspec.structs.replace(self, **{n: p for n, p in given.items() if p is not None})
 
     def places(self) -> dict[str, str]:
-        """Return part -> its place, for each given part."""
+        """Return part -> its place, for each part that the map gives."""
         parts = {name: getattr(self, name) for name in Parts.__struct_fields__}
         return {name: part.at for name, part in parts.items() if part is not None}

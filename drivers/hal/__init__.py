@@ -1,9 +1,10 @@
-"""Buses, each in its own file or folder. Only this code imports vendor libraries, and only on use.
+"""Buses, each in its own file or folder. Only this code imports vendor libraries, and only when a bus
+needs them.
 
 The file or folder is named after the bus `type:` of the YAML and holds a `BUS`. A Bus belongs to one
 thread. Every failure is a HalError, raised within the bus's I/O timeout. After a failure the bus backs
-off for 0.5 to 30 s, during which calls fail at once. So a dead device costs the other devices on its
-bus at most one timeout per backoff.
+off for 0.5 to 30 s, and calls during the backoff fail at once. So a dead device costs the other devices
+on its bus at most one timeout per backoff.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -31,10 +32,11 @@ Settings = TypeVar("Settings", bound=msgspec.Struct)
 
 
 class Where(NamedTuple):
-    """The place of a bus in the building: two files with the same `Where` use the same hardware.
+    """The place of a bus in the building. Two files with the same `Where` use the same hardware.
 
-    `text`: its name for a person. `local`: it belongs to this machine, as a serial port does.
-    `clients`: the maximum number of daemons at once; None if the number depends on the make.
+    `text`: the place's name for a person. `local`: the place belongs to this machine, such as a serial
+    port. `clients`: the maximum number of daemons that can use the place at once; None if the make
+    decides.
     """
 
     text: str
@@ -45,9 +47,9 @@ class Where(NamedTuple):
 class Needs(NamedTuple):
     """The permissions that a daemon needs from systemd for a bus (`bridges/runtime/drop_in.py`).
 
-    `devices`: in the form of DeviceAllow: a path, or a class whose devices may come and go
-    (`char-ttyUSB`). `modules`: the kernel modules of those classes. `group`: the group with access to
-    the devices. `family`: an address family besides IP's. `host`: the host reached over IP.
+    `devices`: paths, or classes whose devices may come and go (`char-ttyUSB`), as for DeviceAllow.
+    `modules`: the kernel modules of these classes. `group`: the group with access to the devices.
+    `family`: an address family in addition to IP. `host`: the host that the bus reaches over IP.
     """
 
     devices: tuple[str, ...] = ()
@@ -58,66 +60,68 @@ class Needs(NamedTuple):
 
 
 class UnwatchedOutputs(NamedTuple):
-    """Remarks on outputs that keep their value when the daemon's machine or the network dies."""
+    """Remarks about outputs that keep their value when the daemon's machine or the network dies."""
 
     warnings: Sequence[Remark] = ()
     notes: Sequence[Remark] = ()
 
 
 class Bus:
-    """The base of every bus; each type adds its own (`points.PointsBus`, HTTP calls…).
+    """The base of every bus. Each type adds its own methods, such as `points.PointsBus` or HTTP calls.
 
-    `calls`: the number of ended calls, successful or not; systemd's watchdog depends on it.
+    `calls`: the number of ended calls, successful or not. systemd's watchdog depends on this number.
     """
 
     calls = 0
 
     def on_edge(self, wake: Callable[[], None]) -> None:
-        """Call `wake` (from any thread) when an input may have changed; a polled bus never calls it."""
+        """Call `wake`, from any thread, when an input may have changed. A polled bus never calls
+        `wake`."""
 
     def scanned(self) -> None:
-        """Report a finished scan. A dead-man, if there is one, drops the outputs when scans stop."""
+        """Report a finished scan. If the bus has a dead-man, it drops the outputs when scans stop."""
 
     def insist(self) -> None:
-        """Make the next call at once, without waiting for the backoff: outputs are about to go off."""
+        """Let the next call skip the backoff, because outputs are about to go off."""
 
     def close(self) -> None:
-        """Release the bus. Does not raise; may be called twice."""
+        """Release the bus. Does not raise. The caller may call `close` twice."""
 
 
 class BusSettings(
     msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="type"
 ):
-    """The base of the section of every bus; its `tag` is the YAML's `type:`."""
+    """The base of the settings of every bus. Its `tag` is the YAML's `type:`."""
 
 
 class BusType(msgspec.Struct, Generic[Settings], frozen=True):
-    """One type of bus: a `BUS` at the end of `drivers/hal/<type>`, which needs no vendor library.
+    """One type of bus: the `BUS` at the end of `drivers/hal/<type>`. It needs no vendor library.
 
-    `settings`: the struct below the bus's name in the YAML, with `scan_s` (the period of readings).
-    `open_bus(settings)`: makes the bus, which sends nothing yet. Raises HalError.
-    `open_to_switch_off(settings)`: makes a bus that is quicker to load, for a process that only
-    switches off; None without such a bus.
-    `where(settings)`: its place in the building; None if files never share such a bus.
-    `needs(settings)`: its needs of the machine, beside IP.
-    `warnings(settings)`: (path, text) of legal settings that are worth a look. `fake`: the name of the
-    module with the far side (`hal_fakes/fake.py`); without a name there is no simulation.
-    `fake_inside`: the fake must run in the daemon's process, as for pins.
+    `settings`: the struct below the bus's name in the YAML. Its `scan_s` is the period of readings (s).
+    `open_bus(settings)`: makes the bus. The bus sends nothing before its first call. Raises HalError.
+    `open_to_switch_off(settings)`: makes a bus that loads faster, for a process that only switches
+    off. It is None if there is no such bus.
+    `where(settings)`: the bus's place in the building; None if two files never share such a bus.
+    `needs(settings)`: the permissions that the bus needs in addition to IP.
+    `warnings(settings)`: (path, text) of valid settings that may be a mistake.
+    `fake`: the name of the module that simulates the far side (`hal_fakes/fake.py`). Without a name
+    there is no simulation.
+    `fake_inside`: the fake must run inside the daemon's process, as a fake of pins must.
     `unwatched(settings, places)`: remarks on outputs at `places` that keep their value when the
     daemon's machine or the network dies. The daemon writes all of `places`.
     `tables(settings)`: further facts for `check`, such as the values that are written to a watchdog.
-    `paced(settings, devices, points)`: remarks on settings that are too slow for these devices on the
-    bus, and for its canonical points in use.
+    `paced(settings, devices, points)`: remarks on settings that are too slow for these devices and
+    for the canonical points that they use.
 
-    A bus with points also has
-    `canonical(point)`: the canonical spelling of a point; the text of its ValueError has the fix;
-    `describe(point)`: every spelling, for the electrician's table;
-    `wire_problems(wire)`: the errors in this wire on this bus;
-    `wire_warnings(wire)`: legal properties of the wire that are worth a look;
-    `unreachable(settings, point)`: why a bus with these settings cannot reach this canonical point;
-    `unfit(settings, point, direction)`: why the point cannot be an input, or an output;
-    `place(settings, point)`: the thing at this canonical point that no other file may use; None if
-    every file may use it.
+    A bus with points also has these functions:
+    `canonical(point)`: the canonical spelling of a point. Its ValueError gives the right spelling.
+    `describe(point)`: every spelling of the point, for the electrician's table.
+    `wire_problems(wire)`: the errors of this wire on this bus.
+    `wire_warnings(wire)`: valid properties of the wire that may be a mistake.
+    `unreachable(settings, point)`: why a bus with these settings cannot reach this canonical point.
+    `unfit(settings, point, direction)`: why the point cannot be an input, or an output.
+    `place(settings, point)`: the hardware at this canonical point that no other file may use. It is
+    None if every file may use the point.
     """
 
     settings: type[Settings]
@@ -147,4 +151,4 @@ class BusType(msgspec.Struct, Generic[Settings], frozen=True):
 
 
 AnyBus: TypeAlias = BusType[Any]
-"""Any bus type."""
+"""A bus type with any settings."""

@@ -1,4 +1,4 @@
-"""A bus's backoff after failures: 0.5 to 30 s, doubled each time, ended by the first success."""
+"""A bus's backoff after failures. The pause doubles from 0.5 to 30 s, and the first success ends it."""
 
 import math
 from collections.abc import Callable
@@ -9,11 +9,12 @@ from drivers.hal.points import HalError
 BACKOFF_FIRST_S: Final = 0.5
 BACKOFF_MAX_S: Final = 30.0
 JITTER: Final = 0.2
-"""The maximum random cut of a pause, as a fraction; it keeps many daemons from calling in step."""
+"""The maximum random cut of a pause, as a fraction. The cut keeps many daemons from calling at the same
+moment."""
 
 
 class Backoff:
-    """Pauses after failures. `jitter()` is between 0 and 1."""
+    """Pauses after failures. `jitter()` returns a number between 0 and 1."""
 
     def __init__(self, clock: Callable[[], float], jitter: Callable[[], float]) -> None:
         self._clock = clock
@@ -27,7 +28,7 @@ class Backoff:
 
     @property
     def insisting(self) -> bool:
-        """Does the next attempt ignore the pause?"""
+        """Return whether the next attempt ignores the pause."""
         return self._insisted
 
     @property
@@ -37,27 +38,28 @@ class Backoff:
 
     @property
     def probing(self) -> bool:
-        """Is the next attempt a probe after a failure?"""
+        """Return whether the next attempt is a probe after a failure."""
         return self.failing and not self._insisted
 
     def check(self, not_yet: bool = False) -> None:
-        """Raise HalError with the last failure's text during the pause, or if `not_yet`."""
+        """Raise HalError with the last failure's text if the pause still runs, or if `not_yet`."""
         if self._clock() < self._retry_at or not_yet:
             raise HalError(self._failure)
 
     def failed(self, text: str) -> HalError:
-        """Begin a pause, twice as long as the last; return the HalError to raise."""
+        """Begin a pause that is twice as long as the last. Return the HalError that the caller
+        raises."""
         self._failure = text
         self._pause_s = min(max(2 * self._pause_s, BACKOFF_FIRST_S), BACKOFF_MAX_S)
         self._retry_at = self._clock() + self._pause_s * (1 - JITTER * self._jitter())
         return HalError(text)
 
     def mended(self) -> None:
-        """Record a success: end the pause, and begin with the shortest pause next time."""
+        """Record a success. It ends the pause, and makes the next pause the shortest."""
         self._pause_s, self._retry_at, self._insisted = 0.0, -math.inf, False
         self.proven = True
 
     def insist(self) -> None:
-        """End the pause for one attempt; further calls have no effect until an attempt succeeds."""
+        """Let one attempt skip the pause. Further calls have no effect until an attempt succeeds."""
         if not self._insisted:
             self._insisted, self._retry_at = True, -math.inf

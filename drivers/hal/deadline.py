@@ -1,8 +1,8 @@
-"""TCP connections with one deadline for a whole call, whatever the far side does.
+"""TCP connections with one deadline for a whole call, even if the far side misbehaves.
 
-A timeout of requests or of a socket covers a single wait: a server that sends a byte now and then keeps
-the caller waiting for ever. Here every wait of a call (the name lookup, the connection, each send and
-each receive) gets only the call's remaining time.
+A timeout of requests or of a socket covers only a single wait. A server that sends one byte now and
+then would keep the caller waiting for ever. Here every wait of a call (the name lookup, the connection,
+each send and each receive) gets only the call's remaining time.
 """
 
 import ipaddress
@@ -25,14 +25,14 @@ Address = tuple[socket.AddressFamily, socket.SocketKind, int, str, SocketAddress
 
 
 class Resolve(Protocol):
-    """socket.getaddrinfo, or a test's."""
+    """The name lookup: socket.getaddrinfo, or a test's replacement."""
 
     def __call__(self, host: str, port: int, *, type: int) -> Sequence[Address]:
         """Return the addresses of this name. Raises OSError."""
 
 
 class Deadline:
-    """The end of the call under way, in monotonic seconds."""
+    """The end of the current call, in monotonic seconds."""
 
     def __init__(self) -> None:
         self.at = 0.0
@@ -42,7 +42,7 @@ class Deadline:
         self.at = time.monotonic() + timeout_s
 
     def left(self) -> float:
-        """Return the call's remaining time (s). Raises TimeoutError when there is none."""
+        """Return the call's remaining time (s). Raises TimeoutError when no time is left."""
         left_s = self.at - time.monotonic()
         if left_s <= 0:
             raise TimeoutError("the call's time is up")
@@ -54,25 +54,26 @@ class Deadline:
 
 
 class DeadlineSocket(socket.socket):
-    """A TCP socket; each of its waits ends by the deadline of the current call."""
+    """A TCP socket whose waits all end by the deadline of the current call."""
 
     deadline: Deadline
 
     def recv_into(self, buffer: "WriteableBuffer", nbytes: int = 0, flags: int = 0) -> int:
-        """Do socket.recv_into, through which http.client does all its reading."""
+        """Receive within the deadline. http.client does all its reading through this method."""
         self.settimeout(self.deadline.left())
         return super().recv_into(buffer, nbytes, flags)
 
     def sendall(self, data: "ReadableBuffer", flags: int = 0) -> None:
-        """Do socket.sendall, whose timeout already covers the whole send."""
+        """Send within the deadline. The timeout of socket.sendall already covers the whole send."""
         self.settimeout(self.deadline.left())
         super().sendall(data, flags)
 
 
 def tls_socket(deadline: Deadline) -> "type[ssl.SSLSocket]":
-    """Make a class of TLS sockets; each of their waits ends by the deadline.
+    """Make a class of TLS sockets whose waits all end by the deadline.
 
-    A TLS socket takes only the timeout from the plain socket inside, so it checks the deadline itself.
+    A TLS socket takes only the timeout from the plain socket inside. So the TLS socket checks the
+    deadline itself.
     """
     import ssl
 
@@ -91,9 +92,10 @@ def tls_socket(deadline: Deadline) -> "type[ssl.SSLSocket]":
 
 
 class Dialler:
-    """Makes the connections to one host. `dialled`: their number. `failure`: the last error.
+    """The maker of all connections to one host. `dialled`: the number of connections so far. `failure`:
+    the last error.
 
-    `resolve`: socket.getaddrinfo, or a test's.
+    `resolve`: socket.getaddrinfo, or a test's replacement.
     """
 
     def __init__(self, host: str, port: int, resolve: Resolve = socket.getaddrinfo) -> None:
@@ -107,7 +109,7 @@ class Dialler:
         self._last: socket.socket | None = None
 
     def dial(self) -> socket.socket:
-        """Connect anew; the addresses share the remaining time. Raises OSError."""
+        """Open a new connection. All addresses of the host share the remaining time. Raises OSError."""
         self.dialled += 1
         try:
             self._last = self._first_of(self._addresses())
@@ -117,7 +119,7 @@ class Dialler:
             raise
 
     def hang_up(self) -> None:
-        """End the last connection, even if a file of it is still open."""
+        """End the last connection, even if a file object of the connection is still open."""
         last, self._last = self._last, None
         descriptor = -1 if last is None else last.detach()
         if descriptor != -1:
@@ -140,7 +142,7 @@ class Dialler:
             sock.settimeout(timeout_s)
             sock.connect(where)
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            sock.settimeout(self.deadline.left())  # for a handshake of TLS
+            sock.settimeout(self.deadline.left())  # the timeout for a TLS handshake
         except OSError:
             sock.close()
             raise
@@ -159,7 +161,7 @@ class Dialler:
             found = answer.get(timeout=self.deadline.left())
         except queue.Empty:
             raise TimeoutError("the name's lookup takes too long") from None
-        self._lookup = None  # the lookup has answered; its thread may end a moment later
+        self._lookup = None  # the lookup has answered, though its thread may end a moment later
         if isinstance(found, OSError):
             raise found
         return found

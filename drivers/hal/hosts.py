@@ -5,7 +5,8 @@ import re
 
 
 def misspelt_address(host: str) -> str:
-    """Return the error for dotted numbers that are no IPv4 address; "" for an address or a name."""
+    """Return the error of a text of dotted numbers that is no IPv4 address. Return "" for an address or
+    a name."""
     if not re.fullmatch(r"[0-9]+(\.[0-9]+)+", host):
         return ""
     try:
@@ -24,7 +25,8 @@ def is_loopback(host: str) -> bool:
 
 
 def misspelt_host(host: str) -> str:
-    """Return the error for a text that is neither an address nor a host's name; "" for a good text."""
+    """Return the error of a text that is neither an address nor a host's name. Return "" for a valid
+    text."""
     if re.fullmatch(r"[^:]*:[0-9]+", host):
         name, _, port = host.partition(":")
         return f"is {host!r}: write host: {name}, port: {port}"

@@ -1,9 +1,11 @@
-"""HTTP: one controller that answers requests, through requests; with TLS where its address says https.
+"""HTTP: one controller that answers requests, through the library requests. An https address uses TLS.
 
 Every call has one deadline from the lookup of the name to the last byte of the body
-(`drivers/hal/deadline.py`). The body is capped; proxies, redirects and compression are off. Each call
-has a connection of its own, because replies in HTTP/1.1 have no numbers: on a kept connection a late or
-second reply would be taken for the reply to the next request. A call is sent only once.
+(`drivers/hal/deadline.py`). The body has a maximum size. Proxies, redirects and compression are off.
+
+Each call has a connection of its own, because replies in HTTP/1.1 have no numbers. On a kept
+connection, a late or second reply would pass for the reply to the next request. A call is sent only
+once.
 """
 
 import os
@@ -47,7 +49,7 @@ _HINTS = {
 
 
 class HttpBus(Bus):
-    """Calls to one controller. Every failure is a HalError with the thing to check.
+    """Calls to one controller. Every failure is a HalError that says what to check.
 
     Tests replace `clock` and `resolve`.
     """
@@ -67,7 +69,8 @@ class HttpBus(Bus):
         self._pushes: Pushes | None = None
 
     def on_edge(self, wake: Callable[[], None]) -> None:
-        """Call `wake` at each message of the controller's WebSocket, if it has one."""
+        """Call `wake` at each message of the controller's WebSocket, if the controller has a
+        WebSocket."""
         if self._settings.push_path and self._pushes is None:
             from drivers.hal.http_push import Pushes
 
@@ -81,9 +84,10 @@ class HttpBus(Bus):
     def get_json(
         self, path: str, method: Method = "GET", body: str | None = None
     ) -> dict[str, object]:
-        """Read `api_base` + `path`; return the JSON object of the answer, which must have status 200.
+        """Read `api_base` + `path`, and return the JSON object of the answer. The answer must have
+        status 200.
 
-        `method`, `body`: for a controller that reads by other requests than GET.
+        `method`, `body`: for a controller whose readings are other requests than GET.
         """
         url = self._base.url(path)
         with self._attempt(self._backoff):
@@ -92,10 +96,10 @@ class HttpBus(Bus):
     def send(
         self, path: str, method: Method = "POST", body: str | None = None, safe: bool = False
     ) -> None:
-        """Send a command, with `body` (JSON) if any; any 2xx is success.
+        """Send a command, with a JSON `body` if given. Any status 2xx is success.
 
-        It is sent at most once, even when the answer is lost. `safe`: the command switches an output
-        off, so it does not wait for the backoff of a failed reading.
+        The command is sent at most once, even when the answer is lost. `safe`: the command switches an
+        output off, so it does not wait for the backoff of a failed reading.
         """
         url = self._base.url(path)
         with self._attempt(self._safe_backoff if safe else self._backoff):
@@ -108,18 +112,19 @@ class HttpBus(Bus):
             return json_object(url, *self._call(method, url, body, reads=True))
 
     def insist(self) -> None:
-        """Make the next call at once, without waiting for the backoff."""
+        """Let the next call skip the backoff."""
         self._backoff.insist()
         self._safe_backoff.insist()
 
     def close(self) -> None:
-        """End the WebSocket, if there is one; no other connection stays open between calls."""
+        """End the WebSocket, if there is one. No other connection stays open between calls."""
         if self._pushes:
             self._pushes.close()
 
     @contextmanager
     def _attempt(self, backoff: Backoff) -> Iterator[None]:
-        """Guard one attempt: during the backoff after a failure, fail at once with the same text."""
+        """Guard one attempt. During the backoff after a failure, fail at once with the failure's
+        text."""
         backoff.check()
         self._dialler.deadline.start(self._settings.timeout_s)
         try:
@@ -136,7 +141,7 @@ class HttpBus(Bus):
     def _call(
         self, method: str, url: str, sent: str | None = None, reads: bool = False
     ) -> tuple[str, bytes]:
-        """Return content type and body of a good answer; the body of a command's answer is not read."""
+        """Return (content type, body) of a good answer. The body of a command's answer is not read."""
         import requests
 
         self._dialler.failure = None
@@ -170,7 +175,8 @@ class HttpBus(Bus):
         return self._authorization() | (self._signer.basic() if self._signer else {})
 
     def _authorization(self) -> dict[str, str]:
-        """Read the token, for each call, because it may be renewed meanwhile."""
+        """Return the header with the token. Each call reads the token again, because somebody may have
+        renewed it."""
         file = self._settings.token_file
         if file is None:
             return {}
@@ -205,8 +211,8 @@ class HttpBus(Bus):
 def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":
     """Make requests' HTTP adapter, on the dialler's connections.
 
-    There is no Session: a Session reads the whole body of a redirect even if it must not follow it,
-    keeps cookies, and takes proxies and passwords from the environment.
+    There is no Session, for three reasons. A Session reads the whole body of a redirect that it must
+    not follow. It keeps cookies. It takes proxies and passwords from the environment.
     """
     from requests.adapters import HTTPAdapter
     from urllib3 import HTTPConnectionPool, HTTPSConnectionPool
@@ -218,10 +224,10 @@ def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":
             return dialler.dial()
 
     class Connection(Dialled, HTTPConnection):
-        """Without TLS."""
+        """A connection without TLS."""
 
     class TlsConnection(Dialled, HTTPSConnection):
-        """With TLS."""
+        """A connection with TLS."""
 
     class Pool(HTTPConnectionPool):
         ConnectionCls = Connection
@@ -234,7 +240,7 @@ def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":
     if scheme == "https":
         context = (
             create_urllib3_context()
-        )  # trusts no authority yet: each call's `verify` adds them
+        )  # this context trusts no authority; each call's `verify` adds some
         context.sslsocket_class = tls_socket(dialler.deadline)
         adapter.poolmanager.connection_pool_kw["ssl_context"] = context
     return adapter
@@ -259,7 +265,7 @@ def _check_status(url: str, reads: bool, status: int) -> None:
 
 
 def _capped(raw: "BaseHTTPResponse") -> bytes:
-    """Read the whole body, or one byte beyond the limit: only reading to the end shows a cut body."""
+    """Read the whole body, or one byte beyond the limit. A body that was cut shows only at its end."""
     body = b""
     while len(body) <= BODY_MAX and (
         more := raw.read(BODY_MAX + 1 - len(body), decode_content=False)
@@ -269,7 +275,7 @@ def _capped(raw: "BaseHTTPResponse") -> bytes:
 
 
 def _cause(error: BaseException) -> str:
-    """Return the root cause inside the exceptions of requests and urllib3."""
+    """Return the root cause inside an exception of requests and urllib3."""
     while (below := error.__cause__ or error.__context__) is not None:
         error = below
     return excerpt(str(error) or type(error).__name__)

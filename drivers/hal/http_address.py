@@ -1,4 +1,4 @@
-"""The addresses of an HTTP API: its `api_base`, and the paths of its resources below that."""
+"""The addresses of an HTTP API: its `api_base`, and the paths of its resources below the `api_base`."""
 
 import re
 from typing import Annotated, Final, NamedTuple
@@ -15,7 +15,7 @@ Path = Annotated[
         extra={"pattern": "a path that begins with a slash (/relay/0?turn=on)"},
     ),
 ]
-"""A path below `api_base`, with its query if there is one."""
+"""A path below `api_base`. The path may end with a query."""
 
 PORTS: Final = {"http": 80, "https": 443}
 
@@ -28,7 +28,7 @@ _BASE: Final = re.compile(
 
 
 class Base(NamedTuple):
-    """An `api_base` in parts. `path` is "" or begins with a slash and does not end with one."""
+    """An `api_base` in parts. A `path` that is not "" begins with a slash and does not end with one."""
 
     host: str
     port: int

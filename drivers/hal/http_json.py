@@ -12,7 +12,7 @@ def excerpt(text: str) -> str:
 
 
 def json_object(url: str, content_type: str, body: bytes) -> dict[str, object]:
-    """Decode the answer's JSON object. Raises HalError if the answer is anything else."""
+    """Decode the answer's JSON object. Raises HalError if the answer is not a JSON object."""
     sort = content_type.partition(";")[0].strip().lower()
     if sort != "application/json" and not sort.endswith("+json"):
         what = excerpt(sort) or "no content type"
@@ -27,7 +27,7 @@ def json_object(url: str, content_type: str, body: bytes) -> dict[str, object]:
 
 
 def strict_json(text: str) -> object:
-    """Decode JSON as RFC 8259 has it: no NaN, no duplicate key. Raises ValueError."""
+    """Decode JSON as RFC 8259 defines it, without NaN and without duplicate keys. Raises ValueError."""
     try:
         return json.loads(text, parse_constant=_no_number, object_pairs_hook=_without_doubles)
     except RecursionError:
@@ -39,7 +39,7 @@ def _no_number(word: str) -> NoReturn:
 
 
 def _without_doubles(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    """Refuse an object with a duplicate key: JSON does not define which key counts."""
+    """Refuse an object with a duplicate key, because JSON does not define which value counts."""
     found = dict(pairs)
     if len(found) < len(pairs):
         raise ValueError("a key occurs twice in one object")

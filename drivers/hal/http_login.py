@@ -1,7 +1,8 @@
-"""A user and password for HTTP: basic (RFC 7617) or digest (RFC 7616), by requests.
+"""A user and password for HTTP: basic (RFC 7617) or digest (RFC 7616), through the library requests.
 
-A digest takes two requests: the controller refuses the first one with a challenge, and does nothing.
-Later requests carry the challenge's nonce from the start, for as long as the controller accepts it.
+A digest login takes two requests. The controller refuses the first request with a challenge, and does
+nothing. Later requests carry the challenge's nonce from the start, until the controller refuses the
+nonce.
 """
 
 import base64
@@ -39,7 +40,8 @@ class Login(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class Signer:
-    """Signs requests for one user. The password is read for each call: it may be renewed meanwhile."""
+    """Signs requests for one user. Each call reads the password again, because somebody may have
+    renewed it."""
 
     def __init__(self, login: Login) -> None:
         from requests.auth import HTTPDigestAuth
@@ -48,7 +50,8 @@ class Signer:
         self._digest = HTTPDigestAuth(login.user, "")
 
     def sign(self, request: "PreparedRequest") -> None:
-        """Sign the request, as far as it can be signed before a challenge. Raises HalError."""
+        """Sign the request. A digest needs a challenge first, so before the first challenge it stays
+        unsigned. Raises HalError."""
         if self._login.method == "basic":
             request.headers.update(self.basic())
         else:
@@ -61,14 +64,14 @@ class Signer:
         return {"Authorization": f"Basic {base64.b64encode(pair).decode()}"}
 
     def is_challenge(self, answer: "Response") -> bool:
-        """Does this answer ask for a digest?"""
+        """Return whether this answer asks for a digest."""
         asked = answer.headers.get("WWW-Authenticate", "").lower()
         digest = self._login.method == "digest" and asked.startswith("digest ")
         return digest and answer.status_code == 401
 
     def answered(self, answer: "Response", verify: bool | str) -> "Response":
-        """Send the challenged request again, signed; return its answer. A second challenge is the
-        answer then, a refusal. The body of the challenge is not read."""
+        """Sign the challenged request, send it again, and return its answer. If this answer is a second
+        challenge, it counts as a refusal. The body of the challenge is not read."""
         answer.raw.close()
         signed: Response = self._digest.handle_401(  # type: ignore[no-untyped-call]
             answer, stream=True, verify=verify

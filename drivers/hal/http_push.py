@@ -1,8 +1,9 @@
-"""A controller's WebSocket, through websockets: at each message the controller is read at once.
+"""A controller's WebSocket, through the library websockets. At each message the controller is read at
+once.
 
-A message is not believed: it has no age, and many makes push only the part that has changed. So a
-WebSocket that is silent, late, garbled or gone makes no reading wrong; the controller is then read only
-every `scan_s`, and once anew after each connection.
+The content of a message is not used. A message has no age, and many makes push only the part that has
+changed. So a WebSocket that is silent, late, garbled or gone makes no reading wrong. In this case the
+controller is read only every `scan_s`, and once more after each new connection.
 """
 
 import logging
@@ -16,7 +17,7 @@ from drivers.hal.backoff import BACKOFF_FIRST_S, BACKOFF_MAX_S
 from drivers.hal.http_json import excerpt
 
 AT_MOST_EVERY_S: Final = 0.1
-"""The least time between two readings for messages, however many there are."""
+"""The least time (s) between two readings that messages cause."""
 MESSAGE_MAX: Final = 64 * 1024
 OPEN_S: Final = 3.0
 CLOSE_S: Final = 0.2
@@ -30,9 +31,9 @@ log = logging.getLogger(__name__)
 class Pushes:
     """Listens to a WebSocket in a thread of its own, until `close`.
 
-    `headers`: those of the handshake, made for each connection. `wake`: called from the thread after
-    each connection and for messages. A connection without a message counts as failed: a server may
-    accept each one and close it at once.
+    `headers` returns the headers of the handshake, anew for each connection. The thread calls `wake`
+    after each connection and for messages. A connection without a message counts as failed, because a
+    server may accept each connection and close it at once.
     """
 
     def __init__(
@@ -53,7 +54,7 @@ class Pushes:
         self._thread.start()
 
     def close(self) -> None:
-        """End the thread. May be called twice."""
+        """End the thread. The caller may call `close` twice."""
         self._ended.set()
         if self._connection:
             self._connection.close()
@@ -73,7 +74,7 @@ class Pushes:
             pause_s = min(2 * pause_s, BACKOFF_MAX_S)
 
     def _listened(self) -> str:
-        """Listen over one connection until it ends; return the reason for its end."""
+        """Listen on one connection until it ends. Return the reason for its end."""
         try:
             from websockets.exceptions import WebSocketException
         except ImportError:

@@ -12,7 +12,7 @@ from drivers.hal.http_address import Path, base
 from drivers.hal.http_login import Login
 
 Method = Literal["POST", "PUT", "GET"]
-"""The HTTP method of a command. Some makes take commands as a GET with a query."""
+"""The HTTP method of a command. Some makes take a command as a GET with a query."""
 Header = Annotated[
     str,
     msgspec.Meta(
@@ -21,7 +21,8 @@ Header = Annotated[
     ),
 ]
 Timeout = Annotated[float, msgspec.Meta(ge=0.1, le=5, extra={"unit": "s"})]
-"""At most 5 s: a longer call would look like a hang to systemd (`WatchdogSec=10` of the unit)."""
+"""The timeout of a call. It is at most 5 s, because systemd would take a longer call for a hang
+(`WatchdogSec=10` of the unit)."""
 
 
 class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="http"):
@@ -61,7 +62,7 @@ class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
     ] = None
 
     def problems(self) -> Remarks:
-        """Yield problems: an invalid address; settings without effect."""
+        """Yield a problem for an invalid address, and for each setting without effect."""
         try:
             tls = base(self.api_base).scheme == "https"
         except ValueError as error:
@@ -87,7 +88,8 @@ class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 def _readable_secret(settings: HttpSettings) -> Literal["login", "token_file", ""]:
-    """Return the setting whose secret leaves this machine unencrypted; "" if there is none."""
+    """Return the setting whose secret leaves this machine unencrypted; "" if every secret is encrypted
+    or there is none."""
     basic = settings.login is not None and settings.login.method == "basic"
     if not basic and not settings.token_file:
         return ""
@@ -98,7 +100,7 @@ def _readable_secret(settings: HttpSettings) -> Literal["login", "token_file", "
 
 
 def warnings(settings: HttpSettings) -> Remarks:
-    """Yield valid settings that deserve a second look: (path, text)."""
+    """Yield a warning (path, text) for each valid setting that may be a mistake."""
     readable = _readable_secret(settings)
     if readable and settings.accept_unencrypted:
         text = f"the secret goes over the network unencrypted: {settings.accept_unencrypted}"

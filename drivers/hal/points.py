@@ -1,8 +1,8 @@
 """Points: the named contacts of a device, on any bus that has contacts.
 
-A driver works with signals that are asserted or not (`fire_alarm`, `call_L1`). This file knows their
-addresses and polarity; the bus (`drivers/hal/`) knows only levels. GPIO pins and the coils and discrete
-inputs of a Modbus I/O module are treated alike.
+A driver works with signals that are asserted or not (`fire_alarm`, `call_L1`). This file knows the
+signals' addresses and polarity. The bus (`drivers/hal/`) knows only levels. Signals on GPIO pins are
+treated like signals on the coils and discrete inputs of a Modbus I/O module.
 """
 
 import re
@@ -52,7 +52,7 @@ class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Output(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One relay or line that is driven. Its safe level is always not asserted."""
+    """One relay or line that is driven. Its safe level always means "not asserted"."""
 
     refused: ClassVar[Mapping[str, str]] = {
         "bus": "an output is always on the device's own bus: wire the relay there, and delete 'bus'"
@@ -89,22 +89,23 @@ class Output(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def input_wires(inputs: msgspec.Struct, debounce_s: float | None = None) -> list["Wire"]:
-    """Return a row for each Input of a YAML's `inputs`; `debounce_s` is the default."""
+    """Return a row for each Input of a YAML's `inputs`. `debounce_s` is the default."""
     fields = ((signal, getattr(inputs, signal)) for signal in inputs.__struct_fields__)
     return [line.wire(s, ("inputs", s), debounce_s) for s, line in fields if line is not None]
 
 
 class Flash(msgspec.Struct, frozen=True):
-    """A pulse that the module times: the point of the request, and the duration (s)."""
+    """A pulse that the module times. It has the point of the request, and the duration (s)."""
 
     point: str
     on_s: float
 
 
 class Clearing(msgspec.Struct, frozen=True):
-    """A controller may take the commands in these bits of a place, and clear the bits by itself.
+    """The habit of a controller that takes commands and clears them by itself. `bits`: the bits of a
+    place that hold the command.
 
-    `pulse`: the command is a pulse, so nobody needs to hear that the controller ends it earlier.
+    `pulse`: the command is a pulse. If the controller ends the pulse early, nobody needs a warning.
     """
 
     bits: int = 1
@@ -121,7 +122,7 @@ class Wire(msgspec.Struct, frozen=True):
     pull: Pull | None = None
     debounce_s: float | None = None
     path: tuple[str, ...] = ()
-    """The wire's path in the YAML, from the device downwards, for error messages."""
+    """The wire's path in the YAML for error messages. The path begins at the device."""
     flash: Flash | None = None
     read_back: bool = True
     clearing: Clearing | None = None
@@ -130,17 +131,18 @@ class Wire(msgspec.Struct, frozen=True):
     """The bus of an input that is not on the device's own bus."""
 
     def level(self, asserted: bool) -> bool:
-        """Return the electrical level (True is high) for this meaning."""
+        """Return the electrical level (True is high) that means asserted, or not asserted."""
         return asserted == (self.active == "high")
 
     def asserted(self, level: int) -> bool:
-        """Does this electrical level (1 is high) mean asserted?"""
+        """Return whether this electrical level (1 is high) means asserted."""
         return level == (self.active == "high")
 
     def broken_reads(self) -> bool | None:
-        """Return the reading of a cut wire: asserted or not; None if it floats.
+        """Return the reading of a cut wire: True for asserted, False for not asserted, None if the wire
+        floats.
 
-        A GPIO input goes to the level of its pull; an open contact at a Modbus module reads 0.
+        A GPIO input goes to the level of its pull. An open contact at a Modbus module reads 0.
         """
         if self.direction == "out":
             return False
@@ -150,31 +152,32 @@ class Wire(msgspec.Struct, frozen=True):
 
 
 def is_number(wires: Iterable[Wire]) -> bool:
-    """Are these lines the bits of registers? Then they are a number inside a controller, which has no
-    cable that could be cut."""
+    """Return whether these lines are bits of registers. Such bits form a number inside a controller,
+    and have no cable that could be cut."""
     return all(re.search(r"\bbit\b", wire.point, re.IGNORECASE) for wire in wires)
 
 
 class Lines(Protocol):
-    """Raw levels of some points of one bus (1 and True are high), claimed for one device."""
+    """The raw levels of one device's points on one bus. 1 and True are high."""
 
     def claim(self) -> None:
-        """Take every output at its safe level in one step, and every input. Raises HalError."""
+        """Claim every output at its safe level in one step, and every input. Raises HalError."""
 
     def read(self) -> Mapping[str, int]:
-        """Read every input's level now, by its canonical point. Raises HalError.
+        """Read the level of every input now. Return canonical point -> level. Raises HalError.
 
-        An output among the points has lost its level, and must be written again.
+        An output in the result has lost its level, and must be written again.
         """
 
     def write(self, levels: Mapping[str, bool]) -> None:
-        """Drive these outputs. Raises HalError; then their levels are unknown.
+        """Drive these outputs. Raises HalError; after an error their levels are unknown.
 
-        Tries every output that goes to its safe level, even after another output has failed.
+        The call tries every output that goes to its safe level, even after another output has failed.
         """
 
     def outputs(self) -> Mapping[str, int] | None:
-        """Read back the levels of the outputs that can be read; None where none can."""
+        """Read back the levels of the outputs that can be read. Return None if no output can be
+        read."""
 
     def close(self) -> None:
         """Set the outputs to their safe level and release every line. Does not raise."""
@@ -187,20 +190,20 @@ class FlashLines(Protocol):
     def flash(self, point: str, flash: Flash) -> None:
         """Request once that the module switches this output on, and off again by itself.
 
-        Raises HalError; then the output may be on.
+        Raises HalError; after an error the output may be on.
         """
 
 
 @runtime_checkable
 class RenewedLines(Protocol):
-    """Lines of a bus whose relays may have timers of their own, which switch them off."""
+    """Lines of a bus whose relays may have timers. A relay's own timer switches the relay off."""
 
     def renew(self, points: Iterable[str]) -> None:
-        """Start the timers of these relays again, which are on. Raises HalError."""
+        """Restart the timers of these relays, which are on. Raises HalError."""
 
 
 class PointsBus(Protocol):
-    """A bus that has points: GPIO, or Modbus."""
+    """A bus that has points: GPIO, Modbus or MQTT."""
 
     def canonical(self, point: str) -> str:
         """Return the canonical spelling of a point. Raises ValueError with the right spelling."""
@@ -212,14 +215,14 @@ class PointsBus(Protocol):
         unread: Collection[str] = (),
         clearing: Mapping[str, Clearing] = MappingProxyType({}),
     ) -> Lines:
-        """Return the lines of one device: canonical points; outputs with their safe levels.
+        """Return the lines of one device: canonical inputs, and outputs with their safe levels.
 
         `unread`: outputs that are never read back. `clearing`: outputs that the controller may clear.
         """
 
 
 class HalError(DriverError):
-    """The bus failed: no such chip, connection refused, timeout, exception reply, bad frame."""
+    """The error of a bus: no such chip, connection refused, timeout, exception reply, bad frame."""
 
 
 Readings = Callable[[], Mapping[str, bool]]
@@ -255,7 +258,7 @@ class Points:
         self._elsewhere = elsewhere
 
     def open(self) -> None:
-        """Claim every line, outputs not asserted."""
+        """Claim every line. No output is asserted afterwards."""
         self._written = None
         self._lines.claim()
 
@@ -274,11 +277,12 @@ class Points:
         return self._read
 
     def last_known(self) -> dict[str, bool]:
-        """Return each input's last reading, and each output's last written value if known."""
+        """Return each input's last reading, and each output's last written value if this value is
+        known."""
         return {**self._read, **(self._written or {})}
 
     def write(self, asserted: Mapping[str, bool]) -> None:
-        """Set every output, off first: exclusive outputs never overlap."""
+        """Set every output. Outputs that go off come first, so that exclusive outputs never overlap."""
         wanted = {signal: asserted.get(signal, False) for signal in self._out}
         known = self._written or {}
         unread = {s for s, (wire, _) in self._out.items() if not wire.read_back}
@@ -299,18 +303,19 @@ class Points:
         self._written = wanted
 
     def flash(self, signal: str) -> None:
-        """Let the module time a pulse of this output; its level is unknown from now on.
+        """Let the module time a pulse of this output. From now on the output's level is unknown.
 
-        Raises HalError; then there may be a pulse, and a second request would prolong the pulse.
+        Raises HalError; after an error there may be a pulse, and a second request would prolong it.
         """
         wire, point = self._out[signal]
-        assert wire.flash  # only an output with `flash` gets here
+        assert wire.flash  # the caller only passes outputs with `flash`
         assert isinstance(self._lines, FlashLines)  # `wire_problems` refuses `flash` on other buses
         self._written = None
         self._lines.flash(point, wire.flash)
 
     def make_safe(self) -> None:
-        """Switch every output off, even outputs believed off, and read them back where possible."""
+        """Switch every output off, even an output that is believed off. Read the outputs back where
+        possible."""
         self._written = None
         self.write({})
         levels = self._lines.outputs()

@@ -7,21 +7,23 @@ from typing import Final
 from drivers.hal.points import HalError
 
 AGAIN_S: Final = 5.0
-"""A contradiction later than this (s) after a pause counts as the first contradiction."""
+"""The time (s) after a pause in which a contradiction counts as a repetition. A later one counts as the
+first."""
 FIRST_S: Final = 1.0
 LONGEST_S: Final = 30.0
-"""The first and the longest pause (s) in writing an output that another master writes too."""
+"""The longest pause (s) before the next write to an output that another master writes too. FIRST_S is
+the first pause."""
 
 
 class Rivals:
-    """The outputs, by name, that another master writes too: each repeatedly contradicts its written
-    value.
+    """The outputs, by name, that another master seems to write too. Such an output contradicts its
+    written value repeatedly.
 
-    After the first contradiction the output is written again at once: the module may have restarted.
-    With another master, repeated writes would switch the relay to and fro for ever. So after the second
-    contradiction the output is left alone for 1 s, then for twice as long each time, up to 30 s.
-    Meanwhile every write of its device fails, with an error that names the fault. Only safe values are
-    still written, at once and every time.
+    After the first contradiction the output is written again at once, because the module may have
+    restarted. With another master, repeated writes would switch the relay to and fro for ever. So after
+    the second contradiction the output is left alone for 1 s. Each further pause is twice as long, up
+    to 30 s. During a pause every write of the device fails with an error that names the fault. Only
+    safe values are still written, at once and every time.
     """
 
     def __init__(self, now: Callable[[], float]) -> None:
@@ -30,14 +32,14 @@ class Rivals:
         self._at: dict[str, float] = {}
 
     def contradicted(self, name: str) -> None:
-        """Record that this output contradicts its written value."""
+        """Record that this output has contradicted its written value."""
         now, before_s = self._now(), self._pause_s.get(name, 0.0)
         again = now - self._at.get(name, -math.inf) <= before_s + AGAIN_S
         self._at[name] = now
         self._pause_s[name] = min(max(FIRST_S, 2 * before_s), LONGEST_S) if again else 0.0
 
     def check(self, names: Iterable[str]) -> None:
-        """Raise HalError for the first of these outputs that is left alone now."""
+        """Raise HalError for the first of these outputs whose pause still runs."""
         for name in names:
             if self._now() - self._at.get(name, -math.inf) < self._pause_s.get(name, 0.0):
                 raise HalError(

@@ -8,7 +8,8 @@ from drivers.hal import Needs
 USB: Final = ("ttyUSB", "ttyACM")
 BOARD: Final = ("ttyAMA", "ttyS")
 MODULES: Final = {"ttyUSB": "usbserial", "ttyACM": "cdc_acm"}
-"""USB adapters: their kernel module, which may load after the daemon's start, adds a device class."""
+"""Class of a USB adapter's device -> its kernel module. The module may load after the daemon's start,
+and then adds the class."""
 
 
 def needs(port: str) -> Needs:
@@ -19,7 +20,7 @@ def needs(port: str) -> Needs:
 
 
 def _classes(port: PurePath) -> tuple[str, ...]:
-    """Return the possible classes of device (as in /proc/devices) behind a port."""
+    """Return the device classes (as in /proc/devices) that may be behind a port."""
     named = tuple(name for name in (*USB, *BOARD) if port.name.startswith(name))
     if named:
         return named

@@ -1,1 +1,1 @@
-"""Drivers of ingestors: those of dispensers."""
+"""Drivers of ingestors, which are those of dispensers."""

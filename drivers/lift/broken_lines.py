@@ -1,7 +1,7 @@
-"""Finds misreadings of a lift's codes when one of their lines is cut or shorted.
+"""Finds misreadings of a lift's codes when one of the code's lines is cut or shorted.
 
-A service or motion code is unsafe if it then shows a safer state than the lift's real state. A floor
-code gives a warning if it then shows another floor.
+A misread service or motion code is unsafe if it shows a safer state than the lift's real state. A
+misread floor code gives a warning if it shows another floor.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,12 +14,13 @@ from drivers.tables import Lines, breaks
 from drivers.unsafe import Unsafe
 
 SERVES = {"agv_mode": 0, "normal": 1, "overload": 1}
-"""How far a state restricts robots; every unlisted state takes the lift away from RMF."""
+"""State -> how far the state restricts robots. Every unlisted state takes the lift away from RMF."""
 TAKEN_AWAY = 2
 
 
 class Misread(NamedTuple):
-    """With `line` broken (`how`: cut or shorted), the code for `shown` reads as `reads`."""
+    """One misreading. With `line` broken (`how` is cut or shorted), the code for `shown` reads as
+    `reads`."""
 
     line: str
     how: str
@@ -32,7 +33,8 @@ def misread(
     read: Callable[[Lines], str | None],
     table: Mapping[str, Wire],
 ) -> Iterator[Misread]:
-    """Yield each misreading by one broken line. `shown`: meaning -> its codes; `read`: the decoder."""
+    """Yield each misreading that one broken line causes. `shown` is meaning -> its codes; `read`
+    decodes lines."""
     for meaning, numbers in shown.items():
         for lines in numbers:
             for line, how, then in breaks(lines, table):
@@ -42,7 +44,8 @@ def misread(
 
 
 def unsafe_codes(wiring: LiftWiring, table: Mapping[str, Wire]) -> Iterator[Unsafe]:
-    """Yield the lines of the service and motion codes that `accept_unsafe` must name."""
+    """Yield each line of the service and motion codes whose break is unsafe. `accept_unsafe` must name
+    these lines."""
     for name, code in (("service", wiring.inputs.service), ("motion", wiring.inputs.motion)):
         if code is None or any(number >> len(code.bits) for number in code.codes):
             continue
@@ -55,9 +58,8 @@ def unsafe_codes(wiring: LiftWiring, table: Mapping[str, Wire]) -> Iterator[Unsa
 
 
 def floor_warnings(code: FloorCode, table: Mapping[str, Wire]) -> str:
-    """Describe the floors that read as another floor with one broken line; "" if there are no such
-    floors.
-    """
+    """Describe the floors that read as another floor when one line is broken. Return "" if there are
+    none."""
     shown: dict[str, list[Lines]] = {}
     for _, level, lines in code.shows():
         if level is not None:
@@ -74,12 +76,14 @@ def sentence(found: Iterator[Misread]) -> str:
 
 
 def _danger(state: str) -> int:
-    """Rank a state by its restriction of robots (greater is stricter; a moving car is strictest)."""
+    """Rank a state by how far it restricts robots. A greater rank is stricter, and a moving car is
+    strictest."""
     return 0 if state == "stopped" else SERVES.get(state, TAKEN_AWAY)
 
 
 def _shown(name: str, code: ServiceCode | MotionCode) -> dict[str, list[Lines]]:
-    """Return state -> its codes as lines, without the codes that the controller never shows."""
+    """Return state -> its codes as lines. Codes of a fault are missing, because the controller never
+    shows them."""
     shown: dict[str, list[Lines]] = {}
     for number, state in code.codes.items():
         if state != "fault":

@@ -27,7 +27,8 @@ ALARMED = (Hazard.FIRE, Hazard.CODE_BLUE, Hazard.EARTHQUAKE, Hazard.EMERGENCY)
 
 
 def problems(wiring: LiftWiring) -> Remarks:
-    """Yield the problems that keep the daemon from starting, with unaccepted unsafe choices."""
+    """Yield the problems that keep the daemon from starting. Unsafe choices that nobody has accepted
+    are among them."""
     yield from floors(wiring)
     yield from alarm(wiring)
     yield from _floor_code(wiring.floor_code, wiring.levels())
@@ -40,7 +41,7 @@ def problems(wiring: LiftWiring) -> Remarks:
 
 
 def warnings(wiring: LiftWiring) -> Remarks:
-    """Yield valid wiring that deserves a second look."""
+    """Yield a warning for each valid choice of wiring that may be a mistake."""
     table = {w.signal: w for w in wires(wiring)}
     told = wiring.inputs.agv_mode is not None or _in_service(wiring, "agv_mode")
     fire = sees(wiring, Hazard.FIRE)
@@ -68,10 +69,11 @@ def warnings(wiring: LiftWiring) -> Remarks:
 def missing(
     settings: LiftSettings, path: tuple[str, ...], told: bool, asks: bool, fire: bool, holds: bool
 ) -> Remarks:
-    """Yield a warning for each absent optional signal.
+    """Yield a warning for each optional signal that is absent.
 
     `told`: the lift reports AGV mode. `asks`: an output requests AGV mode. `fire`: the lift reports a
-    fire. `holds`: an output holds the door open. `path`: the section that lacks them.
+    fire. `holds`: an output holds the door open. `path`: the section of the YAML where the signal would
+    be.
     """
     by_call = settings.agv_mode == "by_call"
     if not told:
@@ -89,11 +91,11 @@ def missing(
 
 
 Sees = Callable[[str], bool]
-"""A question to the lift's settings: does the lift report this hazard, by a line or by a code?"""
+"""A function that returns whether the lift reports this hazard, by a line or by a code."""
 
 
 def notes(settings: LiftSettings, sees: Sees) -> Remarks:
-    """Yield intended choices with effects that the site should know."""
+    """Yield a note for each intended choice with side effects that the site should know."""
     if sees(Hazard.FIRE) and settings.alarm == "none":
         text = (
             "a fire stops this lift for robots, and no topic tells the fleets of it (alarm: none)"
@@ -107,7 +109,7 @@ def notes(settings: LiftSettings, sees: Sees) -> Remarks:
 
 
 def alarm(settings: LiftSettings) -> Remarks:
-    """Yield the problems of the alarm for the fleets."""
+    """Yield the problems with the alarm that the lift sends to the fleets."""
     yield from alarm_problems(settings)
     if settings.alarm == "none" and settings.alarm_on != [Hazard.FIRE]:
         yield ("alarm_on",), "alarm: none sends no alarm; write alarm: emergency_signal"
@@ -122,9 +124,8 @@ def unseen(settings: LiftSettings, sees: Sees) -> Remarks:
 
 
 def by_call(settings: LiftSettings, told: bool, asks: bool, request: tuple[str, ...]) -> Remarks:
-    """Check `by_call`: the lift reports AGV mode, and no output requests AGV mode. `request`: the path
-    of such an output.
-    """
+    """Yield problems with `by_call`. The lift must report AGV mode, and no output may request AGV mode.
+    `request` is the path of such an output."""
     if settings.agv_mode == "by_call" and not told:
         text = "by_call needs an agv_mode input: nothing else shows that the lift accepted a call"
         yield ("agv_mode",), text
@@ -133,7 +134,8 @@ def by_call(settings: LiftSettings, told: bool, asks: bool, request: tuple[str, 
 
 
 def unsafe(wiring: LiftWiring) -> Iterator[Unsafe]:
-    """Yield the wiring that `accept_unsafe` must name: a cut wire or a power-on could cause harm."""
+    """Yield the wiring that `accept_unsafe` must name, because a cut wire or a power-on could cause
+    harm."""
     table = {w.signal: w for w in wires(wiring)}
     yield from _cut(table, Hazard.FIRE, True, "a fire alarm reads clear")
     yield from _cut(table, "agv_mode", False, "AGV mode reads on")
@@ -154,7 +156,8 @@ def _cut(table: Mapping[str, Wire], signal: str, asserted: bool, meaning: str) -
 
 
 def floors(wiring: LiftSettings) -> Remarks:
-    """Yield problems: no floors; a floor, or one door of a landing, that is named twice."""
+    """Yield problems: no floors at all, a floor that is named twice, or one door of a landing that is
+    named twice."""
     stops = wiring.stops()
     if not stops:
         yield ("floors",), "no floors: list this lift's floors by their names on RMF's map"
@@ -186,7 +189,8 @@ def counts_down(settings: LiftSettings, codes: Mapping[int, str], path: tuple[st
 def named(
     what: str, section: tuple[str, ...], given: Collection[str], levels: Collection[str]
 ) -> Remarks:
-    """Check that `given` has exactly the landings. `what`: the name of an entry."""
+    """Yield a problem for each landing that `given` lacks or has in addition. `what` names an entry of
+    `given`."""
     for level in given:
         if level not in levels:
             yield section, f"{level!r} is not a landing of this lift, which has {', '.join(levels)}"
@@ -312,7 +316,7 @@ def _service(wiring: LiftWiring) -> Remarks:
 
 
 def sees(wiring: LiftWiring, hazard: str) -> bool:
-    """Does the lift report this hazard, by a line or by its service code?"""
+    """Return whether the lift reports this hazard, by a line or by its service code."""
     return getattr(wiring.inputs, hazard) is not None or _in_service(wiring, hazard)
 
 
@@ -326,7 +330,8 @@ def _in_register(code: FloorCode, table: Mapping[str, Wire]) -> bool:
 
 
 def _dead_code(code: FloorCode, table: Mapping[str, Wire]) -> Iterator[Unsafe]:
-    """Check that the code reads as no floor with all lines cut at once (the cable, the supply)."""
+    """Yield the code if it reads as a floor when all lines are cut at once, with the cable or the
+    supply."""
     if _in_register(code, table):
         return
     lines = [signal for signal, _, _ in code.inputs()]

@@ -1,4 +1,5 @@
-"""Converts numbers on several lines, least significant first: binary, Gray or BCD."""
+"""Converts numbers on several lines. The code is binary, Gray or BCD, and the least significant line
+comes first."""
 
 from collections.abc import Mapping, Sequence
 from typing import Literal
@@ -15,7 +16,7 @@ def decode(encoding: Encoding, lines: Sequence[bool]) -> int | None:
 
 
 def encode(encoding: Encoding, number: int, width: int) -> tuple[bool, ...]:
-    """Return the lines for a number. Raises ValueError if it needs more lines than `width`."""
+    """Return the lines for a number. Raises ValueError if the number needs more lines than `width`."""
     pattern = number
     if encoding == "gray":
         pattern = number ^ (number >> 1)

@@ -1,4 +1,4 @@
-"""A lift on dry contacts: one line for each signal, or numbers on several lines, by the YAML.
+"""A lift on dry contacts. By the YAML, each signal has a line, or several lines form a number.
 
 The lines are GPIO pins, or coils and discrete inputs of a Modbus I/O module.
 """
@@ -23,7 +23,7 @@ DOOR = {
     (False, False): DoorReading.BETWEEN,
     (True, True): DoorReading.BOTH,
 }
-"""(opened, closed) contacts."""
+"""(opened, closed) contacts -> the reading of the door."""
 
 UP_DOWN = {
     (True, False): Motion.UP,
@@ -37,7 +37,8 @@ class DryContactLiftSettings(LiftWiring, frozen=True, kw_only=True, forbid_unkno
     """A lift on dry contacts."""
 
     def problems(self) -> Remarks:
-        """Yield invalid wiring, and unsafe choices that `accept_unsafe` does not name."""
+        """Yield a problem for invalid wiring, and for each unsafe choice that `accept_unsafe` does not
+        name."""
         return lift_checks.problems(self)
 
 
@@ -45,12 +46,12 @@ wires, debounce, warnings = lift_table.wires, lift_table.debounce, lift_checks.w
 
 
 def notes(settings: DryContactLiftSettings) -> Remarks:
-    """Yield intended choices with effects to know about: (path below the device, text)."""
+    """Yield a note (path below the device, text) for each intended choice with side effects."""
     return lift_checks.notes(settings, partial(lift_checks.sees, settings))
 
 
 def create(name: str, settings: DryContactLiftSettings, bus: PointsBus) -> "DryContactLift":
-    """Make the lift's driver on its GPIO or Modbus bus; it touches nothing before `open`."""
+    """Make the lift's driver on its GPIO or Modbus bus. The driver touches nothing before `open`."""
     return DryContactLift(settings, bus)
 
 
@@ -67,12 +68,12 @@ class DryContactLift(OnPoints):
         return decode(self._settings, self._points.read(), self._conditional)
 
     def write(self, outputs: LiftOutputs) -> None:
-        """Set every output to this level, switching off first."""
+        """Set every output to this level. Outputs that go off come first."""
         self._points.write(encode(self._settings, outputs))
 
 
 def encode(settings: DryContactLiftSettings, outputs: LiftOutputs) -> dict[str, bool]:
-    """Return signal -> asserted, also for signals without a wire, which `Points` leaves out."""
+    """Return signal -> asserted for all signals. `Points` leaves out signals without a wire."""
     calls = {f"call_{level}": level == outputs.call for level in settings.calls}
     if settings.call_code:
         calls = settings.call_code.lines(outputs.call)
@@ -87,7 +88,7 @@ def encode(settings: DryContactLiftSettings, outputs: LiftOutputs) -> dict[str, 
 def decode(
     settings: DryContactLiftSettings, shown: Mapping[str, bool], conditional: frozenset[str]
 ) -> LiftSample:
-    """Decode the lines (signal -> asserted). `conditional`: the groups that count only in AGV mode."""
+    """Decode the lines (signal -> asserted). The groups in `conditional` count only in AGV mode."""
     inputs = settings.inputs
     service = _service(inputs, shown)
     agv = _agv(inputs, shown, service)

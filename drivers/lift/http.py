@@ -1,8 +1,8 @@
-"""A lift behind a gateway that speaks HTTP and JSON (RMF's lift template, makers' gateways).
+"""A lift behind a gateway that speaks HTTP and JSON, such as RMF's lift template or a maker's gateway.
 
-If the network fails, only the gateway's own timers can end AGV mode and release the door. So `ask` of
-a held command starts its timer (`switches_off_after_s`), and the driver sends `ask` in every scan while
-the command is on. A call is one request, as a press of a button is.
+If the network fails, only the gateway's own timers can end AGV mode and release the door. So `ask` of a
+held command starts the command's timer (`switches_off_after_s`). The driver sends `ask` in every scan
+while the command is on. A call is one request, just as a person presses a button once.
 """
 
 from collections.abc import Iterator, Mapping
@@ -39,7 +39,7 @@ class HttpLiftSettings(LiftSettings, frozen=True, kw_only=True, forbid_unknown_f
     ] = None
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
-        """Return the shortest timer (s) and its path in the YAML; None if there is no timer."""
+        """Return the shortest timer (s), and its path in the YAML. Return None if there is no timer."""
         if any(PROFILE.problems(self.profile, self.api)):
             return None
         timers = (
@@ -73,13 +73,14 @@ class HttpLiftSettings(LiftSettings, frozen=True, kw_only=True, forbid_unknown_f
 
 
 def api_of(settings: HttpLiftSettings) -> LiftApi:
-    """Return the YAML's API, or else the profile's, for this lift."""
+    """Return the API for this lift, from the YAML or the profile."""
     found = PROFILE.chosen(settings.profile, settings.api)
     return found if settings.lift_id is None else found.of_lift(settings.lift_id)
 
 
 def _path(settings: HttpLiftSettings, *below: str) -> tuple[str, ...]:
-    """Return the path of a part of the API in the YAML, or of the profile that has it."""
+    """Return the YAML path of a part of the API. If a profile has the API, return the path of
+    `profile`."""
     return ("api", *below) if settings.api else ("profile",)
 
 
@@ -114,7 +115,8 @@ def _unsafe(settings: HttpLiftSettings) -> Iterator[Unsafe]:
 
 
 def claims(settings: HttpLiftSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (command, path): another device's use of a command would disturb this lift."""
+    """Yield (command, path) of each command. If another device used the command, it would disturb this
+    lift."""
     if any(PROFILE.problems(settings.profile, settings.api)):
         return
     seen: set[str] = set()
@@ -125,7 +127,8 @@ def claims(settings: HttpLiftSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
 
 
 def warnings(settings: HttpLiftSettings) -> Remarks:
-    """Yield valid settings to review before the lift goes into service: (path, text)."""
+    """Yield a warning (path, text) for each valid setting to review before the lift goes into
+    service."""
     found = api_of(settings)
     state, commands = found.state, found.commands
     told, fire = state.shows("agv_mode"), state.shows(Hazard.FIRE)
@@ -160,17 +163,17 @@ def warnings(settings: HttpLiftSettings) -> Remarks:
 
 
 def notes(settings: HttpLiftSettings) -> Remarks:
-    """Yield intended choices with effects to know about: (path below the device, text)."""
+    """Yield a note (path below the device, text) for each intended choice with side effects."""
     return checks.notes(settings, api_of(settings).state.shows)
 
 
 def debounce(settings: HttpLiftSettings) -> Mapping[str, float]:
-    """Return debounce times (s), as for contacts: a gateway may show a half-changed state."""
+    """Return debounce times (s), as for contacts, because a gateway may show a half-changed state."""
     return {**DEBOUNCE_S, **dict.fromkeys(Hazard, HAZARD_DEBOUNCE_S)}
 
 
 def describe(settings: HttpLiftSettings, bus: http.HttpSettings) -> Iterator[tuple[str, str]]:
-    """Yield rows for `check`: the readings, the fields and the commands."""
+    """Yield rows for `check` about the readings, the fields and the commands."""
     api, found = http.base(bus.api_base), api_of(settings)
     if found.state_path:
         yield "state", f"GET {api.url(found.state_path)} every {bus.scan_s:g} s"
@@ -188,7 +191,8 @@ def describe(settings: HttpLiftSettings, bus: http.HttpSettings) -> Iterator[tup
 
 
 def tables(settings: HttpLiftSettings) -> Iterator[Table]:
-    """Yield the floors from the lowest up, the values of each field, and how long commands last."""
+    """Yield tables of the floors (lowest first), of each field's values, and of the commands'
+    durations."""
     found, levels = api_of(settings), settings.levels()
     yield floors(settings)
     landings = ((json_fields.value_text(found.state.floor.value(at)), at) for at in levels)
@@ -204,7 +208,7 @@ def tables(settings: HttpLiftSettings) -> Iterator[Table]:
 
 
 class GatewayCalls(InsistentCalls, Protocol):
-    """An HTTP bus whose readings may be any request."""
+    """An HTTP bus that can read by any request."""
 
     def get_json(
         self, path: str, method: http.Method = "GET", body: str | None = None
@@ -213,15 +217,16 @@ class GatewayCalls(InsistentCalls, Protocol):
 
 
 def create(name: str, settings: HttpLiftSettings, bus: GatewayCalls) -> "HttpLift":
-    """Make the lift's driver on its bus; it sends nothing before `open`."""
+    """Make the lift's driver on its bus. The driver sends nothing before `open`."""
     return HttpLift(settings, bus)
 
 
 class HttpLift:
     """`drivers.Driver[LiftSample, LiftOutputs]` for one lift.
 
-    `_told`: each held command's last commanded state, without those in doubt. `_called`: the landing of
-    the last call that was not withdrawn. `_sure`: this call has been answered.
+    `_told`: the state that each held command was last commanded to; commands in doubt are missing.
+    `_called`: the landing of the last call that was not withdrawn. `_sure`: the gateway has answered
+    this call.
     """
 
     def __init__(self, settings: HttpLiftSettings, bus: GatewayCalls) -> None:
@@ -236,9 +241,10 @@ class HttpLift:
         self._claimed = self._touched = False
 
     def open(self) -> None:
-        """Check that the gateway answers; the first time, switch off every command that is not off.
+        """Check that the gateway answers. At the first call, also switch off every command that is not
+        off.
 
-        After a failure it only reads: a lost answer must not end a ride.
+        After a failure `open` only reads, because a lost answer must not end a ride.
         """
         answer = self._answer()
         if not self._claimed:
@@ -256,7 +262,8 @@ class HttpLift:
         return sample
 
     def write(self, outputs: LiftOutputs) -> None:
-        """Set every command to this level, switching off first; renew commands with a timer."""
+        """Set every command to this level. Commands that go off come first. Renew the commands that
+        have a timer."""
         wanted = {name: _wants(outputs, name) for name in self._held}
         idle = [name for name in wanted if not wanted[name] and self._told.get(name) is not False]
         for name in sorted(idle, key=lambda name: name == self._failed):
@@ -272,7 +279,7 @@ class HttpLift:
             self._call(outputs.call)
 
     def make_safe(self) -> None:
-        """Switch every command off, and verify it where the state shows the command."""
+        """Switch every command off. Verify each command that the gateway's state shows."""
         self._off([*self._held])
         answer = self._answer() if any(c.shown for c in self._held.values()) else {}
         still = [name for name in self._held if self._shown(name, answer)]
@@ -280,23 +287,24 @@ class HttpLift:
             raise DriverError(f"{' and '.join(still)} still on after being switched off")
 
     def close(self) -> None:
-        """Switch every command off if any was ever sent. Does not raise."""
+        """Switch every command off if the driver ever sent one. Does not raise."""
         if not self._touched:
             return
         try:
             self._off([*self._held])
         except DriverError:
-            return  # the daemon is ending; the gateway's timers end the commands
+            return  # the daemon ends, and the gateway's timers end the commands
 
     def _answer(self) -> Mapping[str, object]:
-        """Return the state: the whole answer, or each part's answer by its name."""
+        """Return the state: the whole answer, or part -> answer if the state has several parts."""
         if self._api.state_path:
             return self._bus.get_json(self._api.state_path)
         parts = self._api.state_parts.items()
         return {name: self._bus.get_json(c.path, c.method, c.body) for name, c in parts}
 
     def _off(self, names: list[Held]) -> None:
-        """Withdraw the call and switch these off: each is tried, even if another has failed."""
+        """Withdraw the call, and switch these commands off. Each is tried, even if another has
+        failed."""
         failed: DriverError | None = None
         for step in (self._withdraw, *(lambda n=n: self._switch(n, on=False) for n in names)):
             try:

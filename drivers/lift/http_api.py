@@ -1,7 +1,7 @@
 """The HTTP API of a lift's gateway: the requests for the lift's state, and the commands.
 
 `profile: NAME` takes such an API from drivers/profiles/. In a body, "{lift_id}" with its quotes stands
-for the device's `lift_id`, and "{level}" for the called landing's value.
+for the device's `lift_id`. "{level}" stands for the value of the called landing.
 """
 
 import json
@@ -52,11 +52,11 @@ class HeldCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     ] = None
 
     def is_renewed(self) -> bool:
-        """Is `ask` sent in every scan while the command is on?"""
+        """Does the driver send `ask` in every scan while the command is on?"""
         return self.release is None or self.switches_off_after_s is not None
 
     def problems(self) -> Remarks:
-        """Yield a problem for a `release` that is the same request."""
+        """Yield a problem for a `release` that equals `ask`."""
         if self.ask == self.release:
             yield ("release",), "is the same request as ask"
 
@@ -84,18 +84,19 @@ class LiftCommands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     ] = None
 
     def held(self) -> dict[Held, HeldCommand]:
-        """Return the given commands that are held, by signal."""
+        """Return signal -> command, for each held command that the YAML gives."""
         given = {name: getattr(self, name) for name in HELD}
         return {name: command for name, command in given.items() if command is not None}
 
     def calling(self, level: str, value: Value) -> Call:
-        """Return the request that calls the car to this landing. `value`: its value in the API."""
+        """Return the request that calls the car to this landing. `value` is the landing's value in the
+        API."""
         if self.call is None:
             return self.calls[level]
         return _filled(self.call, LEVEL, value)
 
     def requests(self) -> Iterator[tuple[tuple[str, ...], Call]]:
-        """Yield each request with its path below this section."""
+        """Yield (path, request) of each request. The path begins below this section."""
         for name, command in self.held().items():
             yield (name, "ask"), command.ask
             if command.release:
@@ -104,7 +105,8 @@ class LiftCommands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
         yield from (((n,), c) for n, c in (("call", self.call), ("cancel", self.cancel)) if c)
 
     def problems(self) -> Remarks:
-        """Yield problems: two ways of calling; a call without a landing; one request twice."""
+        """Yield a problem for two ways of calling, for a call without a landing, and for a request that
+        is used twice."""
         if self.call and self.calls:
             yield ("calls",), "calls and call are two ways of calling: delete one of the two"
         if self.call and LEVEL not in (self.call.body or ""):
@@ -118,7 +120,7 @@ class LiftCommands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
 
 class LiftApi(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The gateway's API. The paths follow the bus's `api_base`."""
+    """The gateway's API. Every path is relative to the bus's `api_base`."""
 
     state_path: Annotated[
         http.Path | None, tells("the path that GET reads the whole state from.")
@@ -133,7 +135,7 @@ class LiftApi(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     commands: Annotated[LiftCommands, tells("the commands to the gateway.")]
 
     def requests(self) -> dict[tuple[str, ...], Call]:
-        """Return path below this section -> each request, except a GET of `state_path`."""
+        """Return path -> request, except a GET of `state_path`. The path begins below this section."""
         parts = {("state_parts", name): call for name, call in self.state_parts.items()}
         return parts | {("commands", *path): call for path, call in self.commands.requests()}
 
@@ -155,7 +157,8 @@ class LiftApi(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
         return found
 
     def problems(self) -> Remarks:
-        """Yield problems: no request for the state; a field of no part of the state."""
+        """Yield a problem for a state without a request, and for a field that belongs to no part of the
+        state."""
         if bool(self.state_path) == bool(self.state_parts):
             yield ("state_path",), "give either state_path or state_parts"
         elif self.state_parts:
@@ -175,7 +178,7 @@ def _filled(call: Call, mark: str, value: Value) -> Call:
 
 
 def numbers(values: Mapping[str, Value]) -> dict[int, str]:
-    """Return number -> landing, for the landings whose values are whole numbers."""
+    """Return number -> landing, for each landing whose value is a whole number."""
     return {
         value: level
         for level, value in values.items()
@@ -184,7 +187,7 @@ def numbers(values: Mapping[str, Value]) -> dict[int, str]:
 
 
 def value_rows(state: JsonLiftState) -> Iterator[tuple[str, str, str]]:
-    """Yield each listed value: part, value and meaning."""
+    """Yield (part, value, meaning) of each listed value."""
     for name in ("door", "rear_door", "motion", "service"):
         if place := getattr(state, name):
             for meaning, values in place.states().items():

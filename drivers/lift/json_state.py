@@ -1,7 +1,7 @@
-"""A lift's state in a JSON answer: floor, doors, motion, service state and hazards, each in a field.
+"""A lift's state in a JSON answer. Floor, doors, motion, service state and hazards each have a field.
 
-An unlisted value is a fault; it never means a floor, an open door or a standing car. A field that is
-null is not known, and a null hazard gives no reading at all.
+An unlisted value is a fault. It never means a floor, an open door or a standing car. A field that is
+null is unknown. With a null hazard the whole reading fails.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -27,9 +27,9 @@ DOOR: Mapping[str | None, DoorReading] = {
 
 
 class JsonFloor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The car's position."""
+    """The field of the car's position."""
 
-    field: Annotated[Field, tells("the field that holds it; null between floors.")]
+    field: Annotated[Field, tells("the field that holds the position; null between floors.")]
     values: Annotated[
         dict[Name, Value],
         tells("landing -> its value; without `values` a landing's name is its value."),
@@ -41,7 +41,7 @@ class JsonFloor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         return self.values.get(level, level)
 
     def problems(self) -> Remarks:
-        """Yield a problem for each value with two meanings."""
+        """Yield a problem for each value that has two meanings."""
         given = [(("values", level), value, level) for level, value in self.values.items()]
         between = enumerate(self.between_floors)
         given += [(("between_floors", str(n)), value, "between floors") for n, value in between]
@@ -49,17 +49,17 @@ class JsonFloor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class ListedStates(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A field whose values stand for states: each further key is a state, with a list of its values."""
+    """A field whose values stand for states. Each further key is a state with a list of its values."""
 
     field: Annotated[Field, tells("the field that holds it.")]
 
     def states(self) -> dict[str, list[Value]]:
-        """Return state -> its values, for each state that has any."""
+        """Return state -> its values, for each state that has a value."""
         given = {name: getattr(self, name) for name in self.__struct_fields__ if name != "field"}
         return {name: values for name, values in given.items() if values}
 
     def problems(self) -> Remarks:
-        """Yield a problem for each value with two meanings."""
+        """Yield a problem for each value that has two meanings."""
         yield from _doubles(
             ((state, str(n)), value, state)
             for state, values in self.states().items()
@@ -68,7 +68,7 @@ class ListedStates(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
 
 class JsonDoor(ListedStates, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A door. A value that is not listed is a fault."""
+    """The field of a door. An unlisted value is a fault."""
 
     open: Annotated[Values, tells("the values for a fully open door.")]
     closed: Annotated[Values, tells("the values for a closed door.")]
@@ -76,7 +76,7 @@ class JsonDoor(ListedStates, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class JsonMotion(ListedStates, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The car's motion. A value that is not listed is a fault."""
+    """The field of the car's motion. An unlisted value is a fault."""
 
     stopped: Annotated[Values, tells("the values for a standing car.")]
     up: Annotated[list[Value], tells("the values for a car that goes up.")] = []
@@ -84,14 +84,15 @@ class JsonMotion(ListedStates, frozen=True, kw_only=True, forbid_unknown_fields=
     moving: Annotated[list[Value], tells("the values for a car that goes either way.")] = []
 
     def problems(self) -> Remarks:
-        """Yield problems: no values for a moving car; a value with two meanings."""
+        """Yield a problem for missing values of a moving car, and for a value with two meanings."""
         yield from super().problems()
         if not self.moving and not (self.up and self.down):
             yield (), "needs values for moving, or for up and down"
 
 
 class JsonService(ListedStates, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The lift's service state. At a value that is not listed the lift is out of service."""
+    """The field of the lift's service state. An unlisted value means that the lift is out of
+    service."""
 
     normal: Annotated[Values, tells("the values for a lift that serves people.")]
     agv_mode: Annotated[list[Value], tells("the values for AGV mode.")] = []
@@ -105,7 +106,7 @@ class JsonService(ListedStates, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class JsonLiftState(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The fields of a lift's answer: names with dots between them."""
+    """The fields of a lift's answer. A field is a path of names with dots between them."""
 
     online: Annotated[
         JsonFlag | None, tells("the gateway reaches the lift; otherwise there is no reading.")
@@ -140,12 +141,13 @@ class JsonLiftState(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     overload: Annotated[JsonFlag | None, tells("the car is too heavy; delays the ride.")] = None
 
     def places(self) -> dict[str, str]:
-        """Return part -> its field, for each given part."""
+        """Return part -> its field, for each part that the YAML gives."""
         parts = {name: getattr(self, name) for name in self.__struct_fields__}
         return {name: part.field for name, part in parts.items() if part is not None}
 
     def shows(self, state: str) -> bool:
-        """Does the answer have this hazard or AGV mode, as a flag or as a state of `service`?"""
+        """Return whether the answer shows this hazard or AGV mode, as a flag or as a state of
+        `service`."""
         in_service = self.service is not None and state in self.service.states()
         return in_service or getattr(self, state) is not None
 
@@ -156,7 +158,7 @@ class JsonLiftState(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
 
 def _doubles(given: Iterable[tuple[tuple[str, str], Value, str]]) -> Remarks:
-    """Yield a problem for each value with two meanings. `given`: path, value and meaning."""
+    """Yield a problem for each value that has two meanings. `given` yields path, value and meaning."""
     seen: list[tuple[Value, str]] = []
     for path, value, meaning in given:
         for before, other in seen:
@@ -168,8 +170,8 @@ def _doubles(given: Iterable[tuple[tuple[str, str], Value, str]]) -> Remarks:
 def decode(
     place: JsonLiftState, answer: Answer, levels: Sequence[str], stale_s: float
 ) -> LiftSample:
-    """Decode the answer of a lift with these landings. Raises DriverError with the field's name, also
-    for a reading of the gateway that is older than `stale_s`."""
+    """Decode the answer of a lift with these landings. Raises a DriverError that names the field. Also
+    raises if the gateway's reading is older than `stale_s`."""
     _current(place, answer, stale_s)
     level, code_fault = _floor(place.floor, answer, levels)
     service = _service(place, answer)
@@ -209,7 +211,7 @@ def _value(answer: Answer, field: str) -> Value | None:
 
 
 def _state(place: ListedStates, answer: Answer) -> str | None:
-    """Return the state of this field's value; None for null and for an unlisted value."""
+    """Return the state for this field's value. Return None for null and for an unlisted value."""
     value = _value(answer, place.field)
     return next((state for state, given in place.states().items() if _is_one(value, given)), None)
 

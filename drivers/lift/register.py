@@ -1,7 +1,7 @@
 """A lift behind the Modbus registers of a gateway.
 
-Floor, door, motion and service state are numbers, hazards are bits, commands are registers or coils. An
-unlisted number is a fault; it never means a floor, an open door or a standing car.
+Floor, door, motion and service state are numbers. Hazards are bits. Commands are registers or coils. An
+unlisted number is a fault. It never means a floor, an open door or a standing car.
 """
 
 from collections.abc import Iterator, Mapping, Set
@@ -117,17 +117,17 @@ def warnings(settings: RegisterLiftSettings) -> Remarks:
 
 
 def notes(settings: RegisterLiftSettings) -> Remarks:
-    """Yield intended choices with effects to know about: (path below the device, text)."""
+    """Yield a note (path below the device, text) for each intended choice with side effects."""
     return checks.notes(settings, settings.map.shows)
 
 
 def debounce(settings: RegisterLiftSettings) -> Mapping[str, float]:
-    """Return debounce times (s), as for contacts: a gateway may show a half-changed number."""
+    """Return debounce times (s), as for contacts, because a gateway may show a half-changed number."""
     return {**DEBOUNCE_S, **dict.fromkeys(Hazard, HAZARD_DEBOUNCE_S)}
 
 
 def claims(settings: RegisterLiftSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of each command; no other device may write there."""
+    """Yield (place, path) of each command. No other device may write to these places."""
     seen: set[str] = set()
     for path, place, _ in settings.map.commands.places():
         if place not in seen and misplaced(apart(place)[1], WRITABLE) is None:
@@ -136,7 +136,7 @@ def claims(settings: RegisterLiftSettings) -> Iterator[tuple[str, tuple[str, ...
 
 
 def describe(settings: RegisterLiftSettings, bus: object) -> Iterator[tuple[str, str]]:
-    """Yield rows for `check`: the place of each part of the map, and of each command."""
+    """Yield rows for `check` with the place of each part of the map, and of each command."""
     for name, part in settings.map.parts().items():
         yield name, f"{point_at(settings.unit, place_of(part))}{_meaning(part)}"
     commands = settings.map.commands
@@ -150,7 +150,8 @@ def describe(settings: RegisterLiftSettings, bus: object) -> Iterator[tuple[str,
 
 
 def tables(settings: RegisterLiftSettings) -> Iterator[Table]:
-    """Yield the floors from the lowest up, each part's numbers, and each command's values."""
+    """Yield tables of the floors (lowest first), of each part's numbers, and of each command's
+    values."""
     yield floors(settings)
     for name, part in settings.map.parts().items():
         if isinstance(part, Number):
@@ -177,7 +178,7 @@ def _unlisted(part: Number) -> str:
 
 
 def _outputs(settings: RegisterLiftSettings) -> Table:
-    """Tabulate each command alone, though commands that share a register are written as one value."""
+    """Tabulate each command alone. (Commands that share a register are written as one value.)"""
     commands, off = settings.map.commands, settings.map.commands.words((), None)
     levels = settings.levels()
     rows = []
@@ -204,7 +205,7 @@ def _meaning(part: Number | LiftFlag) -> str:
 
 
 def create(name: str, settings: RegisterLiftSettings, bus: ModbusBus) -> "RegisterLift":
-    """Make the lift's driver on its bus; it sends nothing before `open`."""
+    """Make the lift's driver on its bus. The driver sends nothing before `open`."""
     inputs = {n: point_at(settings.unit, place_of(p)) for n, p in settings.map.parts().items()}
     safe = encode(settings.map, LiftOutputs())
     outputs = {place: point_at(settings.unit, place) for place in safe}
@@ -222,7 +223,7 @@ class RegisterLift:
         self._lines = lines
 
     def open(self) -> None:
-        """Check that the gateway answers; the first time, switch every command off."""
+        """Check that the gateway answers. At the first call, also switch every command off."""
         self._lines.claim()
 
     def read(self) -> LiftSample:
@@ -230,7 +231,7 @@ class RegisterLift:
         return decode(self._map, self._lines.read())
 
     def write(self, outputs: LiftOutputs) -> None:
-        """Set every command to this level, switching off first."""
+        """Set every command to this level. Commands that go off come first."""
         self._lines.bring(encode(self._map, outputs))
 
     def make_safe(self) -> None:
@@ -238,12 +239,12 @@ class RegisterLift:
         self._lines.make_safe()
 
     def close(self) -> None:
-        """Switch every command off, if any was ever written. Does not raise."""
+        """Switch every command off if the driver ever wrote one. Does not raise."""
         self._lines.close()
 
 
 def encode(found: LiftMap, outputs: LiftOutputs) -> dict[str, int]:
-    """Return place -> value. The values of commands that share a register are combined with OR."""
+    """Return place -> value. If commands share a register, their values are combined with OR."""
     asserted = {"agv_mode_request"} if outputs.agv_request else set()
     if outputs.hold_door:
         asserted.add(HOLD[outputs.hold_door])
@@ -253,7 +254,7 @@ def encode(found: LiftMap, outputs: LiftOutputs) -> dict[str, int]:
 
 
 def decode(found: LiftMap, words: Mapping[str, int]) -> LiftSample:
-    """Decode the registers, given by part of the map. Never raises."""
+    """Decode the registers. `words` gives a value for each part of the map. Never raises."""
     flags = {n: p.asserted(words[n]) for n, p in found.parts().items() if isinstance(p, LiftFlag)}
     service = _service(found, words)
     agv = _agv(found, flags, service)

@@ -1,4 +1,4 @@
-"""The register map of a lift's gateway in the YAML: places, and meanings of the numbers."""
+"""The register map of a lift's gateway in the YAML. It gives places, and the meanings of numbers."""
 
 import functools
 import operator
@@ -44,7 +44,7 @@ class LiftCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_field
 
 
 class CallCommand(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Calls as numbers in a register."""
+    """The command for calls, which are numbers in one register."""
 
     TABLES = ("holding register",)
 
@@ -55,7 +55,8 @@ class CallCommand(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields
     unit: Annotated[Unit | None, UNIT] = None
 
     def problems(self) -> Remarks:
-        """Yield problems: a place that cannot be written; a landing with the number of no call."""
+        """Yield a problem for a place that cannot be written, and for a landing with the number of "no
+        call"."""
         yield from super().problems()
         if self.none in self.codes:
             yield ("codes", str(self.none)), f"{self.none} is the number for no call (none)"
@@ -84,7 +85,8 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = True
 
     def singles(self) -> Iterator[tuple[str, tuple[str, ...], LiftCommand]]:
-        """Yield each command except `call`: its signal, its path below this section, the command."""
+        """Yield (signal, path, command) of each command except `call`. The path begins below this
+        section."""
         for name in ("agv_mode_request", "door_open", "rear_door_open"):
             command: LiftCommand | None = getattr(self, name)
             if command:
@@ -93,7 +95,8 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield f"call_{level}", ("calls", level), command
 
     def places(self) -> Iterator[tuple[tuple[str, ...], str, int]]:
-        """Yield each command's path below this section, its place, and the bits it uses there."""
+        """Yield (path, place, bits) of each command: the bits are those that the command uses at the
+        place."""
         for _, path, command in self.singles():
             yield path, place_of(command), command.ask | command.release
         if self.call:
@@ -101,7 +104,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield ("call",), place_of(self.call), bits
 
     def calling(self) -> dict[str, int]:
-        """Return place -> the bits of calls there."""
+        """Return place -> the bits that calls use there."""
         found: dict[str, int] = {}
         for path, place, bits in self.places():
             if path[0] in ("calls", "call"):
@@ -113,7 +116,8 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return {place for place, read_back in self._read_back().items() if False in read_back}
 
     def _read_back(self) -> dict[str, dict[bool, tuple[str, ...]]]:
-        """Return place -> `read_back` of its commands -> the path of the last such command."""
+        """Return place -> `read_back` -> the path of the last command at this place with this
+        `read_back`."""
         found: dict[str, dict[bool, tuple[str, ...]]] = {}
         every: list[tuple[tuple[str, ...], LiftCommand | CallCommand]] = [
             (path, command) for _, path, command in self.singles()
@@ -126,7 +130,8 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return found
 
     def words(self, asserted: Collection[str], call: str | None) -> dict[str, int]:
-        """Return place -> value for these asserted signals and this landing's call (None: no call)."""
+        """Return place -> value, for these asserted signals and a call to this landing (None: no
+        call)."""
         found: dict[str, int] = {}
         for signal, _, command in self.singles():
             at = place_of(command)
@@ -138,7 +143,8 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return found
 
     def problems(self) -> Remarks:
-        """Yield problems: both `calls` and `call`; commands that use the same bit of a register."""
+        """Yield a problem if both `calls` and `call` are given, and if commands use the same bit of a
+        register."""
         if self.calls and self.call:
             yield ("calls",), "calls and call are two ways of calling: delete one of the two"
         for at, told in self._read_back().items():
@@ -166,8 +172,8 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The gateway's register map. Addresses begin at 0.
 
-    Each door, and the motion, is either a number or the flags of contacts. Give motion in one way:
-    `motion`, `moving`, `stopped`, or `up` with `down`.
+    Each door is either a number or the flags of contacts, and so is the motion. Give the motion in one
+    way: `motion`, `moving`, `stopped`, or `up` with `down`.
     """
 
     floor: Annotated[FloorField, tells("the car's position.")]
@@ -218,7 +224,7 @@ class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     commands: Annotated[Commands, tells("the commands to the lift.")]
 
     def problems(self) -> Remarks:
-        """Yield problems: a door, or the motion, that is given by halves or in two ways."""
+        """Yield a problem for a door or motion that is incomplete, or that is given in two ways."""
         for door in ("door", "rear_door"):
             ends = [name for name in (f"{door}_opened", f"{door}_closed") if getattr(self, name)]
             if len(ends) == 1:
@@ -234,17 +240,17 @@ class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
             yield (ways[1],), f"{' and '.join(ways)} are several ways of motion: keep one"
 
     def parts(self) -> dict[str, Number | LiftFlag]:
-        """Return name -> part, for each given part that is read."""
+        """Return name -> part, for each part that is read."""
         read = [name for name in self.__struct_fields__ if name != "commands"]
         found = {name: getattr(self, name) for name in read}
         return {name: part for name, part in found.items() if part is not None}
 
     def flag(self, name: str) -> LiftFlag | None:
-        """Return the flag of this name, if it is given."""
+        """Return the flag of this name; None if the map does not give it."""
         part = getattr(self, name, None)
         return part if isinstance(part, LiftFlag) else None
 
     def shows(self, state: str) -> bool:
-        """Does the map have this state, as a flag or as a state of `service`?"""
+        """Return whether the map has this state, as a flag or as a state of `service`."""
         in_service = self.service is not None and state in self.service.codes.values()
         return in_service or getattr(self, state) is not None

@@ -1,4 +1,5 @@
-"""The parts of a lift's register map: numbers in registers, and flags, each at a unit of the bus."""
+"""The parts of a lift's register map: numbers in registers, and flags. Each part is at a unit of the
+bus."""
 
 from collections.abc import Collection
 from typing import Annotated, Final, Literal, Protocol, TypeAlias
@@ -18,7 +19,7 @@ UNIT: Final = tells("the unit with this place, if it is another than the device'
 
 
 class AtUnit(Protocol):
-    """A part that may be at a unit of its own."""
+    """A part that may be at another unit than the device's."""
 
     @property
     def at(self) -> str:
@@ -26,22 +27,23 @@ class AtUnit(Protocol):
 
     @property
     def unit(self) -> int | None:
-        """Return the unit; None for the device's."""
+        """Return the part's unit; None for the device's unit."""
 
 
 def place_of(part: AtUnit) -> str:
-    """Return a part's place, with its own unit if it has one: `coil 0`, `unit 2 coil 0`."""
+    """Return a part's place, with the part's unit if it has its own: `coil 0`, `unit 2 coil 0`."""
     return part.at if part.unit is None else f"unit {part.unit} {part.at}"
 
 
 def point_at(unit: int, where: str) -> Point:
-    """Return the point of a valid place as written by `place_of`. `unit`: the device's."""
+    """Return the point of a valid place that `place_of` has written. `unit` is the device's unit."""
     own, place = apart(where)
     return at(unit if own is None else own, place)
 
 
 def apart(where: str) -> tuple[int | None, str]:
-    """Split a place as written by `place_of` into its own unit and the place there, valid or not."""
+    """Split a place that `place_of` has written into (its own unit, the place there). The place may be
+    invalid."""
     if not where.startswith("unit "):
         return None, where
     _, own, place = where.split(" ", 2)
@@ -72,7 +74,8 @@ class NumberField(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=T
         return sum((number >> i & 1) << bit for i, bit in enumerate(self.bits))
 
     def fits(self, numbers: Collection[int], key: str) -> Remarks:
-        """Yield problems: an invalid place, a bit listed twice, numbers of `key` that do not fit."""
+        """Yield a problem for an invalid place, for a bit that is listed twice, and for numbers that do
+        not fit. `key` is the key of the numbers."""
         yield from InRegister.problems(self)
         if len(set(self.bits)) < len(self.bits):
             yield ("bits",), "a bit is listed twice"
@@ -90,7 +93,7 @@ class FloorField(NumberField, frozen=True, kw_only=True, forbid_unknown_fields=T
     )
 
     def problems(self) -> Remarks:
-        """Yield problems: those of `fits`; a number with two meanings."""
+        """Yield the problems of `fits`, and a problem for each number with two meanings."""
         yield from self.fits([*self.codes, *self.between_floors], "codes")
         for number in self.codes:
             if number in self.between_floors:
@@ -106,7 +109,8 @@ class DoorField(NumberField, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ]
 
     def problems(self) -> Remarks:
-        """Yield problems: those of `fits`; a door without a code for open or for closed."""
+        """Yield the problems of `fits`, and a problem for a door without a code for open or for
+        closed."""
         yield from self.fits(self.codes, "codes")
         if not {"open", "closed"} <= set(self.codes.values()):
             yield ("codes",), "needs a code for open and one for closed"
@@ -121,7 +125,7 @@ class MotionField(NumberField, frozen=True, kw_only=True, forbid_unknown_fields=
     ]
 
     def problems(self) -> Remarks:
-        """Yield problems: those of `fits`; no code for standing, or no code for moving."""
+        """Yield the problems of `fits`, and a problem if standing or moving has no code."""
         yield from self.fits(self.codes, "codes")
         shown = set(self.codes.values())
         if "stopped" not in shown or not ("moving" in shown or {"up", "down"} <= shown):
@@ -160,7 +164,7 @@ class LiftFlag(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
     unit: Annotated[Unit | None, UNIT] = None
 
     def asserted(self, word: int) -> bool:
-        """Is the flag asserted, by the value of its register or bit?"""
+        """Return whether the flag is asserted at this value of its register or bit."""
         return bool(word >> (self.bit or 0) & 1) == (self.active == "high")
 
     def word(self, asserted: bool) -> int:
@@ -168,7 +172,8 @@ class LiftFlag(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return (asserted == (self.active == "high")) << (self.bit or 0)
 
     def problems(self) -> Remarks:
-        """Yield problems: an invalid place; a register without a bit; a coil with a bit."""
+        """Yield a problem for an invalid place, for a register without a bit, and for a coil with a
+        bit."""
         yield from super().problems()
         if self.is_in(*REGISTERS) and self.bit is None:
             yield ("bit",), "a flag is one bit of a register: say which"

@@ -1,4 +1,4 @@
-"""Tabulates a lift's wiring: one row for each line, with its signal, point and debounce."""
+"""Tabulates a lift's wiring. Each line has a row with its signal, point and debounce."""
 
 from collections.abc import Iterator
 
@@ -7,10 +7,10 @@ from drivers.hal.points import Clearing, Output, Wire
 from drivers.lift.wiring import LiftInput, LiftWiring
 
 DEBOUNCE_S = {"floor": 0.08, "door": 0.1, "rear_door": 0.1, "motion": 0.05, "agv_mode": 0.05}
-"""Each group's default debounce (s); HAZARD_DEBOUNCE_S is the default for hazards and service codes.
+"""Each group's default debounce (s). HAZARD_DEBOUNCE_S is the default for hazards and service codes.
 
-A door that reads open for 50 ms while the car passes a floor is a glitch. Without a motion line only
-the debounce filters it out.
+A door that reads open for 50 ms while the car passes a floor is a glitch. Without a motion line,
+nothing but the debounce filters this glitch out.
 """
 
 HAZARD_DEBOUNCE_S = 0.05
@@ -20,7 +20,7 @@ Row = tuple[str, tuple[str, ...], LiftInput]
 
 
 def input_rows(wiring: LiftWiring) -> Iterator[Row]:
-    """Yield each input line: its signal, its path below the device, and the line."""
+    """Yield (signal, path, line) of each input line. The path begins below the device."""
     for name in wiring.inputs.__struct_fields__:
         found = getattr(wiring.inputs, name)
         if isinstance(found, LiftInput):
@@ -33,7 +33,7 @@ def input_rows(wiring: LiftWiring) -> Iterator[Row]:
 
 
 def output_rows(wiring: LiftWiring) -> Iterator[tuple[str, tuple[str, ...], Output]]:
-    """Yield each output line: its signal, its path below the device, and the line."""
+    """Yield (signal, path, line) of each output line. The path begins below the device."""
     for name in wiring.outputs.__struct_fields__:
         output = getattr(wiring.outputs, name)
         if output is not None:
@@ -45,7 +45,7 @@ def output_rows(wiring: LiftWiring) -> Iterator[tuple[str, tuple[str, ...], Outp
 
 
 def wires(wiring: LiftWiring) -> list[Wire]:
-    """Return the wiring table, inputs first, with default debounces filled in."""
+    """Return the wiring table with default debounces filled in. Inputs come first."""
     return [
         *(line.wire(s, path, _debounce_s(s, line)) for s, path, line in input_rows(wiring)),
         *(line.wire(s, path, clearing=_call(wiring, s)) for s, path, line in output_rows(wiring)),
@@ -53,13 +53,14 @@ def wires(wiring: LiftWiring) -> list[Wire]:
 
 
 def _call(wiring: LiftWiring, signal: str) -> Clearing | None:
-    """Return how a controller may clear this line; None for a line that is no call."""
+    """Return how a controller may clear this line. Return None for a line that is no call."""
     pulse = wiring.limits.call_pulse_s is not None
     return Clearing(pulse=pulse) if signal.startswith("call_") else None
 
 
 def group(signal: str) -> str:
-    """Return a signal's group: `floor`, `door`, `rear_door`, `motion`, `service`, or the signal."""
+    """Return a signal's group: `floor`, `door`, `rear_door`, `motion` or `service`; otherwise the
+    signal itself."""
     for name in ("floor", "door", "rear_door", "motion", "service"):
         if signal == name or signal.startswith(f"{name}_"):
             return name
@@ -67,7 +68,7 @@ def group(signal: str) -> str:
 
 
 def debounce(wiring: LiftWiring) -> dict[str, float]:
-    """Return each group's debounce (s): the longest of its lines.
+    """Return group -> debounce (s). A group's debounce is the longest of its lines.
 
     A state of the service code has the debounce of the code's lines.
     """

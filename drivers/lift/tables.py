@@ -1,4 +1,4 @@
-"""Tabulates a lift's codes and outputs: each number with its lines, and its readings with a cut."""
+"""Tabulates a lift's codes and outputs. Each number has its lines, and its readings with a cut line."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -17,7 +17,7 @@ BETWEEN = "between floors"
 
 
 def tables(wiring: LiftWiring) -> Iterator[Table]:
-    """Yield the floors from the lowest up, the other codes, and the drive of each output."""
+    """Yield tables of the floors (lowest first), of the other codes, and of each output's drive."""
     table = {wire.signal: wire for wire in wires(wiring)}
     yield floors(wiring)
     yield _floor_code(wiring, table)
@@ -28,7 +28,7 @@ def tables(wiring: LiftWiring) -> Iterator[Table]:
 
 
 def floors(wiring: LiftSettings) -> Table:
-    """Tabulate RMF's floors from below, to reveal a list in the wrong order."""
+    """Tabulate RMF's floors with the lowest first, to reveal a list in the wrong order."""
     stops = list(wiring.stops().items())
     rows = [
         (_place(i, len(stops)), name, stop.level, "rear door" if stop.side is Side.REAR else "door")
@@ -55,7 +55,8 @@ def _floor_code(wiring: LiftWiring, table: Mapping[str, Wire]) -> Table:
 
 
 def _height(level: str | None, levels: Sequence[str]) -> int:
-    """Return a sort key: between floors first, then the landings from the lowest up."""
+    """Return a sort key that puts "between floors" first, then the landings from the lowest to the
+    highest."""
     return -1 if level is None else levels.index(level)
 
 
@@ -65,7 +66,7 @@ def _landing(code: FloorCode, shown: Mapping[str, bool]) -> str:
 
 
 def _code(name: str, width: int, meanings: Mapping[int, str], table: Mapping[str, Wire]) -> Table:
-    """Tabulate every number that plain binary lines can show."""
+    """Tabulate every number that the code's binary lines can show."""
 
     def read(shown: Mapping[str, bool]) -> str:
         return meanings.get(codes.shown_number(name, shown, width), FAULT)
@@ -96,7 +97,7 @@ _DRIVEN = {
 
 
 def how_long(settings: LiftSettings, output: str) -> str:
-    """Describe an output's time of being driven; an unlisted output is a call."""
+    """Describe how long an output is driven. An output that is missing in `_DRIVEN` is a call."""
     limits = settings.limits
     if output in _DRIVEN:
         return _DRIVEN[output].format(grace_s=limits.release_grace_s)

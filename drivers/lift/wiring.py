@@ -1,4 +1,4 @@
-"""A lift's wiring in the YAML. Sites differ in every signal, so every signal is configured."""
+"""A lift's wiring in the YAML. Every signal is configured, because sites differ in every signal."""
 
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
@@ -37,7 +37,7 @@ class DoorInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class ParityInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A parity line, which reveals a broken line of the code."""
+    """A parity line. It reveals that a line of the code is broken."""
 
     total: Annotated[
         Literal["even", "odd"], tells("the number of asserted lines, including the parity line.")
@@ -87,7 +87,7 @@ class ServiceCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 class LiftInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The lines from the lift.
 
-    A hazard takes the lift away from RMF at once. A door has one contact or two. Give motion in one
+    A hazard takes the lift away from RMF at once. A door has one contact or two. Give the motion in one
     way: `moving`, `stopped`, `up` with `down`, or a code.
     """
 
@@ -138,7 +138,7 @@ class LiftInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
 
 
 class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The car's position."""
+    """The car's position as a code on several lines."""
 
     encoding: Annotated[
         Literal["binary", "gray", "bcd", "one_hot"],
@@ -157,7 +157,7 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     ] = msgspec.field(default_factory=lambda: [0])
 
     def inputs(self) -> Iterator[tuple[str, tuple[str, ...], LiftInput]]:
-        """Yield each line: its signal, its path below this section, and the line."""
+        """Yield (signal, path, line) of each line. The path begins below this section."""
         for i, bit in enumerate(self.bits):
             yield f"floor_bit{i}", ("bits", str(i)), bit
         for level, line in self.lines.items():
@@ -166,7 +166,8 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
             yield "floor_parity", ("parity",), self.parity
 
     def read(self, shown: Mapping[str, bool]) -> tuple[str | None, str]:
-        """Return the landing (None between floors), and the code's fault ("" for none)."""
+        """Return (landing, fault). The landing is None between floors; the fault of the code is "" if
+        there is none."""
         if self.encoding == "one_hot":
             on = [level for level in self.lines if shown[f"floor_{level}"]]
             if len(on) > 1:
@@ -183,16 +184,19 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         return None, "" if number in self.between_floors else f"code {number} is not a floor's"
 
     def show(self, level: str | None) -> dict[str, bool]:
-        """Return signal -> asserted at a landing (None: between floors), or raise ValueError."""
+        """Return signal -> asserted at a landing (None: between floors). Raises ValueError if the
+        landing has no code."""
         for _, shown_level, shown in self.shows():
             if shown_level == level:
                 return shown
         raise ValueError(f"no code for {level or 'between floors'}")
 
     def shows(self) -> Iterator[tuple[int | None, str | None, dict[str, bool]]]:
-        """Yield each code of the controller: (number, landing or None between floors, its lines).
+        """Yield (number, landing, lines) of each code that the controller shows. The landing is None
+        between floors.
 
-        `one_hot` has no numbers. Raises ValueError for a number that does not fit on the lines.
+        With `one_hot` the number is None. Raises ValueError for a number that does not fit on the
+        lines.
         """
         if self.encoding == "one_hot":
             for level in (None, *self.lines):
@@ -212,19 +216,19 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class CallCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Calls as a binary number on several lines; 0 is no call."""
+    """Calls as a binary number on several lines; 0 means no call."""
 
     bits: Annotated[list[Output], tells("least significant first.")]
     codes: Annotated[dict[Number, Name], tells("number -> landing.")]
 
     def lines(self, level: str | None) -> dict[str, bool]:
-        """Return signal -> asserted, for a call to this landing (None: no call)."""
+        """Return signal -> asserted for a call to this landing (None: no call)."""
         number = next((n for n, name in self.codes.items() if name == level), 0)
         return codes.lines("call", number, len(self.bits))
 
 
 class LiftOutputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The lines to the lift, except calls. Each is a level, and off is its safe state."""
+    """The lines to the lift, except calls. Each line is a level whose safe state is off."""
 
     agv_mode_request: Annotated[
         Output | None, tells("requests AGV mode while a robot holds the lift.")
@@ -238,7 +242,7 @@ class LiftOutputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
 
 
 class LiftWiring(LiftSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A lift on dry contacts, on GPIO pins or a Modbus I/O module."""
+    """A lift on dry contacts, which are GPIO pins or points of a Modbus I/O module."""
 
     inputs: Annotated[LiftInputWiring, tells("the lines from the lift.")]
     floor_code: Annotated[FloorCode, tells("the car's position.")]

@@ -5,9 +5,8 @@
     source: "..."            where the numbers come from
     map: {...}               the content, under the key for it in a device YAML
 
-A profile is parsed like a device YAML, so each problem has its file, line and column. The parser is
-imported only for a profile, because `outputs-off` reads a contact's record
-without a parser.
+A profile is parsed like a device YAML, so each problem has its file, line and column. Only code that
+uses a profile imports the parser, because `outputs-off` must work without a parser.
 """
 
 import functools
@@ -28,7 +27,8 @@ Content = TypeVar("Content", bound=msgspec.Struct, covariant=True)
 
 
 class Profile(Generic[Content]):
-    """One type of profile. `reader`: its `for:`; `key`: its content's key; `content`: its struct."""
+    """One type of profile. `reader` is its `for:`, `key` the key of its content, and `content` its
+    struct."""
 
     def __init__(self, reader: str, key: str, content: type[Content]) -> None:
         self.reader = reader
@@ -48,11 +48,12 @@ class Profile(Generic[Content]):
         return found
 
     def chosen(self, name: str | None, inline: Content | None) -> Content:
-        """Return the YAML's content, or else the profile's content. Raises SettingsError."""
+        """Return the YAML's content, or the profile's content if the YAML has none. Raises
+        SettingsError."""
         return inline or self.load(name or "")
 
     def problems(self, name: str | None, inline: object) -> Remarks:
-        """Yield problems of `profile:` and of the key that may replace it (`map`)."""
+        """Yield problems of `profile:`, and of the key that may replace the profile (`map`)."""
         if name is None and inline is None:
             text = f"needs '{self.key}', or a profile: {either(self.names())}"
             yield ("profile",), text
@@ -68,7 +69,8 @@ class Profile(Generic[Content]):
                     yield ("profile",), f"the profile is not right: {problem}"
 
     def warnings(self, name: str | None, advice: str) -> Remarks:
-        """Yield a warning for a make's profile that nobody has tried; `advice`: the test to do."""
+        """Yield a warning for a make's profile that nobody has tried on hardware. `advice` is the test
+        to do."""
         if name and self._read(FOLDER / f"{name}.yaml")["hardware"] == "untried":
             text = f"nobody has tried the profile {name} on hardware: {advice}"
             yield ("profile",), text

@@ -1,9 +1,10 @@
 """Stores the texts of profiles and DBC files that this process has read or received.
 
 A daemon records these texts together with its claims. `outputs-off` may run much later, even after an
-upgrade that changed the files; with the recorded texts it reads the same maps as the daemon.
+upgrade that changed the files. With the recorded texts, `outputs-off` reads the same maps as the
+daemon.
 
-A file of drivers/profiles/ is stored under its name, any other file under its path.
+A file of drivers/profiles/ is stored under its name, and any other file under its path.
 """
 
 from collections.abc import Callable, Mapping
@@ -15,14 +16,14 @@ _texts: dict[str, bytes] = {}
 
 
 def text(file: Path, read: Callable[[], bytes]) -> bytes:
-    """Return a file's stored text; without one, call `read` and store its result."""
+    """Return a file's stored text. If there is none, call `read` and store the result."""
     if _name(file) not in _texts:
         _texts[_name(file)] = read()
     return _texts[_name(file)]
 
 
 def known(file: Path) -> bytes | None:
-    """Return a file's stored text, or None."""
+    """Return a file's stored text; None if there is none."""
     return _texts.get(_name(file))
 
 
@@ -37,7 +38,7 @@ def all_known() -> dict[str, bytes]:
 
 
 def give(texts: Mapping[str, bytes]) -> None:
-    """Replace the stored texts by these; they are not read from disk again."""
+    """Replace the stored texts by these texts. They are not read from disk again."""
     _texts.clear()
     _texts.update(texts)
 

@@ -3,11 +3,12 @@
     settings.py    the settings in a YAML
     frames.py      frames, their ids and their names
     bus.py         receives and distributes frames, pauses, and tracks the bus's troubles
-    link.py        python-can: opens, reads, sends
+    link.py        opens, reads and sends through python-can
     broadcasts.py  one device that broadcasts its frames and needs periodic frames from us
-    canopen.py     one CANopen node; sdo.py: the canopen library
+    canopen.py     one CANopen node
+    sdo.py         the SDO client of the canopen library
 
-Only link.py and sdo.py import a library, and they are imported when a bus or a node is made.
+Only link.py and sdo.py import a library. They are imported when a bus or a node is made.
 """
 
 from drivers.hal import BusType

@@ -1,7 +1,7 @@
 """A device that broadcasts its frames, and works only while it receives periodic frames.
 
-A broadcast is valid while it is fresh. The periodic frames are sent from the scan, never by a cyclic
-sender: when the daemon hangs, they cease.
+A broadcast is valid while it is fresh. A scan sends the periodic frames, and no cyclic sender does. So
+the frames cease when the daemon hangs.
 """
 
 from collections.abc import Callable, Collection, Mapping
@@ -15,7 +15,7 @@ NEVER = float("-inf")
 
 
 class Said(NamedTuple):
-    """A frame that the device sends. `mask`: the bits of its id that count. `length`: in bytes.
+    """A frame that the device sends. `mask`: the bits of its id that are compared. `length`: its bytes.
 
     `fresh_s`: how long the frame is valid (s). `needed`: a reading fails without this frame.
     """
@@ -28,14 +28,15 @@ class Said(NamedTuple):
 
 
 Values = Mapping[str, float]
-"""Frame.Signal -> its value."""
+"""Frame.Signal -> the signal's value."""
 
 
 class Sequel(NamedTuple):
-    """Frames that explain another frame, such as an error, and may come after it.
+    """Frames that explain another frame, such as an error, and may come after the explained frame.
 
-    `first`: the explained frame. `others`: the explaining frames. `begins(values)`: does `first` need
-    an explanation? `is_told(values)`: is the explanation there?
+    `first`: the name of the explained frame. `others`: the names of the explaining frames.
+    `begins(values)` returns whether `first` needs an explanation. `is_told(values)` returns whether the
+    explanation has come.
     """
 
     first: str
@@ -45,7 +46,7 @@ class Sequel(NamedTuple):
 
 
 class Broadcasts:
-    """The frames of one device by their names. `decode(frame, payload)`: signal -> value."""
+    """The frames of one device by their names. `decode(frame, payload)` returns signal -> value."""
 
     def __init__(
         self,
@@ -69,10 +70,11 @@ class Broadcasts:
             )
 
     def read(self) -> dict[str, float]:
-        """Return the values of fresh frames, by Frame.Signal. Raises HalError and `decode`'s errors.
+        """Return Frame.Signal -> value, from all fresh frames. Raises HalError, and the errors of
+        `decode`.
 
-        Waits for a needed frame. When the sequel's first frame begins to need an explanation, waits
-        once for the explaining frames.
+        The call waits for a needed frame that is missing. When the sequel's first frame begins to need
+        an explanation, the call waits once for the explaining frames.
         """
         self._bus.take()
         if self._missing():
@@ -106,7 +108,8 @@ class Broadcasts:
             )
 
     def feed(self, frame_id: int, every_s: float, payload: Callable[[], bytes]) -> bool:
-        """Send a frame if it is due in this scan; return True if sent. Raises HalError."""
+        """Send a frame if the frame is due in this scan; return whether it was sent. Raises
+        HalError."""
         now, slack_s = self._bus.now(), self._bus.settings.scan_s / 2
         if now < self._sent_at.get(frame_id, NEVER) + every_s - slack_s:
             return False

@@ -1,13 +1,13 @@
 """CAN: one bus, on an interface of the kernel (SocketCAN) or an slcan adapter, through python-can.
 
-Everything runs in the loop's thread. A reading takes all frames since the last reading and gives each
-to the devices that want it. Ids that no device wants are kept for a while: errors about missing frames
-name them. Frames are sent only from a scan, never by a cyclic sender of the kernel or the library: a
-daemon that hangs falls silent.
+Everything runs in the loop's thread. A reading takes all frames that came after the last reading. It
+gives each frame to the devices that want the frame. The bus remembers ids that no device wants for a
+while, because errors about missing frames name these ids. Only a scan sends frames; no cyclic sender of
+the kernel or the library does. So a daemon that hangs falls silent.
 
-An interface that is down, gone or bus-off is closed, and opened again after a backoff of 0.5 to 30 s,
-during which calls fail at once. A bus-off ends with the next frame, or when the controller reports it;
-`restart-ms` of `ip link` makes the controller restart.
+If the interface is down, gone or bus-off, the bus closes it and opens it again after a backoff of 0.5
+to 30 s. Calls during the backoff fail at once. A bus-off ends with the next frame, or when the
+controller reports its end. `restart-ms` of `ip link` makes the controller restart.
 """
 
 import random
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from drivers.hal.can.link import Link, Vendor
 
 FRAMES_AT_ONCE: Final = 20_000
-"""The maximum number of frames in a reading: a bus at 1 Mbit/s has 8,000 a second."""
+"""The maximum number of frames in a reading. A bus at 1 Mbit/s has about 8,000 frames a second."""
 HANG_S: Final = 1.0
-"""A reading this late (s) shows that the daemon hung."""
+"""The delay (s) of a reading that shows that the daemon has hung."""
 ROUTES_MAX: Final = 4096
 RECENT_S: Final = 5.0
 OTHERS_MAX: Final = 64
@@ -59,21 +59,21 @@ class CanBus(Bus):
         self._deaf = False
 
     def backoff(self) -> Backoff:
-        """Return a new backoff for one device; `insist` ends its pauses too."""
+        """Return a new backoff for one device. `insist` ends the pauses of this backoff too."""
         made = Backoff(self.now, self._jitter)
         self._backoffs.append(made)
         return made
 
     def listen(self, wanted: Iterable[FrameFilter], hear: Hear) -> None:
-        """Call `hear` with each of these frames, until the bus is closed."""
+        """Call `hear` for each of these frames, until the bus is closed."""
         self._wanted += [(one, hear) for one in wanted]
         self._routes.clear()
         self._others.clear()
 
     def take(self) -> None:
-        """Distribute the frames received since the last call. Raises HalError.
+        """Distribute the frames received after the last call. Raises HalError.
 
-        After a hang the age of these frames is unknown, so they are dropped.
+        After a hang the age of the received frames is unknown, so the frames are dropped.
         """
         self._deaf = self.now() - self._taken_at > HANG_S + self.settings.scan_s
         try:
@@ -84,7 +84,8 @@ class CanBus(Bus):
             self._deaf, self._taken_at = False, self.now()
 
     def wait(self, heard: Callable[[], bool], within_s: float) -> bool:
-        """Take frames until `heard()` or for `within_s`; True if heard. Raises HalError."""
+        """Take frames until `heard()` is true, or for `within_s` seconds. Return whether it became
+        true. Raises HalError."""
         deadline = self.now() + within_s
         while not heard():
             left_s = deadline - self.now()
@@ -98,7 +99,7 @@ class CanBus(Bus):
         return True
 
     def send(self, frame: Frame) -> None:
-        """Send a frame. Raises HalError; then the frame may have been sent or not."""
+        """Send a frame. Raises HalError; after an error the frame may have been sent or not."""
         self._open()
         try:
             self._link.send(frame)
@@ -106,7 +107,8 @@ class CanBus(Bus):
             raise self._failed(str(error)) from error
 
     def silence(self) -> str:
-        """Describe a likely cause of a device's silence: the bus's trouble, or the ids on the bus."""
+        """Describe a likely cause of a device's silence: trouble on the bus, or other ids than
+        expected."""
         if self._trouble.text and (
             self._trouble.bus_off or self.now() - self._trouble_at < RECENT_S
         ):
@@ -118,12 +120,12 @@ class CanBus(Bus):
         return f"the bus works, and other ids are heard: {shown}{' …' if others[OTHERS_SHOWN:] else ''}"
 
     def others(self) -> list[int]:
-        """Return the ids that were heard in the last RECENT_S and that no device wants."""
+        """Return the ids heard in the last RECENT_S seconds that no device wants."""
         now = self.now()
         return sorted(found for found, at in self._others.items() if now - at < RECENT_S)
 
     def insist(self) -> None:
-        """Make the next call at once, without waiting for the backoff, to switch off before the end."""
+        """Let the next call skip the backoff, so that outputs go off before the daemon ends."""
         for backoff in self._backoffs:
             backoff.insist()
 
@@ -139,7 +141,7 @@ class CanBus(Bus):
             raise self._failed(str(error)) from error
 
     def _step(self, wait_s: float) -> bool:
-        """Take one frame; False when none came."""
+        """Take one frame. Return False when no frame came."""
         self._open()
         try:
             found = self._link.receive(wait_s)
@@ -172,7 +174,7 @@ class CanBus(Bus):
         return made
 
     def _note(self, trouble: Trouble) -> None:
-        """Note the controller's report of a trouble, or of its end."""
+        """Record the controller's report that a trouble began or ended."""
         self._trouble, self._trouble_at = trouble, self.now()
         if trouble.bus_off:
             raise self._failed(

@@ -1,14 +1,14 @@
 """One CANopen node: its heartbeat, and its objects by SDO (CiA 301), through the `canopen` library.
 
-The library encodes and decodes; this file sends, waits and backs off, in the loop's thread. The library
-alone would accept any frame with the reply's id, even a late reply. Here
+The library encodes and decodes. This file sends, waits and backs off, in the loop's thread. The library
+alone would accept any frame with the reply's id, even a late reply. This file has stricter rules:
 
-- a reply counts only if it has eight bytes and names the requested object; other frames are dropped,
-  and the error names them if no reply comes;
-- after a request without a reply the node gets no request for LATE times the timeout: a late reply must
-  not pass for the reply to the next request;
-- no request is sent twice;
-- a write that switches power off is sent at once, even after a failed reading.
+- A reply counts only if it has eight bytes and names the requested object. Other frames are dropped. If
+  no reply comes, the error names the dropped frames.
+- After a request without a reply, the node gets no request for LATE times the timeout. Otherwise a late
+  reply could pass for the reply to the next request.
+- No request is sent twice.
+- A write that switches power off is sent at once, even after a failed reading.
 
 A lost node has a backoff, as every device has. The node's heartbeat or restart ends the backoff.
 """
@@ -36,11 +36,11 @@ OPERATIONAL: Final = 5
 
 
 class Aborted(HalError):
-    """The node refused a transfer: it is present, but the transfer is wrong."""
+    """The error of a transfer that the node refused. The node is present, but the transfer is wrong."""
 
 
 class CanOpenNode:
-    """One node of a bus. `heartbeat_timeout_s`: None for a node that has no heartbeat.
+    """One node of a bus. `heartbeat_timeout_s` is None for a node without a heartbeat.
 
     `starts`: the number of restarts that the node has reported.
     """
@@ -66,7 +66,8 @@ class CanOpenNode:
         bus.listen([FrameFilter(SDO_FROM_NODE + node)], self._hear_reply)
 
     def alive(self) -> None:
-        """Take new frames. Raises HalError if there is no heartbeat, or the node is not operational."""
+        """Take new frames. Raises HalError if the heartbeat is missing, or the node is not
+        operational."""
         self._bus.take()
         if self._beat_limit_s is None:
             return
@@ -75,14 +76,14 @@ class CanOpenNode:
             if not self._bus.wait(self._beats, self._timeout_s):
                 raise self._beat_pause.failed(self._silent())
         if self._beat_pause.failing:
-            self.starts += 1  # the node may have restarted unheard
+            self.starts += 1  # the node may have restarted while its heartbeat was lost
         self._beat_pause.mended()
         if self._state != OPERATIONAL:
             state = STATES.get(self._state, f"in state {self._state}")
             raise HalError(f"{self._name()} is {state}, not operational: look at the node")
 
     def read(self, index: int, subindex: int, octets: int) -> int:
-        """Read an unsigned number of this many octets. Raises HalError."""
+        """Read an unsigned number of `octets` bytes. Raises HalError."""
         what = f"read 0x{index:04X}:{subindex:02X}"
         found = self._exchanged(what, self._sdo_pause, lambda: self._client.upload(index, subindex))
         number = bytes(found)[:octets]
@@ -96,7 +97,7 @@ class CanOpenNode:
     def write(
         self, index: int, subindex: int, octets: int, number: int, safe: bool = False
     ) -> None:
-        """Set an unsigned number. Raises HalError; then the number may be set or not.
+        """Set an unsigned number. Raises HalError; after an error the number may be set or not.
 
         `safe`: the write switches power off, so it ignores the backoff of failed readings.
         """
@@ -106,7 +107,7 @@ class CanOpenNode:
         self._exchanged(what, pause, lambda: self._client.download(index, subindex, payload))
 
     def _exchanged(self, what: str, pause: Backoff, transfer: Callable[[], Reply]) -> Reply:
-        """Make one SDO transfer by the library. Raises HalError."""
+        """Make one SDO transfer through the library. Raises HalError."""
         waits = pause is self._sdo_pause and not pause.insisting
         pause.check(not_yet=waits and self._bus.now() < self._late_until)
         text = f"{self._name()}, {what}: "
@@ -117,13 +118,13 @@ class CanOpenNode:
         except self._client.ABORTED as error:
             raise Aborted(f"{text}refused: {error}") from error
         except self._client.FAILURES as error:
-            raise pause.failed(f"{text}no SDO reply to it ({error})") from error
+            raise pause.failed(f"{text}no SDO reply to the request ({error})") from error
         pause.mended()
         return found
 
     def exchange(self, request: bytes) -> bytes:
-        """Send eight bytes; return the reply about the same object. Raises TimeoutError, HalError."""
-        self._bus.take()  # drops a late reply to the last request
+        """Send eight bytes. Return the reply about the same object. Raises TimeoutError or HalError."""
+        self._bus.take()  # this drops a late reply to the last request
         self._answer, self._stray, self._asked = None, "", request[1:4]
         try:
             self.post(request)
@@ -136,7 +137,7 @@ class CanOpenNode:
         return self._answer
 
     def post(self, request: bytes) -> None:
-        """Send these eight bytes, which have no reply. Raises HalError."""
+        """Send these eight bytes. The node does not reply to them. Raises HalError."""
         self._bus.send(Frame(SDO_TO_NODE + self._node, request))
 
     def _hear_beat(self, frame: Frame, at: float) -> None:
@@ -181,7 +182,7 @@ class CanOpenNode:
 
 
 def _client(node: CanOpenNode) -> "Client":
-    """Return the library's client, imported only here."""
+    """Return the library's client. Only this function imports the library."""
     from drivers.hal.can.sdo import Client
 
     return Client(node.exchange, node.post)

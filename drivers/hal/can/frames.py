@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 EXTENDED: Final = 1 << 31
-"""The mark of an id of 29 bits: 0x123 and an extended 0x123 are different ids."""
+"""The mark of an id of 29 bits. It keeps 0x123 and an extended 0x123 apart."""
 
 
 class Frame(NamedTuple):
@@ -15,29 +15,30 @@ class Frame(NamedTuple):
 
 
 class Trouble(NamedTuple):
-    """A trouble of the bus itself, from an error frame. `text`: "" if the controller works again."""
+    """A trouble of the bus itself, reported by an error frame. `text` is "" when the trouble has
+    ended."""
 
     text: str
     bus_off: bool
 
 
 class LinkDown(Exception):
-    """The interface cannot be used now. The text says what to check."""
+    """The error of an interface that cannot be used now. Its text says what to check."""
 
 
 class FrameFilter(NamedTuple):
-    """The frames whose id equals `id` in the bits of `mask`; without a mask, in all bits."""
+    """The frames whose id equals `id` in the bits of `mask`. Without a mask all bits must be equal."""
 
     id: int
     mask: int = 0xFFFF_FFFF
 
     def fits(self, frame_id: int) -> bool:
-        """Is this the id of one of these frames?"""
+        """Does the filter let this id pass?"""
         return (frame_id ^ self.id) & self.mask == 0
 
 
 Hear = Callable[[Frame, float], None]
-"""A receiver: called with a frame and its reading time (monotonic s)."""
+"""A function that receives a frame and the time of its reading (monotonic seconds)."""
 
 
 def named(frame_id: int) -> str:

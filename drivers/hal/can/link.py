@@ -1,15 +1,16 @@
-"""One CAN bus by python-can: an interface of the kernel (SocketCAN), or an slcan adapter.
+"""One CAN bus through python-can: an interface of the kernel (SocketCAN), or an slcan adapter.
 
 python-can opens, reads and sends. This file adds what python-can lacks:
 
-- python-can's `recv` waits by the wall clock: on a silent bus, a clock set back by an hour would add an
-  hour. So this file waits, and `recv` only reads received data.
-- If an slcan adapter returns no frame, more may follow: the adapter may have sent an acknowledgement.
-- Bytes that are not slcan break python-can's parser permanently, so the adapter is opened again.
-- python-can's slcan write waits for the adapter without limit; here it has `timeout_s`.
+- python-can's `recv` waits by the wall clock. If the clock is set back by an hour, `recv` waits an hour
+  longer on a silent bus. So this file waits, and `recv` only reads received data.
+- An slcan adapter may return no frame although more data follows: the adapter may have sent an
+  acknowledgement. So this file reads on.
+- Bytes that are not slcan break python-can's parser permanently. So this file opens the adapter again.
+- python-can's slcan write waits for the adapter without limit. Here the write has `timeout_s`.
 - An interface that is down or gone raises many types of exceptions. Here each exception becomes a
   LinkDown, whose text has a remedy.
-- SocketCAN reports the bus's own troubles as error frames (linux/can/error.h).
+- SocketCAN reports the bus's own troubles as error frames (linux/can/error.h). This file decodes them.
 """
 
 import errno
@@ -29,12 +30,12 @@ from can.interfaces.slcan import slcanBus
 from drivers.hal.can.frames import EXTENDED, Frame, LinkDown, Trouble
 from drivers.hal.can.settings import Slcan
 
-logging.getLogger("can").setLevel(logging.CRITICAL)  # our texts say it all
+logging.getLogger("can").setLevel(logging.CRITICAL)  # our texts report the same failures
 
 FAILURES: Final = (can.CanError, serial.SerialException, OSError, ValueError, IndexError)
-"""The errors of python-can and its libraries. Its parser raises ValueError and IndexError."""
+"""The errors of python-can and its libraries. python-can's parser raises ValueError and IndexError."""
 IN_ONE_GO: Final = 4096
-"""The maximum number of lines other than frames that one call reads from an adapter."""
+"""The maximum number of lines that one call reads from an adapter without finding a frame."""
 
 BUS_OFF: Final = 0x40
 RESTARTED: Final = 0x100
@@ -47,15 +48,15 @@ TROUBLES: Final = {
     0x10: "transceiver errors",
     0x01: "frames cannot be sent in time",
 }
-"""Bits of an error frame's id (linux/can/error.h), the most serious first."""
+"""Bits of an error frame's id (linux/can/error.h). The most serious bit comes first."""
 
 
 Vendor = Callable[[], BusABC]
-"""Opens python-can's bus."""
+"""A function that opens python-can's bus."""
 
 
 def socketcan(interface: str) -> BusABC:
-    """Open an interface of the kernel; its bitrate comes from `ip link`."""
+    """Open an interface of the kernel. `ip link` has set its bitrate."""
     from can.interfaces.socketcan import SocketcanBus
 
     return SocketcanBus(channel=interface)
@@ -73,7 +74,7 @@ def slcan(settings: Slcan) -> BusABC:
 
 
 class SlcanAdapter(slcanBus):
-    """python-can's adapter, but exclusive, and with a time limit for writes."""
+    """python-can's adapter, with two changes: the port is exclusive, and writes have a time limit."""
 
     def _write(self, string: str) -> None:
         with error_check("Could not write to serial device"):
@@ -87,7 +88,7 @@ class SlcanAdapter(slcanBus):
 
 
 class Link:
-    """One bus, reopened when needed. `where`: its name, for errors."""
+    """One bus, which is opened again when needed. `where` is its name in errors."""
 
     def __init__(self, vendor: Vendor, where: str, timeout_s: float) -> None:
         self._vendor = vendor
@@ -107,7 +108,8 @@ class Link:
         self._readable = _selecting(self._bus)
 
     def receive(self, wait_s: float) -> Frame | Trouble | None:
-        """Return the next frame or trouble; None after `wait_s` without any. Raises LinkDown."""
+        """Return the next frame or trouble. Return None if nothing comes within `wait_s`. Raises
+        LinkDown."""
         assert self._bus is not None
         for _ in range(IN_ONE_GO):
             try:
@@ -123,7 +125,7 @@ class Link:
         return None
 
     def send(self, frame: Frame) -> None:
-        """Send a frame. Raises LinkDown. Success does not mean that any device has read the frame."""
+        """Send a frame. Raises LinkDown. Success does not prove that any device has read the frame."""
         assert self._bus is not None
         message = can.Message(
             arbitration_id=frame.id & ~EXTENDED,
@@ -136,14 +138,14 @@ class Link:
             raise LinkDown(self._explained(error)) from error
 
     def close(self) -> None:
-        """Close the interface, in any state. May be called twice."""
+        """Close the interface, in any state. The caller may call `close` twice."""
         bus, self._bus = self._bus, None
         if bus is None:
             return
         with suppress(*FAILURES):
             bus.shutdown()
         port = getattr(bus, "serialPortOrig", None)
-        if port is not None:  # python-can keeps the port of an unplugged adapter
+        if port is not None:  # python-can does not close the port of an unplugged adapter
             with suppress(*FAILURES):
                 port.close()
 
@@ -169,7 +171,8 @@ _HINTS: Final = {
 
 
 def _selecting(bus: BusABC) -> Callable[[float], bool] | None:
-    """Return a function that waits for input; None for a bus within this process, which has no file."""
+    """Return a function that waits for input. Return None for a bus inside this process, which has no
+    file."""
     try:
         descriptor = bus.fileno()
     except NotImplementedError:
@@ -178,7 +181,8 @@ def _selecting(bus: BusABC) -> Callable[[float], bool] | None:
 
 
 def _meaning(message: Message) -> Frame | Trouble | None:
-    """Convert a data frame or the controller's trouble. Return None for remote and FD frames."""
+    """Convert a data frame, or a trouble that the controller reports. Return None for remote and FD
+    frames."""
     if message.is_error_frame:
         found = message.arbitration_id
         if found & RESTARTED and not found & BUS_OFF:
@@ -192,7 +196,7 @@ def _meaning(message: Message) -> Frame | Trouble | None:
 
 
 def _code(error: BaseException | None) -> int:
-    """Return the errno of an error or of its cause; 0 if there is none."""
+    """Return the errno of an error or of its cause. Return 0 if neither has an errno."""
     while error is not None:
         code = getattr(error, "error_code", None) or getattr(error, "errno", None)
         if isinstance(code, int):

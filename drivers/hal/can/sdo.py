@@ -1,4 +1,5 @@
-"""The canopen library's SDO client, which sends through `canopen.py`. Imported with the first node."""
+"""The canopen library's SDO client, which sends through `canopen.py`. The first node imports this
+file."""
 
 import logging
 import struct
@@ -10,11 +11,12 @@ from canopen.sdo.client import SdoClient
 
 ABORT: Final = 0x80
 
-logging.getLogger("canopen").setLevel(logging.CRITICAL)  # our HalErrors say it all
+logging.getLogger("canopen").setLevel(logging.CRITICAL)  # our HalErrors report the same failures
 
 
 class Client(SdoClient):
-    """`exchange`: sends eight bytes and returns the reply's eight. `post`: sends without a reply.
+    """SDO client. `exchange` sends eight bytes and returns the reply's eight. `post` sends without a
+    reply.
 
     Raises ABORTED if the node refuses, and FAILURES for an invalid reply.
     """
@@ -35,5 +37,5 @@ class Client(SdoClient):
         return reply
 
     def send_request(self, request: bytes) -> None:
-        """Send a request without a reply."""
+        """Send a request that has no reply."""
         self._post(bytes(request))

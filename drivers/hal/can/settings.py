@@ -47,7 +47,7 @@ class Slcan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class CanSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="can"):
-    """One CAN bus: either `socketcan` or `slcan`."""
+    """One CAN bus. The YAML gives either `socketcan` or `slcan`."""
 
     socketcan: Annotated[
         Interface | None,
@@ -77,7 +77,7 @@ class CanSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 def warnings(settings: CanSettings) -> Remarks:
-    """Yield valid settings that deserve a second look: (path, text)."""
+    """Yield a warning (path, text) for each valid setting that may be a mistake."""
     if settings.slcan and not settings.slcan.port.startswith("/dev/serial/by-"):
         port = settings.slcan.port
         text = f"{port} may be another adapter after a reboot: use a path of /dev/serial/by-id"
@@ -85,14 +85,15 @@ def warnings(settings: CanSettings) -> Remarks:
 
 
 def where(settings: CanSettings) -> Where:
-    """Return the kernel's interface, which programs can share, or an adapter's port."""
+    """Return the place of the bus. Programs can share a kernel's interface, but not an adapter's
+    port."""
     if settings.slcan:
         return Where(settings.slcan.port, local=True, clients="one")
     return Where(str(settings.socketcan), local=True)
 
 
 def needs(settings: CanSettings) -> Needs:
-    """Return CAN's sockets, or an adapter's port."""
+    """Return the needs: CAN sockets for an interface, or the port of an adapter."""
     return serial_port.needs(settings.slcan.port) if settings.slcan else Needs(family="AF_CAN")
 
 

@@ -60,7 +60,8 @@ def where(settings: GpioSettings) -> Where:
 
 
 def needs(settings: GpioSettings) -> Needs:
-    """Return the chip of the settings; without one every chip, as each is opened to read its label."""
+    """Return the need for the chip in the settings. Without one, return every chip, because the bus
+    opens each chip to read its label."""
     chip = "char-gpiochip" if settings.chip is None else f"/dev/gpiochip{settings.chip}"
     return Needs((chip,), group="gpio")
 
@@ -70,9 +71,9 @@ def open_bus(
     factory: Factory | None = None,
     clock: Callable[[], float] = time.monotonic,
 ) -> "GpioBus":
-    """Open the header's pins. Raises HalError with the thing to check.
+    """Open the header's pins. Raises HalError; its text says what to check.
 
-    `factory`: a gpiozero pin factory whose pins claim as those of `pins.py` do.
+    `factory`: a gpiozero pin factory whose pins claim lines as those of `pins.py` do.
     """
     if factory is None:
         with _with_lgpio():
@@ -90,7 +91,7 @@ def open_to_switch_off(settings: GpioSettings) -> "GpioBus":
 
 @contextmanager
 def _with_lgpio() -> Iterator[None]:
-    """Turn errors of lgpio's import into HalError."""
+    """Turn errors of importing lgpio into HalError."""
     try:
         yield
     except ImportError as error:

@@ -1,6 +1,6 @@
-"""Pins on lgpio alone: a new process switches off sooner if it need not load gpiozero.
+"""Pins on lgpio alone. A new process switches off sooner if it need not load gpiozero.
 
-Outputs are claimed, written and released by the same calls as in `pins.py`. There are no edges.
+The calls that claim, write and release outputs are the same as in `pins.py`. There are no edges.
 """
 
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from drivers.hal.gpio.chip import PULLS, claim, open_chip
 
 
 class BarePin:
-    """One line, claimed in one call and left at its safe level."""
+    """One line. One call claims the line, and `close` leaves the line at its safe level."""
 
     edges = "none"
     when_changed: Callable[[object, object], None] | None = None
@@ -32,16 +32,16 @@ class BarePin:
         lgpio.gpio_write(self._handle, self._line, int(level))
 
     def output_with_state(self, state: bool) -> None:
-        """Claim as an output at this level, its safe level, restored on close."""
+        """Claim the line as an output at this level. This is its safe level, which `close` restores."""
         self._claim(lgpio.gpio_claim_output, int(state))
         self._safe = int(state)
 
     def input_with_pull(self, pull: str) -> None:
-        """Claim as an input with this resistor."""
+        """Claim the line as an input with this resistor."""
         self._claim(lgpio.gpio_claim_input, PULLS[pull])
 
     def close(self) -> None:
-        """Set an output to its safe level, then release the line. May be called twice."""
+        """Set an output to its safe level, then release the line. The caller may call `close` twice."""
         if not self._held:
             return
         self._held = False
@@ -55,14 +55,14 @@ class BarePin:
 
 
 class BareFactory:
-    """The lines of an open chip. The kernel refuses a second claim of a pin in one process."""
+    """The lines of an open chip. The kernel refuses to claim one pin twice in one process."""
 
     def __init__(self, chip: int | None) -> None:
-        """Open this chip, or the header's. Raises HalError."""
+        """Open this chip. Without a number, open the header's chip. Raises HalError."""
         self._handle, self._chip = open_chip(chip)
 
     def reserve_pins(self, requester: object, *pins: str) -> None:
-        """Do nothing: the YAML was checked."""
+        """Do nothing, because the check of the YAML has found double use already."""
 
     def release_pins(self, requester: object, *pins: str) -> None:
         """Do nothing."""

@@ -1,4 +1,4 @@
-"""The pins of one header: claimed, sampled, driven and released, through gpiozero's pins."""
+"""The pins of one header. The bus claims, samples, drives and releases them through gpiozero."""
 
 import logging
 import sys
@@ -23,14 +23,14 @@ DROPPED = (
 
 
 class Pin(Protocol):
-    """A pin of gpiozero's that claims as those of `pins.py` do."""
+    """A gpiozero pin that claims lines as those of `pins.py` do."""
 
     state: int
     edges: str
     when_changed: Callable[[object, object], None] | None
 
     def output_with_state(self, state: bool) -> None:
-        """Claim the pin as an output, at this level from the first moment on."""
+        """Claim the pin as an output that has this level from the first moment."""
 
     def input_with_pull(self, pull: str) -> None:
         """Claim the pin as an input with this resistor: `up`, `down` or `floating`."""
@@ -43,7 +43,7 @@ class Factory(Protocol):
     """gpiozero's pin factory."""
 
     def reserve_pins(self, requester: object, *pins: str) -> None:
-        """Reserve these pins for one requester. Raises GPIOZeroError if another has them."""
+        """Reserve these pins for one requester. Raises GPIOZeroError if another requester has them."""
 
     def release_pins(self, requester: object, *pins: str) -> None:
         """Release the reservation."""
@@ -73,8 +73,8 @@ class GpioBus(Bus):
         unread: Collection[str] = (),
         clearing: Mapping[str, Clearing] = MappingProxyType({}),
     ) -> "GpioLines":
-        """Return these lines: canonical inputs with their pull, outputs with their safe level. The last
-        two parameters are for modules."""
+        """Return the lines of these points: canonical inputs with their pull, and outputs with their
+        safe level. The last two parameters matter only for modules, not for pins."""
         self._devices.append(GpioLines(self, dict(inputs), dict(outputs)))
         return self._devices[-1]
 
@@ -83,7 +83,7 @@ class GpioBus(Bus):
         self._wake = wake
 
     def edge(self, ticks: object, state: object) -> None:
-        """Report a changed input, with gpiozero's signature."""
+        """Report a changed input. gpiozero prescribes the signature."""
         if self._wake is not None:
             self._wake()
 
@@ -105,7 +105,7 @@ class GpioBus(Bus):
         try:
             self.factory.close()
         except _failures():
-            return  # the kernel releases the lines when the process ends
+            return  # the kernel releases the lines at the process's end
 
 
 class GpioLines:
@@ -121,9 +121,8 @@ class GpioLines:
         self._dropped = False
 
     def claim(self) -> None:
-        """Claim the outputs at their safe level, each in one call, then the inputs. After a failure
-        nothing is claimed.
-        """
+        """Claim the outputs at their safe level, each in one call, then the inputs. After a failure,
+        release all of them."""
         self._release()
         self._dropped = False
         try:
@@ -143,7 +142,8 @@ class GpioLines:
         return self._levels(self._pulls)
 
     def write(self, levels: Mapping[str, bool]) -> None:
-        """Drive these outputs; try every switching off, even after a failure. Raises HalError."""
+        """Drive these outputs. Try every output that goes off, even after a failure. Raises
+        HalError."""
         every = Every()
         for point, level in levels.items():
             if level != self._safe[point]:
@@ -153,11 +153,12 @@ class GpioLines:
                 self._of(point).state = level
         every.check()
         if self._dropped and levels.items() - self._safe.items():
-            self.drop()  # the dead-man dropped during this write: drop these outputs too
+            self.drop()  # the dead-man dropped the outputs during this write, so drop again
             self._check()
 
     def drop(self) -> None:
-        """Hold every output at its safe level until the next claim. For any thread; does not raise."""
+        """Hold every output at its safe level until the next claim. Any thread may call this. Does not
+        raise."""
         self._dropped = True
         for point, level in self._safe.items():
             if point in self._claimed:
@@ -193,7 +194,7 @@ class GpioLines:
         return self._claimed[point]
 
     def _pin(self, point: str) -> Pin:
-        """Reserve a pin before using it: gpiozero refuses a pin that another device holds."""
+        """Reserve a pin before its use. gpiozero refuses a pin that another device holds."""
         self._bus.factory.reserve_pins(self, point)
         self._claimed[point] = self._bus.factory.pin(point)
         return self._claimed[point]
@@ -205,7 +206,8 @@ class GpioLines:
         pin.when_changed = self._bus.edge
 
     def _conflicts_with(self, other: object) -> bool:
-        """Is `other` a different device? gpiozero asks this about the present holder of a pin."""
+        """Return whether `other` is a different device. gpiozero asks this about the present holder of
+        a pin."""
         return other is not self
 
     def _release(self) -> None:
@@ -223,7 +225,7 @@ class GpioLines:
 
 
 def _failures() -> tuple[type[Exception], ...]:
-    """Return the errors of gpiozero and lgpio, as far as these are loaded."""
+    """Return the error types of gpiozero and lgpio, without libraries that are not loaded."""
     gpiozero, lgpio = sys.modules.get("gpiozero"), sys.modules.get("lgpio")
     vendors = ((gpiozero, "GPIOZeroError"), (lgpio, "error"))
     return (OSError, *(getattr(vendor, name) for vendor, name in vendors if vendor))
@@ -238,5 +240,5 @@ def _hal_errors(point: str) -> Iterator[None]:
 
 
 def _hal_error(point: str, error: Exception) -> HalError:
-    text = getattr(error, "value", error)  # lgpio's errors print in quotes
+    text = getattr(error, "value", error)  # printed directly, lgpio's errors have quotes
     return HalError(f"{describe(point)}: {text}")

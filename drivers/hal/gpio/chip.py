@@ -1,6 +1,7 @@
-"""The header's chip and claims of its lines, through lgpio alone. Imported only where there is lgpio.
+"""The header's chip and the claims of its lines, through lgpio alone. Import this only where lgpio is
+installed.
 
-lgpio creates a FIFO in the working directory on import, so import it in the runtime directory.
+lgpio creates a FIFO in the working directory during import, so import this in the runtime directory.
 """
 
 import os
@@ -18,7 +19,8 @@ DEV = Path("/dev")
 
 
 def open_chip(chip: int | None, dev: Path = DEV) -> tuple[int, int]:
-    """Open this chip, or the header's by its label: (handle, number). Raises HalError."""
+    """Open this chip; without a number, find the header's chip by its label. Return (handle, number).
+    Raises HalError."""
     if chip is not None:
         return _open(chip, dev), chip
     numbers = sorted(int(p.name[8:]) for p in dev.glob("gpiochip*") if p.name[8:].isdecimal())
@@ -38,7 +40,7 @@ def open_chip(chip: int | None, dev: Path = DEV) -> tuple[int, int]:
 def claim(
     call: Callable[[int, int, int], object], handle: int, chip: int, line: int, value: int
 ) -> None:
-    """Claim a line by this call of lgpio's. Raises HalError with the name of the line's holder."""
+    """Claim a line with this lgpio function. Raises HalError with the name of the line's holder."""
     try:
         call(handle, line, value)
     except lgpio.error as error:
@@ -46,7 +48,8 @@ def claim(
 
 
 def _holder(handle: int, chip: int, line: int) -> str:
-    """Name the line's holder: the processes with the chip open, else the kernel's label."""
+    """Name the line's holder: the processes that have the chip open. If none is seen, give the kernel's
+    label."""
     *_, label = lgpio.gpio_get_line_info(handle, line)
     if not label:
         return ""

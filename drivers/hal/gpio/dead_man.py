@@ -1,8 +1,8 @@
-"""The dead-man beside a loop: when its scans stop, the outputs drop and stay dropped.
+"""The dead-man beside a loop. When the loop's scans stop, the outputs drop and stay dropped.
 
-It needs outputs that another thread can write, so it is for GPIO. (A Modbus client cannot be
-pre-empted; Modbus modules have their own watchdog.) A thread that keeps Python's global lock stops the
-dead-man too; then systemd's watchdog acts.
+The dead-man writes outputs from another thread, so it is only for GPIO. (No thread can interrupt a
+Modbus client; Modbus modules have their own watchdog.) A thread that keeps Python's global lock stops
+the dead-man too. In this case systemd's watchdog acts.
 """
 
 import threading
@@ -13,7 +13,7 @@ AFTER_S = 2.0
 
 
 class GpioDeadMan:
-    """Calls `drop` once, from its own thread, when `fed` has not been called for AFTER_S seconds."""
+    """A thread that calls `drop` once when nobody has called `fed` for AFTER_S seconds."""
 
     def __init__(
         self, drop: Callable[[], None], clock: Callable[[], float] = time.monotonic
@@ -32,7 +32,7 @@ class GpioDeadMan:
             self._thread.start()
 
     def check(self) -> bool:
-        """Drop the outputs if the last scan is too old; return True if dropped."""
+        """Drop the outputs if the last scan is too old. Return True if they were dropped."""
         overdue = self._fed_at is not None and self._clock() - self._fed_at > AFTER_S
         if overdue:
             self._fed_at = None

@@ -1,7 +1,7 @@
-"""The 40-pin header: the spelling of its pins, and checks of the wires on them.
+"""The 40-pin header: the spelling of its pins, and checks of the wires on the pins.
 
-Points are `BCM17` or `J8:11`. A bare number is refused: mixing up position and BCM number is the most
-common wiring mistake.
+A point is written as `BCM17` or `J8:11`. A bare number is refused, because mixing up position and BCM
+number is the most common wiring mistake.
 """
 
 import re
@@ -34,7 +34,7 @@ SHARED = {
 
 
 def canonical(point: str) -> str:
-    """Return `BCM4` for `J8:7` and `BCM4`. Raises ValueError with the right spelling."""
+    """Return `BCM4` for `J8:7` or `BCM4`. Raises ValueError with the right spelling."""
     if found := re.fullmatch(r"BCM(0|[1-9][0-9]?)", point):
         if int(found[1]) in POSITION:
             return point
@@ -65,19 +65,21 @@ def describe(point: str) -> str:
 
 
 def boot_level(point: str) -> bool:
-    """Return the level to which a pin is pulled from power-on until it is claimed.
+    """Return the level of a pin from power-on until the daemon claims it. A resistor pulls the pin
+    there.
 
-    BCM0-8 up, BCM9-27 down (BCM2835 ARM Peripherals, table 6-31, and its successors).
+    The level is up for BCM0-8, and down for BCM9-27 (BCM2835 ARM Peripherals, table 6-31, and its
+    successors).
     """
     return int(canonical(point)[3:]) <= 8
 
 
 def wire_problems(wire: Wire) -> Iterable[str]:
-    """Yield the errors in this wire on a header pin."""
+    """Yield each error of a wire on a header pin."""
     try:
         name = canonical(wire.point)
     except ValueError:
-        return  # the check of the point's spelling reports it
+        return  # the spelling check reports an invalid point
     if wire.direction == "in":
         if wire.pull is None:
             yield "pull is missing: write up, down, or none where an external resistor is fitted"
@@ -94,11 +96,11 @@ def wire_problems(wire: Wire) -> Iterable[str]:
 
 
 def wire_warnings(wire: Wire) -> Iterable[str]:
-    """Yield the other uses of this pin."""
+    """Yield a warning if the firmware or the kernel may use this pin too."""
     try:
         name = canonical(wire.point)
     except ValueError:
-        return  # the check of the point's spelling reports it
+        return  # the spelling check reports an invalid point
     if name in SHARED:
         free = "; see that it is switched off in config.txt, or use another pin"
         yield f"{name} is for {SHARED[name]}{free}"

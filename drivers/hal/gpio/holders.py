@@ -1,4 +1,5 @@
-"""Finds the processes with a GPIO chip open: the kernel has only a label ('lg') of a line's holder."""
+"""Finds the processes that have a GPIO chip open. About the holder of a line the kernel tells only a
+label ('lg')."""
 
 import os
 from collections.abc import Iterator
@@ -6,9 +7,10 @@ from pathlib import Path
 
 
 def holders(chip: Path, proc: Path = Path("/proc")) -> list[str]:
-    """Return the other processes with this device open, as far as this user may see them.
+    """Return the other processes that have this device open. Processes that this user may not see are
+    missing.
 
-    A service has the name of its systemd unit, any other its process id and command.
+    A service appears by its systemd unit. Any other process appears by its id and command.
     """
     found = (_name(p) for p in _processes(proc) if p.name != str(os.getpid()) and _has(p, chip))
     return sorted(set(found))
@@ -21,7 +23,7 @@ def _processes(proc: Path) -> Iterator[Path]:
 def _has(process: Path, chip: Path) -> bool:
     try:
         return any(os.readlink(fd) == str(chip) for fd in (process / "fd").iterdir())
-    except OSError:  # the process has ended, or is another user's
+    except OSError:  # the process has ended, or belongs to another user
         return False
 
 

@@ -1,9 +1,10 @@
-"""gpiozero's pins on lgpio, with outputs that never glitch. Imported only where there is lgpio.
+"""gpiozero's pins on lgpio, with outputs that never glitch. Import this only where lgpio is installed.
 
-The stock `LGPIOPin` claims an output as an input, then as an output at low, and only then writes
-its level: an active-low relay clicks at each start. On close it claims a floating input. These pins
-claim once, at the safe level, and keep that level after close: the kernel of Raspberry Pi OS keeps the
-level of a line that no process holds.
+The stock `LGPIOPin` claims an output first as an input, then as an output at low, and writes its level
+last. So an active-low relay clicks at each start. On close the stock pin claims a floating input.
+
+The pins of this file claim a line once, at its safe level. They keep this level after close, because
+the kernel of Raspberry Pi OS keeps the level of a line that no process holds.
 """
 
 from collections.abc import Callable
@@ -16,16 +17,16 @@ from gpiozero.pins.local import LocalPiFactory, LocalPiPin
 
 from drivers.hal.gpio.chip import DEV, PULLS, claim, open_chip
 
-# Any board with the 40-pin header: gpiozero needs a board for the names of pins, and our hardened
-# systemd unit hides /proc/cpuinfo, where gpiozero would read the board.
+# Any board with the 40-pin header. gpiozero needs a board for the names of pins. It would read the
+# board from /proc/cpuinfo, but our hardened systemd unit hides that file.
 REVISION = 0xA02082
 
 
 class HeldPin(LGPIOPin):  # type: ignore[misc]
-    """One line, claimed in one call and left at its safe level."""
+    """One line. One call claims the line, and `close` leaves the line at its safe level."""
 
     def __init__(self, factory: LGPIOFactory, info: object) -> None:
-        LocalPiPin.__init__(self, factory, info)  # LGPIOPin's own claims an input
+        LocalPiPin.__init__(self, factory, info)  # the constructor of LGPIOPin would claim an input
         self._pwm = None
         self._bounce = None
         self._callback = None
@@ -34,19 +35,19 @@ class HeldPin(LGPIOPin):  # type: ignore[misc]
         self._safe: int | None = None
 
     def output_with_state(self, state: bool) -> None:
-        """Claim as an output at this level, its safe level, restored on close."""
+        """Claim the line as an output at this level. This is its safe level, which `close` restores."""
         self._claim(lgpio.gpio_claim_output, int(state))
         self._safe = int(state)
 
     def input_with_pull(self, pull: str) -> None:
-        """Claim as an input with this resistor."""
+        """Claim the line as an input with this resistor."""
         if self.info.pull not in (pull, ""):
             raise PinFixedPull(f"{self!r} has a fixed pull-{self.info.pull} resistor")
         self._claim(lgpio.gpio_claim_input, PULLS[pull])
         self._safe = None
 
     def close(self) -> None:
-        """Set an output to its safe level, then release the line. May be called twice."""
+        """Set an output to its safe level, then release the line. The caller may call `close` twice."""
         if not self._held or self.factory._handle is None:
             return
         self._held = False
@@ -65,7 +66,7 @@ class HeldPin(LGPIOPin):  # type: ignore[misc]
 
 
 class HeldFactory(LGPIOFactory):  # type: ignore[misc]
-    """Pins of an open chip. gpiozero's own constructor would choose the chip by the board."""
+    """The pins of an open chip. gpiozero's own constructor would choose the chip by the board."""
 
     def __init__(self, handle: int, chip: int) -> None:
         LocalPiFactory.__init__(self)
@@ -78,5 +79,5 @@ class HeldFactory(LGPIOFactory):  # type: ignore[misc]
 
 
 def open_factory(chip: int | None, dev: Path = DEV) -> HeldFactory:
-    """Open the header's chip, by this number or by its label. Raises HalError."""
+    """Open the header's chip by this number; without a number, by its label. Raises HalError."""
     return HeldFactory(*open_chip(chip, dev))

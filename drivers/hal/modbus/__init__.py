@@ -1,15 +1,21 @@
 """Modbus: the coils, discrete inputs and registers of units, over TCP or on a serial line (RTU).
 
-    settings.py   settings of the YAML; also tcp_or_serial.py (address or line) and watchdog.py
-    points.py     spelling of contacts and relays; registers.py: spelling of a map's places
-    bus.py        the units of one connection or line: retries, pauses
-    lines.py      one device's coils and registers: claim, read, write, read back, release; a second
-                  master on one output is a fault, and makes no relay chatter
-    clearing.py   calls that the controller takes and clears by itself
-    dead_man.py   arms and refreshes the modules' watchdogs
-    wire.py       a request and its answer; tcp.py and rtu.py carry them, frames.py makes the frames
+    settings.py       the bus in the YAML
+    tcp_or_serial.py  the address or the serial line in the YAML
+    watchdog.py       the modules' watchdog in the YAML
+    points.py         the spelling of contacts and relays
+    registers.py      the spelling of places in a register map
+    bus.py            the units of one connection or line, with retries and pauses
+    lines.py          one device's coils and registers: claim, read, write, read back, release;
+                      a second master on one output is a fault, and makes no relay chatter
+    clearing.py       calls that the controller takes and clears by itself
+    dead_man.py       arms and refreshes the modules' watchdogs
+    wire.py           a request and its answer
+    tcp.py, rtu.py    carry requests and answers
+    frames.py         makes and reads the frames
 
-Only frames.py (pymodbus) and rtu.py (pyserial) import a library. They are imported when a bus needs it.
+Only frames.py (pymodbus) and rtu.py (pyserial) import a library. They are imported when a bus needs
+them.
 """
 
 from drivers.hal import BusType

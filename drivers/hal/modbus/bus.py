@@ -1,18 +1,18 @@
 """The units of one TCP connection or serial line: one request at a time, with retries and backoff.
 
-- A request has `timeout_s` from the name lookup to the last byte of the reply, and up to `retries` more
-  tries. Reads and writes may be repeated; a pulse is not, because a repeat would prolong it. `tcp.py`
-  (new connections) and `rtu.py` (silence) keep a late reply or half a frame from passing for the reply
-  to another request.
-- If the connection or port cannot be opened, the whole bus backs off for 0.5 to 30 s; if a unit fails,
-  only that unit does. During a backoff calls fail at once with the same text. After a backoff each
-  request gets only one try, until the unit answers again. A unit that has never answered also gets only
-  one try. A dead unit costs the others one `timeout_s` per backoff. Between two such failed tries the
-  live units have their turn.
-- Writes that switch off have their own backoff at each unit: a failed reading never delays the first
-  such write.
+- One try of a request has `timeout_s`, from the name lookup to the last byte of the reply. After a
+  failure there are up to `retries` more tries. Reads and writes may be repeated. A pulse is not
+  repeated, because a repeat would prolong it. `tcp.py` (by a new connection) and `rtu.py` (by silence)
+  keep a late reply or half a frame from passing for the reply to another request.
+- If the connection or port cannot be opened, the whole bus backs off for 0.5 to 30 s. If a unit fails,
+  only this unit backs off. During a backoff calls fail at once with the same text.
+- After a backoff each request gets only one try, until the unit answers again. A unit that has never
+  answered also gets only one try. So a dead unit costs the other units one `timeout_s` for each
+  backoff. Between two such failed tries the live units have their turn.
+- At each unit, writes that switch off have a backoff of their own. So a failed reading never delays the
+  first such write.
 
-If a gateway waits for its serial units longer than `timeout_s`, the other units wait too: set the
+If a gateway waits for its serial units longer than `timeout_s`, the other units wait too. Set the
 gateway's timeout below `timeout_s`.
 """
 
@@ -46,16 +46,16 @@ from drivers.hal.modbus.wire import (
 from drivers.hal.points import Clearing, Pull
 
 TURN_S: Final = 0.05
-"""The pause after a failed try before another failed unit is tried: longer than the rest of a scan, and
-shorter than a scan's period.
-"""
+"""The pause (s) after a failed try before another failed unit is tried. The pause is longer than the
+rest of a scan, and shorter than the period of scans."""
 
 
 class ModbusBus(Bus):
-    """One TCP connection or serial line, and the units there (also a `drivers.hal.points.PointsBus`).
+    """One TCP connection or serial line, and its units. It is also a `drivers.hal.points.PointsBus`.
 
-    Tests replace `clock` and `jitter`; `now` is the clock. `scan_s`: the period of readings (s).
-    `refused`: the gaps that units lack, so that no further reading asks for them.
+    Tests replace `clock` and `jitter`; `now` is the clock. `scan_s` is the period of readings (s).
+    `refused` holds the ranges that a unit refused because it lacks an address between used points. No
+    further reading asks for these ranges.
     """
 
     canonical = staticmethod(canonical)
@@ -84,12 +84,13 @@ class ModbusBus(Bus):
         unread: Collection[str] = (),
         clearing: Mapping[str, Clearing] = MappingProxyType({}),
     ) -> ModbusLines:
-        """Return these lines: canonical inputs, and coils with their safe level (True is 1)."""
+        """Return the lines of these points: canonical inputs, and coils with their safe level (True is
+        1)."""
         read, driven = ({n: parse(n) for n in names} for names in (inputs, outputs))
         return ModbusLines(self, read, driven, dict(outputs), unread, clearing)
 
     def read(self, asked: Range, safe: bool = False) -> dict[Point, int]:
-        """Read these bits (0 or 1) or registers by one request. Raises HalError."""
+        """Read these bits (0 or 1) or registers with one request. Raises HalError."""
         question = UnitRequest(asked.unit, READS[asked.table], asked.start, asked.count)
         found = self._ask(f"read {asked}", question, safe)
         return dict(zip(asked.points(), found.values, strict=True))
@@ -99,33 +100,36 @@ class ModbusBus(Bus):
         return Image(self, points).read()
 
     def write(self, point: Point, value: int, safe: bool = False) -> None:
-        """Set this coil (0 or 1) or register. Raises HalError; then its value is unknown."""
+        """Set this coil (0 or 1) or register. Raises HalError; after an error its value is unknown."""
         coil = point.table == "coil"
         sent = (COIL_ON if value else 0) if coil else value
         what = f"write {'coil' if coil else 'register'} {point.address}"
         self._ask(what, UnitRequest(point.unit, WRITES[point.table], point.address, sent), safe)
 
     def flash(self, place: Point, on_s: float) -> None:
-        """Let the module time a pulse, by "flash on" of Waveshare's Modbus RTU Relay boards.
+        """Let the module time a pulse, by the command "flash on" of Waveshare's Modbus RTU Relay
+        boards.
 
-        The request is function 5. The address is 0x0200 plus the relay's number, from 0, and the value
-        is the time in tenths of a second; the reply is an echo. Source: the maker's manual, protocol
-        V2: `01 05 02 00 00 07 8D B0` switches relay 0 of unit 1 on for 0.7 s. A repeat would restart
-        the time, so the request is sent once. Raises HalError; then there may be a pulse.
+        The request is function 5. Its address is 0x0200 plus the relay's number, which begins at 0. Its
+        value is the time in tenths of a second. The reply is an echo. Source: the maker's manual,
+        protocol V2: `01 05 02 00 00 07 8D B0` switches relay 0 of unit 1 on for 0.7 s.
+
+        The request is sent once, because a repeat would restart the time. Raises HalError; after an
+        error there may be a pulse.
         """
         question = UnitRequest(place.unit, WRITES["coil"], place.address, round(on_s * 10))
         self._ask(f"flash at coil {place.address:#x}", question, once=True)
 
     def guard(self, units: Iterable[int]) -> DeviceWatchdogs:
-        """Return the modules' own watchdogs for a device with outputs at these units."""
+        """Return the watchdogs of the modules at these units, for a device with outputs there."""
         return self._watchdogs.guard(units)
 
     def scanned(self) -> None:
-        """Keep the modules' watchdogs from tripping."""
+        """Refresh the modules' watchdogs, so that they do not trip."""
         self._watchdogs.scanned()
 
     def insist(self) -> None:
-        """Make the next call at once, without waiting for the backoff, to switch off before the end."""
+        """Let the next call skip the backoff, so that outputs go off before the daemon ends."""
         for backoff in (self._link, *self._units.values()):
             backoff.insist()
 
@@ -136,7 +140,7 @@ class ModbusBus(Bus):
     def _ask(
         self, what: str, question: UnitRequest, safe: bool = False, once: bool = False
     ) -> UnitReply:
-        """Return the unit's valid answer. `once`: do not repeat the request. Raises HalError."""
+        """Return the unit's valid answer. `once`: send the request only once. Raises HalError."""
         unit = question.unit
         backoff = self._units.setdefault((unit, safe), self._backoff())
         self._link.check()
@@ -158,7 +162,8 @@ class ModbusBus(Bus):
         return answer
 
     def _tried(self, question: UnitRequest, tries: int) -> tuple[UnitReply | None, str]:
-        """Return an answer, or the cause of its absence. Raises HalError without a connection."""
+        """Return (answer, ""), or (None, the reason why there is none). Raises HalError without a
+        connection."""
         reason = ""
         for _ in range(tries):
             try:
@@ -176,7 +181,8 @@ class ModbusBus(Bus):
         return None, reason
 
     def _refused(self, backoff: Backoff, unit: int, text: str, code: int) -> HalError:
-        """Return the error for an exception reply. No backoff after 1 to 3: the unit works."""
+        """Return the error for an exception reply. Codes 1 to 3 cause no backoff, because the unit
+        works."""
         self._watchdogs.refused(unit, code)
         text += f"exception {code}, {EXCEPTIONS.get(code, UNDEFINED)}"
         if code not in (1, 2, 3):
@@ -185,7 +191,8 @@ class ModbusBus(Bus):
 
 
 def _way(settings: ModbusSettings) -> tuple[UnitWire, str]:
-    """Return the wire to the units and its name for texts. Only this function imports the libraries."""
+    """Return the wire to the units, and its name for texts. Only this function imports the
+    libraries."""
     if settings.serial:
         from drivers.hal.modbus.rtu import SerialLine
 

@@ -1,9 +1,12 @@
-"""Calls that a controller takes and then clears by itself: their places read "no call" soon after.
+"""Calls that a controller takes and then clears by itself. Soon after the write their places read "no
+call".
 
-Only the places of calls are judged here. A place clears itself if it loses the value of each written
-call within a scan. Nobody can tell such a controller from another master that writes "no call" as
-quickly, so the warning names both. Every other contradiction is another master's (`Rivals` in
-`lines.py`): a call that is lost later, another call than the written one, and any other command.
+Only places of calls are judged here. A place counts as clearing itself if it loses the value of each
+written call within a scan. Another master that writes "no call" as quickly would look the same, so the
+warning names both causes.
+
+Every other contradiction counts as another master's write (`Rivals` in `lines.py`). Such are a call
+that is lost later, another call than the written one, and any other command.
 """
 
 import logging
@@ -16,12 +19,12 @@ from drivers.hal.points import Clearing
 log = logging.getLogger(__name__)
 
 TWICE: Final = 2
-"""After so many calls in a row that were lost within a scan, the place clears itself. The first lost
-call is written again, because the module may have restarted."""
+"""The number of calls in a row that must be lost within a scan before the place counts as clearing
+itself. The first lost call is written again, because the module may have restarted."""
 
 
 class ClearedCalls:
-    """The places, by name, that may clear a written call. `scan_s`: the period of readings (s)."""
+    """The places, by name, that may clear a written call. `scan_s` is the period of readings (s)."""
 
     def __init__(
         self,
@@ -47,12 +50,12 @@ class ClearedCalls:
         self._gone.discard(name)
 
     def may_read(self, name: str, written: int, found: int) -> bool:
-        """Is this reading the written value, or that value without its call?"""
+        """Return whether this reading is the written value, or the written value without its call."""
         cleared = name not in self._stayed and found == self._without_call(name, written)
         return found == written or cleared
 
     def keeps(self, name: str, written: int, found: int) -> bool:
-        """Judge a reading for which `may_read` is true; return False if the call must be written
+        """Judge a reading for which `may_read` is true. Return False if the call must be written
         again."""
         habits = self._clearing.get(name)
         if habits is None or habits.pulse or self._without_call(name, written) == written:
@@ -68,7 +71,7 @@ class ClearedCalls:
         return self._in_a_row[name] >= TWICE
 
     def tell(self, name: str, place: str) -> None:
-        """Log once that this place clears itself."""
+        """Log a warning that this place clears itself, once for each place."""
         if self._in_a_row.get(name, 0) >= TWICE and name not in self._told:
             self._told.add(name)
             text = (
@@ -79,6 +82,6 @@ class ClearedCalls:
             log.warning(pairs("call_cleared", place=place, reason=text))
 
     def _without_call(self, name: str, written: int) -> int:
-        """Return the value of a place that has cleared its call."""
+        """Return the value that a place has after it has cleared its call."""
         bits = self._clearing[name].bits if name in self._clearing else 0
         return (written & ~bits) | (self._safe[name] & bits)

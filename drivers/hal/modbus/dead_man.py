@@ -1,12 +1,13 @@
-"""Arms and refreshes the modules' own watchdogs (`watchdog.py` has their settings).
+"""Arms and refreshes the modules' own watchdogs. Their settings are in `watchdog.py`.
 
-- A watchdog is armed before the first output is driven, and counts as armed only when read back.
-- Only a finished scan refreshes it: when the daemon hangs, the module drops its outputs. So one round
-  of the loop, failing units included, must be shorter than the module's time.
-- After a trip (read back, or exception 4) every output is unknown: the watchdog is armed again, each
-  device on the unit fails one reading, and its outputs are written anew.
+- The first output is driven only after its watchdog is armed. A watchdog counts as armed only when read
+  back.
+- Only a finished scan refreshes a watchdog, so the module drops its outputs when the daemon hangs. One
+  round of the loop must be shorter than the module's time, even with failing units.
+- After a trip (read back, or reported by exception 4) every output is unknown. The watchdog is armed
+  again. Each device on the unit fails one reading, and its outputs are written anew.
 
-After the daemon's end the watchdog stays armed: the outputs are off already, and stay off.
+After the daemon's end the watchdog stays armed. The outputs are off already, and stay off.
 """
 
 import itertools
@@ -22,11 +23,11 @@ if TYPE_CHECKING:
     from drivers.hal.modbus.bus import ModbusBus
 
 DEVICE_FAILURE: Final = 4
-"""The exception with which modules refuse outputs after a trip of their watchdog."""
+"""The exception code with which a module refuses outputs after its watchdog tripped."""
 
 
 class UnitWatchdog:
-    """The watchdog of one unit. `trips`: the number of observed trips."""
+    """The watchdog of one unit. `trips` counts the trips that the daemon has seen."""
 
     def __init__(self, bus: "ModbusBus", unit: int, habits: Habits) -> None:
         self._bus = bus
@@ -50,7 +51,7 @@ class UnitWatchdog:
         self.armed = True
 
     def refresh(self, now: float) -> None:
-        """If due, refresh the watchdog and check it for a trip. Does not raise."""
+        """If a refresh is due, refresh the watchdog and check for a trip. Does not raise."""
         if not self.armed or now < self._refreshed_at + self._habits.refresh_s:
             return
         self._refreshed_at = now
@@ -61,7 +62,7 @@ class UnitWatchdog:
             self.tripped()
 
     def tripped(self) -> None:
-        """Record a trip: the outputs are unknown."""
+        """Record a trip. Afterwards the outputs are unknown."""
         if self.armed:
             self.armed = False
             self.trips += 1
@@ -84,13 +85,14 @@ class UnitWatchdog:
 
 
 class DeviceWatchdogs:
-    """One device's view of its units' watchdogs."""
+    """The watchdogs of the units that have one device's outputs."""
 
     def __init__(self, watchdogs: Iterable[UnitWatchdog]) -> None:
         self._seen = {watchdog: watchdog.trips for watchdog in watchdogs}
 
     def check(self) -> None:
-        """Arm all watchdogs. Raises HalError, also once after each trip, because outputs went off."""
+        """Arm all watchdogs. Raises HalError. After each trip it raises once more, because outputs went
+        off."""
         trips = [watchdog for watchdog, seen in self._seen.items() if watchdog.trips != seen]
         for watchdog in self._seen:
             watchdog.arm()
@@ -103,7 +105,7 @@ class DeviceWatchdogs:
 
 
 class Watchdogs:
-    """The watchdogs of one bus, by unit; empty if the YAML has no watchdog."""
+    """The watchdogs of one bus, by unit. There are none if the YAML has no watchdog."""
 
     def __init__(
         self, bus: "ModbusBus", settings: Watchdog | None, clock: Callable[[], float]
@@ -115,13 +117,13 @@ class Watchdogs:
             self._units = {unit: UnitWatchdog(bus, unit, habits) for unit in settings.units}
 
     def guard(self, units: Iterable[int]) -> DeviceWatchdogs:
-        """Return a device's watchdogs; the device has outputs at these units."""
+        """Return the watchdogs of these units, for a device with outputs there."""
         return DeviceWatchdogs(
             self._units[unit] for unit in sorted(set(units)) if unit in self._units
         )
 
     def refused(self, unit: int, code: int) -> None:
-        """Record a unit's answer with this exception."""
+        """Record that a unit has answered with this exception code."""
         if code == DEVICE_FAILURE and unit in self._units:
             self._units[unit].tripped()
 

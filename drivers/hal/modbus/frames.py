@@ -1,9 +1,11 @@
-"""Modbus frames and their contents, by pymodbus. Imported when a bus needs it.
+"""Modbus frames and their contents, through pymodbus. A bus imports this file when it needs frames.
 
-pymodbus's decoders accept wrong replies, so this file has stricter decoders. pymodbus's client is not
-used: its timeout starts again at each byte and follows the wall clock, its name lookup has no limit, it
-repeats requests on a connection that may still hold late replies, and it accepts a reply to another
-function. pymodbus's server costs 15 MB and is never imported.
+pymodbus's decoders accept wrong replies, so this file has stricter decoders.
+
+pymodbus's client is not used, for four reasons. Its timeout starts again at each byte and follows the
+wall clock. Its name lookup has no limit. It repeats requests on a connection that may still hold late
+replies. It accepts a reply to another function. pymodbus's server costs 15 MB of memory and is never
+imported.
 """
 
 import logging
@@ -31,14 +33,14 @@ from pymodbus.pdu.register_message import (
 
 from drivers.hal.modbus.wire import BadReply, UnitReply, UnitRequest
 
-logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # our HalErrors say it all
+logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # our HalErrors report them
 
 FAILURES: Final = (ModbusException, struct.error, IndexError, ValueError)
-"""The errors of pymodbus for bytes that are not a reply."""
+"""The errors that pymodbus raises for bytes that are not a reply."""
 
 
 class AnyCoilRequest(WriteSingleCoilRequest):
-    """Function 5 with any value. Some modules take a time there instead of on and off."""
+    """Function 5 with any value. Some modules expect a time in place of on and off."""
 
     def encode(self) -> bytes:
         """Encode address and value."""
@@ -56,7 +58,7 @@ REQUESTS: Final[dict[int, type[ModbusPDU]]] = {
 
 
 class Coils(ReadCoilsResponse):
-    """Bits; a wrong byte count is refused."""
+    """A reply with bits. A wrong number of bytes is refused."""
 
     def decode(self, data: bytes) -> None:
         """Decode the bits. Raises ValueError for a wrong number of bytes."""
@@ -66,13 +68,13 @@ class Coils(ReadCoilsResponse):
 
 
 class DiscreteInputs(Coils):
-    """The same as `Coils`, for discrete inputs."""
+    """A reply with discrete inputs, decoded as `Coils`."""
 
     function_code = 2
 
 
 class HoldingRegisters(ReadHoldingRegistersResponse):
-    """Registers; a wrong byte count is refused."""
+    """A reply with holding registers. A wrong number of bytes is refused."""
 
     def decode(self, data: bytes) -> None:
         """Decode the registers. Raises ValueError for a wrong number of bytes."""
@@ -82,13 +84,13 @@ class HoldingRegisters(ReadHoldingRegistersResponse):
 
 
 class InputRegisters(HoldingRegisters):
-    """Registers, as `HoldingRegisters`, of another table."""
+    """A reply with input registers, decoded as `HoldingRegisters`."""
 
     function_code = 4
 
 
 class CoilEcho(WriteSingleCoilResponse):
-    """A coil's address and value. pymodbus alone would read every value as 1."""
+    """The echo of a coil's address and value. pymodbus alone would read every value as 1."""
 
     def decode(self, data: bytes) -> None:
         """Decode address and value. Raises ValueError for a wrong number of bytes."""
@@ -99,7 +101,7 @@ class CoilEcho(WriteSingleCoilResponse):
 
 
 class RegisterEcho(WriteSingleRegisterResponse):
-    """A register's address and value."""
+    """The echo of a register's address and value."""
 
     def decode(self, data: bytes) -> None:
         """Decode address and value. Raises ValueError for a wrong number of bytes."""
@@ -116,15 +118,16 @@ RTU: Final = FramerRTU(DECODER)
 
 
 def tcp_request(question: UnitRequest, number: int) -> bytes:
-    """Return the request's frame on TCP. `number`: the transaction's, not 0. Raises BadReply."""
+    """Return the request's frame on TCP. `number` is the transaction number, which is not 0. Raises
+    BadReply."""
     return TCP.buildFrame(_request(question, number))
 
 
 def tcp_answer(question: UnitRequest, number: int, heard: bytes) -> tuple[int, UnitReply | None]:
-    """Return the number of used bytes, and the answer once it is complete. Raises BadReply.
+    """Return (number of used bytes, answer). The answer is None until it is complete. Raises BadReply.
 
-    Replies to other requests and of other units are dropped. pymodbus alone would accept a reply with
-    number 0 for any request, and any unit's reply to a request to unit 0.
+    Replies to other requests and replies of other units are dropped. pymodbus alone would accept a
+    reply with number 0 for any request. It would also accept any unit's reply to a request to unit 0.
     """
     used = 0
     while True:
@@ -149,8 +152,9 @@ def rtu_answer(question: UnitRequest, frame: bytes) -> UnitReply:
 
 
 def rtu_size(heard: bytes) -> int:
-    """Return the size of the reply at the beginning of `heard`; 0: too few bytes. Raises BadReply."""
-    if len(heard) < 5:  # the shortest reply is an exception
+    """Return the size of the reply at the beginning of `heard`; 0 if there are too few bytes. Raises
+    BadReply."""
+    if len(heard) < 5:  # an exception is the shortest reply
         return 0
     try:
         sort = DECODER.lookupPduClass(heard)
@@ -186,7 +190,7 @@ def _decoded(question: UnitRequest, content: bytes) -> UnitReply:
 
 
 def _answer(question: UnitRequest, reply: ModbusPDU) -> UnitReply:
-    """Return the reply's answer. Raises BadReply if the reply does not belong to the request."""
+    """Return the answer in the reply. Raises BadReply if the reply does not belong to the request."""
     function, asked = question.function, question.value
     if reply.function_code & 0x7F != function:
         raise BadReply(f"function {reply.function_code} instead of {function}")

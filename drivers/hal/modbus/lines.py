@@ -1,9 +1,10 @@
-"""One device's coils and registers: the same claim, read, write, read-back and close for each driver.
+"""One device's coils and registers. For each driver, claim, read, write, read-back and close are the
+same.
 
-An output is read before its first write, read back after each write, and compared in each reading. This
-reveals a module that restarts with its outputs off, a tripped watchdog, and another master (`Rivals`).
-Every output that goes to its safe value is written, even if another output, an input or the unit's
-watchdog fails.
+An output is read before its first write, read back after each write, and compared in each reading. The
+comparison reveals a module that restarted with its outputs off, a tripped watchdog, and another master
+(`Rivals`). Every output that goes to its safe value is written, even if another output, an input or the
+unit's watchdog fails.
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class Image:
-    """Points that are read together, in as few requests as possible."""
+    """A set of points that are read together, in as few requests as possible."""
 
     def __init__(self, units: "ModbusBus", points: Iterable[Point]) -> None:
         self._units = units
@@ -34,7 +35,7 @@ class Image:
     def read(self, safe: bool = False, every: Every | None = None) -> dict[Point, int]:
         """Read bits (0 or 1) and registers now. Raises HalError.
 
-        With `every`: return the points that can be read, even if others fail.
+        With `every`, return all points that can be read, even if other points fail.
         """
         image: dict[Point, int] = {}
         asked = list(self._ranges)
@@ -44,7 +45,8 @@ class Image:
         return image
 
     def _part(self, part: Range, asked: list[Range], safe: bool) -> dict[Point, int]:
-        """Make one request. If the module lacks addresses in a gap, later requests skip the gap."""
+        """Make one request. If the module lacks an address between used points, later requests skip
+        that gap."""
         parts = pieces(part, self._points)
         if len(parts) == 1 or not self._units.refused.within(part):
             try:
@@ -63,7 +65,8 @@ class ModbusLines:
     """One device's inputs and outputs by name (`drivers.hal.points.Lines`).
 
     `safe`: each output's safe value. `unread`: outputs that cannot be read back. Every scan writes
-    them, because the controller may have restarted. `clearing`: outputs that the controller may clear.
+    these outputs, because the controller may have restarted. `clearing`: outputs that the controller
+    may clear.
     """
 
     def __init__(
@@ -91,10 +94,11 @@ class ModbusLines:
         self._guard = units.guard(point.unit for point in outputs.values())
 
     def claim(self) -> None:
-        """Read each output and bring it to its safe value; once only.
+        """Read each output, and bring it to its safe value. Only the first claim does so.
 
-        Where outputs cannot be read, inputs are read to check that the unit answers. A claim after a
-        failure only reads and leaves the outputs unchanged: a lost reply must not release a held door.
+        If the outputs cannot be read, read the inputs instead, to check that the unit answers. A claim
+        after a failure only reads. It leaves the outputs unchanged, because a lost reply must not
+        release a held door.
         """
         self._set.clear()
         every = Every()
@@ -110,8 +114,8 @@ class ModbusLines:
         self._claimed = True
 
     def read(self) -> dict[str, int]:
-        """Read every input, and each output whose lost call must be written again. Raises HalError,
-        also if an output contradicts its written value.
+        """Read every input, and each output whose lost call must be written again. Raises HalError.
+        Also raises if an output contradicts its written value.
 
         After a failure the outputs count as unknown.
         """
@@ -124,7 +128,7 @@ class ModbusLines:
         return {**lost, **{name: p.of(image[p.cell]) for name, p in self._inputs.items()}}
 
     def bring(self, values: Mapping[str, int]) -> None:
-        """Set these outputs, except outputs known to have the value already. Raises HalError.
+        """Set these outputs. Skip an output that is known to have its value already. Raises HalError.
 
         Also raises while another master writes one of the device's outputs.
         """
@@ -133,38 +137,41 @@ class ModbusLines:
         self._rivals.check(map(str, self._outputs.values()))
 
     def write(self, values: Mapping[str, int]) -> None:
-        """Set these outputs, and read them back. Raises HalError; then their values are unknown."""
+        """Set these outputs, and read them back. Raises HalError; after an error their values are
+        unknown."""
         every = Every()
         self._write(values, every)
         every.check()
 
     def flash(self, point: str, flash: Flash) -> None:
-        """Request this pulse. The module switches the coil, so its value is not compared."""
+        """Request this pulse. The module itself switches the coil, so the coil's value is not
+        compared."""
         self._touched = True
         self._set.pop(point, None)
         self._units.flash(parse(flash.point), flash.on_s)
 
     def outputs(self) -> dict[str, int] | None:
-        """Read the outputs now; None where none can be read."""
+        """Read the outputs now. Return None if no output can be read."""
         image = self._back.read()
         return {n: image[p] for n, p in self._outputs.items() if n not in self._unread} or None
 
     def make_safe(self) -> None:
-        """Set every output to its safe value, even outputs believed safe. Raises HalError."""
+        """Set every output to its safe value, even an output that is believed safe. Raises HalError."""
         self.write(self._safe)
 
     def close(self) -> None:
-        """Try once to make every output safe, if any was ever written. Does not raise."""
+        """If any output was ever written, try once to make every output safe. Does not raise."""
         if not self._touched:
             return
         self._units.insist()
-        unheard = Every()  # failures are dropped: the daemon is ending
+        unheard = Every()  # failures are dropped, because the daemon is ending
         for name, point in self._outputs.items():
             with unheard.one():
                 self._units.write(point, self._safe[name], safe=True)
 
     def _write(self, values: Mapping[str, int], every: Every) -> None:
-        """Write, off first, then read back each output. After a failure nothing is switched on."""
+        """Write the outputs that go off first, then read back each output. After a failure switch
+        nothing on."""
         self._touched = self._touched or bool(values)
         safe = {name for name, value in values.items() if value == self._safe[name]}
         written: dict[str, int] = {}
@@ -197,11 +204,13 @@ class ModbusLines:
                 )
 
     def _reading(self, name: str, value: int, image: Mapping[Point, int]) -> int:
-        """Return an output's reading; its written value if the reading was not made, or counts not."""
+        """Return an output's reading. Return the written value if the output was not read or is in
+        `unread`."""
         return value if name in self._unread else image.get(self._outputs[name], value)
 
     def _lost(self, known: Mapping[str, int], image: Mapping[Point, int]) -> dict[str, int]:
-        """Return the outputs that have lost their call, which must be written again."""
+        """Return name -> reading of the outputs that have lost their call. These calls must be written
+        again."""
         lost: dict[str, int] = {}
         for name, value in known.items():
             point = self._outputs[name]

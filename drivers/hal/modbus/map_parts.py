@@ -1,6 +1,6 @@
 """The parts of a register map in a YAML or a profile: a place, a bit, a command.
 
-The maps of lifts, doors and chargers, and of modules' watchdogs, consist of these parts.
+The register maps of lifts, doors, chargers and module watchdogs consist of these parts.
 """
 
 from collections.abc import Collection, Mapping
@@ -15,7 +15,7 @@ from drivers.numbers import Bit
 
 
 class Placed(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A part with a place. `TABLES`: its allowed tables."""
+    """A part with a place. `TABLES` lists the tables that the place may be in."""
 
     TABLES: ClassVar[Collection[str]] = tuple(TABLES)
     refused: ClassVar[Mapping[str, str]] = {
@@ -33,7 +33,7 @@ class Placed(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             yield ("at",), reason
 
     def is_in(self, *tables: str) -> bool:
-        """Is the part's place in one of these tables?"""
+        """Return whether the part's place is in one of these tables."""
         return misplaced(self.at, tables) is None
 
 
@@ -59,12 +59,12 @@ class RegisterBit(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=T
     bit: Annotated[Bit, tells("the bit's number; 0 is the least significant.")]
 
     def is_on(self, word: int) -> bool:
-        """Is the bit set in a register's value?"""
+        """Return whether the bit is set in a register's value."""
         return bool(word >> self.bit & 1)
 
 
 class WrittenLevels(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A command with an on and an off value. `ON`, `OFF`: the keys of the two values."""
+    """A command with an on value and an off value. `ON` and `OFF` are the names of their two keys."""
 
     ON: ClassVar[str]
     OFF: ClassVar[str]
@@ -75,7 +75,8 @@ class WrittenLevels(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fiel
         return value
 
     def problems(self) -> Remarks:
-        """Yield problems: a place that cannot be written; values that it cannot hold."""
+        """Yield a problem for a place that cannot be written, for equal values, and for values that do
+        not fit the place."""
         yield from super().problems()
         if self.value(True) == self.value(False):
             yield (self.OFF,), f"is the value of {self.ON}"

@@ -1,9 +1,11 @@
 """The spelling of a point of a Modbus module in a YAML: unit, table and address.
 
-A contact is a discrete input, a coil, or one bit of a register; a relay is a coil. Addresses are those
-on the wire: they begin at 0. Manuals often print the data model's numbers. These begin at 1, and their
-first digit is the table: coil 0 is 00001, discrete input 0 is 10001, input register 0 is 30001, holding
-register 0 is 40001. Such a number is refused, and the error suggests the probable address.
+A contact is a discrete input, a coil, or one bit of a register. A relay is a coil. Addresses are those
+on the wire, which begin at 0.
+
+Manuals often print the numbers of the data model. These numbers begin at 1, and their first digit is
+the table: coil 0 is 00001, discrete input 0 is 10001, input register 0 is 30001, holding register 0 is
+40001. Such a number is refused, and the error suggests the probable address.
 """
 
 import re
@@ -16,7 +18,7 @@ from drivers.hal.points import Wire
 from drivers.numbers import BITS
 
 Table = Literal["coil", "discrete input", "holding register", "input register"]
-"""`registers.py` spells places: points without a unit, and whole registers."""
+"""The four tables of a unit. For places without a unit, and whole registers, see `registers.py`."""
 
 GAP_MAX: Final[dict[Table, int]] = {
     "coil": 8,
@@ -24,16 +26,16 @@ GAP_MAX: Final[dict[Table, int]] = {
     "holding register": 0,
     "input register": 0,
 }
-"""The widest gap between two points of one read request. Registers are never read across a gap: a
-controller may lack those addresses, or take a reading for an acknowledgement.
-"""
+"""The widest gap between two points of one read request. Registers are never read across a gap, because
+a controller may lack the addresses in the gap, or take their reading for an acknowledgement."""
 COUNT_MAX: Final[dict[Table, int]] = {
     "coil": 2000,
     "discrete input": 2000,
     "holding register": 125,
     "input register": 125,
 }
-"""The maximum number in one reply (Modbus Application Protocol V1.1b3, 6.1 to 6.4)."""
+"""The maximum number of bits or registers in one reply (Modbus Application Protocol V1.1b3, 6.1 to
+6.4)."""
 
 _MODEL_DIGIT: Final[dict[Table, int]] = {
     "coil": 0,
@@ -74,11 +76,11 @@ class Point(Struct, frozen=True, order=True):
 
     @property
     def cell(self) -> "Point":
-        """Return the point to read: the whole register for one bit of a register."""
+        """Return the point to read. For one bit of a register, the point is the whole register."""
         return self if self.bit is None else Point(self.unit, self.table, self.address)
 
     def of(self, value: int) -> int:
-        """Extract the point's value from its cell's value."""
+        """Return the point's value, taken from the value of its cell."""
         return value if self.bit is None else value >> self.bit & 1
 
 
@@ -129,7 +131,7 @@ def wire_problems(wire: Wire) -> Iterable[str]:
     try:
         point = parse(wire.point)
     except ValueError:
-        return  # the check of the point's spelling reports it
+        return  # the spelling check reports an invalid point
     if wire.pull is not None:
         yield "pull is for GPIO pins; the module has resistors of its own: delete pull"
     if wire.direction == "in":
@@ -150,7 +152,7 @@ def wire_problems(wire: Wire) -> Iterable[str]:
 
 
 def wire_warnings(wire: Wire) -> Iterable[str]:
-    """Yield a warning for a relay whose release nobody can verify; a call needs no such proof."""
+    """Yield a warning for a relay whose release nobody can verify. A call needs no such proof."""
     if wire.direction == "out" and not (wire.read_back or wire.clearing):
         yield "the coil is not read back: switching it off is not verified"
 
@@ -166,9 +168,10 @@ def _flash_problems(wire: Wire, output: Point) -> Iterable[str]:
 
 
 def ranges(points: Iterable[Point], gap: int | None = None) -> list[Range]:
-    """Return as few requests as possible that read all these points. Gaps up to `gap` are read too.
+    """Return as few read requests as possible for all these points. They also read gaps of up to `gap`
+    addresses.
 
-    `gap`: None for the table's GAP_MAX.
+    Without `gap`, the widest gap is the table's GAP_MAX.
     """
     found: list[Range] = []
     for point in sorted(set(points)):
@@ -181,12 +184,12 @@ def ranges(points: Iterable[Point], gap: int | None = None) -> list[Range]:
 
 
 def pieces(whole: Range, points: Iterable[Point]) -> Sequence[Range]:
-    """Return parts of a range that contain these points and no others."""
+    """Return the parts of a range that contain these points and nothing between them."""
     return ranges(set(points).intersection(whole.points()), gap=0)
 
 
 class RefusedRanges:
-    """Ranges that a unit has refused, because it lacks an address between the points in use."""
+    """Ranges that a unit has refused because it lacks an address between the used points."""
 
     def __init__(self) -> None:
         self._found: set[Range] = set()
@@ -196,7 +199,7 @@ class RefusedRanges:
         self._found.add(refused)
 
     def within(self, asked: Range) -> bool:
-        """Does this range contain a refused range?"""
+        """Return whether this range contains a refused range."""
         end = asked.start + asked.count
         return any(
             (one.unit, one.table) == (asked.unit, asked.table)

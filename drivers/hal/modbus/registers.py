@@ -1,8 +1,8 @@
 """The spelling of a place in register maps and profiles: `holding register 4`, `coil 0`.
 
-A place has no unit, because a map serves several units. Addresses are those on the wire, from 0. The
-data model's numbers begin at 1 (40001 is holding register 0, 30001 input register 0). Such a number is
-refused, and the error names the right address.
+A place has no unit, because one map serves several units. Addresses are those on the wire, from 0. The
+numbers of the data model begin at 1: 40001 is holding register 0, and 30001 is input register 0. Such a
+number is refused, and the error names the right address.
 """
 
 import re
@@ -39,7 +39,7 @@ _SPELLING: Final = re.compile(r"(?P<table>[a-z][a-z _-]*?)[\s_]+(?P<address>0x[0
 
 
 def place(text: str, tables: Collection[str] = tuple(TABLES)) -> tuple[Table, int]:
-    """Return table and address of a place. Raises ValueError with the right spelling."""
+    """Return (table, address) of a place. Raises ValueError with the right spelling."""
     how = " or ".join(f"'{table} 0'" for table in tables)
     words = _SPELLING.fullmatch(text.strip().lower())
     table = TABLES.get(re.sub(r"[\s_-]+", " ", words["table"])) if words else None
@@ -49,7 +49,8 @@ def place(text: str, tables: Collection[str] = tuple(TABLES)) -> tuple[Table, in
 
 
 def misplaced(text: str, tables: Collection[str]) -> str | None:
-    """Return the error in a place, for a struct's `problems`; None for a valid place."""
+    """Return the error in a place as a text for a struct's `problems`. Return None for a valid
+    place."""
     try:
         place(text, tables)
     except ValueError as error:

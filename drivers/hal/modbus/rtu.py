@@ -1,16 +1,17 @@
 """A serial line with Modbus RTU units: one request at a time, one deadline, silence between frames.
 
-pyserial opens and configures the port, and pymodbus makes and reads the frames (`frames.py`). This file
-waits and times. It is imported when a bus needs it.
+pyserial opens and configures the port. pymodbus makes and reads the frames (`frames.py`). This file
+waits and times. A bus imports this file when it needs a serial line.
 
-RTU has no transaction number, so a late reply looks like the reply to the present request. Hence:
+RTU has no transaction number, so a late reply looks like the reply to the present request. Hence these
+rules:
 
-- A request is sent only after 3.5 characters of silence; earlier bytes are dropped.
-- Frames of other units are dropped, and the wait goes on. Bytes that are no frame may be the reply in a
-  collision with a late reply: the try ends when the line is silent.
+- A request is sent only after 3.5 characters of silence. Earlier bytes are dropped.
+- Frames of other units are dropped, and the wait goes on. Bytes that are no frame may be the wanted
+  reply in collision with a late reply. After such bytes the try ends when the line is silent.
 - A unit that misses its timeout may answer late, until LATE x `timeout_s` after its request. Until then
-  it gets only repeats of the same request, within the same call. The first reply counts, since both
-  were sampled after the call began; the second is dropped.
+  the unit gets only repeats of the same request, within the same call. The first reply counts, because
+  the unit sampled both replies after the call began. The second reply is dropped.
 
 A unit that answers even later needs a longer `timeout_s`.
 """
@@ -33,20 +34,20 @@ from drivers.hal.modbus.wire import BadReply, NoReply, UnitReply, UnitRequest, U
 LATE: Final = 3.0
 PARITY: Final = {"none": "N", "even": "E", "odd": "O"}
 WRITES: Final = (5, 6, 15, 16)
-"""The functions with replies that may begin with the same bytes as the request."""
+"""The functions whose replies may begin with the same bytes as the request."""
 UNITS: Final = range(1, 248)
 PAUSE_S: Final = 0.05
-"""The longest pause within a frame: adapters delay characters by up to 16 ms."""
+"""The longest pause (s) within a frame. Adapters delay characters by up to 16 ms."""
 FRAME_MAX: Final = 256
 """The number of characters in the longest frame (Modbus over Serial Line V1.02, 2.5.1)."""
 
 
 class Noise(BadReply):
-    """The bytes are not a frame. The reply may still come."""
+    """The error of bytes that are not a frame. The reply may come later."""
 
 
 class SerialLine:
-    """One serial port, opened exclusively, and again when needed."""
+    """One serial port, opened exclusively. It is opened again when needed."""
 
     def __init__(self, settings: Serial, timeout_s: float) -> None:
         self._settings = settings
@@ -59,11 +60,11 @@ class SerialLine:
         self._stray = b""
 
     def owes(self, unit: int) -> bool:
-        """May this unit still reply to an older request? Then a new request should wait."""
+        """May this unit still reply to an older request? If so, a new request should wait."""
         return time.monotonic() < self._late.get(unit, 0.0)
 
     def begin(self, unit: int) -> None:
-        """Wait, before a new request to this unit, until no reply to an older request can come."""
+        """Before a new request to this unit, wait until no reply to an older request can come."""
         time.sleep(max(0.0, self._late.pop(unit, 0.0) - time.monotonic()))
 
     def connect(self) -> None:
@@ -86,12 +87,12 @@ class SerialLine:
             self.close()
             raise NoReply(f"the port broke ({_why(error)})") from error
         except BadReply as error:
-            raise NoReply(f"no Modbus reply to it ({error})") from error
+            raise NoReply(f"no Modbus reply to the request ({error})") from error
 
     def exchange(self, request: bytes) -> bytes:
-        """Send this frame; return the reply's frame with a valid CRC.
+        """Send this frame, and return the reply's frame, which has a valid CRC.
 
-        Raises TimeoutError, OSError when the port breaks, or BadReply.
+        Raises TimeoutError, OSError if the port fails, or BadReply.
         """
         if request[0] not in UNITS:
             raise BadReply("units on a serial line are 1 to 247")
@@ -105,11 +106,11 @@ class SerialLine:
             raise
 
     def close(self) -> None:
-        """Close the port. May be called twice."""
+        """Close the port. The caller may call `close` twice."""
         port, self._port = self._port, None
         if port is not None:
             with suppress(OSError, termios.error):
-                port.reset_output_buffer()  # bytes left for a dead line would delay closing
+                port.reset_output_buffer()  # bytes that a dead line has not taken would delay closing
             with suppress(OSError, termios.error):
                 port.close()
 
@@ -122,12 +123,14 @@ class SerialLine:
             timeout=0,
             exclusive=True,
         )
-        with suppress(OSError, ValueError):  # some adapters refuse, and deliver after 16 ms
+        with suppress(
+            OSError, ValueError
+        ):  # some adapters refuse this; they deliver after up to 16 ms
             port.set_low_latency_mode(True)
         return port
 
     def _settle(self) -> None:
-        """Wait until the line is silent for the gap between frames. Bytes until then are dropped."""
+        """Wait until the line is silent for the gap between frames. Drop all bytes until then."""
         while heard := self._heard(self._busy_until + self._settings.gap_s - time.monotonic()):
             self._stray = heard
         self._stray = b""
@@ -135,14 +138,15 @@ class SerialLine:
     def _send(self, request: bytes) -> None:
         self._sent_at = time.monotonic()
         self._busy_until = self._sent_at + len(request) * self._settings.character_s
-        if request[0] in self._late:  # a repeat, which the unit may answer late too
+        if request[0] in self._late:  # the unit may answer this repeat late too
             self._late[request[0]] = self._sent_at + LATE * self._timeout_s
         assert self._port  # `connect` has opened it
         if os.write(self._port.fileno(), request) != len(request):
             raise OSError(errno.EIO, "the port does not accept the whole request")
 
     def _heard(self, within_s: float) -> bytes:
-        """Return the next bytes; b"" after `within_s` without any. Raises TimeoutError, OSError."""
+        """Return the next bytes. Return b"" if none come within `within_s`. Raises TimeoutError or
+        OSError."""
         left_s = min(max(0.0, within_s), self._deadline.left())
         assert self._port
         descriptor = self._port.fileno()
@@ -164,7 +168,7 @@ class SerialLine:
         return heard[len(request) :]
 
     def _answer(self, request: bytes, heard: bytes) -> bytes:
-        """Return the reply's frame. No byte may precede it; one byte of noise may follow it."""
+        """Return the reply's frame. No byte may come before the frame. One byte of noise may follow."""
         while True:
             if not request[:1].startswith(heard[:1]) or not _answers(request, heard[1:2]):
                 self._drop(heard)
@@ -177,8 +181,8 @@ class SerialLine:
             heard += more
 
     def _checked(self, frame: bytes, request: bytes) -> bytes:
-        """Return this frame if its CRC is valid. Raises Noise for a late echo of an earlier try, else
-        BadReply."""
+        """Return this frame if its CRC is valid. Raises Noise for a late echo of an earlier try. Raises
+        BadReply for any other invalid frame."""
         if frames.crc_fits(frame):
             return frame
         is_echo = request[1] not in WRITES and frame == request[: len(frame)]
@@ -190,7 +194,8 @@ class SerialLine:
         raise BadReply(f"CRC of {frame.hex(' ')} is wrong")
 
     def _drop(self, heard: bytes) -> None:
-        """Drop another unit's frame: all bytes until silence. Raises Noise if they are no frame."""
+        """Drop another unit's frame, with all bytes until the line is silent. Raises Noise if the bytes
+        are no frame."""
         while more := self._heard(self._settings.gap_s):
             heard = (heard + more)[: 2 * FRAME_MAX]
         self._stray = heard
@@ -218,12 +223,14 @@ class SerialLine:
 
 
 def _answers(request: bytes, function: bytes) -> bool:
-    """May a reply to this request have this function? True while the function is not received."""
+    """Return whether a reply to this request may have this function. Return True until the function has
+    come."""
     return not function or function[0] & 0x7F == request[1]
 
 
 def _complete(heard: bytes) -> int:
-    """Return the size of the frame at the beginning of `heard`; 0 until it is complete."""
+    """Return the size of the frame at the beginning of `heard`. Return 0 until the frame is
+    complete."""
     size = frames.rtu_size(heard)
     return size if size <= len(heard) else 0
 
@@ -233,6 +240,6 @@ def _start(heard: bytes) -> str:
 
 
 def _why(error: Exception) -> str:
-    """Return the error's own text. pyserial wraps texts, and termios.error is not an OSError."""
+    """Return the cause's own text. pyserial wraps texts, and termios.error is not an OSError."""
     text = getattr(error, "strerror", None) or (error.args[-1] if error.args else error)
     return str(text)

@@ -1,4 +1,4 @@
-"""`type: modbus` of a device YAML: the place of the units, and the times."""
+"""`type: modbus` of a device YAML: where the units are, and the times."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -20,7 +20,8 @@ Timeout = Annotated[float, msgspec.Meta(ge=0.05, le=5, extra={"unit": "s"})]
 class ModbusSettings(
     BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="modbus"
 ):
-    """A module, or a gateway or serial line with several units. Give either `tcp` or `serial`."""
+    """A module, or a gateway or serial line with several units. The YAML gives either `tcp` or
+    `serial`."""
 
     tcp: Annotated[Tcp | None, tells("where the module or gateway listens.")] = None
     serial: Annotated[Serial | None, tells("the serial line (Modbus RTU).")] = None
@@ -53,12 +54,12 @@ class ModbusSettings(
                 )
 
     def watched(self) -> Sequence[int]:
-        """Return the units with a watchdog of their own, which drops their outputs."""
+        """Return the units whose own watchdog drops their outputs."""
         return self.module_watchdog.units if self.module_watchdog else ()
 
 
 def warnings(settings: ModbusSettings) -> Remarks:
-    """Yield valid settings that deserve a second look: (path, text)."""
+    """Yield a warning (path, text) for each valid setting that may be a mistake."""
     for path, text in settings.serial.warnings() if settings.serial else ():
         yield ("serial", *path), text
     for path, text in settings.module_watchdog.warnings() if settings.module_watchdog else ():
@@ -66,7 +67,8 @@ def warnings(settings: ModbusSettings) -> Remarks:
 
 
 def unwatched(settings: ModbusSettings, places: Iterable[str]) -> UnwatchedOutputs:
-    """Report the written units without a watchdog: only this daemon switches their outputs off."""
+    """Report the written units without a watchdog. Only this daemon switches the outputs of these units
+    off."""
     written = {int(place.split()[1]) for place in places}
     bare = sorted(written.difference(settings.watched(), settings.without_watchdog))
     warned = [((), _bare(bare))] if bare else []
@@ -83,8 +85,8 @@ def unwatched(settings: ModbusSettings, places: Iterable[str]) -> UnwatchedOutpu
 def paced(
     settings: ModbusSettings, devices: Sequence[DeviceSettings], points: Iterable[str]
 ) -> Remarks:
-    """Yield a warning if one silent unit makes the other units' readings stale, and if a serial line is
-    too slow for its `scan_s`."""
+    """Yield a warning if one silent unit makes the other units' readings stale. Yield one if a serial
+    line is too slow for its `scan_s`."""
     units = {int(point.split()[1]) for point in points}
     units |= {device.unit for device in devices if hasattr(device, "unit")}
     stale_s = min((s for d in devices if (s := d.stale_after()) is not None), default=math.inf)
@@ -102,7 +104,7 @@ def paced(
 
 
 def tables(settings: ModbusSettings) -> Iterable[Table]:
-    """Yield the writes and readings of the modules' watchdog."""
+    """Yield a table of the writes and readings of the modules' watchdogs."""
     if settings.module_watchdog:
         units = ", ".join(map(str, settings.module_watchdog.units))
         yield Table(
@@ -123,7 +125,8 @@ def _bare(units: Sequence[int]) -> str:
 
 
 def unreachable(settings: ModbusSettings, point: str) -> str | None:
-    """Return an error for a unit beyond a line's 1 to 247 (Modbus over Serial Line 2.2), or None."""
+    """Return an error for a unit outside 1 to 247 on a serial line (Modbus over Serial Line 2.2), or
+    None."""
     unit = int(point.split()[1])
     if settings.serial is None or 1 <= unit <= 247:
         return None
@@ -132,10 +135,11 @@ def unreachable(settings: ModbusSettings, point: str) -> str | None:
 
 
 def where(settings: ModbusSettings) -> Where:
-    """Return the gateway or module, or the line's port, which only one daemon can open."""
+    """Return the address of the gateway or module, or the port of the line. Only one daemon can open
+    the port."""
     if settings.serial:
         return Where(settings.serial.port, local=True, clients="one")
-    assert settings.tcp  # or `problems` has said so
+    assert settings.tcp  # otherwise `problems` has reported the missing address
     return Where(f"{settings.tcp.host}:{settings.tcp.port}", local=False, clients=None)
 
 
@@ -143,5 +147,5 @@ def needs(settings: ModbusSettings) -> Needs:
     """Return the line's port, or the module's address."""
     if settings.serial:
         return serial_port.needs(settings.serial.port)
-    assert settings.tcp  # or `problems` has said so
+    assert settings.tcp  # otherwise `problems` has reported the missing address
     return Needs(host=settings.tcp.host)

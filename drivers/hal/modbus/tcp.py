@@ -1,4 +1,5 @@
-"""Modbus TCP: one connection, one request at a time, one deadline. Imported when a bus needs it."""
+"""Modbus TCP: one connection, one request at a time, one deadline. A bus imports this file when it
+needs TCP."""
 
 import socket
 from typing import Final
@@ -8,11 +9,12 @@ from drivers.hal.modbus import frames
 from drivers.hal.modbus.wire import BadReply, NoReply, UnitReply, UnitRequest, Unreachable
 
 NUMBERS: Final = 0xFFFF
-"""The highest transaction number; the lowest is 1. A gateway that does not number replies sends 0."""
+"""The highest transaction number; the lowest is 1. The number 0 stays free for gateways that do not
+number their replies."""
 
 
 class Connection:
-    """The connection to one host, reopened when needed. Tests replace `resolve` (DNS)."""
+    """The connection to one host, opened again when needed. Tests replace `resolve` (DNS)."""
 
     def __init__(
         self, host: str, port: int, timeout_s: float, resolve: Resolve = socket.getaddrinfo
@@ -21,17 +23,17 @@ class Connection:
         self._where = f"{host}:{port}"
         self._dialler = Dialler(host, port, resolve)
         self._socket: socket.socket | None = None
-        self._number = 0  # continues across connections, so no late reply matches
+        self._number = 0  # goes on in the next connection, so no late reply matches
 
     def owes(self, unit: int) -> bool:
-        """Always False: replies have numbers, so a late reply cannot pass for a new reply."""
+        """Return False. Replies have numbers, so a late reply cannot pass for a new reply."""
         return False
 
     def begin(self, unit: int) -> None:
-        """Do nothing: no late reply can pass for a new reply."""
+        """Do nothing, because no late reply can pass for a new reply."""
 
     def connect(self) -> None:
-        """Connect if necessary, and start the time of one try. Raises Unreachable."""
+        """Connect if necessary, and start the time limit of one try. Raises Unreachable."""
         self._dialler.deadline.start(self._timeout_s)
         if self._socket is None:
             try:
@@ -48,13 +50,14 @@ class Connection:
             raise NoReply(self._reason(error)) from error
 
     def close(self) -> None:
-        """Close the connection. May be called twice."""
+        """Close the connection. The caller may call `close` twice."""
         connection, self._socket = self._socket, None
         if connection is not None:
             connection.close()
 
     def _answer(self, question: UnitRequest) -> UnitReply:
-        """Send the request, and read replies until its own comes. Raises OSError, BadReply."""
+        """Send the request, and read replies until the reply to this request comes. Raises OSError or
+        BadReply."""
         assert self._socket is not None
         self._number = self._number % NUMBERS + 1
         self._socket.sendall(frames.tcp_request(question, self._number))
@@ -67,7 +70,8 @@ class Connection:
             heard = heard[used:]
 
     def _heard(self) -> bytes:
-        """Return the next bytes. Raises OSError; TimeoutError when the try's time is up."""
+        """Return the next bytes. Raises OSError. Raises TimeoutError when the time of the try is
+        over."""
         assert self._socket is not None
         self._socket.settimeout(self._dialler.deadline.left())
         received = self._socket.recv(4096)
@@ -90,4 +94,4 @@ class Connection:
             return f"no reply within {self._timeout_s:g} s"
         if isinstance(error, OSError):
             return f"the connection broke ({error.strerror or error})"
-        return f"no Modbus reply to it ({error})"
+        return f"no Modbus reply to the request ({error})"

@@ -1,4 +1,4 @@
-"""The places of Modbus units: behind a TCP address, or on a serial line."""
+"""The two connections of Modbus units: a TCP address, or a serial line."""
 
 import re
 from typing import Annotated, Final, Literal
@@ -13,7 +13,7 @@ BAUDRATES: Final = (
     *(300, 600, 1200, 2400, 4800, 9600, 14400, 19200, 28800, 38400, 56000, 57600, 76800, 115200),
     *(128000, 230400, 250000, 256000, 460800, 500000, 921600, 1000000),
 )
-"""The usual rates of UARTs (Bd)."""
+"""The usual baud rates of UARTs."""
 
 
 class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -29,7 +29,8 @@ class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
 
 class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A serial line (RS-485). Every unit on it has these settings; a character has 8 data bits."""
+    """A serial line (RS-485). Its settings hold for every unit on the line. A character has 8 data
+    bits."""
 
     port: Annotated[Name, tells("the adapter's path, best the stable path: /dev/serial/by-id/….")]
     baudrate: Annotated[int, msgspec.Meta(ge=300, le=1_000_000), tells("bits a second.")]
@@ -38,7 +39,7 @@ class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ignore_echo: Annotated[bool, tells("true for an adapter that receives its own bytes.")] = False
 
     def problems(self) -> Remarks:
-        """Yield problems: a relative path; a rate that no unit has."""
+        """Yield a problem for a relative path, and for a rate that no unit has."""
         if not self.port.startswith("/"):
             text = "write the whole path, as `ls /dev/serial/by-id/*` prints it"
             yield ("port",), f"{self.port!r} is not a serial port: {text}"
@@ -62,12 +63,13 @@ class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     @property
     def least_s(self) -> float:
-        """Return the time (s) of the shortest reading: a request of 8 characters, a reply of 6."""
+        """Return the time (s) of the shortest reading, which has a request of 8 characters and a reply
+        of 6."""
         return 14 * self.character_s + 2 * self.gap_s
 
     @property
     def gap_s(self) -> float:
-        """Return the silence between two frames (s): 3.5 characters, or 1.75 ms above 19200 baud.
+        """Return the silence between two frames (s). It is 3.5 characters, or 1.75 ms above 19200 baud.
 
         Source: Modbus over Serial Line V1.02, 2.5.1.1.
         """

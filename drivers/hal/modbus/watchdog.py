@@ -1,7 +1,8 @@
 """`module_watchdog:` of a Modbus bus: the module's own watchdog for its outputs.
 
 Without timely writes the module drops its outputs by itself. Each make has its own registers for
-arming, refreshing and showing this, so they are in the YAML or a profile. `dead_man.py` uses them.
+arming, refreshing and checking the watchdog. So these registers are in the YAML or a profile.
+`dead_man.py` uses them.
 """
 
 from collections.abc import Iterator
@@ -17,7 +18,7 @@ from drivers.profiles import Profile
 
 
 class RegisterWrite(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One write."""
+    """One write to a register or coil."""
 
     value: Annotated[Word, tells("the value to write.")]
 
@@ -28,18 +29,20 @@ class Refresh(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     values: Annotated[
         list[Word],
         msgspec.Meta(min_length=1),
-        tells("written in turn: some modules ignore a value equal to the last."),
+        tells(
+            "the values, written in turn, because some modules ignore a value equal to the last."
+        ),
     ]
 
 
 class Shows(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A place, and the values to match."""
+    """A place, and the values that match there."""
 
     values: Annotated[list[Word], msgspec.Meta(min_length=1), tells("the readings that match.")]
 
 
 class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The use of a make's watchdog: its writes, readings and times."""
+    """The use of one make's watchdog: its writes, readings and times."""
 
     time_s: Annotated[Period, tells("the time that `arm` gives the module.")]
     arm: Annotated[
@@ -58,7 +61,7 @@ class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     rearm: Annotated[list[RegisterWrite], tells("the writes that end a trip, before `arm`.")] = []
 
     def problems(self) -> Remarks:
-        """Yield a problem for a refresh that comes too late."""
+        """Yield a problem for a refresh that would come too late."""
         if self.refresh_s > self.time_s / 2:
             text = (
                 f"one late scan would drop the outputs: at most {self.time_s / 2:g}, half of time_s"
@@ -76,33 +79,34 @@ class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = None
 
     def problems(self) -> Remarks:
-        """Yield problems: neither or both of profile and habits; a profile with problems."""
+        """Yield a problem for a missing or double choice of profile and habits, and for a profile with
+        problems."""
         if len(set(self.units)) < len(self.units):
             yield ("units",), "a unit is listed twice"
         yield from PROFILE.problems(self.profile, self.habits)
 
     def chosen(self) -> Habits:
-        """Return the YAML's habits, or else the profile's habits."""
+        """Return the YAML's habits, or the profile's habits if the YAML has none."""
         return PROFILE.chosen(self.profile, self.habits)
 
     def rows(self) -> Iterator[tuple[str, str, str]]:
-        """Yield each write, and each reading that is looked at: (when, place, value)."""
+        """Yield (when, place, value) of each write, and of each reading that is compared."""
         chosen = self.chosen()
         for write in chosen.arm:
-            yield f"starts it, for {chosen.time_s:g} s", write.at, str(write.value)
+            yield f"starts the watchdog, for {chosen.time_s:g} s", write.at, str(write.value)
         refresh = " and ".join(map(str, chosen.refresh.values))
         yield f"every {chosen.refresh_s:g} s", chosen.refresh.at, f"{refresh}, in turn"
         for write in chosen.rearm:
             yield "after a trip, first", write.at, str(write.value)
         for when, shown in (
-            ("reads while it runs", chosen.armed),
+            ("reads while the watchdog runs", chosen.armed),
             ("reads after a trip", chosen.tripped),
         ):
             for place in shown:
                 yield when, place.at, " or ".join(map(str, place.values))
 
     def warnings(self) -> Remarks:
-        """Yield a warning for a profile that nobody has tried."""
+        """Yield a warning for a profile that nobody has tried on hardware."""
         if not any(PROFILE.problems(self.profile, self.habits)):
             advice = "pull the network cable, and see that the relays drop"
             yield from PROFILE.warnings(self.profile, advice)

@@ -31,7 +31,7 @@ EXCEPTIONS: Final = {
     10: "gateway path unavailable: look at the gateway's settings",
     11: "gateway target device failed to respond: look at the unit's power, cable and id",
 }
-"""Modbus Application Protocol V1.1b3, section 7."""
+"""The meanings of exception codes (Modbus Application Protocol V1.1b3, section 7)."""
 UNDEFINED: Final = (
     "which Modbus does not define: the unit is at fault; ask its maker for the meaning"
 )
@@ -39,7 +39,7 @@ ILLEGAL_ADDRESS: Final = 2
 
 
 class UnitRequest(Struct, frozen=True):
-    """One request. `value`: the number of bits or registers to read, or the value to write."""
+    """One request. `value` is the number of bits or registers to read, or the value to write."""
 
     unit: int
     function: int
@@ -48,26 +48,27 @@ class UnitRequest(Struct, frozen=True):
 
 
 class UnitReply(NamedTuple):
-    """A unit's reply: bits or registers as numbers, or the number of an exception, which may be 0."""
+    """A unit's reply. It has bits or registers as numbers, or the code of an exception, which may be
+    0."""
 
     values: tuple[int, ...] = ()
     exception: int | None = None
 
 
 class Unreachable(Exception):
-    """There is no connection. The text gives the cause."""
+    """The error of a missing connection. Its text gives the cause."""
 
 
 class NoReply(Exception):
-    """No reply to the request came in time. The text describes what came instead."""
+    """The error of a request without a reply in time. Its text describes anything else that came."""
 
 
 class BadReply(Exception):
-    """The reply does not belong to the request."""
+    """The error of a reply that does not belong to the request."""
 
 
 class UnitException(HalError):
-    """The unit answered with an exception; `code` is its number."""
+    """The error of a unit that answered with an exception. `code` is the exception's number."""
 
     def __init__(self, text: str, code: int) -> None:
         super().__init__(text)
@@ -75,19 +76,19 @@ class UnitException(HalError):
 
 
 class UnitWire(Protocol):
-    """The connection or line to some units, reopened when needed."""
+    """The connection or line to some units, opened again when needed."""
 
     def owes(self, unit: int) -> bool:
-        """May this unit still reply to an older request? Then a new request should wait."""
+        """May this unit still reply to an older request? If so, a new request should wait."""
 
     def begin(self, unit: int) -> None:
-        """Wait, before a new request, until no late reply can pass for its reply."""
+        """Before a new request, wait until no late reply can pass for the new reply."""
 
     def connect(self) -> None:
-        """Connect if necessary, and start the time of one try. Raises Unreachable."""
+        """Connect if necessary, and start the time limit of one try. Raises Unreachable."""
 
     def ask(self, question: UnitRequest) -> UnitReply:
         """Send this request, and return its answer. Raises NoReply."""
 
     def close(self) -> None:
-        """Close the connection. May be called twice."""
+        """Close the connection. The caller may call `close` twice."""

@@ -1,10 +1,14 @@
 """MQTT: contacts and relays behind a broker, and topics for drivers of their own.
 
-settings.py   settings of the YAML; points.py: one contact or relay; topics.py: topics and messages
-makes.py      the topics of well-known makes, for `profile`
-bus.py        the broker: listening, publishing, ages, backoff; a driver uses this
-lines.py      one device's contacts and relays: claim, read, write, read back, renew, release
-link.py       one connection, through paho-mqtt, which only this file imports
+    settings.py  the bus in the YAML
+    points.py    one contact or relay in the YAML
+    topics.py    topics and messages in the YAML
+    makes.py     the topics of well-known makes, for `profile`
+    bus.py       the broker, which a driver uses: listening, publishing, ages, backoff
+    lines.py     one device's contacts and relays: claim, read, write, read back, renew, release
+    link.py      one connection through paho-mqtt
+
+Only link.py imports paho-mqtt.
 """
 
 from drivers.hal import BusType

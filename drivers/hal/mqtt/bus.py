@@ -1,23 +1,24 @@
-"""The broker as a bus: what devices have published, and messages to them.
+"""The broker as a bus: messages that devices have published, and messages to the devices.
 
 A driver of its own (one that is not on contacts) uses these calls:
 
-    bus.listen(topic)                  when it is made, for each topic that it reads
+    bus.listen(topic)                  in the constructor, for each topic that the driver reads
     bus.fresh(topic, stale_after_s)    in `read`: the last message, or a HalError if it is no fact
-    bus.heard(topic)                   the last message of any age; None without one
+    bus.heard(topic)                   the last message of any age; None without a message
     bus.publish(topic, payload)        in `write`; with `safe=True` for a message that switches off
     bus.up()                           in `open`: a HalError if there is no broker
 
-No reading waits: the messages come on a thread of the connection, and a changed payload wakes the
-bus's thread for a scan. With `listen(topic, take)` the connection's thread calls `take` with each
-message, for a driver that must not miss one.
+No reading waits. The connection has a thread of its own, which receives the messages. A changed payload
+wakes the bus's thread for a scan. With `listen(topic, take)` the connection's thread calls `take` for
+each message. This is for a driver that must not miss a message.
 
-- A retained message is what once was: it has no age. A message is a fact only if it came live in this
-  connection, not longer ago than the device's own period.
-- The connection is shared. If it fails, every device of the bus fails; then the bus backs off for 0.5
-  to 30 s. A silent device costs the others nothing, because nobody waits for it.
-- Every connection starts with a clean session, and with nothing heard: a message that was missed
-  while the broker was away may have been the message that counts.
+- A retained message reports an earlier state of unknown age. A message is a fact only if it came live
+  in this connection, and is not older than the device's own period.
+- All devices of the bus share one connection. If the connection fails, every device fails, and the bus
+  backs off for 0.5 to 30 s. A silent device costs the other devices nothing, because nobody waits for
+  it.
+- Every connection starts with a clean session and without earlier messages. The bus may have missed the
+  decisive message while the broker was away.
 - A message to a device is never retained, and is sent once. "On" expires at the broker (MQTT 5), so
   that it never reaches a device that comes back later.
 """
@@ -45,13 +46,13 @@ if TYPE_CHECKING:
 EXPIRES_S: Final = 2
 """The time (s) after which the broker drops an "on" that it could not deliver."""
 KEPT_MAX: Final = 4 * 1024 * 1024
-"""The length (bytes) of all kept payloads together, from which on no more are kept."""
+"""The maximum length (bytes) of all kept payloads together. Beyond this length no payload is kept."""
 
 
 class Heard(msgspec.Struct, frozen=True):
-    """The last message of a topic: `at` is monotonic seconds; None for a retained message.
+    """The last message of a topic. `at` is in monotonic seconds, and None for a retained message.
 
-    `length`: that of the payload in bytes, of which too long a payload is not kept.
+    `length` is the payload's length in bytes. A payload that is too long is not kept, only its length.
     """
 
     payload: bytes
@@ -60,7 +61,7 @@ class Heard(msgspec.Struct, frozen=True):
 
 
 def open_bus(settings: MqttSettings) -> "MqttBus":
-    """Make the bus. Raises HalError where paho is not installed."""
+    """Make the bus. Raises HalError if paho is not installed."""
     if find_spec("paho") is None:
         raise HalError(
             "MQTT needs the Python package paho-mqtt: in the clone .venv/bin/pip install '.[mqtt]'"
@@ -69,7 +70,8 @@ def open_bus(settings: MqttSettings) -> "MqttBus":
 
 
 class MqttBus(Bus):
-    """One broker (also a `drivers.hal.points.PointsBus`). `now`: its clock, which tests replace."""
+    """One broker. It is also a `drivers.hal.points.PointsBus`. `now` is its clock, which tests
+    replace."""
 
     def __init__(
         self,
@@ -89,7 +91,7 @@ class MqttBus(Bus):
         self._wake: Callable[[], None] = lambda: None
 
     def canonical(self, point: str) -> str:
-        """Return the point's name, which has one spelling."""
+        """Return the point's name, which has only one spelling."""
         return point
 
     def lines(
@@ -99,7 +101,8 @@ class MqttBus(Bus):
         unread: Collection[str] = (),
         clearing: Mapping[str, Clearing] = MappingProxyType({}),
     ) -> MqttLines:
-        """Return these points; listen to their topics. The last two parameters are for modules."""
+        """Return the lines of these points, and listen to their topics. The last two parameters matter
+        only for modules."""
         found = {name: self.points[name] for name in (*inputs, *outputs)}
         for point in found.values():
             for place in (point, point.availability):
@@ -110,8 +113,8 @@ class MqttBus(Bus):
     def listen(self, topic: str, take: Callable[[Heard], None] | None = None) -> None:
         """Subscribe to this topic, now and in each later connection.
 
-        `take`: called with each message, on another thread; it must be quick and not raise. Raises
-        HalError for more topics than a bus may have.
+        Another thread calls `take` for each message; `take` must be quick and must not raise. Raises
+        HalError if the bus would have too many topics.
         """
         if len(self._takers) >= TOPICS_MAX and topic not in self._takers:
             raise HalError(f"a bus listens to at most {TOPICS_MAX} topics: define a second bus")
@@ -120,9 +123,9 @@ class MqttBus(Bus):
             self._link.subscribe([topic])
 
     def up(self, safe: bool = False) -> "Link":
-        """Return the connection; make it if there is none. Raises HalError; then, in the backoff, at
-        once. `safe`: to switch off, which does not wait for the backoff of a failed reading.
-        """
+        """Return the connection, and make one if there is none. Raises HalError, at once during a
+        backoff. `safe`: the caller switches off, so the call does not wait for the backoff of a
+        failed reading."""
         if self._link is not None and self._link.up:
             return self._link
         backoff = self._safe_backoff if safe else self._backoff
@@ -138,19 +141,20 @@ class MqttBus(Bus):
         return link
 
     def heard(self, topic: str) -> Heard | None:
-        """Return the topic's last message in this connection; None without one. Raises HalError."""
+        """Return the topic's last message in this connection; None without a message. Raises
+        HalError."""
         if reason := self.up().refused.get(topic):
             raise HalError(f"the broker does not let us read {topic}: {reason}")
         return self._heard.get(topic)
 
     def fresh(self, topic: str, stale_after_s: float = math.inf) -> Heard:
-        """Return the topic's last message if it is a fact. Raises HalError for any other."""
+        """Return the topic's last message if the message is a fact. Otherwise raise HalError."""
         found = self.heard(topic)
         if found is None or found.at is None:
             was = (
                 f"; a retained message of unknown age says {_shown(found.payload)}" if found else ""
             )
-            raise HalError(f"nothing was published on {topic} since we listen{was}")
+            raise HalError(f"nothing has come on {topic} in this connection{was}")
         age_s = self.now() - found.at
         if age_s > stale_after_s:
             raise HalError(
@@ -162,9 +166,10 @@ class MqttBus(Bus):
         return found
 
     def believed(self, topic: str, stale_after_s: float, notices: Availability | None) -> Heard:
-        """Return the topic's last message if it is a fact and the device has not gone since.
+        """Return the topic's last message if the message is a fact and the device has not gone offline
+        later.
 
-        Raises HalError for any other. A retained notice proves nothing.
+        Otherwise raise HalError. A retained notice of availability proves nothing.
         """
         found = self.fresh(topic, stale_after_s)
         if notices is None or (notice := self.heard(notices.topic)) is None or notice.at is None:
@@ -182,10 +187,10 @@ class MqttBus(Bus):
         safe: bool = False,
         expires_s: int | None = EXPIRES_S,
     ) -> None:
-        """Send a message, not retained; with `qos` 1, wait for the broker's confirmation.
+        """Send a message that is not retained. With `qos` 1, wait for the broker's confirmation.
 
-        `safe`: the message switches off; it does not wait for a backoff, and never expires. It is sent
-        once. Raises HalError; then the device may have received it.
+        `safe`: the message switches off. It does not wait for a backoff, and never expires. Every
+        message is sent once. Raises HalError; after an error the device may have received the message.
         """
         data = payload.encode() if isinstance(payload, str) else payload
         link = self.up(safe)
@@ -195,10 +200,10 @@ class MqttBus(Bus):
             self.calls += 1
 
     def ask(self, asks: Iterable[Ask]) -> None:
-        """Send these messages, each at most once in half a scan, however many points need it.
+        """Send these messages. Each is sent at most once in half a scan, even if many points need it.
 
-        The broker must confirm each within `timeout_s`: a broker that was frozen delivers old states
-        as if they were live, and its connection has ended by then. Raises HalError.
+        The broker must confirm each message within `timeout_s`, otherwise the connection ends. A broker
+        that was frozen would deliver old states as if they were live. Raises HalError.
         """
         now, rest_s = self.now(), self.settings.scan_s / 2
         for one in asks:
@@ -217,7 +222,8 @@ class MqttBus(Bus):
         self.wait(all_live, self.settings.timeout_s)
 
     def wait(self, done: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until `done`, which is asked again at each message; return whether it is true.
+        """Wait until `done()` is true, for at most `timeout_s`. Each message causes a new call. Return
+        whether the wait succeeded.
 
         Raises HalError without a connection.
         """
@@ -232,9 +238,9 @@ class MqttBus(Bus):
         return tuple(self._takers)
 
     def survey(self, listen_s: float) -> tuple[Mapping[str, str], bool]:
-        """Listen to every topic of the broker on a second connection; for people who look for devices.
+        """Listen to every topic of the broker on a second connection, for people who look for devices.
 
-        Return topic -> `live` or `retained`, and whether all topics had room. Raises HalError.
+        Return (topic -> `live` or `retained`, whether all topics had room). Raises HalError.
         """
         from drivers.hal.mqtt.link import Link
 
@@ -257,11 +263,12 @@ class MqttBus(Bus):
         return found, len(found) < TOPICS_MAX
 
     def on_edge(self, wake: Callable[[], None]) -> None:
-        """Call `wake`, from the connection's thread, when a topic's payload changes, and at its end."""
+        """Call `wake` when a topic's payload changes, and when the connection ends. The connection's
+        thread makes the call."""
         self._wake = wake
 
     def insist(self) -> None:
-        """Make the next connection at once, without waiting for the backoff."""
+        """Let the next attempt to connect skip the backoff."""
         for backoff in (self._backoff, self._safe_backoff):
             backoff.insist()
 

@@ -1,9 +1,9 @@
 """One device's contacts and relays behind a broker (`drivers.hal.points.Lines`).
 
-A relay is switched off when it is claimed. Its state must follow each change within `answers_within_s`.
-A later contradiction means that the device has restarted, that its timer has run out, or that somebody
-else switches the relay too (`Rivals`). Every relay that goes off gets its message, even if another
-relay fails.
+The claim switches every relay off. A relay's state must follow each command within `answers_within_s`.
+A later contradiction means one of three things: the device has restarted, its timer has run out, or
+somebody else switches the relay too (`Rivals`). Every relay that goes off gets its message, even if
+another relay fails.
 """
 
 import math
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 
 WAIT_S: Final = 0.5
-"""A call never waits longer for a state: systemd's watchdog counts ended calls."""
+"""The longest wait (s) for a state in one call. systemd's watchdog counts ended calls, so a call must
+be short."""
 
 
 class MqttLines:
@@ -40,9 +41,10 @@ class MqttLines:
         self._rivals = Rivals(bus.now)
 
     def claim(self) -> None:
-        """Switch every relay off, once only, and give the device time to publish its first states.
+        """Switch every relay off, and give the device time to publish its first states. Only the first
+        claim does so.
 
-        Raises HalError for a state that is no fact. A claim after a failure only reads: a lost
+        Raises HalError for a state that is no fact. A claim after a failure only reads, because a lost
         confirmation must not release a held door.
         """
         points = (*self._inputs.values(), *self._outputs.values())
@@ -56,7 +58,8 @@ class MqttLines:
                 self._state(point)
 
     def read(self) -> dict[str, bool]:
-        """Read every contact. Raises HalError for a state that is no fact, or a contradicting relay."""
+        """Read every contact. Raises HalError for a state that is no fact, and for a relay that
+        contradicts its command."""
         self._bus.ask(self._asks)
         found = {name: self._state(point) for name, point in self._inputs.items()}
         for name, level in self._set.items():
@@ -64,7 +67,8 @@ class MqttLines:
         return found
 
     def write(self, levels: Mapping[str, bool]) -> None:
-        """Switch these relays, off first. Raises HalError; then their states are unknown."""
+        """Switch these relays; those that go off come first. Raises HalError; after an error their
+        states are unknown."""
         self._touched = self._touched or bool(levels)
         every = Every()
         for name in sorted(levels, key=lambda name: levels[name]):
@@ -80,14 +84,15 @@ class MqttLines:
         every.check()
 
     def renew(self, names: Iterable[str]) -> None:
-        """Start the timers of these relays again, which are on. Raises HalError."""
+        """Restart the timers of these relays, which are on. Raises HalError."""
         for name in names:
             if self._outputs[name].switches_off_after_s is not None:
                 self._rivals.check([name])
                 self._send(name, True)
 
     def outputs(self) -> dict[str, int] | None:
-        """Wait until each relay's state follows its last command; return the readable states."""
+        """Wait until each relay's state follows its last command. Return the states that can be
+        read."""
         readable = {n: p for n, p in self._outputs.items() if p.topic}
         self._bus.ask(self._asks)
         within_s = max((p.answers_within_s for p in readable.values()), default=0.0)
@@ -100,30 +105,31 @@ class MqttLines:
         return {name: bool(self._said(name)) for name in readable}
 
     def close(self) -> None:
-        """Try once to switch every relay off, if any was ever switched. Does not raise."""
+        """If any relay was ever switched, try once to switch every relay off. Does not raise."""
         if not self._touched:
             return
         self._bus.insist()
-        unheard = Every()  # failures are dropped: the daemon is ending
+        unheard = Every()  # failures are dropped, because the daemon is ending
         for name in self._outputs:
             with unheard.one():
                 self._send(name, False)
 
     def _send(self, name: str, on: bool) -> None:
         command = self._outputs[name].command
-        assert command  # `unfit` refuses an output without a command
+        assert command  # `unfit` has refused an output without a command
         payload = command.payload_on if on else command.payload_off
         self._bus.publish(command.topic, payload, command.qos, safe=not on)
 
     def _state(self, point: MqttPoint) -> bool:
-        """Return the state. Raises HalError if it is no fact."""
+        """Return the state. Raises HalError if the state is no fact."""
         assert point.topic
         assert point.stale_after_s
         found = self._bus.believed(point.topic, point.stale_after_s, point.availability)
         return point.asserted(found.payload)
 
     def _verify(self, name: str, level: bool) -> None:
-        """Raise HalError if this relay's state contradicts `level`, and has had time to follow it."""
+        """Raise HalError if this relay's state contradicts `level` although it has had time to
+        follow."""
         point = self._outputs[name]
         if point.topic is None:
             return
@@ -147,7 +153,7 @@ class MqttLines:
         )
 
     def _said(self, name: str) -> bool | None:
-        """Return the relay's state after its last command; None without one."""
+        """Return the relay's state if it came after the relay's last command; otherwise None."""
         point = self._outputs[name]
         assert point.topic
         found = self._bus.heard(point.topic)

@@ -1,12 +1,13 @@
-"""One connection to a broker, through paho: from the lookup of the name to the end, and never again.
+"""One connection to a broker, through paho, from the lookup of the name to the end. An ended connection
+is never used again.
 
-Each connection has a client of its own and a clean session. So nothing of an earlier connection is sent
-again: paho repeats unconfirmed messages when it reconnects, and an "on" of a minute ago must not be
-repeated. A thread serves the connection; it ends with it.
+Each connection has a client of its own and a clean session, so nothing of an earlier connection is sent
+again. paho would repeat unconfirmed messages after a reconnect, and an "on" of a minute ago must not be
+repeated. A thread serves the connection, and ends with the connection.
 
 The protocol allows packets of 256 MB. With MQTT 5 we tell the broker our limit (Maximum Packet Size,
-section 3.1.2.11.4), and the broker holds longer packets back. MQTT 3.1.1 has no such limit, so with
-that version a longer packet ends the connection before its payload is read.
+section 3.1.2.11.4), and the broker holds longer packets back. MQTT 3.1.1 has no such limit. With this
+version a longer packet ends the connection before its payload is read.
 """
 
 import os
@@ -31,25 +32,27 @@ from drivers.hal.mqtt.topics import PAYLOAD_MAX
 from drivers.hal.points import HalError
 
 PACKET_MAX: Final = PAYLOAD_MAX + 1024
-"""The longest packet: a payload with its topic and properties."""
+"""The length (bytes) of the longest packet: a payload with its topic and properties."""
 NOBODY: Final = 0x10
-"""No matching subscribers (MQTT 5.0, 3.4.2.1): no device has received the message."""
+"""The code "no matching subscribers" (MQTT 5.0, 3.4.2.1). No device has received the message."""
 TAKEN: Final = ""
 ACKS_MAX: Final = 256
-"""The number of confirmations that are remembered."""
+"""The maximum number of confirmations that are remembered."""
 LOOK_S: Final = 1.0
 GARBLED: Final = (ValueError, IndexError, KeyError, TypeError, struct.error, MQTTException)
-"""Errors of paho at bytes that are no MQTT."""
+"""The errors that paho raises for bytes that are no MQTT."""
 
 Taken = Callable[[str, bytes, bool], None]
-"""Takes topic, payload, and whether the message is retained. Called on the connection's thread."""
+"""A function that takes topic, payload, and whether the message is retained. The connection's thread
+calls it."""
 
 
 class Link(threading.Thread):
-    """A connection. `up`: connected, and the topics are subscribed to. `failure`: why it has ended.
+    """A connection. `up`: it is connected and has subscribed to the topics. `failure`: why it has
+    ended.
 
-    `refused`: topic -> the broker's reason for not letting us subscribe. `changed` is notified, and
-    `on_end` called, when one of these changes.
+    `refused`: topic -> the broker's reason for refusing our subscription. When one of these changes,
+    the thread notifies `changed`. When the connection ends, the thread calls `on_end`.
     """
 
     def __init__(self, settings: MqttSettings, topics: Iterable[str], take: Taken) -> None:
@@ -143,7 +146,7 @@ class Link(threading.Thread):
         client.on_publish = self._on_publish
         client.on_disconnect = self._on_disconnect
         client.on_socket_open = _without_delay
-        client.on_socket_register_write = _nothing  # so that only this thread writes to the socket
+        client.on_socket_register_write = _nothing  # only this thread may write to the socket
         return client
 
     def _on_connect(self, _c: Any, _u: Any, flags: Any, reason: ReasonCode, _p: Any) -> None:
@@ -166,7 +169,7 @@ class Link(threading.Thread):
         self._rise()
 
     def _on_message(self, client: object, _: object, message: paho.MQTTMessage) -> None:
-        if not self._closing:  # what an ended connection still delivers may be old
+        if not self._closing:  # messages after the end of a connection may be old
             self._take(message.topic, bytes(message.payload), message.retain)
 
     def _on_publish(self, _c: Any, _u: Any, mid: int, reason: ReasonCode, _p: Any) -> None:
@@ -204,7 +207,7 @@ class Link(threading.Thread):
         self._client.disconnect()
         self._client.loop_write()
         if (sock := self._client.socket()) is not None:
-            sock.close()  # a broker that does not read leaves the farewell unsent
+            sock.close()  # a broker that does not read leaves DISCONNECT unsent, so close anyway
         self.on_end()
 
     def _explained(self, error: OSError) -> str:
@@ -224,7 +227,8 @@ class Link(threading.Thread):
 class BoundedClient(paho.Client):
     """A client that ends the connection before it reads a packet beyond PACKET_MAX.
 
-    `cut`: the reason, if it has done so. paho reads the rest of a packet with one call of `_sock_recv`.
+    `cut`: the reason, if the client ended the connection so. paho reads the rest of a packet with one
+    call of `_sock_recv`.
     """
 
     cut = ""
@@ -248,7 +252,8 @@ def _connect_options(v5: bool) -> dict[str, Any]:
 
 
 def _password(file: str | None) -> str | None:
-    """Read the password, for each connection, because it may be renewed meanwhile. Raises HalError."""
+    """Read the password, anew for each connection, because somebody may have renewed it. Raises
+    HalError."""
     if file is None:
         return None
     try:
@@ -258,7 +263,7 @@ def _password(file: str | None) -> str | None:
 
 
 def _tls(settings: BrokerTls) -> ssl.SSLContext:
-    """Read the certificates, for each connection. Raises HalError."""
+    """Read the certificates, anew for each connection. Raises HalError."""
     for file in (settings.ca_file, settings.certificate_file, settings.key_file):
         if file and not os.access(file, os.R_OK):
             raise HalError(f"tls: {file} cannot be read")
@@ -272,7 +277,7 @@ def _tls(settings: BrokerTls) -> ssl.SSLContext:
 
 
 def _without_delay(client: object, _: object, sock: Any) -> None:
-    """Send each message at once: by Nagle's algorithm a command may wait 40 ms for an ACK."""
+    """Send each message at once. With Nagle's algorithm a command might wait 40 ms for an ACK."""
     sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
 

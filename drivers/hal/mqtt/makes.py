@@ -1,7 +1,7 @@
 """Relays and inputs of well-known makes on MQTT: their topics, payloads and fields.
 
-Each function takes the device's name on MQTT, one part of the device, and the relay's timer in seconds
-(None without one); it returns the keys of a point (`points.py`).
+Each function takes the device's name on MQTT, one part of the device, and the time of the relay's timer
+in seconds (None without a timer). It returns the keys of a point (`points.py`).
 """
 
 import json

@@ -1,4 +1,5 @@
-"""One point of the YAML's `points`: a state that a device publishes, or a relay that it switches."""
+"""One point of the YAML's `points`. It is a state that a device publishes, or a relay that a device
+switches."""
 
 from typing import Annotated
 
@@ -14,13 +15,13 @@ from drivers.hal.points import HalError
 from drivers.json_fields import Field, Value
 
 WHOLE = "payload"
-"""The name of a payload without `field`, in messages."""
+"""The name, in messages, of a payload that is read without `field`."""
 
 
 class MqttPoint(
     msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True
 ):
-    """A contact or relay behind a broker. A profile has the topics, payloads and fields of a make."""
+    """A contact or relay behind a broker. A profile gives the topics, payloads and fields of a make."""
 
     profile: Annotated[
         Profile | None, tells("the make; when absent, the keys from `topic` on are written here.")
@@ -67,7 +68,8 @@ class MqttPoint(
     ] = None
 
     def whole(self) -> "MqttPoint":
-        """Return the point with its profile's keys, except written keys. Raises ValueError."""
+        """Return the point with its profile's keys. Keys written in the YAML come first. Raises
+        ValueError."""
         if self.profile is None:
             return self
         keys = MAKES[self.profile](self.device or "", self.part or "", self.switches_off_after_s)

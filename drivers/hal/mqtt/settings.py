@@ -16,13 +16,14 @@ from drivers.hal.mqtt.topics import TOPICS_MAX
 from drivers.hal.points import Wire
 
 Confirmation = Annotated[float, msgspec.Meta(ge=0.1, le=5, extra={"unit": "s"})]
-"""At most 5 s: a longer wait would look like a hang to systemd (`WatchdogSec=10` of the unit)."""
+"""The longest wait for a confirmation. It is at most 5 s, because systemd would take a longer wait for
+a hang (`WatchdogSec=10` of the unit)."""
 RENEWED = 3
-"""The least number of scans after which a relay may switch itself off."""
+"""The least number of scans that a relay's timer must last."""
 
 
 class BrokerTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """TLS to the broker. Its certificate must be valid for `host`."""
+    """TLS to the broker. The broker's certificate must be valid for `host`."""
 
     ca_file: Annotated[
         AbsolutePath | None,
@@ -38,7 +39,8 @@ class BrokerTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     ] = None
 
     def problems(self) -> Remarks:
-        """Yield a problem for half of a client certificate."""
+        """Yield a problem for a client certificate without its key, or a key without its
+        certificate."""
         if bool(self.certificate_file) != bool(self.key_file):
             key = "key_file" if self.key_file else "certificate_file"
             yield (key,), "certificate_file and key_file need each other"
@@ -80,7 +82,7 @@ class MqttSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
     ] = msgspec.field(default_factory=dict)
 
     def wholes(self) -> Mapping[str, MqttPoint]:
-        """Return the points with the keys of their profiles, without points that have problems."""
+        """Return the points, completed from their profiles. Points that have problems are missing."""
         valid = {name: point for name, point in self.points.items() if not any(point.problems())}
         return {name: point.whole() for name, point in valid.items()}
 
@@ -114,7 +116,8 @@ class MqttSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 def _used_twice(points: Mapping[str, MqttPoint]) -> Remarks:
-    """Yield problems: a state or command that two points use; a command topic that is a state's."""
+    """Yield a problem for a state or command that two points use, and for a command topic that is also
+    a state topic."""
     states = {point.topic: name for name, point in points.items() if point.topic}
     first: dict[object, str] = {}
     for name, point in points.items():
@@ -143,14 +146,14 @@ def _written(point: MqttPoint) -> Iterator[tuple[str, str]]:
 
 
 def _at(point: MqttPoint, name: str, key: str) -> tuple[str, ...]:
-    """Return the path of a key of this point; a profile's keys are not in the YAML."""
+    """Return the path of a point's key in the YAML. For a profile's key, return `part`."""
     if point.profile:
         return "points", name, "part"
     return ("points", name, key) if key == "topic" else ("points", name, key, "topic")
 
 
 def warnings(settings: MqttSettings) -> Remarks:
-    """Yield valid settings that deserve a second look: (path, text)."""
+    """Yield a warning (path, text) for each valid setting that may be a mistake."""
     if settings.password_file and not settings.tls:
         text = "the password goes over the network unencrypted: add tls where the broker has it"
         yield ("password_file",), text
@@ -188,12 +191,12 @@ def where(settings: MqttSettings) -> Where:
 
 
 def unfit(settings: MqttSettings, point: str, direction: Literal["in", "out"]) -> str | None:
-    """Return why this name cannot be an input or output; None if it can."""
+    """Return the reason why this point cannot be an input, or an output. Return None if it can."""
     if point not in settings.points:
         return unknown("point", point, settings.points)
     whole = settings.wholes().get(point)
     if whole is None:
-        return None  # the point's own problems are told
+        return None  # the point's own check reports its problems
     if direction == "in" and whole.topic is None:
         return f"'{point}' has no topic, so its state cannot be read: add topic to it"
     if direction == "out" and whole.command is None:
@@ -202,7 +205,8 @@ def unfit(settings: MqttSettings, point: str, direction: Literal["in", "out"]) -
 
 
 def place(settings: MqttSettings, point: str) -> str | None:
-    """Return the command that no other file may send; None for a state, which every file may read."""
+    """Return the command, which no other file may send. Return None for a state, which every file may
+    read."""
     command = settings.wholes()[point].command
     return f"the command {command.topic} {command.payload_on}" if command else None
 
@@ -220,7 +224,7 @@ def wire_problems(wire: Wire) -> Iterable[str]:
 
 
 def tables(settings: MqttSettings) -> Iterable[Table]:
-    """Yield the topics of each point."""
+    """Yield a table of the topics of each point."""
     rows = []
     for name, point in settings.wholes().items():
         state = " ".join(filter(None, (point.topic, point.field))) or "-"

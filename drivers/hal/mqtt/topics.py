@@ -1,4 +1,4 @@
-"""Topics, messages and commands of MQTT as the YAML has them."""
+"""Topics, messages and commands of MQTT, as the YAML gives them."""
 
 from typing import Annotated, Final, Literal
 
@@ -8,9 +8,9 @@ from bridges.kinds.shared.fields import tells
 from bridges.kinds.shared.remarks import Remarks
 
 PAYLOAD_MAX: Final = 256 * 1024
-"""The longest payload (bytes) that is taken. The state of a vehicle by VDA 5050 may be that long."""
+"""The maximum length (bytes) of a payload. The state of a VDA 5050 vehicle may be that long."""
 TOPICS_MAX: Final = 512
-"""The greatest number of topics that one bus listens to."""
+"""The maximum number of topics that one bus listens to."""
 
 Topic = Annotated[
     str,
@@ -25,7 +25,8 @@ Payload = Annotated[str, msgspec.Meta(max_length=1024)]
 Age = Annotated[float, msgspec.Meta(ge=0.1, le=86400, extra={"unit": "s"})]
 Answer = Annotated[float, msgspec.Meta(ge=0.1, le=60, extra={"unit": "s"})]
 Qos = Literal[0, 1]
-"""At most once, or at least once. "Exactly once" (2) adds nothing to a level that is sent again."""
+"""At most once (0), or at least once (1). "Exactly once" (2) would add nothing, because a level is sent
+again anyway."""
 
 
 class Ask(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -36,9 +37,11 @@ class Ask(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
 
 class Availability(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A device's own notice of its connection: its last will, or a gateway's judgement.
+    """A device's notice that it has lost its connection. It is the device's last will, or a gateway's
+    judgement.
 
-    The notice is a hint: a broker publishes a last will after one and a half keepalives of silence.
+    The notice is only a hint. A broker publishes a last will after one and a half keepalive periods of
+    silence.
     """
 
     topic: Annotated[Topic, tells("where the notice is published.")]
@@ -50,7 +53,7 @@ class Availability(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
 
 class StateTopic(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A topic where a device publishes a state, as JSON or as a plain text or number."""
+    """A topic where a device publishes a state. The payload is JSON, or a plain text or number."""
 
     topic: Annotated[Topic, tells("where the state is published.")]
     stale_after_s: Annotated[
@@ -72,7 +75,10 @@ class Message(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     topic: Annotated[Topic, tells("where the device listens.")]
     payload: Annotated[Payload, tells("the message.")] = ""
     qos: Annotated[
-        Qos, tells("1: the broker confirms the message, and repeats it; 0: it does not.")
+        Qos,
+        tells(
+            "1: the broker confirms the message, and repeats it if needed; 0: the broker does neither."
+        ),
     ] = 1
 
 
@@ -84,10 +90,12 @@ class RelayCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     payload_off: Annotated[Payload, tells("the message that switches the relay off.")]
     qos: Annotated[
         Qos,
-        tells("1: the broker confirms the message, and repeats it to the device; 0: it does not."),
+        tells(
+            "1: the broker confirms the message, and repeats it to the device; 0: it does neither."
+        ),
     ] = 1
 
     def problems(self) -> Remarks:
-        """Yield a problem for messages that do not differ."""
+        """Yield a problem for two messages that are equal."""
         if self.payload_on == self.payload_off:
             yield ("payload_off",), "is the same message as payload_on"

@@ -124,7 +124,7 @@ def test_an_answer_of_another_type_is_refused(side: Side) -> None:
     ours, node, *_ = side
     node.answer = lambda request: ["60" + request[1:4].hex() + "05000000"]
     assert failure(lambda: ours.read(*STATE)) == (
-        f"{NAME}, read 0x2002:0A: no SDO reply to it (Unexpected response 0x60)"
+        f"{NAME}, read 0x2002:0A: no SDO reply to the request (Unexpected response 0x60)"
     )
 
 
@@ -132,7 +132,7 @@ def test_a_write_is_done_only_when_the_node_says_so(side: Side) -> None:
     ours, node, *_ = side
     node.answer = lambda request: [value(request, 1)]
     assert failure(lambda: ours.write(*ENABLE, 1)) == (
-        f"{NAME}, write 0x2000:01: no SDO reply to it (Unexpected response 0x4B)"
+        f"{NAME}, write 0x2000:01: no SDO reply to the request (Unexpected response 0x4B)"
     )
 
 

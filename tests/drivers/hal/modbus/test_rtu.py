@@ -159,7 +159,7 @@ def test_the_late_reply_to_one_question_never_answers_another(line: SerialModule
 def test_half_a_frame_is_not_waited_for_until_the_end(line: SerialModule) -> None:
     line.on_wire = lambda frame: IS_1[:4]
     text = fails(bus_to(line.port, timeout_s=5.0, retries=0), IN0)
-    assert text.endswith("no Modbus reply to it (01 02 01 01 is half a frame), tried 1x")
+    assert text.endswith("no Modbus reply to the request (01 02 01 01 is half a frame), tried 1x")
 
 
 def test_a_unit_that_owes_a_reply_is_not_asked_until_it_cannot_come(line: SerialModule) -> None:

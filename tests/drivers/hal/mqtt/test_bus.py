@@ -66,7 +66,7 @@ def test_a_retained_message_is_no_fact_until_a_live_one_comes(
         bus.up()
         wait_until(lambda: bus.heard(STATE), "the retained message")
         assert reason(bus, STATE) == (
-            "nothing was published on relay/state since we listen;"
+            "nothing has come on relay/state in this connection;"
             " a retained message of unknown age says 'ON'"
         )
         device.says(STATE, "OFF", retain=True)
@@ -86,7 +86,7 @@ def test_what_was_heard_before_the_broker_went_is_forgotten(
         broker.start()
         bus.insist()
         wait_until(
-            lambda: "since we listen" in reason(bus, STATE), "a connection with nothing heard"
+            lambda: "in this connection" in reason(bus, STATE), "a connection with nothing heard"
         )
 
 
