@@ -1,1 +1,2 @@
-"""The transports to RMF's graph. The YAML selects a transport; all carry the same messages."""
+"""The transports to RMF's graph. The YAML selects a transport. All transports carry the same
+messages."""

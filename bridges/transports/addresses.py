@@ -1,4 +1,5 @@
-"""The addresses at which this machine can reach other machines; transports watch them for changes."""
+"""The addresses at which this machine can reach other machines. Transports watch these addresses for
+changes."""
 
 import fcntl
 import socket
@@ -19,12 +20,13 @@ def addresses() -> Addresses:
 
 
 def _address(asking: socket.socket, name: str) -> str:
-    """Return an interface's IPv4 address; "" if it is loopback, down, or without link or address."""
+    """Return an interface's IPv4 address. Return "" for loopback, and for an interface without address
+    or link."""
     request = struct.pack("256s", name.encode()[:15])
     try:
         flags = struct.unpack_from("H", fcntl.ioctl(asking, GET_FLAGS, request), 16)[0]
         if flags & (UP | RUNNING | LOOPBACK) != UP | RUNNING:
             return ""
         return socket.inet_ntoa(fcntl.ioctl(asking, GET_ADDRESS, request)[20:24])
-    except OSError:  # it has no address, or has just gone
+    except OSError:  # the interface has no address, or has just disappeared
         return ""

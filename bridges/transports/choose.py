@@ -1,7 +1,7 @@
 """Chooses a daemon's transport, ROS domain and network.
 
-The YAML decides. For keys that the YAML lacks, ROS's environment variables decide, as for any ROS node.
-Each transport has a folder beside this file: `ros2/`, `dds/`, `zenoh/`.
+The YAML decides. If the YAML lacks a key, ROS's environment variables decide, as for any ROS node. Each
+transport has a folder beside this file: `ros2/`, `dds/`, `zenoh/`.
 """
 
 import importlib
@@ -42,7 +42,7 @@ def open_transport(
 ) -> Transport:
     """Join the RMF graph as `node_name`. Raises TransportError with a remedy.
 
-    `localhost` keeps all traffic on this machine, whatever the YAML and the environment say.
+    `localhost` keeps all traffic on this machine, even if the YAML or the environment says otherwise.
     `ros_args`: `--ros-args` and the arguments after it on the command line.
     """
     domain = domain_id(rmf, os.environ)
@@ -68,7 +68,7 @@ def open_transport(
 
 
 def domain_id(rmf: Rmf, environ: Mapping[str, str]) -> int:
-    """Return the ROS domain of the YAML, else ROS_DOMAIN_ID, else 0. Raises TransportError."""
+    """Return the ROS domain: from the YAML, else from ROS_DOMAIN_ID, else 0. Raises TransportError."""
     if rmf.domain_id is not None:
         return rmf.domain_id
     text = environ.get("ROS_DOMAIN_ID", "") or "0"
@@ -80,8 +80,8 @@ def domain_id(rmf: Rmf, environ: Mapping[str, str]) -> int:
 def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str], peers: Sequence[str] = ()) -> bool:
     """Does the YAML, ROS_LOCALHOST_ONLY or ROS_AUTOMATIC_DISCOVERY_RANGE keep us on loopback?
 
-    As in ROS 2 Jazzy, the older ROS_LOCALHOST_ONLY=1 wins over the newer variable, and LOCALHOST
-    still reaches static `peers`. Raises TransportError.
+    As in ROS 2 Jazzy, the older ROS_LOCALHOST_ONLY=1 wins over the newer variable. With LOCALHOST the
+    node still reaches static `peers`. Raises TransportError.
     """
     if rmf.network == "localhost" or environ.get("ROS_LOCALHOST_ONLY") == "1":
         return True
@@ -95,7 +95,7 @@ def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str], peers: Sequence[str]
 
 
 def _choice(rmf: Rmf) -> tuple[str, str]:
-    """Return the transport and the reason for its choice."""
+    """Return (transport, the reason for choosing it)."""
     if rmf.transport in ("dds", "zenoh"):
         return rmf.transport, "configured"
     missing = missing_of_ros()
@@ -112,13 +112,14 @@ def _choice(rmf: Rmf) -> tuple[str, str]:
 
 
 def _best_without(ros: str) -> tuple[str, str]:
-    """Return the choice of `auto` without ROS, and its reason. `ros`: the missing part of ROS."""
+    """Return the choice of `auto` without ROS, and its reason. `ros` describes the missing part of
+    ROS."""
     missing = missing_of_dds()
     return ("zenoh", f"{ros}; {missing}") if missing else ("dds", ros)
 
 
 def missing_of_dds() -> str:
-    """Return the reason why transport `dds` cannot be used here; "" if it can."""
+    """Return the reason why transport `dds` cannot be used on this machine; "" if it can."""
     try:
         importlib.import_module("cyclonedds.core")
     except ImportError as error:
@@ -127,7 +128,7 @@ def missing_of_dds() -> str:
 
 
 def missing_of_ros() -> str:
-    """Return the reason why transport `ros2` cannot be used here; "" if it can."""
+    """Return the reason why transport `ros2` cannot be used on this machine; "" if it can."""
     try:
         importlib.import_module("rclpy")
     except ImportError as error:

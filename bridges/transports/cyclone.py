@@ -1,5 +1,5 @@
-"""Configurations of Cyclone DDS, for `dds` and for ROS on Cyclone, to use the network or only this
-machine."""
+"""Configurations of Cyclone DDS, for `dds` and for ROS on Cyclone. One uses the network, and one stays
+on this machine."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -16,24 +16,26 @@ INTERNAL: Final = (
     "<PrimaryReorderMaxSamples>1</PrimaryReorderMaxSamples>"
     "<SecondaryReorderMaxSamples>1</SecondaryReorderMaxSamples></Internal>"
 )
-"""Lets a node leave at once, even when its address has gone. By default Cyclone 0.10 ends its receive
-threads with a datagram to that address, and waits for this datagram, for minutes (q_receive.c,
-trigger_recv_threads); and every writer waits 1 s for acknowledgements that do not come. Meanwhile rclpy
-holds Python's lock, and the whole daemon stops.
+"""Settings with which a node leaves at once, even when its address has gone. By default Cyclone 0.10
+ends its receive threads with a datagram to that address, and waits minutes for this datagram
+(q_receive.c, trigger_recv_threads). Every writer also waits 1 s for acknowledgements that do not
+come. During these waits rclpy holds Python's lock, and the whole daemon stops.
 
 A sample longer than LONGEST is dropped at its first fragment. For each writer, memory holds at most one
-incomplete sample and one sample that came too early (by default 16 and 128); after a loss the writer is
-asked to send again."""
+incomplete sample and one sample that came too early. (The defaults are 16 and 128.) After a loss the
+node asks the writer to send again.
+"""
 FOUND_AGAIN: Final = "<SPDPInterval>2 s</SPDPInterval>"
-"""The period at which a node announces itself. It is short, so that other nodes soon find the node
-after a network failure longer than a lease (10 s). By default Cyclone 0.10 announces itself every 8 s,
-and Cyclone 11 every 30 s to a lost peer."""
+"""The period at which a node announces itself. The period is short, so that other nodes soon find the
+node after a network failure longer than a lease (10 s). By default Cyclone 0.10 announces itself
+every 8 s, and Cyclone 11 every 30 s to a lost peer."""
 NEVER_FORGOTTEN: Final = (
     "<InitialLocatorPruneDelay>inf</InitialLocatorPruneDelay>"
     "<DiscoveredLocatorPruneDelay>inf</DiscoveredLocatorPruneDelay>"
 )
-"""Lets Cyclone 11 never give up a peer; by default it does, after 30 s if it has not found the peer,
-and after 60 s if it has lost the peer. Cyclone 0.10 never gives up, and refuses these names."""
+"""Settings with which Cyclone 11 never gives up a peer. By default Cyclone 11 gives a peer up 30 s
+after a search without success, and 60 s after losing the peer. Cyclone 0.10 never gives up, and
+refuses these names."""
 LOOPBACK: Final = (
     "<CycloneDDS><Domain><General>"
     '<Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>'
@@ -42,15 +44,16 @@ LOOPBACK: Final = (
     "<MaxAutoParticipantIndex>30</MaxAutoParticipantIndex>"
     '<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>'
 )
-"""Keeps a node on this machine: unicast on `lo`, for up to 31 processes."""
+"""A configuration that keeps a node on this machine: unicast on `lo`, for up to 31 processes."""
 
 
 def configuration(environ: Mapping[str, str]) -> str:
-    """Return the configuration of a node on the network: our settings, then those of CYCLONEDDS_URI.
+    """Return the configuration of a node on the network. Our settings come before those of
+    CYCLONEDDS_URI.
 
-    As in rmw_cyclonedds (ROS 2 Jazzy, rmw_node.cpp), the node reaches static peers by unicast beside
-    multicast, and peers can guess its participant index. With LOCALHOST the node reaches this
-    machine and the static peers, without multicast. With SYSTEM_DEFAULT Cyclone decides on discovery.
+    As in rmw_cyclonedds (ROS 2 Jazzy, rmw_node.cpp), the node uses multicast, and reaches static peers
+    by unicast. Peers can guess its participant index. With LOCALHOST the node reaches this machine and
+    the static peers, without multicast. With SYSTEM_DEFAULT Cyclone decides on discovery.
     """
     own = environ.get("CYCLONEDDS_URI", "")
     wanted = environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE")
@@ -72,7 +75,8 @@ def configuration(environ: Mapping[str, str]) -> str:
 
 
 def for_ros(environ: Mapping[str, str]) -> str:
-    """Return CYCLONEDDS_URI for a ROS node on the network: our settings before its present value."""
+    """Return CYCLONEDDS_URI for a ROS node on the network. Our settings come before the present
+    value."""
     ours, own = (
         f"<CycloneDDS><Domain>{INTERNAL}<Discovery>{FOUND_AGAIN}</Discovery></Domain></CycloneDDS>",
         environ.get("CYCLONEDDS_URI", ""),

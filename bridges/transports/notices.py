@@ -1,5 +1,5 @@
-"""The transports' log lines about samples and peers: the same for all transports, once for each
-cause."""
+"""The transports' log lines about samples and peers. All transports share these lines. Each cause is
+logged once."""
 
 import logging
 
@@ -12,20 +12,21 @@ from bridges.transports.transport import Receive
 log = logging.getLogger(__name__)
 
 FAILURES = 5
-"""After this many failed reads in a row a transport ends its thread, and the daemon ends too."""
+"""The number of failed reads in a row after which a transport ends its thread. Then the daemon ends
+too."""
 NOT_HEARD = "a publisher is not heard"
 NOT_SERVED = "a subscription is not served"
 
 
 def drop(dropped: dict[str, int], topic: AnyTopic, error: CdrError) -> None:
-    """Count an invalid sample, and log the first invalid sample of its topic."""
+    """Count an invalid sample. Log the first invalid sample of each topic."""
     dropped[topic.name] = dropped.get(topic.name, 0) + 1
     if dropped[topic.name] == 1:
         log.warning(pairs("sample_dropped", topic=topic.name, reason=error, further="only counted"))
 
 
 def hand_on(dropped: dict[str, int], topic: AnyTopic, received: Receive, message: Message) -> None:
-    """Deliver a message to its subscriber. An exception of the callback loses only this message."""
+    """Deliver a message to its subscriber. If the callback raises, only this message is lost."""
     try:
         received(message)
     except Exception as error:
@@ -37,5 +38,5 @@ def hand_on(dropped: dict[str, int], topic: AnyTopic, received: Receive, message
 
 
 def misfit(topic: AnyTopic, text: str, policy: str) -> None:
-    """Log the QoS policy by which a peer does not match our end of a topic."""
+    """Log the QoS policy that keeps a peer from matching our end of a topic."""
     log.warning(pairs("misfit", topic=topic.name, reason=f"{text}: its {policy} does not fit ours"))

@@ -1,10 +1,10 @@
-"""The announced ends (publishers and subscriptions) of other nodes. They show RMF's release, and types
-that do not fit our types.
+"""The announced ends (publishers and subscriptions) of other nodes. The transports report the ends. The
+ends show RMF's release, and types that do not fit our types.
 
-A fleet adapter shows the release, because it publishes FleetState and, in newer releases, subscribes to
-EmergencySignal, and our daemons do not. With `auto` we speak the release of the fleet adapters, or the
-default release if there is no fleet adapter. Adapters of two releases are a fault, and we keep our
-present release. The transports report the ends.
+A fleet adapter shows the release. It publishes FleetState, and in newer releases it subscribes to
+EmergencySignal; our daemons do neither. With `auto` we speak the release of the fleet adapters. Without
+a fleet adapter we speak the default release. Adapters of two releases are a fault, and we keep our
+present release.
 """
 
 import logging
@@ -24,20 +24,20 @@ from bridges.transports import notices
 log = logging.getLogger(__name__)
 
 MOST: Final = 5000
-"""The most ends that are remembered. No site has more."""
+"""The maximum number of remembered ends. No site has more."""
 WITNESSES: Final = {
     (type_name(FleetState), True),
     (type_name(EmergencySignal), False),
     (type_name(Alert), False),
 }
-"""(message's type, published): ends that only RMF's own nodes have."""
+"""(type of the message, whether the end publishes) of the ends that only RMF's own nodes have."""
 MISFIT: Final = "TYPE_MISFIT"
 MIXED: Final = "TWO_RELEASES"
 
 
 class Announced(Struct, frozen=True):
-    """An end of any node. `topic`: its name, without slash. `type`: package/msg/Name. `hash`: the type
-    hash, "" if unknown."""
+    """An end of any node. `topic`: the topic's name without the first slash. `type`: package/msg/Name.
+    `hash`: the type hash, "" if unknown."""
 
     topic: str
     type: str
@@ -46,7 +46,8 @@ class Announced(Struct, frozen=True):
 
 
 class Peers:
-    """Other nodes' announced ends, and the release derived from them. `wanted`: None for `auto`."""
+    """The announced ends of other nodes, and the release that these ends show. `wanted`: None for
+    `auto`."""
 
     def __init__(self, wanted: Release | None) -> None:
         self.release = wanted or DEFAULT
@@ -57,20 +58,20 @@ class Peers:
         self._named: set[tuple[str, bool]] = set()
 
     def ours(self, topic: AnyTopic, *, publishes: bool) -> None:
-        """Note an end of our own."""
+        """Record an end of our own node."""
         self._ours[topic.name.strip("/"), publishes] = topic
 
     def seen(self, key: Hashable, end: Announced) -> None:
-        """Note an end of another node."""
+        """Record an end of another node."""
         if len(self._ends) < MOST or key in self._ends:
             self._ends[key] = end
 
     def gone(self, key: Hashable) -> None:
-        """Note that an end has left."""
+        """Record that an end has left."""
         self._ends.pop(key, None)
 
     def clear(self) -> None:
-        """Forget all ends, because we join again."""
+        """Forget all ends, because our node joins the graph again."""
         self._ends.clear()
 
     def settle(self) -> bool:
@@ -90,7 +91,8 @@ class Peers:
                 self.name(self._ours[end.topic, not end.publishes], published=end.publishes)
 
     def name(self, topic: AnyTopic, *, published: bool) -> None:
-        """Log once that other nodes publish or subscribe to a topic with another type."""
+        """Log once that other nodes use another type on a topic. `published`: they publish the topic;
+        otherwise they subscribe."""
         key = topic.name.strip("/"), published
         if key not in self._named:
             self._named.add(key)
@@ -101,7 +103,7 @@ class Peers:
         return _hash_of(topic, self.release) != _hash_of(topic, before)
 
     def faults(self) -> list[tuple[str, str]]:
-        """Return (code, detail) of each fault that now keeps nodes from hearing each other."""
+        """Return (code, detail) of each present fault that keeps nodes from hearing each other."""
         heard = sorted(release.name for release in self._heard())
         found = [(MIXED, f"{' and '.join(heard)} are both on this graph")] if len(heard) > 1 else []
         counts = Counter(end.topic for end in list(self._ends.values()) if self._misfits(end))
@@ -124,7 +126,7 @@ class Peers:
         return end.type != type_name(ours.type) or not fits
 
     def _name_mixed(self, heard: set[Release]) -> None:
-        """Log once, when the second release appears, that two releases are on the graph."""
+        """Log once that two releases are on the graph, when the second release appears."""
         if len(heard) > 1 and not self._mixed:
             names = " ".join(sorted(release.name for release in heard))
             log.warning(pairs("two_releases", on_this_graph=names, we_speak=self.release.name))
@@ -136,6 +138,6 @@ def _hash_of(topic: AnyTopic, release: Release) -> str:
 
 
 def _only(hashed: str) -> Iterator[Release]:
-    """Yield the release with this hash; yield nothing if several releases have it."""
+    """Yield the release with this hash. If several releases have the hash, yield nothing."""
     found = releases_of(hashed)
     return iter(found if len(found) == 1 else ())

@@ -1,4 +1,4 @@
-"""The publishers of received messages: looked up only for a listener that wants to tell them apart."""
+"""The publishers of received messages. A publisher is looked up only when a listener asks for it."""
 
 import time
 from collections.abc import Callable, Hashable
@@ -8,17 +8,18 @@ from typing import Final
 from bridges.messages.heard import Sender
 
 MOST: Final = 1000
-"""The limit of remembered publishers; beyond it the one heard longest ago is forgotten."""
+"""The maximum number of remembered publishers. Beyond this number, the publisher heard longest ago is
+forgotten."""
 AGAIN_S: Final = 1.0
-"""The pause (s) between two looks for the node of a publisher."""
+"""The pause (s) between two attempts to find the node of a publisher."""
 
 
 class Senders:
     """The publishers that one transport has heard, by their identities on its wire.
 
-    Before a subscription hands on a message, it sets `key`, the identity of the publisher (None
-    if unknown), and `node_of`, which finds the node of an identity ("" if unknown). That is all for a
-    daemon, which never asks.
+    Before a subscription hands on a message, it sets two attributes. `key` is the identity of the
+    publisher (None if unknown). `node_of` finds the node of an identity ("" if unknown). A daemon never
+    asks for a publisher, so nothing more happens there.
     """
 
     def __init__(self) -> None:
@@ -28,7 +29,7 @@ class Senders:
         self._look_at: dict[Hashable, float] = {}
 
     def now(self) -> Sender | None:
-        """Return the publisher of the message that is being handed on."""
+        """Return the publisher of the message that the subscription hands on now."""
         key = self.key
         if key is None:
             return None

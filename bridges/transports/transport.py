@@ -1,6 +1,7 @@
 """The interface of every transport: `ros2`, `dds`, `zenoh`.
 
-Each has a folder beside this file; `bridges/transports/choose.py` opens the YAML's transport.
+Each transport has a folder beside this file. `bridges/transports/choose.py` opens the transport that
+the YAML selects.
 """
 
 from collections.abc import Callable
@@ -20,7 +21,7 @@ Receive = Callable[[Message], None]
 
 
 def any_type(received: Callable[[M], None]) -> Receive:
-    """Return a subscription's callback with the type that transports store for every topic.
+    """Return a subscription's callback, cast to the type that transports store for every topic.
 
     The cast is safe, because a transport decodes each message as the type of the subscription's topic.
     """
@@ -28,40 +29,44 @@ def any_type(received: Callable[[M], None]) -> Receive:
 
 
 class TransportError(Exception):
-    """The transport cannot be opened, or has been lost: the network, library or domain is missing."""
+    """The error of a transport that cannot be opened or has been lost. The network, library or domain
+    is missing."""
 
 
 class Publisher(Protocol[M_contra]):
     """The sending end of one topic."""
 
     def publish(self, message: M_contra) -> None:
-        """Send a message; block for at most 20 ms. Raises TransportError without a connection."""
+        """Send a message. The call blocks for at most 20 ms. Raises TransportError without a
+        connection."""
 
     def matched(self) -> int:
-        """Return the number of subscriptions that receive our messages, in any process; 0 after
+        """Return the number of subscriptions, in any process, that receive our messages; 0 after
         close."""
 
     def close(self) -> None:
-        """Take this publisher, but not its node, off the graph at once. May be called twice."""
+        """Take this publisher off the graph at once. Its node stays. The caller may call `close`
+        twice."""
 
 
 class Subscription(Protocol):
     """The receiving end of one topic."""
 
     def matched(self) -> int:
-        """Return the number of publishers that are heard here, in any process; 0 after close."""
+        """Return the number of publishers, in any process, that this subscription hears; 0 after
+        close."""
 
     def senders(self) -> list[str]:
-        """Return the known nodes of these publishers, as `/namespace/name`; from any thread. Anybody
-        can forge a name."""
+        """Return the known nodes of the heard publishers, as `/namespace/name`. Anybody can forge a
+        name. Any thread may call this."""
 
 
 class Transport(Protocol):
     """One node on the RMF graph. `speaks`: the transport's name in a YAML. `domain_id`: its ROS domain.
 
-    `received` is called on the transport's own thread. A callback must only append to an inbox and
-    must not raise. Samples that do not decode, or whose callback raises, are dropped, counted in
-    `dropped` (topic name -> number), and logged once for each topic.
+    The transport's own thread calls `received`. A callback must only append to an inbox and must not
+    raise. If a sample does not decode, or its callback raises, the sample is dropped. The drop is
+    counted in `dropped` (topic name -> number), and logged once for each topic.
     """
 
     name: str
@@ -71,11 +76,11 @@ class Transport(Protocol):
 
     @property
     def release(self) -> Release:
-        """The release of RMF's messages that the node speaks now."""
+        """The release of RMF's messages that the node speaks at present."""
 
     def faults(self) -> list[tuple[str, str]]:
-        """Return (code, detail) of each fault that now keeps this node and others from hearing each
-        other; from any thread."""
+        """Return (code, detail) of each present fault that keeps this node and others from hearing each
+        other. Any thread may call this."""
 
     def publisher(self, topic: Topic[M]) -> Publisher[M]:
         """Declare a publisher with `topic.publish` QoS."""
@@ -85,19 +90,21 @@ class Transport(Protocol):
     ) -> Subscription:
         """Declare a subscription with `topic.subscribe` QoS.
 
-        `others_only`: messages of this transport's own publishers are not delivered.
+        `others_only`: the subscription does not receive messages of this transport's own publishers.
         """
 
     def sender(self) -> Sender | None:
         """Return the publisher of the message that `received` takes now; None if the wire hides it.
-        Only in that callback."""
+        Only that callback may call this."""
 
     @property
     def lives(self) -> bool:
-        """Does the transport's thread run? True also without a network, a router or a peer."""
+        """Does the transport's thread run? The answer is True even without a network, a router or a
+        peer."""
 
     def wall(self) -> float:
         """Return RMF's time for stamps (s since the epoch): the wall clock, or ROS's simulated time."""
 
     def close(self) -> None:
-        """Leave the graph at once, so that no ghost endpoint remains. May be called twice."""
+        """Leave the graph at once, so that no ghost endpoint remains. The caller may call `close`
+        twice."""

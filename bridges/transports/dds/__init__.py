@@ -1,1 +1,1 @@
-"""The transport `dds`: speaks as a ROS 2 node without ROS, through cyclonedds."""
+"""The transport `dds`. It speaks as a ROS 2 node through cyclonedds, and needs no ROS."""

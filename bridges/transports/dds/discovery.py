@@ -1,8 +1,9 @@
-"""Makes our endpoints a named node on the ROS graph, by the topic `ros_discovery_info`.
+"""Makes our endpoints a named node on the ROS graph, through the topic `ros_discovery_info`.
 
 DDS has participants, readers and writers, but no nodes. On this topic each ROS participant publishes
-the node of each of its readers and writers, and the message is retained for late joiners. Without this
+which node owns each of its readers and writers. The message is retained for late joiners. Without this
 topic `ros2 node list` shows our endpoints under `_CREATED_BY_BARE_DDS_APP_`.
+
 Source: ros2/rmw_dds_common, msg/*.msg, as rmw_cyclonedds and rmw_fastrtps publish them.
 """
 
@@ -50,7 +51,7 @@ class ParticipantEntitiesInfo(IdlStruct, typename=PACKAGE + "ParticipantEntities
 
 
 class NodeOnGraph:
-    """The node of a participant, published again whenever its endpoints change."""
+    """The node of a participant. It is published again whenever its endpoints change."""
 
     def __init__(self, participant: DomainParticipant, node_name: str) -> None:
         self._node = NodeEntitiesInfo("/", node_name, [], [])
@@ -78,12 +79,13 @@ class NodeOnGraph:
         self.writer.write(self._info)
 
     def listen(self) -> DataReader:
-        """Begin to hear the owners of writers; each participant retains its last message."""
+        """Begin to listen for the owners of writers. Each participant retains its last message."""
         self.reader = DataReader(self._participant, self.topic, qos=_qos(MOST_PARTICIPANTS))
         return self.reader
 
     def owners(self, writers: Iterable[bytes]) -> list[str]:
-        """Return the nodes of these writers (guids), if the nodes have been heard."""
+        """Return the nodes of these writers (guids). Nodes that have not announced themselves yet are
+        missing."""
         assert self.reader is not None
         for info in self.reader.take(MOST_PARTICIPANTS):
             for node in info.node_entities_info_seq:

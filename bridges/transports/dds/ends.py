@@ -1,7 +1,6 @@
 """The ends of the `dds` transport: its publishers and subscriptions.
 
-An end outlives its writer or reader, because it gets a new writer or reader when the transport joins
-again.
+An end outlives its DDS writer or reader. When the transport joins again, the end gets a new one.
 """
 
 import threading
@@ -29,15 +28,16 @@ from bridges.transports.senders import Senders
 from bridges.transports.transport import Receive, TransportError
 
 WRITE_BLOCKS_NS: Final = 20_000_000
-"""The longest wait of a writer for a peer. Shorter than a scan, because the writer holds Python's
-lock."""
+"""The longest wait (ns) of a writer for a peer. The wait is shorter than a scan, because the writer
+holds Python's lock."""
 AT_ONCE: Final = 100
-"""The most samples taken from one subscription before other subscriptions have their turn."""
+"""The maximum number of samples taken from one subscription before other subscriptions have their
+turn."""
 POLICIES: Final = {2: "durability", 11: "reliability", 23: "data representation", 24: "type"}
 
 
 class DdsPublisher:
-    """The publisher of one topic. `withdraw(publisher, writer)` takes it off the graph."""
+    """The publisher of one topic. `withdraw(publisher, writer)` takes the writer off the graph."""
 
     def __init__(
         self,
@@ -58,14 +58,14 @@ class DdsPublisher:
     def create(
         self, participant: DomainParticipant, topic: DdsTopic, release: Release
     ) -> DataWriter:
-        """Make and return the publisher's writer, in place of an earlier one."""
+        """Make the publisher's writer, which replaces an earlier writer. Return the writer."""
         qos = _writer_qos(self.topic.publish, type_hash(self.topic.type, release))
         self._sample = sample_type(self.topic.type, release)
         self._writer = DataWriter(participant, topic, qos=qos)
         return self._writer
 
     def drop(self) -> None:
-        """Note that the writer is gone, with its participant."""
+        """Record that the writer has gone together with its participant."""
         self._writer = None
 
     def send_retained(self) -> None:
@@ -74,10 +74,11 @@ class DdsPublisher:
             self._write(message)
 
     def publish(self, message: Message) -> None:
-        """Send a message; block for at most 20 ms. Raises TransportError if it was not sent."""
+        """Send a message. The call blocks for at most 20 ms. Raises TransportError if the message was
+        not sent."""
         if not self._reader_thread.is_alive():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
-        self._retained.append(message)  # sent again when the node joins again
+        self._retained.append(message)  # this message is sent again when the node joins again
         if self._writer is None:
             why = "there is no network, or RMF's release lacks the message"
             raise TransportError(f"topic {self.topic.name}: not sent: {why}")
@@ -102,7 +103,7 @@ class DdsPublisher:
         self._writer.write(self._sample(message))
 
     def log_misfits(self, peers: Peers) -> None:
-        """Log each new subscription of this topic whose QoS does not match."""
+        """Log each new subscription of this topic whose QoS does not match ours."""
         if self._writer is None:
             return
         status = self._writer.get_offered_incompatible_qos_status()
@@ -112,7 +113,7 @@ class DdsPublisher:
 
 class DdsSubscription:
     """The subscription of one topic. `dropped`: topic name -> number of invalid samples.
-    `owners(guids)`: the nodes of these writers."""
+    `owners(guids)` returns the nodes of these writers."""
 
     def __init__(
         self,
@@ -127,7 +128,7 @@ class DdsSubscription:
         self.topic = topic
         self._owners = owners
         self._senders = senders
-        self._finds_node = self._node_of  # made once: a daemon takes many messages
+        self._finds_node = self._node_of  # bound only once, because a daemon takes many messages
         self._others_only = others_only
         self._reader: DataReader = None
         self._received = received
@@ -138,14 +139,14 @@ class DdsSubscription:
     def create(
         self, participant: DomainParticipant, topic: DdsTopic, release: Release
     ) -> DataReader:
-        """Make and return the subscription's reader, in place of an earlier one."""
+        """Make the subscription's reader, which replaces an earlier reader. Return the reader."""
         hashed = type_hash(self.topic.type, release)
         qos = _reader_qos(self.topic.subscribe, hashed, others_only=self._others_only)
         self._reader = DataReader(participant, topic, qos=qos)
         return self._reader
 
     def drop(self) -> None:
-        """Note that the reader is gone, with its participant."""
+        """Record that the reader has gone together with its participant."""
         self._reader = None
 
     def matched(self) -> int:
@@ -156,7 +157,8 @@ class DdsSubscription:
             return 0
 
     def senders(self) -> list[str]:
-        """Return the nodes of the matched publishers; empty until their announcements have arrived."""
+        """Return the nodes of the matched publishers. The list is empty until their announcements have
+        arrived."""
         reader = self._reader
         try:
             handles = reader.get_matched_publications() if reader else []
@@ -165,7 +167,7 @@ class DdsSubscription:
         return self._nodes(handles)
 
     def _nodes(self, handles: list[int]) -> list[str]:
-        """Return the nodes of these matched publishers, as far as known."""
+        """Return the nodes of these matched publishers. Unknown nodes are missing."""
         reader = self._reader
         try:
             found = [reader.get_matched_publication_data(handle) for handle in handles if reader]
@@ -196,7 +198,7 @@ class DdsSubscription:
         return True
 
     def log_misfits(self, peers: Peers) -> None:
-        """Log each new publisher of this topic whose QoS does not match."""
+        """Log each new publisher of this topic whose QoS does not match ours."""
         if self._reader is None:
             return
         status = self._reader.get_requested_incompatible_qos_status()
@@ -205,7 +207,7 @@ class DdsSubscription:
 
 
 class _Misfits(Protocol):
-    """Cyclone's status of an end that has peers with a QoS that does not fit."""
+    """Cyclone's status about peers whose QoS does not match an end."""
 
     last_policy_id: int
 
@@ -221,7 +223,8 @@ def _log_misfit(topic: AnyTopic, text: str, status: _Misfits, peers: Peers) -> N
 def _writer_qos(qos: topics.Qos, hashed: str) -> Qos:
     if qos.durability == "volatile":
         return Qos(Policy.Durability.Volatile, *_policies(qos, hashed))
-    # A late joiner gets the history of the durability service, by default only the last message.
+    # A late joiner gets the history of the durability service. By default this is only the last
+    # message.
     retained = Policy.DurabilityService(0, Policy.History.KeepLast(qos.depth), -1, -1, -1)
     return Qos(Policy.Durability.TransientLocal, retained, *_policies(qos, hashed))
 

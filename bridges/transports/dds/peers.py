@@ -1,4 +1,5 @@
-"""The announcements of ends on a DDS graph: topic, type, and the type hash from the user data."""
+"""The announcements of ends on a DDS graph. They give the topic, the type, and in the user data the
+type hash."""
 
 import re
 import threading
@@ -35,11 +36,12 @@ class _End(Protocol):
 
 
 class BuiltinReader(builtin.BuiltinDataReader):  # type: ignore[misc] # noqa: TID251
-    """Reads the announcements of participants and their ends, in one thread of the process at a time.
+    """A reader for the announcements of participants and their ends. Only one thread of the process may
+    read at a time.
 
-    cyclonedds reads each announced QoS into the same variables (11.0.1, qos._CQos._gc_*), so if two
+    cyclonedds reads each announced QoS into the same variables (11.0.1, qos._CQos._gc_*). If two
     threads read at once, an end gets another end's user data. A process may have several nodes, each
-    with its thread.
+    with a thread of its own.
     """
 
     def take(self, count: int) -> list[Any]:
@@ -50,14 +52,14 @@ class BuiltinReader(builtin.BuiltinDataReader):  # type: ignore[misc] # noqa: TI
 
 
 class DdsPeers:
-    """Reads the topics on which DDS announces ends, and reports the ends to `peers`."""
+    """A reader of the topics on which DDS announces ends. It reports the ends to `peers`."""
 
     def __init__(self, peers: Peers) -> None:
         self._peers = peers
         self._readers: list[tuple[bool, BuiltinReader]] = []
 
     def join(self, participant: DomainParticipant) -> list[BuiltinReader]:
-        """Make and return new readers, for the caller to wait for and to delete."""
+        """Make and return new readers. The caller waits for them and deletes them."""
         topics = (builtin.BuiltinTopicDcpsSubscription, builtin.BuiltinTopicDcpsPublication)
         readers = [BuiltinReader(participant, topic) for topic in topics]
         self._readers = list(enumerate(readers))  # type: ignore[arg-type]
@@ -87,7 +89,7 @@ class DdsPeers:
 
 
 def _hash(qos: Qos) -> str:
-    """Return the type hash in an end's user data; "" without a hash."""
+    """Return the type hash in an end's user data; "" if it has none."""
     if Policy.Userdata not in qos:
         return ""
     found = HASH.search(bytes(qos[Policy.Userdata].data).decode(errors="replace"))

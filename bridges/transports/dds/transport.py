@@ -1,11 +1,11 @@
-"""The `dds` transport: speaks as a ROS 2 node without ROS, through cyclonedds 11.0.1.
+"""The `dds` transport. It speaks as a ROS 2 node through cyclonedds 11.0.1, and needs no ROS.
 
 Names, types and QoS are those of rmw_cyclonedds and rmw_fastrtps: topic `rt/<name>`, type
 `<package>::msg::dds_::<Type>_`, plain CDR, the type hash in the endpoint's user data.
 
-One thread reads for all subscriptions. It drops and counts invalid samples, and logs the first of each
-topic. (Cyclone's C library itself refuses samples that do not fit their type, and logs them on
-stderr.) If reading fails, the node joins again.
+One thread reads for all subscriptions. The thread drops and counts invalid samples, and logs the first
+invalid sample of each topic. (Cyclone's C library refuses samples that do not fit their type, and logs
+them on stderr.) If reading fails, the node joins again.
 
 Only this folder imports cyclonedds, and only `choose.py` imports this file.
 """
@@ -48,20 +48,23 @@ CANNOT_JOIN: Final = (
 LOOK_EVERY_NS: Final = int(LOOK_EVERY_S * 1e9)
 ANY_SAMPLE: Final = core.SampleState.Any | core.ViewState.Any | core.InstanceState.Any
 ERRORS: Final = 1 | 2
-"""Lets Cyclone log only errors and fatal errors. It would log a warning for each malformed datagram,
-which anybody can send. Neither its Python binding nor its configuration can turn warnings off."""
+"""The categories that Cyclone logs: errors and fatal errors. Cyclone would log a warning for each
+malformed datagram, which anybody can send. Neither its Python binding nor its configuration can turn
+warnings off."""
 
 _domains: WeakValueDictionary[tuple[int, str], Domain] = WeakValueDictionary()
 _domains_lock = threading.Lock()
 
 
 class DdsTransport(Threaded):
-    """One node: a participant, its reader thread, its publishers and subscriptions.
+    """One node: a participant, its reader thread, its publishers and its subscriptions.
 
-    `loopback`: stay on this machine, whatever CYCLONEDDS_URI says. When the wall clock is set back or,
-    without `loopback`, the machine's addresses change, the node leaves the graph and joins again with
-    the same ends, and publishers repeat their retained messages. `release`: None to follow RMF's
-    release. Raises TransportError if the domain cannot be joined.
+    `loopback`: stay on this machine, even if CYCLONEDDS_URI says otherwise. `release`: None to follow
+    RMF's release. Raises TransportError if the domain cannot be joined.
+
+    The node joins the graph again when the wall clock is set back. Without `loopback` it also joins
+    again when the machine's addresses change. The ends stay the same, and publishers repeat their
+    retained messages.
     """
 
     speaks = "dds"
@@ -101,7 +104,8 @@ class DdsTransport(Threaded):
     def subscribe(
         self, topic: Topic[M], received: Callable[[M], None], *, others_only: bool = False
     ) -> DdsSubscription:
-        """Declare a subscription with `topic.subscribe` QoS; `received` runs on our thread."""
+        """Declare a subscription with `topic.subscribe` QoS. The transport's thread calls
+        `received`."""
         subscription = DdsSubscription(
             topic,
             any_type(received),
@@ -118,7 +122,8 @@ class DdsTransport(Threaded):
         return subscription
 
     def close(self) -> None:
-        """Leave the graph at once: delete each entity without waiting for the garbage collector."""
+        """Leave the graph at once. Delete each entity now, because the garbage collector may come
+        late."""
         with self._lock:
             if self._closed:
                 return
@@ -148,7 +153,7 @@ class DdsTransport(Threaded):
         self._joined = True
 
     def _follow_network(self) -> None:
-        """Join again if the machine's addresses have changed, or the last attempt failed."""
+        """Join again if the machine's addresses have changed, or if the last attempt failed."""
         if (self._loopback and self._joined) or not self._look_is_due():
             return
         if self._network_changed() or not self._joined:
@@ -179,7 +184,7 @@ class DdsTransport(Threaded):
         return self._topics[name]
 
     def _attach(self, end: DdsPublisher | DdsSubscription) -> None:
-        """Make the DDS entities of an end, if the release has its message."""
+        """Make the DDS entities of an end, if the present release has the end's message."""
         self._peers.ours(end.topic, publishes=isinstance(end, DdsPublisher))
         if not self.release.has(end.topic.type):
             end.drop()
@@ -220,8 +225,9 @@ class DdsTransport(Threaded):
                 end.log_misfits(self._peers)
 
     def _follow_release(self) -> None:
-        """Adopt RMF's release; join again if a message of ours differs in this release. The lock keeps
-        out another thread that declares an end: a type of the release before would stay for ever."""
+        """Adopt RMF's release. Join again if a message of ours differs in this release. The lock keeps
+        other threads from declaring an end meanwhile, because its type of the earlier release would
+        stay for ever."""
         with self._lock:
             before, changed = self.release, self._peers.settle()
             stale = changed and any(self._peers.differs(e.topic, before) for e in self._ends)
@@ -231,7 +237,8 @@ class DdsTransport(Threaded):
             self._peers.name_misfits()
 
     def _recover(self, error: Exception) -> None:
-        """Recover from an unexpected exception: log it once, and join again after a pause."""
+        """Recover from an unexpected exception. Log the exception once, and join again after a
+        pause."""
         if self._closed:
             return
         if not self._failed:
@@ -249,7 +256,8 @@ class DdsTransport(Threaded):
             return self._node.owners(writers)
 
     def _withdraw(self, publisher: DdsPublisher, writer: DataWriter) -> None:
-        """Take one writer off the graph. After `close`, which has removed all writers, do nothing."""
+        """Take one writer off the graph. After `close` do nothing, because `close` has removed all
+        writers."""
         with self._lock:
             if self._closed or publisher not in self._ends:
                 return
@@ -267,13 +275,13 @@ class DdsTransport(Threaded):
 
     def _delete_entities(self) -> None:
         while self._entities:
-            self._entities.pop().__del__()  # deletes the C entity; a second call does nothing
+            self._entities.pop().__del__()  # this deletes the C entity; a second call does nothing
         self._domain = None
 
 
 def _shared_domain(domain_id: int, configuration: str) -> Domain:
-    """Return this process's domain with this configuration. Participants share the domain, because a
-    process can open it only once."""
+    """Return this process's domain with this configuration. A process can open a domain only once, so
+    participants share the domain."""
     key = domain_id, configuration
     with _domains_lock:
         domain = _domains.get(key)

@@ -1,7 +1,7 @@
 """The ends of the `ros2` transport: its publishers and subscriptions.
 
-An end outlives rclpy's publisher or subscription, and gets a new rclpy object when the transport joins
-again. rclpy's callbacks run in the transport's thread; they only deliver the message.
+An end outlives rclpy's publisher or subscription. When the transport joins again, the end gets a new
+rclpy object. rclpy's callbacks run in the transport's thread, and only deliver the message.
 """
 
 import threading
@@ -31,14 +31,15 @@ from bridges.transports.ros2.types import ros_type
 from bridges.transports.transport import Receive, TransportError
 
 UNHEARD: Final = 256
-"""The most messages of our own that have not come back yet: over twice any topic's depth."""
+"""The maximum number of our own messages that have not come back yet. It is over twice any topic's
+depth."""
 YIELD_S: Final = 50e-6
-"""A pause (s) after a callback, in which the thread that the message wakes can run. After the pause
-rclpy's executor holds Python's lock for a while."""
+"""A pause (s) after a callback. The callback's message wakes another thread, which can run during the
+pause. After the pause rclpy's executor holds Python's lock for a while."""
 
 
 class Ends:
-    """The ends of one node, with the pairs of ends that must not hear each other."""
+    """The ends of one node. Some pairs of them must not hear each other."""
 
     def __init__(self, release: Release) -> None:
         self.release = release
@@ -50,7 +51,8 @@ class Ends:
         yield from self.subscriptions
 
     def heard_back(self, topic: AnyTopic) -> "list[Ros2Subscription]":
-        """Return the subscriptions that would hear this node's messages on the topic, but must not."""
+        """Return this node's subscriptions that would hear its own messages on the topic, but must
+        not."""
         return [end for end in self.subscriptions if end.others_only and end.would_hear(topic)]
 
     def unheard_publishers(self, subscription: "Ros2Subscription") -> int:
@@ -61,8 +63,8 @@ class Ends:
 
 
 class Ros2Publisher:
-    """The publisher of one topic. `lives()`: does the transport live? `withdraw(publisher)` takes it
-    off the graph."""
+    """The publisher of one topic. `lives()` returns whether the transport lives. `withdraw(publisher)`
+    takes the publisher off the graph."""
 
     def __init__(
         self,
@@ -81,7 +83,7 @@ class Ros2Publisher:
         self._retained: deque[Message] = deque(maxlen=depth)
 
     def create(self, node: Node) -> None:
-        """Make rclpy's publisher, and send again the messages that are retained for late joiners."""
+        """Make rclpy's publisher. Send the messages again that are retained for late joiners."""
         made = node.create_publisher(
             ros_type(self.topic.type, self._ends.release),
             self.topic.name,
@@ -96,7 +98,7 @@ class Ros2Publisher:
             self._write(message)
 
     def drop(self) -> None:
-        """Drop rclpy's publisher, which is not used any more."""
+        """Forget rclpy's publisher, which is not used any more."""
         with self._using:
             self._end = None
 
@@ -108,15 +110,16 @@ class Ros2Publisher:
             self._end = None
 
     def publish(self, message: Message) -> None:
-        """Send. Raises TransportError if the message was not sent, CdrError if it cannot be encoded."""
+        """Send a message. Raises TransportError if it was not sent, and CdrError if it cannot be
+        encoded."""
         if not self._lives():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
         self._retained.append(message)
         self._write(message)
 
     def matched(self) -> int:
-        """Return the number of subscriptions reached, without `others_only` subscriptions of this node;
-        0 after close."""
+        """Return the number of subscriptions that hear this publisher; 0 after close. This node's own
+        `others_only` subscriptions do not count."""
         with self._using:
             try:
                 count = int(self._end.get_subscription_count()) if self._end else 0
@@ -144,8 +147,8 @@ class Ros2Publisher:
 class Ros2Subscription:
     """The subscription of one topic. `dropped`: topic name -> number of invalid samples.
 
-    `said`: with `others_only`, this node's own messages that have not come back yet; they are skipped
-    when they come. rclpy (Jazzy) has no such option, and does not tell a sample's sender.
+    `said`: with `others_only`, this node's own messages that have not come back yet. When they come,
+    they are skipped. rclpy (Jazzy) has no option for this, and does not tell who sent a sample.
     """
 
     def __init__(
@@ -184,19 +187,19 @@ class Ros2Subscription:
             self._end, self._node = made, node
 
     def drop(self) -> None:
-        """Drop rclpy's subscription, which is not used any more."""
+        """Forget rclpy's subscription, which is not used any more."""
         with self._using:
             self._end = self._node = None
 
     def would_hear(self, published: AnyTopic) -> bool:
-        """Would DDS match this end with a publisher of that topic?"""
+        """Would DDS match this subscription with a publisher of that topic?"""
         durabilities = (self.topic.subscribe.durability, published.publish.durability)
         return (published.name, published.type) == (self.topic.name, self.topic.type) and (
             durabilities != ("transient_local", "volatile")
         )
 
     def matched(self) -> int:
-        """Return the number of publishers heard; 0 after close."""
+        """Return the number of publishers that this subscription hears; 0 after close."""
         with self._using:
             try:
                 count = int(self._end.get_publisher_count()) if self._end else 0
@@ -205,7 +208,7 @@ class Ros2Subscription:
         return max(0, count - self._ends.unheard_publishers(self))
 
     def senders(self) -> list[str]:
-        """Return the nodes of the publishers heard."""
+        """Return the nodes of the publishers that this subscription hears."""
         with self._using:
             node = self._node
             try:
@@ -243,7 +246,7 @@ def _profile(qos: topics.Qos) -> QoSProfile:
 
 
 class _Misfit(Protocol):
-    """rclpy's event for a peer with a QoS that does not fit an end."""
+    """rclpy's event about a peer whose QoS does not match an end."""
 
     last_policy_kind: object
 

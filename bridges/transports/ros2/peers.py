@@ -8,7 +8,7 @@ from bridges.transports.peers import Announced, Peers
 
 
 class EndpointInfo(Protocol):
-    """The parts of rclpy's TopicEndpointInfo that are read here."""
+    """The parts of rclpy's TopicEndpointInfo that this file reads."""
 
     @property
     def topic_type(self) -> str: ...
@@ -29,7 +29,7 @@ class Graph(Protocol):
 
 
 def look(graph: Graph, peers: Peers, ours: Iterable[tuple[AnyTopic, bool]]) -> None:
-    """Report the present ends to `peers`. `ours`: (topic, True if we publish it)."""
+    """Report the present ends to `peers`. `ours` yields (topic, True if we publish the topic)."""
     peers.clear()
     for topic, publishes in ours:
         peers.ours(topic, publishes=publishes)

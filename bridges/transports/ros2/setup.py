@@ -1,8 +1,8 @@
-"""Sources ROS's setup file before the daemon starts: `ros_setup:` in the YAML.
+"""Sources ROS's setup file before the daemon starts (`ros_setup:` in the YAML).
 
-Without the paths that this file sets, rclpy cannot be imported, and `transport: auto` would choose
-another transport under systemd than in a shell. The daemon's process becomes a shell, which sources the
-file and becomes the daemon. So the process id, which systemd knows, stays the same.
+Without the paths that the setup file sets, rclpy cannot be imported. So `transport: auto` would choose
+another transport under systemd than in a shell. The daemon's process becomes a shell. The shell sources
+the file, and then becomes the daemon. So the process id, which systemd knows, stays the same.
 """
 
 import logging
@@ -16,14 +16,16 @@ from bridges.transports.transport import TransportError
 log = logging.getLogger(__name__)
 
 SOURCED = "RMF_BRIDGE_ROS_SETUP"
-"""The variable with the path of the sourced setup file."""
+"""The environment variable that holds the path of the sourced setup file."""
 SHELL = 'setup=$1; shift; ours=("$@"); set --; . "$setup"; exec "${ours[@]}"'
 
 
 def sourcing(rmf: Rmf, environ: Mapping[str, str], argv: Sequence[str]) -> list[str]:
-    """Return the command that this process must become; empty if no file must be sourced.
+    """Return the command that this process must become. Return an empty list if no file must be
+    sourced.
 
-    `argv`: `sys.orig_argv`. Raises TransportError if `transport: ros2` needs a missing file.
+    `argv`: `sys.orig_argv`. Raises TransportError if the file is missing and the YAML says `transport:
+    ros2`.
     """
     if (
         rmf.ros_setup is None
@@ -40,5 +42,5 @@ def sourcing(rmf: Rmf, environ: Mapping[str, str], argv: Sequence[str]) -> list[
 
 
 def sourced(rmf: Rmf, environ: Mapping[str, str]) -> dict[str, str]:
-    """Return the environment for the command of `sourcing`, which marks the file as sourced."""
+    """Return the environment for the command of `sourcing`. It marks the file as sourced."""
     return {**environ, SOURCED: rmf.ros_setup or ""}

@@ -1,7 +1,7 @@
-"""One stay of a node on ROS 2's graph: rclpy's context, node and executor until the node leaves.
+"""One stay of a node on ROS 2's graph. It has rclpy's context, node and executor until the node leaves.
 
 An RMW reads the machine's network only when a context's node joins. So after a change of address the
-transport leaves, and joins again with a new stay.
+transport leaves the graph, and joins again with a new stay.
 """
 
 import os
@@ -22,18 +22,20 @@ ON_LOOPBACK: Final = {
     "ROS_STATIC_PEERS": None,
     "CYCLONEDDS_URI": LOOPBACK,
 }
-"""Values for the variables that an RMW reads when it joins: with them it finds only this machine's
-nodes, and Cyclone stays on the loopback interface."""
+"""Environment variables that an RMW reads when it joins. With these values the RMW finds only this
+machine's nodes, and Cyclone stays on the loopback interface."""
 FAST_DDS_SPEAKS: Final = "FASTDDS_BUILTIN_TRANSPORTS"
-"""Fast DDS's variable for its transports. UDPv4 excludes shared memory, because over shared memory
-nodes of two users or containers find each other but do not hear each other. `LOCALHOST` brings shared
-memory back (rmw_fastrtps, participant.cpp), and a profile that names transports takes precedence."""
+"""The environment variable for Fast DDS's transports. UDPv4 excludes shared memory. Over shared memory,
+nodes of two users or containers find each other but do not hear each other. `LOCALHOST` brings
+shared memory back (rmw_fastrtps, participant.cpp), and a profile that names transports takes
+precedence."""
 REFUSALS: Final = (RuntimeError, NameValidationException)
 """rclpy's exceptions for a refusal. RCLError and InvalidHandle are RuntimeErrors too."""
 
 
 class Stay:
-    """A node on the graph. If it cannot join, it cleans up and raises one of REFUSALS."""
+    """A node on the graph. If the node cannot join, the constructor cleans up and raises one of
+    REFUSALS."""
 
     def __init__(
         self, name: str, domain_id: int, *, loopback: bool, ros_args: Sequence[str]
@@ -48,15 +50,16 @@ class Stay:
 
     @property
     def lasts(self) -> bool:
-        """Is rclpy's context still valid? False once any code has shut the context down."""
+        """Is rclpy's context still valid? It is invalid after any code has shut the context down."""
         return bool(self._context.ok())
 
     def spin(self, timeout_s: float | None) -> None:
-        """Wait for a callback and run it; stop waiting after `leave_soon` or `timeout_s` (s)."""
+        """Wait for a callback, and run the callback. Stop waiting after `leave_soon` or after
+        `timeout_s` seconds."""
         self._executor.spin_once(timeout_sec=timeout_s)
 
     def leave_soon(self) -> None:
-        """End a waiting `spin`; from any thread."""
+        """End a waiting `spin`. Any thread may call this."""
         self._leaving.trigger()
 
     def leave(self) -> None:
@@ -66,7 +69,8 @@ class Stay:
         self._context.try_shutdown()
 
     def _join(self, name: str, domain_id: int, ros_args: Sequence[str]) -> None:
-        # rclpy's logging stays off, because it opens a file below $HOME, and a service has no home.
+        # rclpy's logging stays off, because it opens a file below $HOME, and a service has no home
+        # directory.
         self._context.init(args=list(ros_args), initialize_logging=False, domain_id=domain_id)
         self.node = Node(
             name,

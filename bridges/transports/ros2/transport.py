@@ -1,9 +1,9 @@
 """The `ros2` transport: an ordinary ROS 2 node, with rclpy, on any installed RMW.
 
-As on `dds`, samples pass through the library as bytes, `cdr.py` encodes and decodes them, and invalid
+As on `dds`, samples pass through the library as bytes, and `cdr.py` encodes and decodes them. Invalid
 samples are dropped and counted. rclpy's executor runs in a thread of this transport. When the machine's
-addresses change or its wall clock is set back, this thread leaves the graph and joins again, with the
-same ends. (After a step of the clock only Cyclone needs to join again; another RMW is only
+addresses change or its wall clock is set back, this thread leaves the graph. The thread joins again
+with the same ends. (After a step of the clock only Cyclone needs to join again. Another RMW is only
 interrupted for a moment.)
 
 Source: rclpy 7.1 (ROS 2 Jazzy), its public API. Only this file, `stay.py` and `ends.py` import rclpy,
@@ -30,17 +30,18 @@ from bridges.transports.transport import M, TransportError, any_type
 log = logging.getLogger(__name__)
 
 AGAIN_S: Final = 1.0
-"""The pause (s) after an exception of rclpy before its executor runs again."""
+"""The pause (s) after an exception of rclpy. Then its executor runs again."""
 
 
 class Ros2Transport(Threaded):
     """One rclpy node, its ends and its executor's thread.
 
     `ros_args`: the arguments after `--ros-args` on the command line: name, namespace, remappings and
-    parameters (`use_sim_time`). `loopback`: stay on this machine, whatever the environment says.
-    When the wall clock is set back or, without `loopback`, the machine's addresses change, the node
-    leaves the graph and joins again, and publishers repeat their retained messages. Raises
-    TransportError if the graph cannot be joined.
+    parameters (`use_sim_time`). `loopback`: stay on this machine, even if the environment says
+    otherwise. Raises TransportError if the graph cannot be joined.
+
+    The node joins the graph again when the wall clock is set back. Without `loopback` it also joins
+    again when the machine's addresses change. Publishers then repeat their retained messages.
     """
 
     speaks = "ros2"
@@ -66,20 +67,21 @@ class Ros2Transport(Threaded):
         self.name = self.node.get_name()
         self._start(self._spin, "ros2")
         self._watch_clock()
-        # An executor's thread that still runs at exit, as after a failed start, aborts the interpreter.
+        # If an executor's thread still runs at exit, as after a failed start, it aborts the
+        # interpreter.
         atexit.register(self.close)
 
     @property
     def node(self) -> Node:
-        """rclpy's node, which is new each time the transport joins again. Raises TransportError without
-        a network."""
+        """rclpy's node. It is a new node each time the transport joins again. Raises TransportError
+        without a network."""
         if self._stay is None:
             raise TransportError(f"{self.name} has no network")
         return self._stay.node
 
     def publisher(self, topic: AnyTopic) -> Ros2Publisher:
-        """Declare a publisher with `topic.publish` QoS. Raises TransportError, also for a missing ROS
-        package."""
+        """Declare a publisher with `topic.publish` QoS. Raises TransportError, for example if a ROS
+        package is missing."""
         publisher = Ros2Publisher(topic, self._ends, lambda: self.lives, self._withdraw)
         with self._lock, self._reporting(f"topic {topic.name} cannot be published"):
             if self._stay is not None:
@@ -90,7 +92,8 @@ class Ros2Transport(Threaded):
     def subscribe(
         self, topic: Topic[M], received: Callable[[M], None], *, others_only: bool = False
     ) -> Ros2Subscription:
-        """Declare a subscription with `topic.subscribe` QoS; `received` runs on our thread."""
+        """Declare a subscription with `topic.subscribe` QoS. The transport's thread calls
+        `received`."""
         subscription = Ros2Subscription(
             topic, any_type(received), self._ends, self.dropped, others_only=others_only
         )
@@ -101,8 +104,8 @@ class Ros2Transport(Threaded):
         return subscription
 
     def faults(self) -> list[tuple[str, str]]:
-        """Return (code, detail) of each fault that keeps nodes from hearing each other; from any
-        thread."""
+        """Return (code, detail) of each fault that keeps nodes from hearing each other. Any thread may
+        call this."""
         with self._lock:
             if not self.lives or self._stay is None:
                 return []
@@ -116,7 +119,8 @@ class Ros2Transport(Threaded):
         return float(self._clock.now().nanoseconds * 1e-9)
 
     def close(self) -> None:
-        """Leave the graph at once, so that no ghost endpoint remains. May be called twice."""
+        """Leave the graph at once, so that no ghost endpoint remains. The caller may call `close`
+        twice."""
         with self._lock:
             if self._closed:
                 return
@@ -162,8 +166,8 @@ class Ros2Transport(Threaded):
                     log.warning(pairs("not_joined", node=self.name, reason=error))
 
     def _spin(self) -> None:
-        """Run the executor. The thread ends only after repeated exceptions of rclpy, or after a
-        shutdown of the context."""
+        """Run the executor. The thread ends after repeated exceptions of rclpy, or after a shutdown of
+        the context."""
         failures = 0
         while not self._closed and self._lasts() and failures < notices.FAILURES:
             try:
@@ -193,7 +197,8 @@ class Ros2Transport(Threaded):
             self._join_anew()
 
     def _withdraw(self, publisher: Ros2Publisher) -> None:
-        """Take one publisher off the graph. After `close`, which has removed all, do nothing."""
+        """Take one publisher off the graph. After `close` do nothing, because `close` has removed all
+        publishers."""
         with self._lock:
             if self._closed or publisher not in self._ends.publishers:
                 return

@@ -1,7 +1,8 @@
 """The types of `definitions.py` for rclpy: the classes of the installed ROS packages.
 
-Samples pass through rclpy as bytes (`transport.py`), so these classes only name the types. The classes'
-fields are compared with `definitions.py`, because bytes of another definition would be misread.
+Samples pass through rclpy as bytes (`transport.py`), so these classes only name the types. This file
+compares the classes' fields with `definitions.py`, because bytes of another definition would be
+misread.
 """
 
 import importlib
@@ -24,14 +25,15 @@ class RosMessage(Protocol):
 
 
 def installed() -> Release:
-    """Return the release of the installed RMF message packages; the default if none fits."""
+    """Return the release of the installed RMF message packages. Return the default if no release
+    fits."""
     fitting = (one for one in RELEASES.values() if all(_fits(kind, one) for kind in DIFFERING))
     return next(fitting, DEFAULT)
 
 
 def _fits(message_type: type, release: Release) -> bool:
-    """Does the installed package define this message as the release does, or lack it as the release
-    does?"""
+    """Return whether the installed package agrees with the release about this message. Both define it
+    in the same way, or both lack it."""
     try:
         module = importlib.import_module(f"{PACKAGES[message_type]}.msg")
     except ImportError:
@@ -44,8 +46,8 @@ def _fits(message_type: type, release: Release) -> bool:
 
 
 def ros_type(message_type: type, release: Release = NEWEST) -> type[RosMessage]:
-    """Return the ROS class of a message type. Raises TransportError if it is missing or has other
-    fields."""
+    """Return the ROS class of a message type. Raises TransportError if the class is missing or has
+    other fields."""
     package, name = PACKAGES[message_type], message_type.__name__
     try:
         found: type[RosMessage] | None = getattr(
@@ -79,7 +81,7 @@ def how_to_install(package: str) -> str:
 
 
 def fields_of(message_type: type, release: Release = NEWEST) -> dict[str, str]:
-    """Return field -> type, with the names of `get_fields_and_field_types()`."""
+    """Return field -> type. The types have the names of `get_fields_and_field_types()`."""
     return {name: _name(kind) for name, kind in release.fields(message_type).items()}
 
 

@@ -1,1 +1,1 @@
-"""The transport `zenoh`: speaks as a ROS 2 node without ROS, through zenoh."""
+"""The transport `zenoh`. It speaks as a ROS 2 node through zenoh, and needs no ROS."""

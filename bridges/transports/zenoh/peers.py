@@ -1,7 +1,7 @@
-"""The tokens by which ends announce themselves on a zenoh graph.
+"""The tokens with which ends announce themselves on a zenoh graph.
 
 Each of our ends watches the tokens on its own topic (`place.py`). `ZenohPeers` watches the tokens that
-show RMF's release, whatever topics we have.
+show RMF's release. Their topics need not be ours.
 """
 
 import logging
@@ -21,21 +21,21 @@ from bridges.transports.zenoh.keys import Keys, Peer
 log = logging.getLogger(__name__)
 
 MOST: Final = 1000
-"""The most tokens that are kept. No site has more ends on one topic."""
+"""The maximum number of tokens that are kept. No site has more ends on one topic."""
 
 Order = Callable[[], None]
 """Work for the transport's thread."""
 
 
 class Merged:
-    """An order that is queued for the transport's thread at most once at a time."""
+    """An order for the transport's thread. If it is queued already, it is not queued again."""
 
     def __init__(self, do: Callable[[Order], None], order: Order) -> None:
         self._do, self._order = do, order
         self._waits = False
 
     def __call__(self) -> None:
-        """Queue the order; from any thread."""
+        """Queue the order. Any thread may call this."""
         if not self._waits:
             self._waits = True
             self._do(self._run)
@@ -46,16 +46,17 @@ class Merged:
 
 
 class Tokens:
-    """The tokens that match some key expressions, while the session is open or until `leave`.
+    """The tokens that match some key expressions. They are tracked until `leave` or the end of the
+    session.
 
-    `came(token, peer)`, `gone(token)`: called on zenoh's threads, one call at a time. At most MOST
-    tokens are kept; further tokens are left out, and this is logged once. When half of the kept tokens
-    have gone, all tokens are queried again, so that no token is missing after a flood. `do(order)` runs
-    an order on the transport's thread.
+    zenoh's threads call `came(token, peer)` and `gone(token)`, one call at a time. `do(order)` runs an
+    order on the transport's thread. At most MOST tokens are kept. Further tokens are left out, and this
+    is logged once. When half of the kept tokens have gone, all tokens are queried again, so that no
+    token is missing after a flood.
 
-    zenoh hands over the present tokens on another thread than the changes, so a token's departure can
-    overtake its arrival. A token that comes after it has gone is therefore counted only if the graph,
-    asked for it, still has it.
+    zenoh reports the present tokens on another thread than the changes. So a token's departure can
+    overtake its arrival. If a token comes after it has gone, the graph is asked for the token. The
+    token counts only if the graph has it.
     """
 
     def __init__(
@@ -71,9 +72,9 @@ class Tokens:
         self._came, self._gone, self._do = came, gone, do
         self._known: set[str] = set()
         self._gone_before: dict[str, None] = {}
-        """The last MOST tokens that went while they were not known, the oldest first."""
+        """The last MOST tokens whose departure came before their arrival, the oldest first."""
         self._doubtful: dict[str, Peer] = {}
-        """Tokens that came after they had gone. The graph will be asked for them."""
+        """Tokens whose arrival came after their departure. The graph will be asked for them."""
         self._asked: dict[str, Peer] = {}
         self._ask = Merged(do, self._ask_all)
         self._crowded = self._named = self._left = False
@@ -91,7 +92,7 @@ class Tokens:
             _undeclare(watching)
 
     def _watch(self) -> None:
-        """Watch for all present tokens, and for each token that comes or goes."""
+        """Watch all present tokens, and each token that comes or goes."""
         on_token = Callback(partial(self._look, self._watch_number), indirect=False)
         self._watching = [
             self._live.declare_subscriber(expression, on_token, history=True)
@@ -99,7 +100,7 @@ class Tokens:
         ]
 
     def _watch_again(self) -> None:
-        with self._lock, suppress(zenoh.ZError):  # the session may have been closed meanwhile
+        with self._lock, suppress(zenoh.ZError):  # the session may be closed already
             if self._left:
                 return
             _undeclare(self._watching)
@@ -112,9 +113,9 @@ class Tokens:
             self._watch()
 
     def _look(self, watch: int, sample: zenoh.Sample) -> None:
-        """Note a token that has come or gone; called on zenoh's threads.
+        """Record a token that has come or gone. zenoh's threads call this.
 
-        Changes from an earlier watch are ignored: they may come when that watch has ended.
+        Changes from an earlier watch are ignored, because they may come after the end of that watch.
         """
         token = str(sample.key_expr)
         goes = sample.kind == zenoh.SampleKind.DELETE
@@ -157,17 +158,18 @@ class Tokens:
         self._asked.pop(token, None)
 
     def _ask_all(self) -> None:
-        """Ask the graph for the doubtful tokens; on the transport's thread."""
+        """Ask the graph for the doubtful tokens. The transport's thread calls this."""
         with self._changing:
             asked, self._doubtful = self._doubtful, {}
             self._asked.update(asked)
             on_reply = Callback(partial(self._answered, self._watch_number), indirect=False)
-        with suppress(zenoh.ZError):  # the session may have been closed meanwhile
+        with suppress(zenoh.ZError):  # the session may be closed already
             for token in asked:
                 self._live.get(token, on_reply)
 
     def _answered(self, watch: int, reply: zenoh.Reply) -> None:
-        """Note that the graph still has a token, unless the token has gone since the question."""
+        """Record that the graph has a token. Ignore the answer if the token has gone after the
+        question."""
         if (sample := reply.ok) is None:
             return
         token = str(sample.key_expr)
@@ -188,8 +190,8 @@ class Tokens:
 
 
 class ZenohPeers:
-    """Reports tokens to `peers`, on zenoh's thread. `news`: called after each token. `do`: see
-    `Tokens`."""
+    """A watch that reports tokens to `peers`, on zenoh's thread. It calls `news` after each token. For
+    `do` see `Tokens`."""
 
     def __init__(self, peers: Peers, news: Order, do: Callable[[Order], None]) -> None:
         self._peers = peers
@@ -197,13 +199,13 @@ class ZenohPeers:
         self._do = do
 
     def watch(self, session: zenoh.Session, keys: Keys) -> Tokens:
-        """Watch in this session from the beginning. The caller must keep the returned Tokens while the
-        session is open."""
+        """Watch in this session from its beginning. The caller must keep the returned Tokens until the
+        session is closed."""
         self._peers.clear()
         return Tokens(session, keys, keys.witnesses(), self._came, self._gone, self._do)
 
     def tell(self, token: str, end: Announced | None) -> None:
-        """Note an end that has come; None: the end has gone."""
+        """Record an end that has come. If `end` is None, the end of this token has gone."""
         if end is None:
             self._peers.gone(token)
         else:

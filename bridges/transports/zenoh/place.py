@@ -1,4 +1,5 @@
-"""An end's place in one zenoh session: the peers that it reaches, and the peers that do not fit."""
+"""An end's place in one zenoh session. It knows the peers that the end reaches, and the peers that do
+not fit."""
 
 from collections.abc import Callable
 
@@ -12,16 +13,16 @@ from bridges.transports.zenoh.keys import Keys, Kind
 from bridges.transports.zenoh.peers import Order, Tokens
 
 Tell = Callable[[str, Announced | None], None]
-"""A callback for a token and its end; the end is None once it has gone."""
+"""A callback with a token and its end. The end is None if it has gone."""
 
 
 class Place:
     """An end's place in one session: its token, and the tokens of its peers.
 
     Peers are the ends of the other kind on the same topic, in any process. `peers`: the peers that this
-    end reaches, by token. `unheard`: the gids of peers that do not fit. Called on zenoh's thread:
-    `misfit(policy)` for each peer whose QoS does not fit; `tell(token, end)` for each peer that comes,
-    with None when it goes. `do`: see `Tokens`.
+    end reaches, by token. `unheard`: the gids of peers that do not fit. zenoh's thread calls
+    `misfit(policy)` for each peer whose QoS does not fit. It calls `tell(token, end)` for each peer
+    that comes, and with None when the peer goes. For `do` see `Tokens`.
     """
 
     def __init__(
@@ -53,7 +54,7 @@ class Place:
         self._alive: zenoh.LivelinessToken | None = None
 
     def appear(self) -> None:
-        """Declare the token, because the end sends or hears from now on."""
+        """Declare the token. From now on the end sends or hears."""
         self._alive = self._live.declare_token(self.token)
 
     def leave(self) -> None:
@@ -63,7 +64,7 @@ class Place:
         self._tokens.leave()
 
     def _part(self, token: str) -> None:
-        """Forget a peer that has gone; called on zenoh's thread, like `_meet`."""
+        """Forget a peer that has gone. zenoh's thread calls this, as it calls `_meet`."""
         self.peers.pop(token, None)
         self.unheard.discard(zenoh_keys.gid(token))
         self._tell(token, None)
@@ -79,7 +80,7 @@ class Place:
             self._misfit(policy)
 
     def _incompatible(self, theirs: zenoh_keys.Peer) -> str:
-        """Return the QoS policy by which DDS would not match the two ends; "" if they match."""
+        """Return the QoS policy that would keep DDS from matching the two ends; "" if they match."""
         hashed = type_hash(self._topic.type, self._keys.release)
         if theirs.type != self._keys.type(self._topic) or theirs.announced.hash not in ("", hashed):
             return "type"

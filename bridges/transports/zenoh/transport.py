@@ -1,9 +1,9 @@
-"""The `zenoh` transport: a session that looks like a ROS node on rmw_zenoh, or like a
-zenoh-bridge-ros2dds with one node behind it.
+"""The `zenoh` transport. Its session looks like a ROS node on rmw_zenoh, or like a zenoh-bridge-ros2dds
+with one node behind the bridge.
 
-zenoh reconnects by itself: it keeps looking for its routers, and declares everything again when a
-router answers. This transport opens a new session only when the machine's addresses have changed,
-because the old session would notice the change only when its links time out.
+zenoh reconnects by itself. It keeps looking for its routers, and declares everything again when a
+router answers. This transport opens a new session only when the machine's addresses have changed. The
+old session would notice that change only when its links time out.
 
 Source: eclipse-zenoh 1.10 (Python API), and the sources named in `keys.py` and `ends.py`. Only this
 folder imports zenoh, and only `choose.py` imports this file.
@@ -48,8 +48,8 @@ NO_ROUTER: Final = (
 class ZenohTransport(Threaded):
     """One node: a session, its publishers and subscriptions, and the thread that delivers messages.
 
-    `loopback`: stay on this machine, without a router, whatever `settings` say. Raises TransportError
-    if no session can be opened. If no other node answers, that is no error.
+    `loopback`: stay on this machine without a router, even if `settings` say otherwise. Raises
+    TransportError if no session can be opened. It is no error if no other node answers.
     """
 
     speaks = "zenoh"
@@ -90,12 +90,12 @@ class ZenohTransport(Threaded):
         self._join()
         if self._session is None and not self._wants_router:
             raise TransportError(f"cannot open a zenoh session: {self._why_unlinked}")
-        # A session that is still open at exit aborts the interpreter.
+        # If a session is open at exit, it aborts the interpreter.
         atexit.register(self.close)
         self._start(self._listen, "zenoh")
 
     def faults(self) -> list[tuple[str, str]]:
-        """Return the faults of every transport, and ROUTER_ON_LOOPBACK or NO_ROUTER."""
+        """Return the faults of every transport, and also ROUTER_ON_LOOPBACK or NO_ROUTER."""
         found = super().faults()
         if self._away:
             found.insert(0, (ROUTER_MET, WHY_AWAY))
@@ -121,7 +121,8 @@ class ZenohTransport(Threaded):
     def subscribe(
         self, topic: Topic[M], received: Callable[[M], None], *, others_only: bool = False
     ) -> ZenohSubscription:
-        """Declare a subscription with `topic.subscribe` QoS; `received` runs on our thread."""
+        """Declare a subscription with `topic.subscribe` QoS. The transport's thread calls
+        `received`."""
         subscription = ZenohSubscription(
             topic,
             any_type(received),
@@ -138,7 +139,8 @@ class ZenohTransport(Threaded):
         return subscription
 
     def close(self) -> None:
-        """Leave the graph at once, so that no ghost endpoint remains. May be called twice."""
+        """Leave the graph at once, so that no ghost endpoint remains. The caller may call `close`
+        twice."""
         with self._lock:
             if self._closed:
                 return
@@ -154,7 +156,7 @@ class ZenohTransport(Threaded):
     # --- the session ---------------------------------------------------------------------------
 
     def _join(self) -> None:
-        """Open a session if possible. A client has no session before a router answers."""
+        """Open a session if possible. A client gets a session only after a router has answered."""
         self._addresses = addresses.addresses()
         if self._loopback:
             ways = zenoh_config.on_loopback(self.domain_id)
@@ -165,7 +167,7 @@ class ZenohTransport(Threaded):
         except zenoh.ZError as error:
             self._why_unlinked = str(error).partition(" at /")[
                 0
-            ]  # without the place in zenoh's source
+            ]  # the text without the place in zenoh's source
             return
         way, name = WAYS[self._settings.keys], str(session.zid())
         self._keys: Keys = way(self.domain_id, name, self.name, self.release)
@@ -186,7 +188,7 @@ class ZenohTransport(Threaded):
             self._attach(end)
 
     def _vanish(self) -> None:
-        """Take the node and every end off the graph, but keep the session, which shows when the router
+        """Take the node and every end off the graph. Keep the session, because it shows when the router
         leaves."""
         for end in self._ends:
             end.leave()
@@ -198,7 +200,7 @@ class ZenohTransport(Threaded):
             presence.undeclare()  # type: ignore[no-untyped-call]
 
     def _attach(self, end: ZenohEnd) -> None:
-        """Give an end its place if the node is on the graph and the release has the end's message."""
+        """Give an end its place, if the node is on the graph and the release has the end's message."""
         self._peers.ours(end.topic, publishes=isinstance(end, ZenohPublisher))
         off = self._away or end.place or not self.release.has(end.topic.type)
         if self._session is None or off:
@@ -209,9 +211,9 @@ class ZenohTransport(Threaded):
         end.create(self._session, self._keys, number)
 
     def _neighbour(self, neighbours: dict[str, zenoh.WhatAmI], event: zenoh.TransportEvent) -> None:
-        """Note a router or peer that has connected or gone; called on zenoh's thread.
+        """Record a router or peer that has connected or gone. zenoh's thread calls this.
 
-        The neighbours are tracked here, because asking the session for them would wait for a lock that
+        This file tracks the neighbours itself. A question to the session would wait for a lock that
         this thread holds.
         """
         if event.kind == zenoh.SampleKind.PUT:
@@ -227,10 +229,10 @@ class ZenohTransport(Threaded):
                 publisher.leave()
 
     def _leave(self) -> None:
-        """Leave the session, and close it in another thread, because on a dead link this takes 10 s.
+        """Leave the session. Another thread closes the session, because this takes 10 s on a dead link.
 
-        Objects declared in the session are kept until it is closed; to drop them earlier may block this
-        thread.
+        Objects declared in the session are kept until the session is closed. Dropping them earlier may
+        block this thread.
         """
         session, self._session = self._session, None
         held: list[object] = [end.give_up() for end in self._ends]
@@ -255,7 +257,7 @@ class ZenohTransport(Threaded):
                 self._leave()
 
     def _follow_release(self) -> None:
-        """Adopt RMF's release; give a new place to each end whose message differs in this release."""
+        """Adopt RMF's release. Give a new place to each end whose message differs in this release."""
         before = self.release
         if not self._peers.settle():
             self._peers.name_misfits()
@@ -289,7 +291,7 @@ class ZenohTransport(Threaded):
                 self._recover(error)
 
     def _recover(self, error: Exception) -> None:
-        """Recover from an unexpected exception: log it once, and open a new session."""
+        """Recover from an unexpected exception. Log the exception once, and open a new session."""
         if not self._failed:
             log.exception(pairs("reader_failed", node=self.name, reason=error))
         self._failed = True
@@ -298,7 +300,7 @@ class ZenohTransport(Threaded):
             self._join_anew()
 
     def _follow_network(self) -> None:
-        """Join again if the machine's addresses have changed, or there is no session."""
+        """Join again if the machine's addresses have changed, or if there is no session."""
         if self._loopback:
             if self._away:
                 self._look()
@@ -316,7 +318,7 @@ class ZenohTransport(Threaded):
 
     def _look(self) -> None:
         """Log once that no router or peer answers, and once that a router or peer answers again. On
-        loopback, leave the graph while a router is linked."""
+        loopback, leave the graph when a router is linked."""
         neighbours = list(self._neighbours.values())
         routers = zenoh.WhatAmI.ROUTER in neighbours
         if self._loopback:
@@ -335,7 +337,7 @@ class ZenohTransport(Threaded):
             log.warning(pairs("not_linked", node=self.name, connect=where, reason=reason))
 
     def _keep_apart(self, away: bool) -> None:
-        """Leave the graph if `away` (a router is linked), else return to the graph."""
+        """If `away` (a router is linked), leave the graph; otherwise return to the graph."""
         with self._lock:
             before, session = self._away, self._session
             if self._closed or session is None or not (before or away):
@@ -353,4 +355,4 @@ class ZenohTransport(Threaded):
 
 
 def _nothing() -> None:
-    """Do nothing; this order only wakes our thread."""
+    """Do nothing. This order only wakes our thread."""
