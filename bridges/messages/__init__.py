@@ -1,1 +1,1 @@
-"""RMF's messages: definitions, bytes, topic names and QoS, and the gaps of each release."""
+"""RMF's messages: definitions, bytes, topic names, QoS, and the messages that each release lacks."""

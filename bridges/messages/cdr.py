@@ -1,7 +1,7 @@
 """Messages as bytes: plain CDR (XCDR1), the encoding that ROS 2 uses on the wire.
 
-A sample has four bytes of header (`00 01 00 00` little endian, `00 00 00 00` big endian), then the
-fields in their order. A number is aligned to its own size, counted from the end of the header. A string
+A sample has four bytes of header (`00 01 00 00` little endian, `00 00 00 00` big endian). The fields
+follow in their order. A number is aligned to its own size, counted from the end of the header. A string
 is its length with the closing NUL (as uint32), then the UTF-8 bytes and the NUL. A sequence is its
 length (as uint32), then its elements. Source: OMG DDS-XTypes 1.3, 7.4.3, and samples of rmw_cyclonedds
 and rmw_fastrtps.
@@ -21,7 +21,8 @@ from bridges.messages.releases import NEWEST, Release
 
 T = TypeVar("T")
 Value = Any
-"""A field's value: a number, text or bool, a tuple of these, or a struct of `definitions.py`."""
+"""A field's value: a number, a text, a bool, a tuple of such values, or a struct of
+`definitions.py`."""
 Put = Callable[[bytearray, Value], None]
 Get = Callable[[bytes, int], tuple[Value, int]]
 
@@ -29,25 +30,25 @@ LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 BIG_ENDIAN = b"\x00\x00\x00\x00"
 HEADER = 4
 LONGEST: Final = 1 << 20
-"""The longest sample (bytes) accepted from the network. A FleetState of 200 robots takes 46 kB, or 0.7
-MB if the path of each robot has 50 places."""
+"""The maximum length (bytes) of a sample from the network. A FleetState of 200 robots takes 46 kB. It
+takes 0.7 MB if the path of each robot has 50 places."""
 LONGEST_FLAT: Final = 1 << 16
-"""The longest sample (bytes) of a type without lists of messages, because a hundred samples may
-wait."""
+"""The maximum length (bytes) of a sample whose type has no lists of messages. It is shorter, because a
+hundred samples may wait in a queue."""
 CODES = {"int32": "i", "uint32": "I", "uint64": "Q", "float32": "f"}
 BYTES = ("uint8", "byte")
 
 
 class CdrError(ValueError):
-    """The bytes are not a message of the type, or the message cannot be encoded."""
+    """The error of bytes that are not a message of the type, or of a message that cannot be encoded."""
 
 
 def encode(message_type: type, message: object, release: Release = NEWEST) -> bytes:
     """Encode the message as little endian CDR with its header.
 
-    Characters that are impossible on the wire (a NUL, half a surrogate pair) become `?`, because a
-    strange text from a device must not block the device's state message. Raises CdrError for a number
-    out of range, or a value of another type.
+    Characters that are impossible on the wire (a NUL, half a surrogate pair) become `?`. Otherwise a
+    strange text from a device would block the device's state message. Raises CdrError for a number out
+    of range, and for a value of another type.
     """
     out = bytearray(LITTLE_ENDIAN)
     try:
@@ -59,13 +60,13 @@ def encode(message_type: type, message: object, release: Release = NEWEST) -> by
 
 @cache
 def longest(message_type: type) -> int:
-    """Return the longest accepted sample (bytes) of this type."""
+    """Return the maximum length (bytes) of a sample of this type."""
     listed = (typing.get_args(kind)[:1] for kind in field_types(message_type).values())
     return LONGEST if any(one and one[0] in PACKAGES for one in listed) else LONGEST_FLAT
 
 
 def decode(message_type: type[T], sample: bytes, release: Release = NEWEST) -> T:
-    """Decode the message in a sample of either byte order. Raises CdrError for other samples.
+    """Decode the message in a sample of either byte order. Raises CdrError for any other sample.
 
     Up to three bytes may follow the last field, because RTPS pads payloads to a multiple of four.
     """
@@ -86,7 +87,7 @@ def decode(message_type: type[T], sample: bytes, release: Release = NEWEST) -> T
 
 
 def decode_text(sample: bytes) -> str:
-    """Decode the text in a std_msgs/String. Raises CdrError."""
+    """Decode the text of a std_msgs/String. Raises CdrError."""
     order = _ORDERS.get(sample[:2])
     try:
         return str(_get(str, order or "<", NEWEST)(sample, 4)[0])
@@ -163,7 +164,8 @@ def _putting_struct(members: list[tuple[str, Put]]) -> Put:
 
 @cache
 def _get(kind: type, order: str, release: Release) -> Get:
-    """Make the function that reads a value of this type at a position and returns (value, its end)."""
+    """Make the function that reads a value of this type at a position. It returns (value, end
+    position)."""
     if typing.get_origin(kind) is typing.Annotated:
         name = typing.get_args(kind)[1]
         return _get_byte if name in BYTES else _getting_number(order + CODES[name])
@@ -229,7 +231,7 @@ def _getting_sequence(get_element: Get, order: str) -> Get:
 
 def _getting_struct(kind: type, members: dict[str, Get]) -> Get:
     gets, names = tuple(members.values()), tuple(members)
-    whole = names == tuple(field_types(kind))  # else the release lacks some fields
+    whole = names == tuple(field_types(kind))  # otherwise the release lacks some fields
 
     def get(sample: bytes, at: int) -> tuple[object, int]:
         values = []

@@ -1,6 +1,6 @@
 """The constants of RMF's messages, as the `.msg` files number them. Type hashes do not cover constants.
 
-Source: see `definitions.py`. The numbers are the same in all releases; Jazzy's RobotMode ends with
+The source is that of `definitions.py`. All releases have the same numbers. Jazzy's RobotMode ends with
 MODE_CLEANING.
 """
 
@@ -8,7 +8,7 @@ from enum import IntEnum
 
 
 class LiftRequestType(IntEnum):
-    """LiftRequest.request_type. LiftState has other numbers: there HUMAN is 1 and AGV is 2."""
+    """LiftRequest.request_type. LiftState has other numbers for modes: HUMAN is 1 and AGV is 2."""
 
     REQUEST_END_SESSION = 0
     REQUEST_AGV_MODE = 1
@@ -61,7 +61,7 @@ class DoorModeValue(IntEnum):
 
 
 class ChargerStateValue(IntEnum):
-    """ChargerState.state. There is no 0, so a default-constructed message is invalid."""
+    """ChargerState.state. The number 0 is undefined, so a default-constructed message is invalid."""
 
     CHARGER_IDLE = 1
     CHARGER_ASSIGNED = 2

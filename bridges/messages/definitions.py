@@ -1,13 +1,14 @@
 """RMF's messages, as the `.msg` files define them: fields in their order, and their types.
 
-This is the only table of messages, with the constants of `constants.py`. The transports make their own
-types from this table (field by field, from the annotations), and the RIHS01 type hashes are computed
-from it. It holds the messages of all releases of RMF; `releases.py` lists the messages and fields that
-a release lacks.
+This file and `constants.py` are the only table of messages. The transports make their own types from
+this table (field by field, from the annotations). The RIHS01 type hashes are computed from it. The
+table holds the messages of all releases of RMF. `releases.py` lists the messages and fields that a
+release lacks.
 
 Source: rmf_internal_msgs 3d4df02 (4.1.0), builtin_interfaces, std_msgs and diagnostic_msgs of ROS 2
 Jazzy.
-A `T[]` of ROS is a tuple here, so that a message is a value: hashable, comparable, immutable.
+
+A `T[]` of ROS is a tuple in this table, so that a message is a value: hashable, comparable, immutable.
 """
 
 from typing import Annotated, Final
@@ -44,7 +45,7 @@ class Time(Struct, frozen=True, gc=False):
 
 
 class Duration(Struct, frozen=True, gc=False):
-    """builtin_interfaces/Duration: `sec` may be negative, and `nanosec` is added to `sec`."""
+    """builtin_interfaces/Duration. `sec` may be negative. `nanosec` is always added to `sec`."""
 
     sec: int32 = 0
     nanosec: uint32 = 0
@@ -218,7 +219,7 @@ class Location(Struct, frozen=True, gc=False):
 
 
 class RobotState(Struct, frozen=True, gc=False):
-    """`battery_percent`: 0-100."""
+    """State of one robot. `battery_percent` is 0 to 100."""
 
     name: str = ""
     model: str = ""
@@ -260,7 +261,7 @@ class AlertParameter(Struct, frozen=True, gc=False):
 
 
 class Alert(Struct, frozen=True, gc=False):
-    """A notice to a person on RMF's dashboard; each notice needs a new `id`."""
+    """A notice to a person on RMF's dashboard. Each notice needs a new `id`."""
 
     id: str = ""
     title: str = ""
@@ -366,9 +367,10 @@ PACKAGES: Final[dict[type, str]] = {
     DiagnosticStatus: "diagnostic_msgs",
     DiagnosticArray: "diagnostic_msgs",
 }
-"""The ROS package that defines each type."""
+"""Type -> the ROS package that defines it."""
 
 
 def field_types(message_type: type) -> dict[str, type]:
-    """Map field -> annotation, in the message's order; the annotation of a number is an `Annotated`."""
+    """Return field -> annotation, in the message's order. The annotation of a number is an
+    `Annotated`."""
     return dict(message_type.__annotations__)

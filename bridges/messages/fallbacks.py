@@ -1,9 +1,10 @@
-"""Substitutes for messages that RMF's release lacks: the nearest message of that release.
+"""Substitutes for messages that RMF's release lacks. A substitute is the nearest message of that
+release.
 
-- In place of an EmergencySignal to all fleets: `fire_alarm_trigger`, which the fleet adapters of every
+- An EmergencySignal to all fleets becomes `fire_alarm_trigger`, which the fleet adapters of every
   release hear.
-- In place of an Alert: a line in the log. The alert's cause is also a fault of the daemon, and so in
-  its diagnostics.
+- An Alert becomes a line in the log. The alert's cause is also a fault of the daemon, so it also
+  appears in the daemon's diagnostics.
 """
 
 from typing import Final
@@ -13,16 +14,16 @@ from bridges.messages.releases import RELEASES
 from bridges.messages.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, AnyTopic
 
 INSTEAD: Final[dict[str, AnyTopic]] = {EMERGENCY_SIGNAL.name: FIRE_ALARM_TRIGGER}
-"""Topic -> its substitute in every release."""
+"""Topic -> its substitute, which every release has."""
 
 
 def converted(message: Message) -> Message | None:
-    """Convert a message for the topic in INSTEAD; None for a message that goes into the log."""
+    """Convert a message for the topic in INSTEAD. Return None for a message that goes into the log."""
     return Bool(message.is_emergency) if isinstance(message, EmergencySignal) else None
 
 
 def remarks(topic: AnyTopic, wanted: str) -> list[str]:
-    """Write remarks for `check` on a topic whose message a release lacks. `wanted`: the YAML's
+    """Return remarks for `check` about a topic whose message a release lacks. `wanted` is the YAML's
     `release`."""
     names = RELEASES if wanted == "auto" else [wanted]
     way = (

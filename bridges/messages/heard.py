@@ -1,7 +1,8 @@
-"""One message of RMF's graph, in the same form from a live graph and from every kind of recording.
+"""One message of RMF's graph. It has the same form whether it comes from a live graph or from any kind
+of recording.
 
-A graph and a recording yield the same values in the same order, so code that judges, explains or draws
-need not know the source.
+A graph and a recording yield the same values in the same order. So code that judges, explains or draws
+messages need not know their source.
 """
 
 from collections.abc import Callable
@@ -17,17 +18,18 @@ from bridges.messages.words import LONGEST_NAME
 FREE_TEXTS: Final = frozenset(
     {"error_message", "message", "title", "subtitle", "value", "performing_action", "model"}
 )
-"""The fields of messages that hold sentences instead of names."""
+"""The message fields that hold sentences instead of names."""
 LONGEST_SENTENCE: Final = 1000
 MOST_PARTS: Final = 500
-"""The most elements of a sequence; a legal FleetState has 200 robots."""
+"""The maximum number of kept elements of a sequence. A legal FleetState has 200 robots."""
 
 
 class Sender(Struct, eq=False):
-    """One publisher on the graph, the same object for all its messages.
+    """One publisher on the graph. All messages of a publisher share one object.
 
-    `node`: the publisher's node, `/namespace/name`, which can be forged; "" until discovery tells.
-    `look`: looks the node up again, from any thread; None if there is nothing to look up.
+    `node`: the publisher's node, `/namespace/name`, which can be forged; "" until discovery finds the
+    node. `look`: a function that looks the node up again, from any thread; None if there is nothing to
+    look up.
     """
 
     node: str = ""
@@ -35,11 +37,11 @@ class Sender(Struct, eq=False):
 
 
 class Heard(Struct, frozen=True):
-    """A message, its topic's ROS name, and the time of its arrival.
+    """A message with its topic's ROS name and the time of its arrival.
 
-    `at`: s on a clock that never steps and has any zero. `wall`: s since the epoch, by the clock of the
-    listening machine, for comparison with stamps. `sender`: None if the wire or the recording does not
-    name it.
+    `at`: seconds on a clock that never steps; its zero is arbitrary. `wall`: seconds since the epoch,
+    by the clock of the listening machine, for comparison with stamps. `sender`: None if the wire or the
+    recording does not name the publisher.
     """
 
     at: float
@@ -50,9 +52,9 @@ class Heard(Struct, frozen=True):
 
 
 class Own(Struct, frozen=True):
-    """A text that our recorder puts beside the messages: a daemon's note in JSON.
+    """A text that our recorder stores beside the messages. It is a daemon's note in JSON.
 
-    `topic`: such as `rmf_bridge/outputs`. The times are as in `Heard`.
+    `topic`: the note's topic, such as `rmf_bridge/outputs`. The times are as in `Heard`.
     """
 
     at: float
@@ -62,11 +64,12 @@ class Own(Struct, frozen=True):
 
 
 def bounded(part: Any, longest: int = LONGEST_NAME) -> Any:
-    """Shorten a message, or a part of it, for memory and display, as anybody can send a name of
+    """Shorten a message, or a part of one, for memory and display. Anybody can send a name of
     megabytes.
 
-    A name of more than LONGEST_NAME characters, or a sentence of more than LONGEST_SENTENCE, is cut and
-    ends with its length; a sequence is cut to MOST_PARTS elements. Parts within limits are not copied.
+    A name of more than LONGEST_NAME characters is cut and ends with its length. So is a sentence of
+    more than LONGEST_SENTENCE. A sequence is cut to MOST_PARTS elements. Parts within these limits are
+    not copied.
     """
     if isinstance(part, str):
         return part if len(part) <= longest else f"{part[:longest]}… ({len(part)} characters)"

@@ -1,13 +1,14 @@
 """The releases of RMF's message packages, and the parts of `definitions.py` that each release lacks.
 
-The sources are in open-rmf/rmf_internal_msgs; every line of the messages was compared:
+The sources are in open-rmf/rmf_internal_msgs. Every line of the messages was compared.
+
 - jazzy: 3.3.1 (a351d51602383eb09a8138d302827a76241630a5), branch jazzy at
   04585f0e2b0da9f11327fb403d38bc547d648fa6. Humble's 3.0.4 and Iron's 3.1.3 are the same.
 - kilted: 3.5.0 (branch kilted at c0f72ce5e2129411d2868414b25f6fab1460fcdb). Lyrical's 4.1.0
   (3d4df023bacaf7a091564e98f4aff0776f72a612) is the same.
 
 If a type differs between two releases, nodes of these releases do not hear each other's messages of
-this type. Each node announces the type hash of every endpoint, so the hashes on a graph show RMF's
+this type. Each node announces the type hash of every endpoint. So the hashes on a graph show RMF's
 release.
 """
 
@@ -26,7 +27,8 @@ from bridges.messages.definitions import (
 
 
 class Release(Struct, frozen=True, eq=False):
-    """One release. `lacks`: missing messages; `without`: missing fields, as (message, field)."""
+    """One release. `lacks`: the missing messages. `without`: the missing fields, as (message,
+    field)."""
 
     name: str
     lacks: frozenset[type] = frozenset()
@@ -37,7 +39,7 @@ class Release(Struct, frozen=True, eq=False):
         return message_type not in self.lacks
 
     def fields(self, message_type: type) -> dict[str, type]:
-        """Map field -> type, in the message's order in this release."""
+        """Return field -> type, in the message's order in this release."""
         return {
             name: kind
             for name, kind in field_types(message_type).items()
@@ -57,10 +59,10 @@ JAZZY: Final = Release(
 KILTED: Final = Release("kilted")
 RELEASES: Final = {release.name: release for release in (JAZZY, KILTED)}
 DEFAULT: Final = JAZZY
-"""The release of most sites, which is used until a fleet adapter shows another release."""
+"""The release of most sites. It is used until a fleet adapter shows another release."""
 DIFFERING: Final = frozenset[type]().union(
     *(release.lacks | {message for message, _ in release.without} for release in RELEASES.values())
 )
 """The messages that differ between releases."""
 NEWEST: Final = KILTED
-"""The release that has every message and field."""
+"""The release that has all messages and fields."""

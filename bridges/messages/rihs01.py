@@ -1,9 +1,10 @@
 """The RIHS01 type hash (ROS REP-2016) of each message, computed from `definitions.py`.
 
-A ROS 2 node announces the hash of its message definition with each endpoint, and warns about a peer
+A ROS 2 node announces the hash of its message definition with each endpoint. It warns about a peer
 without a hash or with another hash. The hash is the SHA-256 of the type's description as JSON: its
 fields, then the descriptions of all nested types, sorted by name. The hash covers the names and types
 of fields, but not constants and comments.
+
 Source: ros2/rosidl, rosidl_generator_type_description, and type_description_interfaces/FieldType.
 """
 
@@ -32,7 +33,7 @@ UNBOUNDED_SEQUENCE = 144
 
 
 def type_hash(message_type: type, release: Release = NEWEST) -> str:
-    """Compute the hash: `RIHS01_` and 64 hexadecimal digits."""
+    """Return the hash: `RIHS01_` and 64 hexadecimal digits."""
     return _hash(message_type, release)
 
 
@@ -48,7 +49,7 @@ def _hash(message_type: Hashable, release: Release) -> str:
 
 
 def releases_of(hashed: str) -> list[Release]:
-    """List the releases with a message of this hash."""
+    """Return the releases that have a message with this hash."""
     return _by_hash().get(hashed, [])
 
 
@@ -62,7 +63,7 @@ def _by_hash() -> dict[str, list[Release]]:
 
 
 def type_name(message_type: type) -> str:
-    """Return the name in ROS: package/msg/Name."""
+    """Return the type's name in ROS: package/msg/Name."""
     return f"{PACKAGES[message_type]}/msg/{message_type.__name__}"
 
 
@@ -95,8 +96,8 @@ def _field_type(kind: type) -> dict[str, object]:
 
 
 def _element(kind: type) -> type:
-    """Return the type of a sequence's elements, or the type itself; for numbers, the type's ROS
-    name."""
+    """Return the type of a sequence's elements. For any other type, return the type itself; for a
+    number, its ROS name."""
     if typing.get_origin(kind) is tuple:
         kind = typing.get_args(kind)[0]
     return typing.get_args(kind)[1] if typing.get_origin(kind) is typing.Annotated else kind

@@ -1,4 +1,4 @@
-"""Conversion of seconds (float) to RMF's Time and Duration, and back."""
+"""Converts seconds (float) to RMF's Time and Duration, and back."""
 
 import math
 from typing import Final
@@ -6,15 +6,15 @@ from typing import Final
 from bridges.messages.definitions import Duration, Time
 
 ENDS: Final = 2**31
-"""RMF's Time counts seconds in 31 bits: its last second is on 2038-01-19."""
+"""The first second after RMF's Time. Its seconds have 31 bits, and the last one is on 2038-01-19."""
 
 
 class ClockError(Exception):
-    """The wall clock is beyond the range of stamps."""
+    """The error of a wall clock that is beyond the range of stamps."""
 
 
 def stamp(wall: float) -> Time:
-    """Convert seconds since the epoch to RMF's Time; before the epoch, to 0 (never). Raises
+    """Convert seconds since the epoch to RMF's Time. A time before the epoch becomes 0 (never). Raises
     ClockError."""
     if not wall < ENDS:
         raise ClockError(
@@ -31,5 +31,5 @@ def duration(seconds: float) -> Duration:
 
 
 def in_seconds(value: Time | Duration) -> float:
-    """Convert a Duration to seconds, and a Time to seconds since the epoch."""
+    """Convert a Duration to seconds, or a Time to seconds since the epoch."""
     return value.sec + value.nanosec * 1e-9

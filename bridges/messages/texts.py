@@ -1,7 +1,9 @@
-"""Message definitions as texts, as in ROS recordings: written from our table, and compared with it.
+"""Message definitions as texts, as ROS recordings hold them. This file writes them from our table, and
+compares recorded ones with the table.
 
-A text has a line for each field of the message, then for each nested type a line of `=`, a line
-`MSG: package/Name`, and the type's fields (the `ros2msg` schema of MCAP, as rosbag2 concatenates it).
+A text has a line for each field of the message. For each nested type follow a line of `=`, a line `MSG:
+package/Name`, and the type's fields. (This is the `ros2msg` schema of MCAP, as rosbag2 concatenates
+it.)
 """
 
 import re
@@ -16,19 +18,20 @@ from bridges.messages.rihs01 import type_name
 RULE: Final = "=" * 80
 LONGEST: Final = 1 << 20
 DEEPEST: Final = 8
-"""The greatest depth of nested types. Without it, a definition that contains itself would never end."""
+"""The maximum depth of nested types. Without this limit, a definition that contains itself would never
+end."""
 
 Shape = tuple[tuple[str, object], ...]
-"""Pairs (field, its type's name or Shape). A sequence has a type's name with `[]`, or a tuple of one
-Shape."""
+"""Pairs (field, its type). A type is a type's name, or the Shape of a nested type. A sequence is a
+type's name with `[]`, or a tuple of one Shape."""
 
 
 class UnknownDefinition(ValueError):
-    """The text is no definition, or matches none of our releases."""
+    """The error of a text that is no definition, or that matches none of our releases."""
 
 
 def text(message_type: type, release: Release) -> str:
-    """Write the definition of a message and of all nested types."""
+    """Return the definition of a message and of all nested types."""
     parts = [_fields(message_type, release)]
     for nested in _below(message_type, release):
         parts += [RULE, f"MSG: {_short(nested)}", _fields(nested, release)]
@@ -36,7 +39,7 @@ def text(message_type: type, release: Release) -> str:
 
 
 def releases_of(message_type: type, definition: str) -> list[Release]:
-    """List the releases with this definition of the message, the newest first."""
+    """Return the releases that define the message so, the newest first."""
     try:
         found = _read(_short(message_type), definition)
     except UnknownDefinition:
@@ -56,7 +59,7 @@ def _fields(message_type: type, release: Release) -> str:
 
 
 def _ros_type(kind: type) -> str:
-    """Return the name of a field's type in a definition."""
+    """Return the name that a field's type has in a definition."""
     if typing.get_origin(kind) is tuple:
         return _ros_type(typing.get_args(kind)[0]) + "[]"
     if kind in PACKAGES:
@@ -71,7 +74,7 @@ def _element(kind: type) -> type:
 
 
 def _below(message_type: type, release: Release) -> list[type]:
-    """List the nested types of a message, each once, in the order of first mention."""
+    """Return the nested types of a message, each once, in the order of their first mention."""
     found: dict[type, None] = {}
     for kind in map(_element, release.fields(message_type).values()):
         if kind in PACKAGES:
@@ -95,12 +98,12 @@ def _shape_of(kind: type, release: Release) -> object:
 
 
 FIELD: Final = re.compile(r"([A-Za-z][\w/]*)(?:<=\d+)?(\[(?:<=)?\d*\])?\s+([a-z]\w*)\b(?!\s*=)")
-"""A field: type, `[]`, name. Only a constant has a `=` after its name; a field's default follows the
-name directly."""
+"""A pattern for a field: type, `[]`, name. A `=` after the name marks a constant. A field's default
+follows the name without `=`."""
 
 
 def _read(name: str, definition: str) -> Shape:
-    """Read a definition's shape. Raises UnknownDefinition."""
+    """Return the shape of a definition. Raises UnknownDefinition."""
     if len(definition) > LONGEST:
         raise UnknownDefinition("longer than any message's")
     sections = re.split(r"^=+$\n?", definition, flags=re.MULTILINE)

@@ -1,8 +1,8 @@
-"""The topics that we publish or subscribe, with their types and QoS.
+"""The topics that we publish or subscribe to, with their types and QoS.
 
 The QoS matches RMF's own endpoints (rmf_ros2 9dedd0f; agv/Node.cpp, lift_supervisor/Node.cpp,
-door_supervisor/Node.cpp). All endpoints are RELIABLE with KEEP_LAST history; only durability and depth
-differ.
+door_supervisor/Node.cpp). All endpoints are RELIABLE with KEEP_LAST history. They differ only in
+durability and depth.
 """
 
 from typing import Generic, Literal, TypeVar
@@ -27,7 +27,8 @@ RETAINED = Qos("transient_local", 100)
 
 
 class Topic(Struct, Generic[M_co], frozen=True):
-    """A topic under its ROS name (without `rt/`), and the QoS of our publisher and subscription."""
+    """A topic under its ROS name (without `rt/`). It has the QoS of our publisher and of our
+    subscription."""
 
     name: str
     type: type[M_co]
@@ -48,8 +49,7 @@ AnyTopic = Topic[d.Message]
 
 
 LIFT_STATES = Topic("lift_states", d.LiftState)
-# The subscription is VOLATILE, because TRANSIENT_LOCAL would replay up to 100 old requests at our
-# restart.
+# The subscription is VOLATILE. With TRANSIENT_LOCAL our restart would replay up to 100 old requests.
 LIFT_REQUESTS = Topic("lift_requests", d.LiftRequest, publish=RETAINED, subscribe=VOLATILE)
 ADAPTER_LIFT_REQUESTS = Topic(
     "adapter_lift_requests", d.LiftRequest, publish=RETAINED, subscribe=RETAINED
@@ -61,14 +61,16 @@ DOOR_SUPERVISOR_HEARTBEAT = Topic("door_supervisor_heartbeat", d.SupervisorHeart
 CHARGER_STATES = Topic("charger_states", d.ChargerState)
 CHARGER_REQUESTS = Topic("charger_requests", d.ChargerRequest)
 CHARGER_CANCELS = Topic("charger_cancels", d.ChargerCancel)
-# This topic is ours, because RMF has no message to answer a request.
+# This topic is our own, because RMF has no message to answer a request.
 CHARGER_REFUSALS = Topic("charger_refusals", d.DiagnosticStatus)
-# These topics of ours carry requests to the charger coordinator; RMF has no such topics.
+# These topics are our own. They carry requests to the charger coordinator, for which RMF has no topics.
 ADAPTER_CHARGER_REQUESTS = Topic("adapter_charger_requests", d.ChargerRequest)
 ADAPTER_CHARGER_CANCELS = Topic("adapter_charger_cancels", d.ChargerCancel)
-# A topic without messages. Its publisher shows that a coordinator serves the graph, so another waits.
+# A topic without messages. Its publisher shows that a coordinator serves the graph. A second
+# coordinator then waits.
 CHARGER_COORDINATOR = Topic("charger_coordinator", d.Bool)
-# Unchanged from Humble to Lyrical; the fleet adapter has SystemDefaults keep_last(100) at its ends.
+# These topics are the same from Humble to Lyrical. The fleet adapter has SystemDefaults keep_last(100)
+# at its ends.
 DISPENSER_REQUESTS = Topic("dispenser_requests", d.DispenserRequest)
 DISPENSER_STATES = Topic("dispenser_states", d.DispenserState)
 DISPENSER_RESULTS = Topic("dispenser_results", d.DispenserResult)
@@ -76,7 +78,7 @@ INGESTOR_REQUESTS = Topic("ingestor_requests", d.IngestorRequest)
 INGESTOR_STATES = Topic("ingestor_states", d.IngestorState)
 INGESTOR_RESULTS = Topic("ingestor_results", d.IngestorResult)
 FLEET_STATES = Topic("fleet_states", d.FleetState)
-# Retained, as by rmf_charging_schedule, for fleet adapters that start later.
+# Retained for fleet adapters that start later, as rmf_charging_schedule does.
 CHARGING_ASSIGNMENTS = Topic(
     "charging_assignments", d.ChargingAssignments, publish=RETAINED, subscribe=RETAINED
 )

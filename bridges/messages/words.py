@@ -1,7 +1,7 @@
 """RMF's messages as one line of text, for `watch`, `send` and the demo.
 
-The words are RMF's constants without their prefix, in lower case except for a lift's mode: DOOR_OPEN is
-`open`, MODE_AGV is `AGV`. A number without a constant is shown as a number. Names come from the
+The words are RMF's constants without their prefix, in lower case except for a lift's mode. So DOOR_OPEN
+is `open`, and MODE_AGV is `AGV`. A number without a constant is shown as a number. Names come from the
 network, so control characters are escaped.
 """
 
@@ -17,23 +17,22 @@ WorkcellResulted = d.DispenserResult | d.IngestorResult
 Stated = d.LiftState | d.DoorState | d.ChargerState | WorkcellStated
 Requested = d.LiftRequest | d.DoorRequest | d.ChargerRequest | d.ChargerCancel | WorkcellRequested
 LONGEST_NAME: Final = 256
-"""The longest part of a name (characters) that is kept and shown, as anybody can send a name of 1
-MB."""
+"""The maximum length (characters) of a name that is kept and shown. Anybody can send a name of 1 MB."""
 Kind = Literal["lift", "door", "charger", "dispenser", "ingestor"]
 KINDS: Final[tuple[Kind, ...]] = ("lift", "door", "charger", "dispenser", "ingestor")
 
 
 def printable(text: str) -> str:
-    """Return the text on one line, with control characters escaped, so that no name moves the
-    cursor."""
+    """Return the text on one line, with control characters escaped. So no name from the network moves
+    the cursor."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def word(enum: type[IntEnum], value: int) -> str:
-    """Write `DOOR_OPEN` as `OPEN`, a name without a prefix whole, and a number without a constant as
-    `7?`."""
+    """Return `OPEN` for `DOOR_OPEN`, a name without a prefix unchanged, and `7?` for a number without a
+    constant."""
     try:
         return enum(value).name.split("_", 1)[-1]
     except ValueError:
@@ -58,7 +57,7 @@ def device(message: Stated | Requested | WorkcellResulted) -> str:
 
 
 def kind(message: Stated | Requested | WorkcellResulted) -> Kind:
-    """Return the kind of device of a state, request or result."""
+    """Return the kind of the device that a state, request or result names."""
     match message:
         case d.DispenserState() | d.DispenserRequest() | d.DispenserResult():
             return "dispenser"
@@ -73,7 +72,7 @@ def kind(message: Stated | Requested | WorkcellResulted) -> Kind:
 
 
 def stamped_at(state: Stated) -> float:
-    """Return the time of the hardware's reading, in seconds since the epoch; 0 for never."""
+    """Return the time of the hardware's reading, in seconds since the epoch. 0 means never."""
     match state:
         case d.LiftState():
             return in_seconds(state.lift_time)
@@ -86,7 +85,8 @@ def stamped_at(state: Stated) -> float:
 
 
 def condition(state: Stated) -> str:
-    """Describe the state without its holder: `car at L1, door open, mode AGV`, `error: too hot`."""
+    """Describe the state without the device's holder: `car at L1, door open, mode AGV`, `error: too
+    hot`."""
     match state:
         case d.LiftState():
             return _lift_condition(state)
@@ -99,7 +99,7 @@ def condition(state: Stated) -> str:
 
 
 def plain(enum: type[IntEnum], value: int) -> str:
-    """Write `DOOR_OPEN` as `open`, and a number without a constant as `7?`."""
+    """Return `open` for `DOOR_OPEN`, and `7?` for a number without a constant."""
     return word(enum, value).lower()
 
 
@@ -128,7 +128,8 @@ def _charger_condition(state: d.ChargerState) -> str:
 
 
 def holder(state: Stated) -> str:
-    """Return the device's holder: a lift's session, or a charger's robot and request; "" for none."""
+    """Return the device's holder: a lift's session, or a charger's robot and request. Return "" if
+    there is none."""
     match state:
         case d.LiftState():
             return printable(state.session_id)
@@ -144,7 +145,8 @@ def holder(state: Stated) -> str:
 
 
 def described(state: Stated) -> str:
-    """Describe a state with its holder: `car at L1, door open, mode AGV, held by fleet/robot`."""
+    """Describe a state with the device's holder: `car at L1, door open, mode AGV, held by
+    fleet/robot`."""
     who = holder(state)
     has = {"charger": "for", "lift": "held by"}.get(kind(state), "queue")
     return condition(state) + (f", {has} {who}" if who else "")
@@ -169,7 +171,7 @@ def request(message: Requested) -> str:
 
 
 def items(message: WorkcellRequested) -> str:
-    """Describe the content of a request: `2 sheets in left`."""
+    """Describe the items of a request: `2 sheets in left`."""
     places = [(one, f" in {one.compartment_name}") for one in message.items]
     each = (
         f"{one.quantity} {one.type_guid}{where if one.compartment_name else ''}"

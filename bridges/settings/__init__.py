@@ -1,1 +1,1 @@
-"""Reads and validates a device YAML: all problems at once, each with its line and column."""
+"""Reads and validates a device YAML. It reports all problems at once, each with its line and column."""

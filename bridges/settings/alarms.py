@@ -1,4 +1,4 @@
-"""Checks that the devices of a file raise one alarm, and that other daemons can see it."""
+"""Checks that the devices of a file raise only one sort of alarm, and that other daemons can see it."""
 
 from collections.abc import Mapping
 
@@ -17,8 +17,8 @@ UNSEEN = (
 def note_alarms(
     page: YamlFile, devices: Mapping[str, DeviceSettings], rmf: Rmf, spot: Spot, of_rmf: Spot | None
 ) -> None:
-    """Note alarms that contradict each other, or that other daemons cannot see. `spot`, `of_rmf`: the
-    devices' section and the section `rmf`."""
+    """Note each alarm that contradicts another, and each alarm that other daemons cannot see. `spot`
+    and `of_rmf` are the devices' section and the section `rmf`."""
     found = {n: one for n, one in devices.items() if isinstance(one, AlarmingSettings)}
     for name, text in disagreements(found):
         page.note(locate(spot, (name, "alarm")).where(), text)

@@ -14,9 +14,10 @@ from drivers.hal import AnyBus
 
 
 class BusRead(Struct, frozen=True):
-    """A bus, as far as it could be read.
+    """The part of a bus that could be read.
 
-    `type` and `hal`: None if the type is missing or wrong. `settings`: BROKEN if they are wrong.
+    `type` and `hal` are None if the type is missing or wrong. `settings` is BROKEN if the settings are
+    wrong.
     """
 
     entry: MappingEntry
@@ -25,15 +26,15 @@ class BusRead(Struct, frozen=True):
     settings: object = BROKEN
 
     def remarks(self) -> Remarks:
-        """Yield the settings of the bus that are legal but may be a mistake."""
+        """Yield a remark on each valid setting of the bus that may be a mistake."""
         return self.hal.warnings(self.settings) if self.hal and self.settings is not BROKEN else ()
 
 
 def read_bus(
     entry: MappingEntry, allowed: list[str], driver: str, values: Values, page: YamlFile
 ) -> BusRead:
-    """Read a bus, and note problems on the page. `allowed`: the bus types that the file's drivers can
-    use."""
+    """Read a bus, and note problems on the page. `allowed` lists the bus types that the file's drivers
+    can use."""
     if not isinstance(entry.value, MappingNode):
         values.entries(entry.spot())
         return BusRead(entry)
@@ -53,7 +54,7 @@ def read_bus(
 
 
 def _note_untyped(bus: MappingEntry, allowed: list[str], values: Values, page: YamlFile) -> None:
-    """Note that a bus has no `type`, or misspells this key. Without a type its other keys have no
+    """Note that a bus has no `type`, or a misspelt `type`. Without a type the bus's other keys have no
     meaning."""
     entries = {e.name: e for e in values.entries(bus.spot())}
     near = nearest("type", entries)

@@ -24,12 +24,12 @@ LATE_S: Final = 0.1
 class Config(Struct, frozen=True):
     """A valid file.
 
-    `text`: its bytes as they were read. `buses` and `devices`: name -> settings, of a type that only
-    the record of the bus type or driver knows. `bus_types`: name -> `type:`. `warnings`: legal settings
-    that may be a mistake. `old_keys`: the warnings of keys with a new name. `notes`: intended settings
-    whose effects the user should know. `section`: the settings of a kind without devices
-    (`bridges/kinds/shared/graph_kind.py`), which has no driver and no buses; or the section that the
-    devices of a kind share.
+    `text`: the file's bytes. `bus_types`: name -> `type:`. `buses` and `devices`: name -> settings.
+    Only the record of the bus type or driver knows the type of these settings. `warnings`: remarks on
+    valid settings that may be a mistake. `old_keys`: warnings about keys that have a new name. `notes`:
+    remarks on intended settings whose effects the user should know. `section`: the settings of a kind
+    without devices (`bridges/kinds/shared/graph_kind.py`). Such a kind has no driver and
+    no buses. For any other kind, `section` holds the settings that its devices share, if there are any.
     """
 
     path: Path
@@ -67,12 +67,12 @@ class Config(Struct, frozen=True):
         return [*self.devices_on(bus), *guests]
 
     def driver_type(self, device_name: str) -> AnyDriver:
-        """Return the driver of a device: its own, or the file's."""
+        """Return the driver of a device. It is the device's own driver, or else the file's."""
         own: str | None = self.devices[device_name].driver
         return named.driver_called(self.kind, own or self.driver)
 
     def wires(self, device_name: str) -> list[Wire]:
-        """Return a device's wiring table; empty if its driver has no wires."""
+        """Return a device's wiring table. The table is empty if the device's driver has no wires."""
         return list(self.driver_type(device_name).wires(self.devices[device_name]))
 
     def wires_on(self, bus: str, device_name: str) -> list[Wire]:

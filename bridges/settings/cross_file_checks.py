@@ -1,7 +1,7 @@
-"""Checks files against each other: places or names used twice, different domains, unknown names.
+"""Checks files against each other for places or names used twice, different domains, and unknown names.
 
-Files that are checked together belong to one site. Unless the user says otherwise, they run on one
-machine.
+Files that are checked together belong to one site. They run on one machine, unless the user says
+otherwise.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -20,29 +20,29 @@ Path = tuple[str, ...]
 
 
 class Found(Struct, frozen=True):
-    """Errors and warnings, in the order of the files."""
+    """The errors and warnings, in the order of the files."""
 
     errors: list[Problem]
     warnings: list[Problem]
 
 
 class ExclusiveUse(Struct, frozen=True):
-    """A use of a thing that only one file may use. `what`: the thing's name. `path`: the key of the
-    use."""
+    """A use of hardware or a name that only one file may use. `what`: its name. `path`: the path of the
+    key that uses it."""
 
     config: Config
     what: str
     path: Path
 
     def place(self) -> Problem:
-        """Return the place in the file, as a Problem without text."""
+        """Return the place in the file as a Problem without text."""
         page = YamlFile(str(self.config.path))
         root = compose(page, self.config.text)
         return page.problem(locate(Spot(root, root, ""), self.path).where(), "")
 
 
 def across(configs: Sequence[Config], one_machine: bool = True) -> Found:
-    """Return the errors and warnings that arise between these files."""
+    """Return the errors and warnings that two or more of these files cause together."""
     claims = [claim for config in configs for claim in _claims(config, one_machine)]
     errors = [*_domains(configs), *taken(configs, one_machine), *_nowhere(configs)]
     gateways = [claim for config in configs for claim in _gateways(config)]
@@ -51,8 +51,8 @@ def across(configs: Sequence[Config], one_machine: bool = True) -> Found:
 
 
 def taken(configs: Sequence[Config], one_machine: bool = True) -> Iterator[Problem]:
-    """Yield each port, pin, point of a unit or RMF name that only one file may use but two files
-    use."""
+    """Yield a problem for each port, pin, point of a unit or RMF name that two files use, although only
+    one may."""
     lines = list(_twice(c for config in configs for c in _lines(config, one_machine)))
     busy = {claim.what for claim, _ in lines}
     claims = (c for config in configs for c in _claims(config, one_machine))
@@ -61,8 +61,8 @@ def taken(configs: Sequence[Config], one_machine: bool = True) -> Iterator[Probl
 
 
 def _twice(claims: Iterable[ExclusiveUse]) -> Iterator[tuple[ExclusiveUse, ExclusiveUse]]:
-    """Yield (later use, first use) for each thing that two files use. The loader has checked single
-    files."""
+    """Yield (later use, first use) for each thing that two files use. Uses within one file are left
+    out, because the loader has checked them."""
     first: dict[str, ExclusiveUse] = {}
     for claim in claims:
         other = first.setdefault(claim.what, claim)
@@ -89,21 +89,22 @@ def _buses(config: Config) -> Iterator[tuple[str, Where]]:
 
 
 def _lines(config: Config, one_machine: bool) -> Iterator[ExclusiveUse]:
-    """Yield ports that only one daemon can open."""
+    """Yield the use of each port that only one daemon can open."""
     for name, where in _buses(config):
         if where.clients == "one" and one_machine:
             yield ExclusiveUse(config, where.text, ("buses", name))
 
 
 def _gateways(config: Config) -> Iterator[ExclusiveUse]:
-    """Yield the addresses of gateways. The make of a gateway decides how many clients may connect."""
+    """Yield the use of each gateway's address. The make of a gateway decides how many clients may
+    connect."""
     for name, where in _buses(config):
         if where.clients is None:
             yield ExclusiveUse(config, where.text, ("buses", name))
 
 
 def _claims(config: Config, one_machine: bool) -> Iterator[ExclusiveUse]:
-    """Yield names on RMF's graph, and places on buses."""
+    """Yield the uses of names on RMF's graph and of places on buses."""
     kind = kind_called(config.kind)
     if isinstance(kind, GraphKind):
         yield ExclusiveUse(config, f"kind: {kind.name}", ("kind",))
@@ -133,7 +134,7 @@ def _places(config: Config, bus: str, device: str) -> Iterator[tuple[str, Path]]
 
 
 def _shared(pair: tuple[ExclusiveUse, ExclusiveUse], claims: Sequence[ExclusiveUse]) -> Problem:
-    """Return the warning for a gateway in two files; it names the units that both files ask."""
+    """Return the warning about a gateway in two files. It names the units that both files ask."""
     claim, other = pair
     both = _units(claim.config, claim.what, claims) & _units(other.config, claim.what, claims)
     units = f" for unit {', '.join(sorted(both))}" if both else ""
@@ -164,7 +165,8 @@ def _devices(configs: Sequence[Config], kind: str) -> dict[str, Config]:
 
 
 def _nowhere(configs: Sequence[Config]) -> Iterator[Problem]:
-    """Yield devices that the file of a kind without hardware names, but no other file defines."""
+    """Yield a problem for each device that no file defines, although the file of a kind without
+    hardware names the device."""
     for claim, kind, name in _spoken(configs):
         known = _devices(configs, kind)
         if known and name not in known:
@@ -172,8 +174,8 @@ def _nowhere(configs: Sequence[Config]) -> Iterator[Problem]:
 
 
 def _unspoken(configs: Sequence[Config]) -> Iterator[Problem]:
-    """Yield devices that the file of a kind without hardware leaves out, although it names other
-    devices of their kind."""
+    """Yield a warning for each device that the file of a kind without hardware leaves out, although the
+    file names other devices of its kind."""
     spoken = [(kind, name, claim) for claim, kind, name in _spoken(configs)]
     for kind in sorted({kind for kind, _, _ in spoken}):
         names = {name for k, name, _ in spoken if k == kind}

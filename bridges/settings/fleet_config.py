@@ -31,7 +31,7 @@ from bridges.yaml.positions import Spot, locate
 
 FLEET = Sort("fleet configuration", "rmf_fleet: ...", 256 * 1024, 20_000)
 EVERY_LEVEL = ""
-"""The level name for reference coordinates that apply to every level."""
+"""The level name of reference coordinates that hold for every level."""
 Soc = Annotated[float, msgspec.Meta(ge=0, le=1)]
 Path = tuple[str, ...]
 OF_ADAPTER: Final = "is this a fleet adapter's configuration?"
@@ -39,7 +39,7 @@ T = TypeVar("T")
 
 
 class Charger(msgspec.Struct, frozen=True):
-    """A robot's charger. `waypoint`: its name in the navigation graph."""
+    """A robot's charger. `waypoint` is the charger's name in the navigation graph."""
 
     waypoint: str | None = None
 
@@ -93,7 +93,7 @@ class MapTransform(msgspec.Struct, frozen=True):
 
 
 class RmfFleet(msgspec.Struct, frozen=True):
-    """The fleet. Percentages are fractions of 1 in this file."""
+    """The fleet. In this file a percentage is a fraction of 1."""
 
     name: str
     limits: Limits | None = None
@@ -110,7 +110,7 @@ class RmfFleet(msgspec.Struct, frozen=True):
 
 
 class Pairs(msgspec.Struct, frozen=True):
-    """The same points on RMF's map and on the robot's map."""
+    """Pairs of points. The two points of a pair are one place, on RMF's map and on the robot's map."""
 
     rmf: list[Point]
     robot: list[Point]

@@ -1,7 +1,7 @@
 """Compares a coordinator's YAML with the configuration of a fleet's adapter, and with RMF's map.
 
-Different people write these files, and RMF reports no mismatch: a robot just waits for ever, or stays
-on a pad. Here each mismatch is reported with its file, its line and the remedy.
+Different people write these files, and RMF reports no mismatch. A robot with a mismatch waits for ever,
+or stays on a pad. This file reports each mismatch with its file, its line and the remedy.
 """
 
 import math
@@ -23,7 +23,8 @@ from bridges.yaml.positions import Spot, locate
 from bridges.yaml.spelling import unknown
 
 Transforms = Mapping[str, Similarity]
-"""Level -> transform from RMF's map to the robot's map; EVERY_LEVEL for all levels."""
+"""Level -> transform from RMF's map to the robot's map. The level is EVERY_LEVEL if one transform holds
+for all."""
 LEAST_HZ = 1.0
 FINISHING = ("charge", "park", "nothing")
 
@@ -37,8 +38,8 @@ class Compared(Struct):
 
 
 def compared(config: Config, fleet: FleetFile, building: BuildingMap | None) -> Compared:
-    """Compare a coordinator's file with one fleet's configuration. With `building`, compare positions
-    too."""
+    """Compare a coordinator's file with one fleet's configuration. If `building` is given, compare
+    positions too."""
     found = _Comparing(config, fleet)
     found.names()
     found.percentages()
@@ -120,7 +121,7 @@ class _Comparing:
             self._theirs("warnings", path, text)
 
     def percentages(self) -> None:
-        """Compare the percentages at which charging begins and ends."""
+        """Compare the battery percentages at which charging begins and ends."""
         soc, threshold = self._fleet.fleet.recharge_soc, self._fleet.fleet.recharge_threshold
         full, again = self._settings.full_percent, self._settings.again_percent
         if soc is not None and full < 100 * soc:
@@ -144,7 +145,7 @@ class _Comparing:
             self._theirs("errors", ("rmf_fleet", "recharge_threshold"), text)
 
     def finishing(self) -> None:
-        """Check what a robot does after a task."""
+        """Check the fleet's finishing request, which a robot follows after a task."""
         request = self._fleet.fleet.finishing_request
         path = ("rmf_fleet", "finishing_request")
         if request is not None and request not in FINISHING:
@@ -158,7 +159,8 @@ class _Comparing:
             self._theirs("warnings", path if request else ("rmf_fleet",), text)
 
     def needed(self) -> None:
-        """Check the keys without which the coordinator sees no robot, or RMF charges none."""
+        """Check the keys that charging needs. Without them the coordinator sees no robot, or RMF
+        charges none."""
         hz = self._fleet.fleet.publish_fleet_state
         if hz is not None and hz < LEAST_HZ:
             text = f"{hz:g} Hz is too seldom for the coordinator to see the robots: write 1 or more"

@@ -51,7 +51,7 @@ OF_RMF: Final = {
     "rmf_fleet": ("a fleet adapter's configuration", "--fleet-config"),
     "levels": ("RMF's building map or navigation graph", "--building-map"),
 }
-"""Top key of a file of RMF -> (the sort of file, the option of `check` for such a file)."""
+"""Top key of an RMF file -> (the sort of file, the option of `check` for such a file)."""
 
 
 def load(path: Path | str) -> Config:
@@ -60,7 +60,8 @@ def load(path: Path | str) -> Config:
 
 
 def understood(path: Path | str, text: bytes) -> Config:
-    """Return the Config of a device YAML's text. `path`: its file. Raises SettingsError."""
+    """Return the Config of a device YAML's text. `path` is the file of the text. Raises
+    SettingsError."""
     page = YamlFile(str(path))
     root = compose(page, text)
     _note_rmfs(page, root)
@@ -72,7 +73,7 @@ def understood(path: Path | str, text: bytes) -> Config:
 
 
 def _note_rmfs(page: YamlFile, root: MappingNode) -> None:
-    """Refuse a file of RMF as a whole, instead of an error for each of its keys."""
+    """Refuse an RMF file as a whole, so that its keys do not cause an error each."""
     for key, (what, option) in OF_RMF.items():
         entry = below(root, key)
         if entry and not below(root, "kind"):
@@ -105,7 +106,8 @@ class _DeviceReading:
         self._notes: list[Problem] = []
 
     def config(self, path: Path, text: bytes, old: list[Problem]) -> Config:
-        """Return the Config of what `all` has read. `old`: the file's old keys."""
+        """Return the Config of the sections that `all` has read. `old` holds the warnings about the
+        file's old keys."""
         return Config(
             path=path,
             text=text,
@@ -123,7 +125,7 @@ class _DeviceReading:
         )
 
     def all(self) -> None:
-        """Read every section, as far as the earlier sections allow."""
+        """Read every section. A section whose meaning depends on a wrong earlier section is skipped."""
         entries = self._values.entries(self._top)
         self._read_kind(below(self._top.node, "kind"))
         if not isinstance(self._kind, GraphKind):
@@ -168,7 +170,8 @@ class _DeviceReading:
             self._driver = named.driver_called(self._kind_name, name)
 
     def _read_own_drivers(self, devices: Node) -> None:
-        """Read the drivers that single devices name; None for a driver that does not exist."""
+        """Read the driver of each device that names its own. The entry is None for a driver that does
+        not exist."""
         for key, value in devices.value if isinstance(devices, MappingNode) else ():
             own = below(value, "driver")
             if own and isinstance(key, ScalarNode) and not is_none(own.value):
@@ -192,7 +195,7 @@ class _DeviceReading:
             self._warn(locate(spot, path).where(), text)
 
     def _read_section(self, entry: MappingEntry | None, kind: AnyGraphKind) -> None:
-        """Read the settings of a kind without devices, whose section may be missing if all its keys are
+        """Read the settings of a kind without devices. The section may be missing if all its keys are
         optional."""
         if entry:
             self._section = self._values.make(kind.settings, entry.spot())
@@ -226,7 +229,7 @@ class _DeviceReading:
                 self._warn(locate(entry.spot(), path).where(), f"bus '{entry.name}': {text}")
 
     def _allowed_types(self) -> list[str]:
-        """Return the bus types that the drivers can use; every type if a driver is unknown."""
+        """Return the bus types that the drivers can use. If a driver is unknown, return every type."""
         types, drivers = named.bus_types(), [self._driver, *self._own_drivers.values()]
         return [t for t in types if not all(d and t not in d.buses for d in drivers)]
 
@@ -249,7 +252,8 @@ class _DeviceReading:
                 self._page.note(self._buses[name].entry.key, text)
 
     def _without_sections(self, entries: list[MappingEntry]) -> list[MappingEntry]:
-        """Return the devices; note each section of a device that stands beside it."""
+        """Return the devices. Note each section that stands beside a device, but belongs into the
+        device."""
         keys = field_names(self._driver.settings) if self._driver else set()
         devices = [entry for entry in entries if entry.name not in keys]
         for entry in entries if devices else ():
@@ -263,7 +267,8 @@ class _DeviceReading:
         return devices
 
     def _can_stand(self, device: MappingEntry, bus: str | None, driver: AnyDriver) -> bool:
-        """Can the device's driver use the device's bus? The file's driver was checked with the bus."""
+        """Can the device's driver use the device's bus? The file's own driver always can, because it
+        was checked with the bus."""
         kind = self._buses[bus].type if bus else None
         if kind is None or kind in driver.buses:
             return True
@@ -273,7 +278,7 @@ class _DeviceReading:
         return False
 
     def _bus_name(self, device: MappingEntry) -> str | None:
-        """Return the bus of a device; None if it cannot be determined."""
+        """Return the name of a device's bus. Return None if the name cannot be determined."""
         entry = below(device.value, "bus")
         if entry is None or is_none(entry.value):
             if len(self._buses) > 1 and isinstance(device.value, MappingNode):
@@ -339,7 +344,7 @@ class _DeviceReading:
             self._notes.append(self._page.problem(node, f"note: {spot.label}: {text}"))
 
     def _collect_bus_remarks(self) -> None:
-        """Collect, once for each bus, remarks about outputs that stay on when this machine fails, and
+        """Collect remarks once for each bus: about outputs that stay on when this machine fails, and
         about a pace that is too slow."""
         for name, bus in () if self._page.problems else self._buses.items():
             assert bus.hal

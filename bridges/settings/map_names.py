@@ -1,6 +1,6 @@
 """Compares the names in a device YAML with the names on RMF's map of the building.
 
-RMF finds a lift, floor, door or charger only by its name. A wrong name causes no error: a robot just
+RMF finds a lift, floor, door or charger only by its name. A wrong name causes no error; instead a robot
 waits for ever.
 """
 
@@ -33,7 +33,8 @@ def places(config: Config) -> list[Place]:
 
 
 def mismatches(config: Config, building: BuildingMap) -> list[Problem]:
-    """Return a problem for each name missing on the map, and for each stop missing in the file."""
+    """Return a problem for each name that the map lacks, and for each stop on the map that the file
+    lacks."""
     page = YamlFile(str(config.path))
     root = compose(page, config.text)
     top = Spot(root, root, "the file")
@@ -52,7 +53,7 @@ def mismatches(config: Config, building: BuildingMap) -> list[Problem]:
 
 
 def _missing(building: BuildingMap, what: str, name: str, lift: str) -> str:
-    """Return the problem, with a suggestion, if the name is missing on the map; else ""."""
+    """Return a problem with a suggestion if the map lacks the name. Return "" if the map has it."""
     stops = building.stops.get(lift)
     known = building.named[what] if stops is None else stops
     if name in known:

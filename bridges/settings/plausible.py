@@ -1,4 +1,4 @@
-"""Finds implausible settings: durations in milliseconds, readings that are always stale."""
+"""Finds implausible settings, such as durations in milliseconds and readings that are always stale."""
 
 from collections.abc import Iterable
 from typing import Final
@@ -10,13 +10,13 @@ from bridges.kinds.shared.remarks import Remarks
 from bridges.yaml.values import described
 
 RENEWED: Final = 3
-"""The least number of scans after which an output may switch off by itself."""
+"""The least number of scans that the timer of an output must last."""
 LONG_S: Final = 1000.0
-"""A duration (s) from this length on is often meant in milliseconds."""
+"""The least duration (s) that counts as suspiciously long. Milliseconds are often meant."""
 
 
 def milliseconds(structs: Iterable[tuple[tuple[str, ...], object]]) -> Remarks:
-    """Yield a remark (path, text) on each suspiciously long duration that is not a default."""
+    """Yield a remark (path, text) for each suspiciously long duration. Defaults are left out."""
     for path, struct in structs:
         cls: object = type(struct)
         info = described(cls)

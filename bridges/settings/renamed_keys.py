@@ -1,8 +1,9 @@
-"""Keys that an earlier version named otherwise: one table, used to read, to warn and to rewrite.
+"""Keys that had another name in an earlier version. One table serves to read, to warn and to rewrite
+them.
 
-A renamed key is read in every version with the major number in which it was renamed, and in every
-version with the next major number (docs/reference/promises.md). `check`, `enable` and `run` read such
-a file; `rmf-bridge migrate` rewrites it (`rewritten.py`).
+A renamed key is read in every version with the major number in which the key was renamed. It is also
+read in every version with the next major number (docs/reference/promises.md). `check`, `enable` and
+`run` read such a file; `rmf-bridge migrate` rewrites it (`rewritten.py`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,10 +17,10 @@ from bridges.yaml.positions import MappingEntry, below
 
 
 class RenamedKey(Struct, frozen=True):
-    """One renamed or moved key.
+    """One key that was renamed or moved.
 
-    `was`, `now`: its paths from the top of the file; `*` stands for any name, the same in both.
-    `since`: the version that renamed the key.
+    `was` and `now` are its old and new path from the top of the file. A `*` stands for any name, which
+    is the same in both. `since`: the version that renamed the key.
     """
 
     was: str
@@ -35,14 +36,15 @@ RENAMED: Final = (
 
 
 class OldKey(Struct, frozen=True):
-    """A renamed key in one file: its mapping, its entry there, and its present path."""
+    """A renamed key in one file. It has the mapping around the key, the key's entry, and its new
+    path."""
 
     parent: MappingNode
     entry: MappingEntry
     path: tuple[str, ...]
 
     def remark(self, file: str) -> str:
-        """Return the text that says what to write instead."""
+        """Return the text that says how to write the key now."""
         value = self.entry.value.value if isinstance(self.entry.value, ScalarNode) else "…"
         *sections, key = self.path
         opened = "".join(f"{{{name}: " for name in sections)
@@ -51,14 +53,14 @@ class OldKey(Struct, frozen=True):
 
 
 def old_keys(root: MappingNode) -> list[OldKey]:
-    """Return every key of the file that has a new name."""
+    """Return every key of the file that has been renamed."""
     return [old for row in RENAMED for old in _matches(root, row)]
 
 
 def read_as_renamed(page: YamlFile, root: MappingNode) -> list[Problem]:
-    """Move renamed keys to their present places, and return a warning of each.
+    """Move renamed keys to their new places, and return a warning for each.
 
-    Notes a problem if a file has both names.
+    If a file has both the old and the new name, note a problem.
     """
     found = old_keys(root)
     for old in found:
@@ -82,7 +84,8 @@ def _matches(root: MappingNode, row: RenamedKey) -> Iterator[OldKey]:
 def _below(
     node: Node, sections: Sequence[str], names: tuple[str, ...]
 ) -> Iterator[tuple[MappingNode, tuple[str, ...]]]:
-    """Yield each mapping at the path, with the names for which its `*` stand."""
+    """Yield (mapping, names) for each mapping at the path. The names are those for which the path's `*`
+    stand."""
     if not isinstance(node, MappingNode):
         return
     if not sections:
@@ -95,8 +98,8 @@ def _below(
 
 
 def _put(page: YamlFile, root: MappingNode, old: OldKey) -> None:
-    """Put the value at its present place, with the marks of the old key. A section that is no mapping
-    stays as it is, because its reader reports it."""
+    """Put the value at its new place, with the line and column of the old key. A section that is no
+    mapping stays unchanged, because its reader reports it."""
     node: Node = root
     *sections, key = old.path
     for part in sections:
@@ -106,7 +109,7 @@ def _put(page: YamlFile, root: MappingNode, old: OldKey) -> None:
     present = below(node, key)
     if present is None:
         node.value.append((_key(key, old), old.entry.value))
-    elif present.value is not old.entry.value:  # else an alias repeats the section
+    elif present.value is not old.entry.value:  # if it is, an alias repeats the section
         text = f"'{old.entry.name}' is the old name of '{key}', which the file has too: delete it"
         page.note(old.entry.key, text)
 

@@ -1,8 +1,8 @@
-"""A device YAML's text with its renamed keys rewritten. Comments, order and layout stay.
+"""Rewrites the renamed keys in the text of a device YAML. Comments, order and layout stay.
 
-Only the text of a renamed key changes; a key that has moved to another section is cut out, with the
+Only the text of a renamed key changes. A key that has moved to another section is cut out, with the
 comment on its line, and written as the first key of that section. The result counts only if it has the
-same meaning as the original, which `rewritten` compares.
+same meaning as the original. `rewritten` compares the two.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,11 +19,12 @@ from bridges.yaml.positions import below
 
 
 class NeedsHand(Exception):
-    """The text cannot be rewritten without changing its meaning: a person must do so."""
+    """The error of a text that cannot be rewritten without a change of meaning. A person must rewrite
+    it."""
 
 
 class _Edit(Struct, frozen=True, order=True):
-    """Replaces the characters from `start` to `end`."""
+    """An edit that replaces the characters from `start` to `end`."""
 
     start: int
     end: int
@@ -31,7 +32,7 @@ class _Edit(Struct, frozen=True, order=True):
 
 
 def rewritten(config: Config) -> str:
-    """Return the file's text without old keys. Raises NeedsHand."""
+    """Return the file's text with new names in place of old names. Raises NeedsHand."""
     text = config.text.decode()
     root = compose(YamlFile(str(config.path)), config.text)
     edits = {edit for old in old_keys(root) for edit in _edits(text, root, old)}
@@ -71,7 +72,7 @@ def _span(node: Node) -> tuple[int, int]:
 
 
 def _deepest(root: MappingNode, sections: Sequence[str]) -> tuple[MappingNode, Sequence[str]]:
-    """Return the innermost section that exists, and the names of the sections still missing in it."""
+    """Return the innermost section that exists, and the names of the missing sections below it."""
     place = root
     for number, name in enumerate(sections):
         entry = below(place, name)
@@ -82,7 +83,7 @@ def _deepest(root: MappingNode, sections: Sequence[str]) -> tuple[MappingNode, S
 
 
 def _cut(text: str, old: OldKey) -> tuple[_Edit, str]:
-    """Return the edit that removes a key with its value, and the comment behind them."""
+    """Return the edit that removes a key with its value, and the comment after the value."""
     start, end = _span(old.entry.key)[0], _span(old.entry.value)[1]
     if old.parent.flow_style:
         after = len(text[end:]) - len(text[end:].lstrip(" ,"))

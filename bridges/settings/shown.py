@@ -1,5 +1,4 @@
-"""Shows a struct's plain settings as text: numbers with their units, and the defaults of changed
-values.
+"""Shows a struct's plain settings as text: numbers with their units, and defaults of changed values.
 
 Wires, maps and code tables are left out, because their drivers describe them
 (`drivers/driver_type.py`).
@@ -11,18 +10,19 @@ import msgspec
 from msgspec import inspect as mi
 
 Row = tuple[str, str, str]
-"""(key with dots, value with its unit, the default if the value differs from it)."""
+"""(key with dots, value with its unit, default). The default is "" if the value equals it."""
 
 _LEAVES = (str, int, float, bool, type(None))
 
 
 def plain(struct: object) -> list[Row]:
-    """Return every setting, at any depth, that is a number, a word or a list of numbers or words."""
+    """Return every setting, at any depth, that is a number, a word, or a list of these."""
     return list(_rows(struct, (), deep=True))
 
 
 def choices_of(device: object) -> list[Row]:
-    """Return the plain settings of a device, and of each section that has no sections inside."""
+    """Return the plain settings of a device, and of each of its sections that has no further sections
+    inside."""
     return list(_rows(device, (), deep=False))
 
 
@@ -57,7 +57,7 @@ def is_section(info: mi.Type) -> bool:
 
 
 def _is_plain(value: object) -> bool:
-    """Is the value a word or a number, or a list or mapping of these?"""
+    """Is the value a word or a number, or a list or mapping of words or numbers?"""
     value = getattr(value, "value", value)
     if isinstance(value, dict):
         value = list(value.values())
@@ -67,7 +67,7 @@ def _is_plain(value: object) -> bool:
 
 
 def _unit(info: mi.Type) -> str:
-    """Return the unit of a number; "" without a unit."""
+    """Return the unit of a number; "" if it has no unit."""
     if isinstance(info, mi.Metadata):
         return (info.extra or {}).get("unit", "") or _unit(info.type)
     if isinstance(info, mi.UnionType):
@@ -91,7 +91,7 @@ def _text(value: object, unit: str) -> str:
 
 
 def _instead(field: mi.Field, value: object, unit: str) -> str:
-    """Return the default if the value differs from it; else ""."""
+    """Return the default if it differs from the value; otherwise ""."""
     if field.required or field.default in (msgspec.NODEFAULT, None, value):
         return ""
     return f"default: {_text(field.default, unit)}"

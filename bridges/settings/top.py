@@ -1,4 +1,5 @@
-"""The top of a device YAML: its keys, by kind, and the values that are one word (`kind`, `driver`)."""
+"""The top of a device YAML. This file knows the top keys of each kind, and the values that are one word
+(`kind`, `driver`)."""
 
 from typing import Final
 
@@ -19,7 +20,8 @@ MAPPING: Final = "a mapping (key: value)"
 
 
 def top_keys(kind: AnyKind | None) -> dict[str, str | None]:
-    """Return key -> the form of its value; None for an optional key. `kind`: None if unknown."""
+    """Return key -> the form of its value; None for an optional key. `kind` is None if it is
+    unknown."""
     first = {"kind": either(kind_names())}
     if isinstance(kind, GraphKind):
         return {**first, "rmf": None, "recording": None, kind.devices_key: None}
@@ -57,7 +59,7 @@ def word(values: Values, entry: MappingEntry | None, words: list[str]) -> str | 
 
 
 def keys_below(kind: AnyKind | None, driver: AnyDriver | None) -> dict[str, str]:
-    """Return key -> its section, for the keys that belong into a section."""
+    """Return key -> its section, for each key that belongs into a section."""
     below_top = {field.encode_name: "rmf" for field in fields(Rmf)}
     below_top |= {field.encode_name: "recording" for field in fields(RecordingSettings)}
     if isinstance(kind, GraphKind):
@@ -72,7 +74,7 @@ def keys_below(kind: AnyKind | None, driver: AnyDriver | None) -> dict[str, str]
 
 
 def owner(kind: str, key: str) -> str:
-    """Say which other drivers of the kind have this key; "" if none has it."""
+    """Describe which other drivers of the kind have this key; "" if none has it."""
     found = [
         name
         for name in named.driver_names(kind)

@@ -1,7 +1,8 @@
-"""Checks the wires of a file against each other: invalid points, points used twice, unsafe wires.
+"""Checks the wires of a file against each other. It finds invalid points, points used twice, and unsafe
+wires.
 
-The bus type knows the spelling of its points and the impossible wires (`canonical` and `wire_problems`
-of its `BUS` in `drivers/hal/`).
+The bus type knows how its points are spelt, and which wires are impossible (`canonical` and
+`wire_problems` of its `BUS` in `drivers/hal/`).
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -23,7 +24,8 @@ from drivers.hal.points import Input, Output, Wire
 
 
 class Use(Struct, frozen=True):
-    """A point of a bus that a device uses, in its canonical spelling (`point`) and as `written`."""
+    """A point of a bus that a device uses. `point` is its canonical spelling, and `written` the YAML's
+    spelling."""
 
     bus: str
     point: str
@@ -34,7 +36,8 @@ class Use(Struct, frozen=True):
 
 
 class WiringCheck:
-    """Collects and checks a device's points, first while its settings are read, and again as wires.
+    """Collects and checks a device's points, first during the reading of its settings, and again as
+    wires.
 
     `bus`: the device's own; "" if unknown. `buses`: all buses of the file. `usable`: the types that the
     device's driver can use. `others`: the other buses that have inputs of the device. `written`: the
@@ -113,7 +116,7 @@ class WiringCheck:
         return ""
 
     def wires(self, wires: Iterable[Wire], spot: Spot) -> None:
-        """Check a driver's wires, which replace the points collected while the settings were read."""
+        """Check a driver's wires. They replace the points that were collected from the settings."""
         self.uses.clear()
         for wire in wires:
             places = [("point", wire.point)]
@@ -127,7 +130,7 @@ class WiringCheck:
                     self.written.append(hal.canonical(wire.point))
 
     def _stands(self, wire: Wire, key: str, text: str, spot: Spot) -> bool:
-        """Record the wire's use of this point; return False if the point is invalid."""
+        """Record the wire's use of this point. Return False if the point is invalid."""
         entry = locate(spot, wire.path)
         point = below(entry.value, key)
         node = point.value if point else entry.where()
@@ -137,14 +140,15 @@ class WiringCheck:
         return reason is None
 
     def warnings(self, wires: Iterable[Wire], spot: Spot) -> Iterable[tuple[Node, str]]:
-        """Yield (node, text) for wires that are legal but may be a mistake."""
+        """Yield a warning (node, text) for each valid wire that may be a mistake."""
         for wire in wires:
             hal = self._hal(wire.bus)
             for text in hal.wire_warnings(wire) if hal else ():
                 yield locate(spot, wire.path).where(), f"'{wire.signal}': {text}"
 
     def claims(self, places: Iterable[tuple[str, tuple[str, ...]]], spot: Spot) -> None:
-        """Record the exclusive places of a device without wires: (place, path in its YAML)."""
+        """Record the exclusive places of a device without wires. A place comes with its path in the
+        YAML."""
         for text, path in places:
             user = f"{self._device} {'.'.join(path)}"
             self.uses.append(Use(self._bus, text, text, user, locate(spot, path).where()))
@@ -170,8 +174,8 @@ class WiringCheck:
             self._page.note(locate(spot, path).where(), text)
 
     def parts(self, structs: Iterable[tuple[tuple[str, ...], object]], spot: Spot) -> None:
-        """Check the wires of a device whose other settings are invalid, so that it has no wiring
-        table."""
+        """Check the wires of a device that has no wiring table, because its other settings are
+        invalid."""
         for path, struct in structs:
             if isinstance(struct, Input):
                 wire = struct.wire(path[-1], path, struct.debounce_s)
@@ -188,7 +192,7 @@ class WiringCheck:
 
 
 def note_conflicts(page: YamlFile, uses: Iterable[Use]) -> None:
-    """Note each point that two signals use, at the later place in the file."""
+    """Note each point that two signals use. The note is at the second use in the file."""
     first: dict[tuple[str, str], Use] = {}
     for use in sorted(uses, key=lambda u: (u.node.start_mark.line, u.node.start_mark.column)):
         other = first.setdefault((use.bus, use.point), use)
@@ -202,7 +206,7 @@ def note_conflicts(page: YamlFile, uses: Iterable[Use]) -> None:
 def note_unknown_signals(
     page: YamlFile, accepted: Iterable[str], signals: list[str], s: Spot
 ) -> None:
-    """Note names in `accept_unsafe` that are no signals of the device."""
+    """Note each name in `accept_unsafe` that is not a signal of the device."""
     for signal in accepted:
         if signal not in signals:
             page.note(locate(s, ("accept_unsafe", signal)).key, unknown("signal", signal, signals))

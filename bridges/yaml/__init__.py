@@ -1,1 +1,1 @@
-"""Reads YAML text into structs: every problem at once, each with its line and column."""
+"""Reads YAML text into structs. It reports every problem at once, each with its line and column."""

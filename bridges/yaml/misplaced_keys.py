@@ -1,4 +1,4 @@
-"""Keys in the wrong place: below another section, indented wrongly, or glued to their value."""
+"""Finds keys in the wrong place: below another section, indented wrongly, or glued to their value."""
 
 from collections.abc import Mapping
 
@@ -16,7 +16,8 @@ def bare(wanted: Type) -> Type:
 
 
 def sections_of(wanted: StructType) -> dict[str, str]:
-    """Return the keys of a struct's sections: key -> its section; "" for the struct's own keys."""
+    """Return key -> the name of its section, for the keys of a struct's sections; "" for the struct's
+    own keys."""
     own = {field.encode_name for field in wanted.fields}
     types = [(f.encode_name, bare(f.type)) for f in wanted.fields]
     inner = [
@@ -55,7 +56,8 @@ def is_decimals(entry: MappingEntry, before: MappingEntry) -> bool:
 
 
 def glued(entry: MappingEntry) -> str:
-    """Describe a key that has its value glued to it, as in `active:high`; "" for other keys."""
+    """Describe a key that has its value glued to it, as in `active:high`. Return "" for any other
+    key."""
     key, colon, value = entry.name.partition(":")
     if not (colon and value and _is_empty(entry.value)):
         return ""

@@ -1,7 +1,8 @@
-"""Parses YAML text to nodes with line and column; refuses invalid YAML and some features of valid YAML.
+"""Parses YAML text to nodes with line and column. It refuses invalid YAML, and some features of valid
+YAML.
 
-PyYAML's pure Python loader is used, because its messages say more, and because libyaml's composer
-recurses in C without a limit: a deeply nested file would crash the interpreter.
+PyYAML's pure Python loader is used, for two reasons. Its messages say more. libyaml's composer recurses
+in C without a limit, so a deeply nested file would crash the interpreter.
 """
 
 import re
@@ -22,7 +23,7 @@ from bridges.yaml.problems import SettingsError as SettingsError
 
 MAX_DEPTH = 32
 HALVES = re.compile("[\ud800-\udfff]")
-"""Surrogates: halves of a UTF-16 pair, which cannot be encoded alone."""
+"""A pattern for surrogates. A surrogate is half of a UTF-16 pair, and cannot be encoded alone."""
 
 
 class Sort(Struct, frozen=True):
@@ -38,7 +39,7 @@ DEVICE = Sort("device YAML", "kind: ...", 256 * 1024, 20_000)
 
 
 class YamlFile:
-    """One file and the problems found in it so far."""
+    """One file, with the problems found so far."""
 
     def __init__(self, file: str) -> None:
         self.file = file
@@ -62,14 +63,14 @@ class YamlFile:
 
 
 class _Refused(MarkedYAMLError):
-    """Valid YAML that we do not accept."""
+    """The error of valid YAML that we do not accept."""
 
     def __init__(self, mark: Mark, text: str) -> None:
         super().__init__(None, None, text, mark)
 
 
 class _Composer(yaml.SafeLoader):
-    """Composes nodes within limits; refuses tags and recursive aliases."""
+    """A composer with limits. It refuses tags and recursive aliases."""
 
     def __init__(self, text: str, page: YamlFile, max_values: int) -> None:
         super().__init__(text)
@@ -140,7 +141,7 @@ def read(file: str, sort: Sort = DEVICE) -> bytes:
 
 
 def compose(page: YamlFile, text: bytes, sort: Sort = DEVICE) -> MappingNode:
-    """Return the file's top-level mapping. Raises SettingsError if there is none."""
+    """Return the file's top-level mapping. Raises SettingsError if the file has no such mapping."""
     root = _root(page, _decoded(page, text), sort)
     if not isinstance(root, MappingNode):
         found = "empty" if root is None else "not a mapping"
@@ -173,7 +174,8 @@ def _root(page: YamlFile, text: str, sort: Sort) -> Node | None:
         told = str(error.problem) if isinstance(error, _Refused) else typo_hints.reason(error, text)
         raise SettingsError([*page.problems, page.problem(mark, told)]) from None
     except (ValueError, OverflowError):
-        # PyYAML raises these for a number that no character or YAML version has, as in "\U00110000".
+        # PyYAML raises these errors for the number of a character or YAML version that does not exist,
+        # as in "\U00110000".
         assert composer is not None
         reason = "not YAML: a number too large, in an escape ('\\U...') or a directive ('%YAML')"
         raise SettingsError([page.problem(composer.get_mark(), reason)]) from None
@@ -185,5 +187,5 @@ def _problem_after(page: YamlFile, before: str, text: str) -> Problem:
 
 
 def is_plain(node: ScalarNode) -> bool:
-    """Is the scalar written without quotes? Then its text decides its type."""
+    """Is the scalar written without quotes? If so, its text decides its type."""
     return node.style is None

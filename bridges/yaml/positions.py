@@ -1,4 +1,4 @@
-"""Places in a YAML file, for values and for errors about the values."""
+"""Places in a YAML file. They belong to values, and to errors about the values."""
 
 from collections.abc import Iterable
 
@@ -11,10 +11,10 @@ from bridges.yaml.spelling import short
 
 
 class Spot(Struct, frozen=True):
-    """A node to be converted to a value.
+    """A node that is to be converted to a value.
 
-    `at`: the place of errors about the whole value (its key). `label`: the value's name in errors.
-    `path`: its path below the top struct.
+    `at`: the place for errors about the whole value, which is its key. `label`: the value's name in
+    errors. `path`: the value's path below the top struct.
     """
 
     node: Node
@@ -35,7 +35,8 @@ class MappingEntry(Struct, frozen=True):
         return Spot(self.value, self.key, f"'{short(self.name)}'", (*path, self.name))
 
     def where(self) -> Node:
-        """Return the place for errors about the value: the scalar, or the key of another value."""
+        """Return the place for errors about the value. It is the value itself if this is a scalar,
+        otherwise its key."""
         node = self.value
         if isinstance(node, ScalarNode) and (node.value or not is_plain(node)):
             return node
@@ -43,7 +44,7 @@ class MappingEntry(Struct, frozen=True):
 
 
 def below(node: Node, part: str) -> MappingEntry | None:
-    """Return the entry of a mapping or the item of a list with the name `part`."""
+    """Return the entry of a mapping, or the item of a list, that has the name `part`."""
     if isinstance(node, MappingNode):
         for key, value in node.value:
             if isinstance(key, ScalarNode) and key.value == part:
@@ -54,7 +55,8 @@ def below(node: Node, part: str) -> MappingEntry | None:
 
 
 def locate(spot: Spot, path: Iterable[object]) -> MappingEntry:
-    """Return the entry at `path` below a value; if it does not exist, its nearest existing parent."""
+    """Return the entry at `path` below a value. If the entry does not exist, return its nearest
+    existing parent."""
     found = MappingEntry("", spot.at, spot.node)
     for part in path:
         entry = below(found.value, str(part))
@@ -65,5 +67,6 @@ def locate(spot: Spot, path: Iterable[object]) -> MappingEntry:
 
 
 def is_none(node: Node) -> bool:
-    """Is the value `null` or `~`? An empty value does not count, because it was probably forgotten."""
+    """Is the value `null` or `~`? An empty value does not count, because somebody has probably
+    forgotten the value."""
     return isinstance(node, ScalarNode) and is_plain(node) and is_null_word(node.value)

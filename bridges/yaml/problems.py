@@ -1,4 +1,4 @@
-"""Problems in a file, with their places. No YAML library is loaded here, because some code only
+"""Problems in a file, with their places. This file loads no YAML library, because some code only
 reports problems."""
 
 from collections.abc import Iterable
@@ -7,7 +7,7 @@ from msgspec import Struct
 
 
 class Problem(Struct, frozen=True, order=True):
-    """One problem or warning and its place; line and column count from 1."""
+    """One problem or warning with its place. Line and column count from 1."""
 
     file: str
     line: int
@@ -19,7 +19,7 @@ class Problem(Struct, frozen=True, order=True):
 
 
 class SettingsError(Exception):
-    """An invalid file: `problems` holds every problem found, in file order."""
+    """The error of an invalid file. `problems` holds every problem in the order of the file."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(sorted(set(problems)))

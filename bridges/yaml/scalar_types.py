@@ -1,7 +1,8 @@
-"""Converts one YAML scalar to a text, number, boolean or choice, or raises an error with the reason.
+"""Converts one YAML scalar to a text, number, boolean or choice. If this fails, it raises an error with
+the reason.
 
-msgspec decides whether the type allows the value. A text must be a text in every version of YAML, and
-a number must be written unambiguously (`scalars.py`).
+msgspec decides whether the type allows the value. A text must be a text in every version of YAML. A
+number must be written unambiguously (`scalars.py`).
 """
 
 from collections.abc import Callable, Mapping
@@ -32,13 +33,13 @@ from bridges.yaml.spelling import either, nearest, short
 from bridges.yaml.typo_hints import has_unit, number_meant
 
 Extra = Mapping[str, str]
-"""A field's `Meta(extra=…)`: its `unit`, its `pattern` in words, the reason for its `least` value, its
-`check`."""
+"""The `Meta(extra=…)` of a field. It has the field's `unit`, its `pattern` in words, the reason for its
+`least` value, and its `check`."""
 
 
 class WrongScalar(Exception):
-    """A scalar of the wrong sort. The error's text follows the value's name ("is …"), without full
-    stop."""
+    """The error of a scalar that does not fit its type. Its text follows the value's name ("is …"), and
+    has no full stop."""
 
 
 def looks(node: Node) -> str:
@@ -57,7 +58,7 @@ def looks(node: Node) -> str:
 
 
 def wanted_text(wanted: Type, extra: Extra | None = None) -> str:
-    """Describe the values of a type, with bounds and unit."""
+    """Describe the values that a type allows, with bounds and unit."""
     if isinstance(wanted, Metadata):
         return wanted_text(wanted.type, wanted.extra)
     if isinstance(wanted, UnionType):
@@ -82,7 +83,7 @@ _NOUNS: dict[type[Type], str] = {
 
 
 def leaf(types: list[Type], node: ScalarNode, extra: Extra) -> object:
-    """Convert the scalar to the first of these types that fits. Raises WrongScalar."""
+    """Convert the scalar to the first of these types that accepts it. Raises WrongScalar."""
     *others, last = sorted(types, key=_rank)
     for wanted in others:
         try:
@@ -118,8 +119,8 @@ _PLAIN: dict[type[Type], type] = {StrType: str, IntType: int, FloatType: float, 
 
 
 def _read(wanted: Type, node: ScalarNode, extra: Extra) -> object:
-    """Return the value if it is unambiguous. Raises WrongScalar."""
-    if isinstance(wanted, LiteralType | EnumType):  # the text counts, not YAML's reading of it
+    """Return the value if its spelling is unambiguous. Raises WrongScalar."""
+    if isinstance(wanted, LiteralType | EnumType):  # the text counts, whatever YAML would read
         return choices(wanted).get(node.value, node.value)
     if isinstance(wanted, StrType):
         _check_text(node, extra)
@@ -138,7 +139,8 @@ _READINGS: dict[type[Type], Callable[[str], object]] = {
 
 
 def _reason(wanted: Type, node: ScalarNode, extra: Extra, length: bool) -> str:
-    """Return the reason why `convert` refused; `length`: the reason is the text's length."""
+    """Return the reason why `convert` refused. `length` is True if the length of a text is the
+    reason."""
     written = short(node.value)
     if isinstance(wanted, LiteralType | EnumType):
         near = nearest(node.value, choices(wanted))
@@ -156,14 +158,15 @@ def _reason(wanted: Type, node: ScalarNode, extra: Extra, length: bool) -> str:
 
 
 def _too_little(wanted: Type, node: ScalarNode, extra: Extra) -> str:
-    """Return the reason for the least value, if the type has one and the value is below it."""
+    """Return why the least value is needed, if the type has a least value and the value is below it."""
     value, least = number(node.value), getattr(wanted, "ge", None)
     small = value is not None and least is not None and value < least
     return f"; {extra['least']}" if small and "least" in extra else ""
 
 
 def _milliseconds(wanted: Type, node: ScalarNode, extra: Extra) -> str:
-    """Return how to write, in seconds, a duration given in milliseconds; "" if that does not fit."""
+    """Return how to write a duration in seconds that was given in milliseconds; "" if the result does
+    not fit."""
     if extra.get("unit") != "s" or not isinstance(wanted, FloatType):
         return ""
     value, least, most = number(node.value), wanted.ge, wanted.le
@@ -185,7 +188,8 @@ def _check_text(node: ScalarNode, extra: Extra) -> None:
 
 
 def _misread(wanted: Type, node: ScalarNode, extra: Extra) -> WrongScalar:
-    """Return the error, with the right spelling, for a text that is no plain number or boolean."""
+    """Return the error for a text that is no plain number or boolean. The error has the right
+    spelling."""
     text, asked = short(node.value), wanted_text(wanted, extra)
     whole = isinstance(wanted, IntType)
     if not is_plain(node):
@@ -235,6 +239,6 @@ def _digits(bound: float) -> str:
 
 
 def choices(wanted: LiteralType | EnumType) -> dict[str, object]:
-    """Return the allowed texts -> their values."""
+    """Return allowed text -> its value."""
     values = wanted.values if isinstance(wanted, LiteralType) else [m.value for m in wanted.cls]
     return {str(value): value for value in values}

@@ -1,4 +1,4 @@
-"""Finds texts without quotes that YAML reads as other values; accepts only unambiguous numbers.
+"""Finds texts without quotes that YAML reads as other values. Accepts only unambiguous numbers.
 
 YAML 1.1 (PyYAML), YAML 1.2 and people read `017`, `1:30`, `no` or `1e3` differently. A name without
 quotes must be the same text for all three. A number must mean the same for all three.
@@ -44,15 +44,14 @@ def is_null(text: str) -> bool:
 
 
 def is_null_word(text: str) -> bool:
-    """Is the text a word for null, and not just empty?"""
+    """Is the text a word for null? An empty text is not a word."""
     return text in _NULL_WORDS
 
 
 def reads_as(text: str) -> str | None:
-    """Describe how YAML 1.1 or 1.2 reads a plain text; None if both read it as this text.
+    """Describe how YAML 1.1 or 1.2 reads a plain text. Return None if both read the text unchanged.
 
-    >>> reads_as("017"), reads_as("no"), reads_as("L1")
-    ('the number 15', 'false', None)
+    >>> reads_as("017"), reads_as("no"), reads_as("L1") ('the number 15', 'false', None)
     """
     if is_null(text):
         return "nothing"
@@ -71,7 +70,7 @@ def _reads_as_number(text: str) -> str | None:
             try:
                 value = reading(text)
                 return value if isinstance(value, str) else f"the number {_short(value)}"
-            except ValueError:  # it has only underscores, or more digits than Python converts
+            except ValueError:  # the text has only underscores, or more digits than Python converts
                 return "a number"
     return None
 
@@ -84,16 +83,16 @@ def _short(value: object) -> str:
 
 
 def whole_number(text: str) -> int | None:
-    """Return the whole number that `12`, `-3` or `0x2000` stands for; None for an ambiguous
-    spelling."""
+    """Return the whole number that a text such as `12`, `-3` or `0x2000` stands for. Return None for an
+    ambiguous spelling."""
     if not _INT.fullmatch(text) or len(text) > 20:
         return None
     return int(text, 16 if "x" in text else 10)
 
 
 def number(text: str) -> float | None:
-    """Return the number that `5`, `0.05` or `1e3` stands for; None for an ambiguous spelling or
-    infinity."""
+    """Return the number that a text such as `5`, `0.05` or `1e3` stands for. Return None for an
+    ambiguous spelling, and for infinity."""
     if not _FLOAT.fullmatch(text):
         return None
     value = float(text)

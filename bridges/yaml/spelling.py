@@ -1,4 +1,5 @@
-"""Formats names for error texts: shortens them, lists them, and finds the most similar known name."""
+"""Formats names for error texts. It shortens names, lists them, and finds the most similar known
+name."""
 
 from collections.abc import Iterable
 
@@ -16,7 +17,7 @@ def either(names: Iterable[str]) -> str:
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
     """Return the most similar known name; None if no name is similar."""
-    from difflib import get_close_matches  # only misspelt names need it
+    from difflib import get_close_matches  # imported late, because only misspelt names need this
 
     return next(iter(get_close_matches(name, list(known), n=1)), None)
 

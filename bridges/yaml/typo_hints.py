@@ -1,6 +1,7 @@
-"""Hints at typing slips that PyYAML does not name: indents, commas, invisible spaces.
+"""Gives hints at typing slips that PyYAML does not name, such as wrong indents, commas and invisible
+spaces.
 
-`reason` rephrases PyYAML's error for a file that is not YAML; the other functions judge one scalar.
+`reason` rephrases PyYAML's error for a file that is not YAML. Every other function judges one scalar.
 """
 
 import re
@@ -34,12 +35,12 @@ _INDENT = re.compile(r"expected <block end>, but found '<block (mapping|sequence
 _ODD = re.compile("[\u00a0\u00ad\u1680\u2000-\u200f\u2028-\u202f\u205f\u2060\u3000\ufeff]")
 _GLUED = re.compile(r"\s*(?:- )?([A-Za-z_][\w.-]*):(?=[^\s/:])(.*)")
 _QUOTED = re.compile(r'[:,\[{] *"[^"\n]*"\w+"')
-"""A text in double quotes that goes on with a word and a third double quote."""
+"""A pattern for a text in double quotes that goes on with a word and a third double quote."""
 _CURLY = ("\u201c", "\u201d", "\u201e", "\u2018", "\u2019", "\u201a", "\u00ab", "\u00bb")
 
 
 def reason(error: MarkedYAMLError, text: str) -> str:
-    """Return PyYAML's error on one line, with the fix if the cause is a common slip."""
+    """Return PyYAML's error on one line. If a common slip is the cause, add the remedy."""
     problem, where = str(error.problem), error.problem_mark or error.context_mark
     lines = text.splitlines()
     since = error.context_mark or where
@@ -70,7 +71,7 @@ def reason(error: MarkedYAMLError, text: str) -> str:
 
 
 def _odd_in(lines: list[str], first: int, last: int) -> str:
-    """Describe the first unusual space in these lines; "" without an unusual space."""
+    """Describe the first unusual space in these lines; "" if there is none."""
     for number, line in enumerate(lines[first : last + 1], first + 1):
         if found := _ODD.search(line.partition(" #")[0]):
             where = f"line {number}, column {found.start() + 1}"
@@ -103,13 +104,13 @@ def _spaces(line: str) -> int:
 
 
 def _follows_no_key(lines: list[str], where: Mark) -> bool:
-    """Does the line above have the same indent, but no key?"""
+    """Has the line above the same indent, but no key?"""
     above, line = lines[max(where.line - 1, 0)], lines[where.line]
     return _spaces(above) == _spaces(line) and ": " not in f"{above} " and where.line > 0
 
 
 def named(character: str) -> str:
-    """Return the name of an invisible character: `a no-break space (U+00A0)`."""
+    """Return the name of an invisible character, such as `a no-break space (U+00A0)`."""
     name = unicodedata.name(character, "character that cannot be seen").lower()
     article = "an" if name[0] in "aeiou" else "a"
     return f"{article} {name} (U+{ord(character):04X})"
@@ -133,7 +134,7 @@ def cleaned(text: str) -> str:
 
 
 def number_meant(text: str, whole: bool) -> str:
-    """Return YAML's spelling of a number that only a person can read; "" if it is not a number."""
+    """Return how YAML writes a number that only a person can read; "" if the text is no number."""
     digits = "".join(str(unicodedata.digit(c, c)) for c in text)
     plain = re.sub(r"(?<=\d)['\u2019 ](?=\d{3}(\D|$))", "", digits)
     grouped = re.fullmatch(r"[-+]?\d{1,3}([.,]\d{3})+", plain)
@@ -145,5 +146,5 @@ def number_meant(text: str, whole: bool) -> str:
 
 
 def has_unit(text: str) -> bool:
-    """Is the text a number with its unit: `10 s`, `10ms`, `80%`?"""
+    """Is the text a number with its unit, such as `10 s`, `10ms` or `80%`?"""
     return bool(re.fullmatch(r"[-+]?\d+([.,]\d+)? ?[A-Za-z%\u00b0\u00b5\u03a9/]+", text))

@@ -1,4 +1,4 @@
-"""Converts YAML nodes to msgspec structs; reports all independent problems, such as unknown and
+"""Converts YAML nodes to msgspec structs. It reports all independent problems, such as unknown and
 duplicate keys, with line and column.
 
 This module walks the nodes itself, because `msgspec.convert` stops at the first problem and knows no
@@ -33,24 +33,25 @@ from bridges.yaml.scalars import is_null
 from bridges.yaml.spelling import either, nearest, short, unknown
 
 VERBS = ("is", "has", "needs", "must", "says")
-"""The first words of problem texts that need their key as the subject."""
+"""The first words of problem texts whose subject is the key."""
 
 T = TypeVar("T")
 
 
 @cache
 def described(cls: Hashable) -> Type:
-    """Return msgspec's description of a type, from a cache, because making it takes a millisecond."""
+    """Return msgspec's description of a type. It comes from a cache, because making it takes a
+    millisecond."""
     return inspect.type_info(cls)
 
 
 def field_names(struct: type[msgspec.Struct]) -> set[str]:
-    """Return the keys of a struct, as a YAML has them."""
+    """Return the keys of a struct, as they are spelt in a YAML."""
     return {field.encode_name for field in msgspec.structs.fields(struct)}
 
 
 class Broken(Enum):
-    """The type of BROKEN, the mark for an invalid value."""
+    """The type of BROKEN. BROKEN stands for an invalid value."""
 
     BROKEN = "broken"
 
@@ -69,7 +70,8 @@ def _node_of(wanted: Type) -> type[Node]:
 
 
 class _Around(NamedTuple):
-    """A section that is being read: its fields, as `known` takes them, and the column of its keys."""
+    """A section that is being read. It has its fields, in the form that `known` takes, and the column
+    of its keys."""
 
     spot: Spot
     fields: Mapping[str, str | None]
@@ -77,16 +79,16 @@ class _Around(NamedTuple):
 
 
 Check = Callable[[str, Spot], str | None]
-"""A function that checks a text at its place and returns None or the problem."""
+"""A function that checks a text at its place. It returns the problem, or None."""
 
 
 class Values:
     """Converts one file's nodes to values, and notes problems on its page.
 
-    `checks`: for texts whose type has `Meta(extra={"check": name})`. Such a text is
+    `checks`: name -> check, for texts whose type has `Meta(extra={"check": name})`. Such a text is
     taken as written, and only its check accepts or refuses it. `structs`: every struct made so far,
-    with its path. `owner(key)`: the place where a key belongs that the outermost struct does not have;
-    "" if nobody knows the key.
+    with its path. `owner(key)`: returns where a key belongs that the outermost struct does not have; ""
+    if nobody knows the key.
     """
 
     def __init__(
@@ -108,9 +110,10 @@ class Values:
     def make(self, cls: object, spot: Spot, besides: tuple[str, ...] = ()) -> object: ...
 
     def make(self, cls: object, spot: Spot, besides: tuple[str, ...] = ()) -> object:
-        """Convert a node to a `cls` (a type, or msgspec's description of one); BROKEN if it fails.
+        """Convert a node to a `cls`, which is a type or msgspec's description of a type. Return BROKEN
+        if this fails.
 
-        `besides`: keys that the caller reads itself.
+        `besides`: keys that the caller itself reads.
         """
         wanted = cls if isinstance(cls, Type) else described(cls)
         if isinstance(wanted, StructType):
@@ -118,7 +121,8 @@ class Values:
         return self._value(wanted, spot)
 
     def entries(self, spot: Spot) -> list[MappingEntry]:
-        """Return a mapping's valid entries; note duplicate, merge and non-text keys."""
+        """Return a mapping's valid entries. Note duplicate keys, merge keys and keys that are no
+        text."""
         if not isinstance(spot.node, MappingNode):
             self._mismatch(spot, "a mapping (key: value)")
             return []
@@ -142,7 +146,8 @@ class Values:
         elsewhere: Mapping[str, str] | None = None,
         refused: Mapping[str, str] = MappingProxyType({}),
     ) -> dict[str, MappingEntry]:
-        """Return the entries of `fields`: key -> form of its value, or None if the key is optional.
+        """Return the entries of `fields`, which is key -> form of its value, or None for an optional
+        key.
 
         A key that is missing is not reported if an unknown key resembles it, so that one slip is one
         problem. `elsewhere`: key of another place -> the section to which it belongs. `refused`: key ->
@@ -154,7 +159,7 @@ class Values:
         for before, entry in zip([None, *entries], entries, strict=False):
             if entry.name not in fields:
                 if before and is_decimals(entry, before):
-                    cut.add(before.name)  # a comma has cut this number: its value is not meant
+                    cut.add(before.name)  # a comma has cut this number, so its value is wrong
                 self._page.note(
                     entry.key,
                     refused.get(entry.name)
@@ -169,13 +174,15 @@ class Values:
         return {name: entry for name, entry in found.items() if name in fields and name not in cut}
 
     def _owned(self, entry: MappingEntry, spot: Spot, fields: Mapping[str, str | None]) -> str:
-        """Say whose key this is, if it belongs to nothing here and resembles no key; "" if unknown."""
+        """Describe where a key belongs that belongs nowhere in this section and resembles no key of it;
+        "" if unknown."""
         if spot.path or nearest(entry.name, fields):
             return ""
         return self._owner(entry.name)
 
     def _too_deep(self, entry: MappingEntry) -> str:
-        """Describe a key that belongs to a section around this one; the section then lacks no key."""
+        """Describe a key that belongs to a section around the present section. Then that section no
+        longer lacks the key."""
         for around in reversed(self._around):
             if entry.name in around.fields:
                 missing = _missing(around.spot, entry.name, around.fields[entry.name] or "")
@@ -200,8 +207,8 @@ class Values:
         return self._leaf([wanted], spot, extra or {})
 
     def _union(self, wanted: UnionType, spot: Spot, extra: Extra | None) -> object:
-        """Convert to the member that fits this kind of node; of several scalar types, to the first that
-        fits."""
+        """Convert to the member of the union that fits this kind of node. Of several scalar types, take
+        the first that fits."""
         members = [t for t in wanted.types if not isinstance(t, NoneType)]
         if len(members) < len(wanted.types) and is_none(spot.node):
             return None
@@ -328,11 +335,12 @@ def _missing(spot: Spot, name: str, wanted: str) -> str:
 
 
 def _of_subject(path: tuple[str, ...], name: str, label: str, text: str) -> str:
-    """Return the text with its key as the subject, unless the text already names its subject."""
+    """Return the text with its key as the subject. If the text has a subject, return the text
+    unchanged."""
     if text.partition(" ")[0] in VERBS:
         return f"'{short(name)}' {text}" if name else f"{label} {text}"
     key = name
-    if name.isdecimal():  # an item of a list, or a number of codes
+    if name.isdecimal():  # an item of a list, or a number in a table of codes
         key = next((part for part in reversed(path) if not part.isdecimal()), "")
     if (key or label) in text:
         return text

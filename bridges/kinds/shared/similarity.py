@@ -1,8 +1,8 @@
 """Estimates the similarity transform (rotation, scale, shift) between two maps, from pairs of points.
 
-The fleet adapter template estimates the same least-squares transform with `nudged` from a fleet
-configuration's `reference_coordinates` (open-rmf/fleet_adapter_template, fleet_adapter.py), with the
-same mean squared error. A point is a complex number here: x + y·i.
+The fleet adapter template estimates the same least-squares transform with `nudged`, from a fleet
+configuration's `reference_coordinates` (open-rmf/fleet_adapter_template, fleet_adapter.py). Its mean
+squared error is the same too. A point is a complex number in this file: x + y·i.
 """
 
 import cmath
@@ -14,8 +14,8 @@ Point = tuple[float, float]
 
 
 class Similarity(Struct, frozen=True):
-    """The transform `to = turn · from + shift`. `mse`: the mean squared error of the pairs from which
-    it was estimated, in units of `to`."""
+    """The transform `to = turn · from + shift`. `mse` is the mean squared error of the pairs that gave
+    the transform, in squared units of `to`."""
 
     turn: complex
     shift: complex
@@ -33,7 +33,7 @@ class Similarity(Struct, frozen=True):
 
     @property
     def error(self) -> float:
-        """The root of `mse`, in units of `from`."""
+        """The square root of `mse`, in units of `from`."""
         return float(self.mse**0.5 / self.scale)
 
     def there(self, at: Point) -> Point:

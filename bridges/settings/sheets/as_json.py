@@ -1,4 +1,4 @@
-"""The findings as JSON: each row of a table is an object whose keys are the table's headings."""
+"""The findings as JSON. Each row of a table becomes an object whose keys are the table's headings."""
 
 from collections.abc import Sequence
 
@@ -9,7 +9,7 @@ from bridges.settings.sheets.findings import Findings
 
 
 def document(files: Sequence[Findings], errors: int, warnings: int) -> str:
-    """Return `{"ok": true, "errors": 0, "warnings": 0, "files": [...]}`, with a newline at its end."""
+    """Return `{"ok": true, "errors": 0, "warnings": 0, "files": [...]}`, with a newline at the end."""
     found = {
         "ok": not errors,
         "errors": errors,

@@ -1,4 +1,5 @@
-"""The findings of `check` about one file, as tables, from which text, JSON and sheet are made."""
+"""The findings of `check` about one file, as tables. Text, JSON and the commissioning sheet are made
+from them."""
 
 import hashlib
 from collections.abc import Sequence
@@ -20,15 +21,15 @@ from drivers.hal.points import Wire
 HEADINGS = ("signal", "point", "direction", "active", "pull", "debounce", "at rest", "wire broken")
 BROKEN = {True: "asserted", False: "not asserted", None: "floats"}
 WIRES, MEANINGS = "wires", "meanings"
-"""The title of the table with a device's wires, and of the table with its messages on the bus."""
+"""The titles of two tables: the table of a device's wires, and the table of its messages on the bus."""
 SETTINGS = ("setting", "value", "not the default")
 
 
 class Part(msgspec.Struct, frozen=True, kw_only=True):
     """One controller: its name, its bus and its tables.
 
-    `device`: its name, or the kind's name if the kind has no devices. `bus`: the name of its bus, or
-    "". `tables`: first the wires, or the commands and readings; then the other tables.
+    `device`: the device's name, or the kind's name if the kind has no devices. `bus`: the name of its
+    bus, or "". `tables`: first the wires, or the commands and readings; then all other tables.
     """
 
     device: str
@@ -46,9 +47,9 @@ class BusShown(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Findings(msgspec.Struct, frozen=True, kw_only=True):
-    """One file: its contents if it is valid, and its errors and warnings.
+    """One file: its contents if the file is valid, and its errors and warnings.
 
-    `sha256`: the hash of the file's bytes, so that a signed sheet identifies the file. `rmf`: the
+    `sha256`: the hash of the file's bytes, with which a signed sheet identifies the file. `rmf`: the
     domain, transport and release, and the names of the topics. `notes`: further facts for the user.
     """
 
@@ -70,7 +71,7 @@ def wrong(file: str, errors: Sequence[Problem]) -> Findings:
 
 
 def findings(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str] = ()) -> Findings:
-    """Return the findings about a valid file. `errors`: from a comparison with RMF's map."""
+    """Return the findings about a valid file. `errors` come from a comparison with RMF's map."""
     return Findings(
         file=str(config.path),
         kind=config.kind,
@@ -86,7 +87,8 @@ def findings(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str
 
 
 def _rmf(config: Config) -> dict[str, str]:
-    """Return the settings to compare with RMF's, and the topics by their names on this site."""
+    """Return the settings to compare with RMF's settings, and the topics by their names on this
+    site."""
     rmf, kind = config.rmf, kind_called(config.kind)
     spoken = [*(() if isinstance(kind, GraphKind) else kind.stated_on), *_published(config)]
     alarms = any(map(alarm_topics, config.devices.values()))
@@ -104,7 +106,7 @@ def _rmf(config: Config) -> dict[str, str]:
 
 
 def _published(config: Config) -> list[Topic[Message]]:
-    """List the topics beside the states on which the file's devices publish."""
+    """List the topics on which the file's devices publish, without the state topics."""
     kind = kind_called(config.kind)
     if isinstance(kind, GraphKind):
         return [*kind.publishes]
@@ -113,7 +115,7 @@ def _published(config: Config) -> list[Topic[Message]]:
 
 
 def _lacking(config: Config) -> list[str]:
-    """List the messages that RMF's release lacks, and their substitutes."""
+    """Describe each message that RMF's release lacks, and its substitute."""
     untold = {s.alarm for s in config.devices.values() if _tells_nobody(s)}  # a note says so
     topics = (topic for topic in _published(config) if topic.name not in untold)
     lines = (fallbacks.remarks(topic, config.rmf.release) for topic in topics)
@@ -158,8 +160,8 @@ def _device(config: Config, name: str) -> Part:
 
 
 def _settings(settings: object) -> Table:
-    """Return durations and choices, but not the bus and the accepted wires, which are shown
-    elsewhere."""
+    """Return a table of durations and choices. The bus and the accepted wires are left out, because
+    other tables show them."""
     rows = (row for row in choices_of(settings) if row[0] not in ("bus", "driver", "accept_unsafe"))
     return Table("settings", SETTINGS, tuple(rows))
 

@@ -1,6 +1,6 @@
-"""The commissioning sheet: an HTML file to print, tick and sign, with a page for each controller.
+"""The commissioning sheet: an HTML file to print, tick and sign. Each controller has a page.
 
-It needs no other file. Texts from a YAML are escaped, so they cannot be markup.
+The file needs no other file. Texts from a YAML are escaped, so they cannot be markup.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,9 +29,9 @@ th { background: #eee; } .box { width: 2.2em; text-align: center; } .seen { min-
 """
 BOX = '<td class="box">&#9744;</td>'
 SHORT = 12
-"""Cells with up to this many letters are not broken into lines."""
+"""The maximum length (characters) of a cell that is not broken into lines."""
 NARROW = 60
-"""Tables with up to this many letters in a row fit in half the page's width."""
+"""The maximum length (characters) of a row in a table that fits in half the page's width."""
 TO_TRY = (
     "every output is off while the unit is off, and after the machine has started",
     "every output is off 10 s after the daemon was killed (kill -9)",
@@ -40,7 +40,7 @@ TO_TRY = (
 
 
 def page(files: Sequence[Findings]) -> str:
-    """Return the whole file."""
+    """Return the whole HTML file."""
     sections = (_section(findings, part) for findings in files for part in findings.parts)
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -91,15 +91,15 @@ def _letters(row: Sequence[str]) -> int:
 
 
 def _remarks(findings: Findings) -> Iterator[str]:
-    """Yield all warnings and notes of the file, for each controller, as each page is signed by
-    itself."""
+    """Yield all warnings and notes of the file. Each controller's page repeats them, because each page
+    is signed by itself."""
     warnings = (f"line {w.line}: {w.text.removeprefix('warning: ')}" for w in findings.warnings)
     for text in (*warnings, *(note.removeprefix(f"{findings.file}:") for note in findings.notes)):
         yield f'<p class="warning">&#9744; {escape(text)}</p>'
 
 
 def _table(table: Table, seen: bool = False) -> Iterator[str]:
-    """Yield a table with a box in each row; with `seen`, also with a column for observations."""
+    """Yield a table with a box in each row. With `seen`, add a column for observations."""
     shown = table.filled()
     headings = "".join(f"<th>{escape(heading)}</th>" for heading in shown.headings)
     more = '<th class="seen">seen</th>' if seen else ""
@@ -123,7 +123,7 @@ def _cell(text: str) -> str:
 
 
 def _trials(part: Part) -> Iterator[str]:
-    """Yield the trials on the controller itself."""
+    """Yield the trials to make on the controller itself."""
     if part.bus:
         trials = Table("to be tried", ("trial",), tuple((trial,) for trial in TO_TRY))
         yield from _table(trials, seen=True)

@@ -8,8 +8,8 @@ from bridges.system.columns import aligned, hanging
 
 
 def lines(findings: Findings, columns: int) -> list[str]:
-    """Return a valid file's kind and driver, its wiring or messages, and a blank line at the end, in
-    lines of at most `columns` characters."""
+    """Return a valid file's findings as lines of at most `columns` characters: kind and driver, wiring
+    or messages, and a blank line."""
     driver = f", driver {findings.driver}" if findings.driver else ""
     return [
         f"{findings.file}: {findings.kind}{driver}",
@@ -37,7 +37,7 @@ def _pairs(settings: Mapping[str, str], between: str = ", ") -> str:
 
 
 def _wiring(parts: Sequence[Part], columns: int) -> Iterator[str]:
-    """Yield the wires of all devices of a bus in one table, then the messages of devices without
+    """Yield the wires of all devices of a bus in one table. Then yield the messages of devices without
     wires."""
     for title in (WIRES, MEANINGS):
         found = [(p.device, table) for p in parts for table in p.tables if table.title == title]
@@ -47,7 +47,7 @@ def _wiring(parts: Sequence[Part], columns: int) -> Iterator[str]:
 
 
 def _tables(parts: Sequence[Part], columns: int) -> Iterator[str]:
-    """Yield the other tables. Equal tables of several devices are printed once."""
+    """Yield all other tables. If several devices have equal tables, print the table once."""
     alike: dict[Table, list[str]] = {}
     for part in parts:
         for table in part.tables:
@@ -60,7 +60,7 @@ def _tables(parts: Sequence[Part], columns: int) -> Iterator[str]:
 
 
 def _table(table: Table, columns: int) -> list[str]:
-    """Return the lines of a table, without columns that are empty in every row."""
+    """Return the lines of a table. Columns that are empty in every row are left out."""
     filled = table.filled()
     return _indented([filled.headings, *filled.rows], columns)
 
