@@ -1,10 +1,11 @@
 """`python -m hal_fakes FILE BUS --socket PATH`: serve the far side of one bus in a separate process.
 
-For buses whose fake is `Outside` (`hal_fakes/fake.py`). When the far side is ready, it prints the
-replacements for the bus's settings as one line of JSON.
+This is for buses whose fake is `Outside` (`hal_fakes/fake.py`). When the far side is ready, the process
+prints the replacements for the bus's settings as one line of JSON.
 
-The process ends with its standard input, so nothing is left behind however the daemon dies. The process
-ignores SIGINT: Ctrl-C in a terminal reaches daemon and far side, and the daemon has to finish first.
+The process ends when its standard input ends, so nothing is left behind even if the daemon is killed.
+The process ignores SIGINT. Ctrl-C in a terminal reaches the daemon and the far side, and the daemon has
+to finish first.
 """
 
 import argparse
@@ -54,10 +55,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def served(path: Path, bus_name: str, socket: Path) -> Iterator[dict[str, object]]:
-    """Serve the far side of this bus until the end of the block; yield the replacements for its
+    """Serve the far side of this bus until the end of the block. Yield the replacements for the bus's
     settings.
 
-    Raises SettingsError, DriverError.
+    Raises SettingsError or DriverError.
     """
     config = load(path)
     far = far_side(config, bus_name)

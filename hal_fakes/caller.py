@@ -1,4 +1,4 @@
-"""A connection to the control socket of a running simulation; `control.py` lists the orders."""
+"""A connection to the control socket of a running simulation. `control.py` lists the orders."""
 
 import json
 import socket
@@ -12,11 +12,12 @@ PATIENCE_S: Final = 120.0
 
 
 class SimulationRefused(Exception):
-    """The simulation refuses an order; the text is the answer."""
+    """The error of an order that the simulation refuses. Its text is the simulation's answer."""
 
 
 class Caller:
-    """A connection. Raises OSError without a listener or an answer within `patience_s` (None: wait)."""
+    """A connection. Raises OSError if nobody listens, or if no answer comes within `patience_s` (None:
+    wait for ever)."""
 
     def __init__(self, path: Path, patience_s: float | None = PATIENCE_S) -> None:
         self._end = socket.socket(socket.AF_UNIX)
@@ -35,7 +36,7 @@ class Caller:
         self.close()
 
     def say(self, line: str) -> str:
-        """Send a line, and return the next line received."""
+        """Send a line. Return the next line that the simulation sends."""
         self._end.sendall(line.encode() + b"\n")
         return self.hear()
 
@@ -46,19 +47,19 @@ class Caller:
             raise SimulationRefused(f"{line}: {answer or 'no answer'}")
 
     def hear(self) -> str:
-        """Return the next line; "" when the simulation has hung up."""
+        """Return the next line. Return "" when the simulation has hung up."""
         return self._lines.readline().rstrip("\n")
 
     def edges(self) -> Iterator[Edge]:
-        """After `follow`: yield every edge until the simulation hangs up."""
+        """Yield every edge until the simulation hangs up. Send `follow` first."""
         while line := self.hear():
             yield Edge(**json.loads(line))
 
     def edge(self, signal: str, value: bool) -> float:
-        """After `follow`: wait for this edge; return its monotonic time (s)."""
+        """Wait for this edge. Return its monotonic time (s). Send `follow` first."""
         return next(e.at for e in self.edges() if (e.signal, e.value) == (signal, value))
 
     def close(self) -> None:
-        """Hang up. May be called twice."""
+        """Hang up. The caller may call `close` twice."""
         self._lines.close()
         self._end.close()

@@ -1,6 +1,7 @@
-"""Choose values for a charger's fields: the driver's rules and errors must read the wanted activity.
+"""Chooses values for a charger's fields. The driver's rules and errors must read the wanted activity
+from them.
 
-Values are tried until the driver's own rules give that activity.
+It tries values until the driver's own rules give that activity.
 """
 
 import itertools
@@ -26,7 +27,7 @@ NEAREST: Final = {
     Activity.STOPPING: Activity.CHARGING,
     Activity.RELEASED: Activity.IDLE,
 }
-"""Nearest activities, shown for an activity without code or rule."""
+"""Activity -> the nearest activity, which is shown if the activity has no code or rule."""
 
 
 def values(
@@ -35,9 +36,9 @@ def values(
     wanted: Meaning,
     natural: Mapping[str, Value],
 ) -> dict[str, Value] | None:
-    """Return the value of each field. `natural`: the fields' usual values, tried first.
+    """Return the value of each field. `natural` gives the fields' usual values, which are tried first.
 
-    Returns None if no rule fits. An error without a rule is shown in the first error field.
+    Return None if no rule fits. If no rule shows an error, the first error field shows it.
     """
     shown: dict[str, Value] = {at: 0 for _, at in errors.places()}
     shown |= {n.at: n.well[0] for n in errors.codes}
@@ -56,7 +57,8 @@ def values(
 
 
 def _shows_error(errors: StationErrors, shown: dict[str, Value], robot: bool) -> bool:
-    """Show an error of this side, or of the other side if this side has no error field."""
+    """Show an error of this side. If this side has no error field, show an error of the other side.
+    Return whether an error is shown."""
     sides = ("robot", "station") if robot else ("station", "robot")
     for side in sides:
         for number in errors.codes:
@@ -84,7 +86,7 @@ def _candidates(
 
 
 def _near(test: Test) -> Iterator[Value]:
-    """Return values that pass a test, and some that fail."""
+    """Yield some values that pass a test, and some that fail."""
     yield from test.one_of
     for limit in (test.above, test.below):
         if limit is not None:

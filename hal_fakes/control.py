@@ -31,7 +31,8 @@ log = logging.getLogger(__name__)
 
 
 class Control:
-    """The server: one thread accepts callers, and one thread for each caller reads orders."""
+    """The server. One thread accepts callers, and each caller has a thread that reads the caller's
+    orders."""
 
     def __init__(self, path: Path, plants: Mapping[str, Plant]) -> None:
         self.path = path
@@ -40,7 +41,7 @@ class Control:
         self._callers: dict[socket.socket, threading.Thread] = {}
         self._lock = (
             threading.Lock()
-        )  # guards followers and callers; released before a plant is called
+        )  # guards followers and callers; no thread holds this lock in a call of a plant
         self._listener = _listen(path)
         for plant in plants.values():
             plant.on_edge = self._tell
@@ -48,7 +49,7 @@ class Control:
         self._thread.start()
 
     def close(self) -> None:
-        """Stop listening, hang up, and remove the socket. May be called twice."""
+        """Stop listening, hang up, and remove the socket. The caller may call `close` twice."""
         for plant in self._plants.values():
             plant.on_edge = None
         _hang_up(self._listener)
@@ -132,7 +133,8 @@ class Control:
 
 
 def _sent(follower: socket.socket, line: bytes) -> bool:
-    """Send without waiting: a follower that does not read must not stop the plants."""
+    """Send without waiting, because a follower that does not read must not stop the plants. Return
+    whether the line was sent."""
     try:
         return follower.send(line, socket.MSG_DONTWAIT) == len(line)
     except OSError:

@@ -10,14 +10,16 @@ from typing import Final
 from bridges.transports.zenoh.config import LOOPBACK_PORT
 
 DOMAINS: Final = range(10, 70)
-"""`bench/` uses domains from 70 on; above 101 the ports overlap Linux's ephemeral ports."""
+"""The domains that the demo and the tests use. `bench/` uses domains from 70 on. Above 101 the ports
+overlap Linux's ephemeral ports."""
 CLAIM: Final = "\0rmf-bridges-test-domain-{}"
 
 
 def free_domain() -> int:
-    """Return a domain without participants on this machine, claimed until this process ends.
+    """Return a domain without participants on this machine. The domain is claimed until this process
+    ends.
 
-    Raises OSError if none is free.
+    Raises OSError if no domain is free.
     """
     domain, claim = _claimed()
     atexit.register(claim.close)
@@ -26,18 +28,18 @@ def free_domain() -> int:
 
 @contextmanager
 def domain_for_a_while() -> Iterator[int]:
-    """Yield a free domain, claimed until the end of the block."""
+    """Yield a free domain. The domain is claimed until the end of the block."""
     domain, claim = _claimed()
     with claim:
         yield domain
 
 
 def _claimed() -> tuple[int, socket.socket]:
-    """Return a free domain and the claim on it, which lasts until closed.
+    """Return a free domain and a socket. The domain is claimed until the socket is closed.
 
-    Raises OSError if none is free. Domain d has its ports from 7400 + 250 d: the first is for multicast
-    discovery, and participant i has the unicast ports 10 + 2 i and 11 + 2 i above the first (DDSI-RTPS
-    2.5, 9.6.2.3). The first participant may have left while others remain.
+    Raises OSError if no domain is free. The ports of domain d begin at 7400 + 250 d. The first port is
+    for multicast discovery. Participant i has the unicast ports 10 + 2 i and 11 + 2 i above the first
+    (DDSI-RTPS 2.5, 9.6.2.3). The first participant may have left when others remain.
     """
     for domain in random.sample(DOMAINS, len(DOMAINS)):
         base = 7400 + 250 * domain

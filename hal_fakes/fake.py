@@ -1,4 +1,4 @@
-"""Finds fakes by name: `DRIVER` and `BUS` name a module, whose `FAKE` stands in for the hardware.
+"""Finds fakes by name. `DRIVER` and `BUS` each name a module whose `FAKE` stands in for the hardware.
 
 Only this file imports fakes by name. A driver without a fake gets its kind's plant,
 `hal_fakes/plants/<kind>.py`, at the far end of its wires.
@@ -24,10 +24,11 @@ Station = TypeVar("Station")
 class Fake(Generic[Settings]):
     """A fake controller of one sort.
 
-    `plant(name, settings, wires)`: its physics; `wires` is the driver's table. `station(plant,
-    settings)`: the controller for the bus's fake, with that plant behind it. Without `station`, the
-    plant's contacts are wired to the bus as a `PlantWiring`. `sited(config, name)`: makes a plant
-    that needs more of the file than the device's settings, in place of `plant`.
+    - `plant(name, settings, wires)` makes its physics. `wires` is the driver's wiring table.
+    - `station(plant, settings)` makes the controller for the bus's fake, with this plant behind the
+      controller. Without `station`, a `PlantWiring` wires the plant's contacts to the bus.
+    - `sited(config, name)` makes a plant that needs more of the file than the device's settings. If
+      given, it replaces `plant`.
     """
 
     plant: Callable[[str, Settings, Sequence[Wire]], Plant]
@@ -38,8 +39,8 @@ class Fake(Generic[Settings]):
 class Server(Protocol):
     """A running far side.
 
-    `replace`: replacements for the bus's settings
-    (`{"tcp": {"host": "127.0.0.1", "port": 41234}}`).
+    `replace`: the replacements for the bus's settings, such as
+    `{"tcp": {"host": "127.0.0.1", "port": 41234}}`.
     """
 
     replace: dict[str, object]
@@ -50,11 +51,12 @@ class Server(Protocol):
 
 @dataclass(frozen=True)
 class Outside(Generic[Settings, Station]):
-    """The far side of a bus, in its own process.
+    """The far side of a bus in a process of its own.
 
-    `serve(settings, stations)`: starts a real server on 127.0.0.1, or on its own line, and returns at
-    once. The server may call the plants from any thread, and never advances the plants' time.
-    `parts`: the parts of the far side that each plant on the bus can fail by.
+    - `serve(settings, stations)` starts a real server on 127.0.0.1, or on a line of its own, and
+      returns at once. The server may call the plants from any thread, and never advances the plants'
+      time.
+    - `parts`: the parts of the far side that can fail for each plant on the bus.
     """
 
     serve: Callable[[Settings, Sequence[Station]], Server]
@@ -65,7 +67,7 @@ class Outside(Generic[Settings, Station]):
 class Inside(Generic[Settings, Station]):
     """The far side of a bus that cannot leave the daemon's process.
 
-    `open_bus(settings, stations, world)`: makes the real bus with these stations on it.
+    `open_bus(settings, stations, world)` makes the real bus with these stations on it.
     """
 
     open_bus: Callable[[Settings, Sequence[Station], RealTime], Bus]

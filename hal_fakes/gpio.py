@@ -1,9 +1,9 @@
 """The far side of the GPIO header: gpiozero's mock pins, wired to plants.
 
-The daemon's own code runs down to gpiozero: only the pins are ours. They claim an output at its
-safe level in one call, as `drivers/hal/gpio/pins.py` does on hardware (gpiozero's stock MockPin
-records a glitch there), and refuse the same as hardware: a pin claimed twice, another pull on a pin
-with a fixed resistor, driving an input, a pull on an output.
+The daemon's own code and gpiozero run as on hardware; only the pins are ours. They claim an output at
+its safe level in one call, as `drivers/hal/gpio/pins.py` does on hardware. (gpiozero's stock MockPin
+records a glitch at this point.) The pins refuse the same uses as hardware: a pin claimed twice, another
+pull on a pin with a fixed resistor, driving an input, a pull on an output.
 """
 
 import time
@@ -32,14 +32,14 @@ class WiredPin(MockPin):  # type: ignore[misc]
         self._safe: bool | None = None
 
     def output_with_state(self, state: bool) -> None:
-        """Claim as an output at this level, to be restored on closing."""
+        """Claim the pin as an output at this level. Closing restores the level."""
         self._function = "output"
         self._state = self._safe = bool(state)
         self.clear_states()
         self.factory.driven(self.point, self._state)
 
     def input_with_pull(self, pull: str) -> None:
-        """Claim as an input, which has the wire's level from the first read on."""
+        """Claim the pin as an input. It has the wire's level from the first read on."""
         if self._safe is not None:
             raise PinInvalidFunction(f"{self.point} is an output")
         super().input_with_pull(pull)
@@ -47,7 +47,7 @@ class WiredPin(MockPin):  # type: ignore[misc]
         self.clear_states()
 
     def close(self) -> None:
-        """Set an output to its safe level, which the kernel keeps; then release the pin."""
+        """Set an output to its safe level, which the kernel keeps. Then release the pin."""
         if self._safe is not None:
             self._change_state(self._safe)
         self._safe = None
@@ -55,7 +55,7 @@ class WiredPin(MockPin):  # type: ignore[misc]
         self._function = "input"
 
     def follow_wire(self, level: bool) -> None:
-        """Take the wire's level; report an edge to the pin's watcher."""
+        """Take the wire's level. Report an edge to the pin's watcher."""
         if self._function == "input":
             (self.drive_high if level else self.drive_low)()
 
@@ -69,8 +69,8 @@ class WiredPin(MockPin):  # type: ignore[misc]
 class WiredFactory(MockFactory):  # type: ignore[misc]
     """The header with its wiring.
 
-    `clock` gives the time (s) of the daemon's outputs; `lock` is held while pins take their
-    wires' levels, so an older level never overtakes a newer one.
+    `clock` gives the time (s) of the daemon's outputs. `lock` is held when pins take their wires'
+    levels, so that an older level never overtakes a newer one.
     """
 
     def __init__(
@@ -85,13 +85,13 @@ class WiredFactory(MockFactory):  # type: ignore[misc]
         self._wirings = wirings
 
     def driven(self, point: str, level: bool) -> None:
-        """Note that the daemon has set an output to this level."""
+        """Record that the daemon has set an output to this level."""
         for wiring in self._wirings:
             if point in wiring.outputs:
                 wiring.drive(point, level, self.clock())
 
     def show(self, now: float, only: WiredPin | None = None) -> None:
-        """Bring every claimed input (or this input) to the level of its wire at `now` (s)."""
+        """Set every claimed input (or only this input) to the level of its wire at `now` (s)."""
         pins = [only] if only else list(self.pins.values())
         claimed = {pin.point: pin for pin in pins}
         with self._lock:

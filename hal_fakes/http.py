@@ -41,15 +41,15 @@ def serve(
 
 
 Asked = tuple[str, str, str]
-"""A request: its method, its path below `api_base`, and its body ("" without a body)."""
+"""A request: its method, its path below `api_base`, and its body. The body is "" if there is none."""
 ANY_BODY: Final = "*"
-"""In a command's request: the body differs from call to call."""
+"""A mark in a command's request. It means that the body differs from call to call."""
 
 
 class HttpStation(Protocol):
     """A controller with a plant behind it.
 
-    `reads`: the requests for its state. `commands`: request -> signal, and asserted or not.
+    `reads`: the requests for its state. `commands`: request -> (signal, asserted or not).
     """
 
     plant: Plant
@@ -57,13 +57,13 @@ class HttpStation(Protocol):
     commands: Mapping[Asked, tuple[str, bool]]
 
     def answer(self, asked: Asked) -> bytes:
-        """Return the body of a reading at this moment."""
+        """Return the body of the answer to a reading now."""
 
     def obey(self, signal: str, asserted: bool) -> None:
         """Obey a command for this signal."""
 
     def tick(self) -> None:
-        """Let timers run out. Called often."""
+        """Let timers run out. The server calls this often."""
 
 
 @runtime_checkable
@@ -77,10 +77,10 @@ class FreeStation(Protocol):
 
 
 class HttpServer:
-    """A running server. `replace`: replacements for the bus's settings.
+    """A running server. `replace` holds the replacements for the bus's settings.
 
-    `path`: the API's path. `timeout_s`: the client's deadline, which slow failures overrun.
-    `push_path`: the WebSocket below `path`, if the controller has one.
+    `path`: the API's path. `timeout_s`: the client's deadline (s), which slow failures overrun.
+    `push_path`: the WebSocket below `path`, if the controller has a WebSocket.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class HttpServer:
         self._thread.start()
 
     def close(self) -> None:
-        """Close every connection. May be called twice."""
+        """Close every connection. The caller may call `close` twice."""
         self._server.shutdown()
         self._server.hang_up()
         self._server.server_close()
@@ -130,7 +130,7 @@ class _Listener(ThreadingHTTPServer):
         super().__init__(("127.0.0.1", 0), _Call)
 
     def service_actions(self) -> None:
-        """Look after the server between requests."""
+        """Let timers run out. The server calls this between requests."""
         for station in self.stations:
             station.tick()
 
@@ -141,7 +141,7 @@ class _Listener(ThreadingHTTPServer):
         return caller, address
 
     def shutdown_request(self, request: socket.socket | tuple[bytes, socket.socket]) -> None:
-        assert isinstance(request, socket.socket)  # a datagram's request would be a pair
+        assert isinstance(request, socket.socket)  # a request by datagram would be a pair
         with self._lock:
             self._callers.discard(request)
         super().shutdown_request(request)
@@ -157,7 +157,8 @@ class _Listener(ThreadingHTTPServer):
     def handle_error(
         self, request: socket.socket | tuple[bytes, socket.socket], client_address: object
     ) -> None:
-        """Ignore a caller that has hung up; anything else is a defect of this file."""
+        """Ignore the error of a caller that has hung up. Raise any other error, because it is a defect
+        of this file."""
         if not isinstance(sys.exception(), ConnectionError):
             super().handle_error(request, client_address)
 
@@ -221,7 +222,7 @@ class _Call(BaseHTTPRequestHandler):
             self._answer(200, body, failures)
 
     def _push(self) -> None:
-        """Serve a WebSocket: at each change of a state, send a message without content."""
+        """Serve a WebSocket. At each change of a state, send a message without content."""
         from websockets.datastructures import Headers
         from websockets.http11 import Request
         from websockets.protocol import OPEN
@@ -257,10 +258,10 @@ class _Call(BaseHTTPRequestHandler):
         self.close_connection = self._send(head, body, failures)
 
     def _send(self, head: bytes, body: bytes, failures: Failures) -> bool:
-        """Write as much of an answer as the failure lets through; True to close the connection.
+        """Write the part of an answer that the failure lets through. Return True if the connection must
+        be closed.
 
-        Head and body go out in one write, because with two writes each answer would take 40 ms (delayed
-        ACK).
+        Head and body go out in one write. With two writes each answer would take 40 ms (delayed ACK).
         """
         whole = head + body
         if failures.get("server") == "off":
@@ -277,20 +278,21 @@ class _Call(BaseHTTPRequestHandler):
         return failures.get("headers") == "garbage"
 
     def _trickle(self, rest: bytes) -> None:
-        """Send byte by byte, so slowly that the answer overruns the caller's deadline."""
+        """Send byte by byte, slowly enough to overrun the caller's deadline."""
         for n in range(len(rest)):
             self._wait(self.server.timeout_s / 4)
             self.wfile.write(rest[n : n + 1])
 
     def _wait(self, seconds: float) -> None:
-        """Wait this long, or until the caller hangs up or the server closes (ConnectionError)."""
+        """Wait this long (s). Raise ConnectionError if the caller hangs up or the server closes
+        first."""
         end = time.monotonic() + seconds
         while (left_s := end - time.monotonic()) > 0:
             if select([self.connection], [], [], min(left_s, LOOK_S))[0]:
                 raise ConnectionAbortedError("the caller has hung up")
 
     def log_message(self, format: str, *args: object) -> None:
-        """Log nothing: the daemon's own log shows the requests."""
+        """Log nothing, because the daemon's own log shows the requests."""
 
 
 FAKE = Outside(serve)

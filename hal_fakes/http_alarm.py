@@ -1,6 +1,6 @@
-"""An alarm panel on HTTP: its plant's sources in the fields named by the YAML.
+"""An alarm panel on HTTP. The YAML names the fields that show the plant's sources.
 
-Failures of server, headers and body: `hal_fakes/http.py`.
+`hal_fakes/http.py` describes the failures of server, headers and body.
 """
 
 import json
@@ -22,13 +22,13 @@ PARTS: Final = ("server", "headers", "body")
 
 
 def fields(settings: HttpPanelSettings) -> dict[str, JsonFlag]:
-    """Return each source, and the drill, with its field."""
+    """Return source -> its field, with the drill among the sources."""
     drill = {DRILL: settings.drill} if settings.drill else {}
     return {**settings.sources, **drill}
 
 
 class FakeHttpPanel:
-    """A controller (`hal_fakes.http.HttpStation`) that is only read."""
+    """A controller (`hal_fakes.http.HttpStation`) that obeys no command."""
 
     def __init__(self, plant: Plant, settings: HttpPanelSettings) -> None:
         self.plant = plant
@@ -38,13 +38,14 @@ class FakeHttpPanel:
         self._last: bytes | None = None
 
     def obey(self, signal: str, asserted: bool) -> None:
-        """Do nothing: there is no command."""
+        """Do nothing, because there is no command."""
 
     def tick(self) -> None:
-        """Do nothing: the controller has no timer."""
+        """Do nothing, because the controller has no timer."""
 
     def answer(self, asked: Asked) -> bytes:
-        """Return the present answer to `GET state_path`; a wrong answer if that failure is ordered."""
+        """Return the present answer to `GET state_path`. If that failure is ordered, return a wrong
+        answer."""
         self.plant.advance(time.monotonic())
         server, body = self.plant.failures.get("server"), self.plant.failures.get("body")
         if server == "stuck" and self._last is not None:

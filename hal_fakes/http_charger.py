@@ -1,6 +1,6 @@
-"""A charging station on HTTP: it shows its plant's state in the maker's fields, as numbers or words.
+"""A charging station on HTTP. It shows its plant's state in the maker's fields, as numbers or words.
 
-`GET state_path` answers this state; the commands clear an error, start, stop and check the range.
+`GET state_path` answers this state. The commands clear an error, start, stop and check the range.
 """
 
 import json
@@ -36,7 +36,8 @@ def build(
 
 
 class FakeJsonCharger:
-    """A station that answers with JSON: one plant with its maker's fields, numbers and words."""
+    """A station that answers with JSON. Its one plant is shown in the maker's fields, numbers and
+    words."""
 
     def __init__(self, plant: Plant, settings: JsonChargerSettings) -> None:
         self.plant = plant
@@ -72,7 +73,7 @@ class FakeJsonCharger:
         return self.body(self.reading())
 
     def body(self, reading: Reading) -> bytes:
-        """Return the answer for this reading; a wrong answer if that failure is ordered."""
+        """Return the answer for this reading. If that failure is ordered, return a wrong answer."""
         server, body = reading.failures.get("server"), reading.failures.get("body")
         if server == "stuck" and self._last is not None:
             return self._last
@@ -89,7 +90,7 @@ class FakeJsonCharger:
         return {"off": b"", "garbage": self._last[:-9]}.get(body or "", self._last)
 
     def _answer(self, code: int | str, reading: Reading) -> dict[str, object]:
-        """Return all values, in the fields named by the YAML."""
+        """Return all values in the fields that the YAML names."""
         fields, answer = self._settings.fields, dict[str, object]()
         if self._settings.codes is not None:
             put(answer, fields.state, self._words.get(code, code))
@@ -110,7 +111,7 @@ class FakeJsonCharger:
         return answer
 
     def _by_rules(self, reading: Reading, answer: dict[str, object]) -> dict[str, Value]:
-        """Return the values of the fields for rules and errors."""
+        """Return field -> value, for the fields that rules and errors read."""
         said = self._settings
         wanted = ROBOT_ERROR if reading.robots else (reading.activity, "")
         shown = {at: found(answer, at) for _, at in places(said.rules)}
@@ -140,7 +141,7 @@ class FakeHttpCharger(FakeJsonCharger):
 
 
 def _commands(settings: HttpChargerSettings) -> Iterator[tuple[Asked, tuple[str, bool]]]:
-    """Return each command as a request, and its effect on the plant."""
+    """Yield each command as a request, with its effect on the plant."""
     if settings.clear_error_path:
         yield ("POST", settings.clear_error_path, ""), ("clear_error", True)
     for call, signal, asserted in (

@@ -1,6 +1,7 @@
-"""A dispenser or ingestor behind HTTP: its plant's contacts in the fields named by the YAML.
+"""A dispenser or ingestor behind HTTP. The YAML names the fields that show the plant's contacts.
 
-The plant takes a start as a pulse. Failures of server, headers and body: `hal_fakes/http.py`.
+The plant takes a start as a pulse. `hal_fakes/http.py` describes the failures of server, headers and
+body.
 """
 
 import json
@@ -20,7 +21,8 @@ PARTS: Final = ("server", "headers", "body")
 
 
 def contacts(settings: HttpWorkcellSettings) -> list[Wire]:
-    """Return the controller's own contacts and relay, for the plant: they can fail as our wires can."""
+    """Return the controller's own contacts and relay. The plant needs them, because they can fail as
+    our wires can."""
     fields = settings.inputs.__struct_fields__
     inputs = [Wire(s, "in", s, "high") for s in fields if getattr(settings.inputs, s)]
     return [*inputs, Wire("start", "out", "start", "high")]
@@ -49,7 +51,8 @@ class FakeHttpWorkcell:
         self.plant.advance(time.monotonic())
 
     def answer(self, asked: Asked) -> bytes:
-        """Return the present answer to `GET state_path`; a wrong answer if that failure is ordered."""
+        """Return the present answer to `GET state_path`. If that failure is ordered, return a wrong
+        answer."""
         self.tick()
         server, body = self.plant.failures.get("server"), self.plant.failures.get("body")
         if server == "stuck" and self._last is not None:
@@ -57,7 +60,7 @@ class FakeHttpWorkcell:
         said: dict[str, object] = {}
         found = self._settings.inputs
         signals = [one for one in found.__struct_fields__ if getattr(found, one)]
-        for signal in sorted(signals, key=self.plant.sense):  # signals may share a field
+        for signal in sorted(signals, key=self.plant.sense):  # several signals may share a field
             place = getattr(found, signal)
             if self.plant.sense(signal) or place.field not in said:
                 put(said, place.field, value_of(place, self.plant.sense(signal)))

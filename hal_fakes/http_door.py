@@ -1,7 +1,7 @@
-"""A door on an HTTP relay: its plant's contacts in the fields named by the YAML.
+"""A door on an HTTP relay. The YAML names the fields that show the plant's contacts.
 
-The relay switches itself off when its timer is not renewed. Failures of server, headers and body:
-`hal_fakes/http.py`.
+The relay switches itself off when its timer is not renewed. `hal_fakes/http.py` describes the failures
+of server, headers and body.
 """
 
 import json
@@ -21,7 +21,8 @@ PARTS: Final = ("server", "headers", "body")
 
 
 def contacts(settings: HttpDoorSettings) -> list[Wire]:
-    """Return the controller's own contacts and relay, for the plant: they can fail as our wires can."""
+    """Return the controller's own contacts and relay. The plant needs them, because they can fail as
+    our wires can."""
     fields = settings.inputs.__struct_fields__
     inputs = [Wire(s, "in", s, "high") for s in fields if getattr(settings.inputs, s)]
     return [*inputs, Wire(HOLD, "out", HOLD, "high")]
@@ -43,7 +44,7 @@ class FakeHttpDoor:
         self._last: bytes | None = None
 
     def obey(self, signal: str, asserted: bool) -> None:
-        """Switch the relay, and start its timer again."""
+        """Switch the relay, and restart its timer."""
         now, after_s = time.monotonic(), self._settings.switches_off_after_s
         self._on = asserted
         self._off_at = now + after_s if asserted and after_s else float("inf")
@@ -55,7 +56,8 @@ class FakeHttpDoor:
             self.obey(HOLD, False)
 
     def answer(self, asked: Asked) -> bytes:
-        """Return the present answer to `GET state_path`; a wrong answer if that failure is ordered."""
+        """Return the present answer to `GET state_path`. If that failure is ordered, return a wrong
+        answer."""
         self.tick()
         self.plant.advance(time.monotonic())
         server, body = self.plant.failures.get("server"), self.plant.failures.get("body")

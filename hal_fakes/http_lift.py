@@ -1,7 +1,7 @@
-"""A lift's gateway on HTTP: its plant's contacts in the fields of its API, its commands as relays.
+"""A lift's gateway on HTTP. Its API's fields show the plant's contacts, and its commands act as relays.
 
 A held command ends by itself when its timer is not renewed. A call without `cancel` is a short press of
-a button. Failures of server, headers and body: `hal_fakes/http.py`.
+a button. `hal_fakes/http.py` describes the failures of server, headers and body.
 """
 
 import json
@@ -27,13 +27,13 @@ from hal_fakes.plants.plant import Plant
 PARTS: Final = ("server", "headers", "body")
 PRESS_S: Final = 0.2
 NONSENSE: Final = "?"
-"""The value for a door that is open and closed at once, and for every unlisted state."""
+"""The value for a door that is open and closed at once. It also stands for every unlisted state."""
 NEVER: Final = float("inf")
 
 
 def contacts(settings: HttpLiftSettings) -> DryContactLiftSettings:
-    """Return the wiring of the contacts of the lift behind the gateway; they can be cut as our wires
-    can."""
+    """Return the wiring of the contacts of the lift behind the gateway. These contacts can be cut as
+    our wires can."""
     api, numbers = api_of(settings), count()
     state, levels = api.state, settings.levels()
 
@@ -78,7 +78,7 @@ class FakeHttpLift:
         self._last: dict[Asked, bytes] = {}
 
     def obey(self, signal: str, asserted: bool) -> None:
-        """Switch this command, and start its timer again; a call ends every other call."""
+        """Switch this command, and restart its timer. A call ends every other call."""
         now = time.monotonic()
         if signal.startswith("call"):
             for level in self._levels:
@@ -93,13 +93,14 @@ class FakeHttpLift:
         self._drive(signal, asserted, NEVER if timer_s is None else now + timer_s)
 
     def tick(self) -> None:
-        """Switch every command off whose timer has run out."""
+        """Switch off every command whose timer has run out."""
         now = time.monotonic()
         for signal in [signal for signal, at in self._off_at.items() if now >= at]:
             self._drive(signal, False, NEVER)
 
     def answer(self, asked: Asked) -> bytes:
-        """Return the present answer to this request; a wrong answer if that failure is ordered."""
+        """Return the present answer to this request. If that failure is ordered, return a wrong
+        answer."""
         self.tick()
         self.plant.advance(time.monotonic())
         server, body = self.plant.failures.get("server"), self.plant.failures.get("body")
@@ -118,7 +119,7 @@ class FakeHttpLift:
         self.plant.drive(signal, on, time.monotonic())
 
     def _commands(self) -> Iterator[tuple[Asked, tuple[str, bool]]]:
-        """Yield each command as a request, and its effect on the plant."""
+        """Yield each command as a request, with its effect on the plant."""
         commands = self._api.commands
         for name, command in commands.held().items():
             yield asked(command.ask), (name, True)

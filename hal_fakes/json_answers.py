@@ -1,11 +1,12 @@
-"""The other side of `drivers/json_fields.py`: writes the answer in which a driver finds its fields."""
+"""The counterpart of `drivers/json_fields.py`. It writes an answer in which the driver finds its
+fields."""
 
 from drivers.http_call import Call
 from drivers.json_fields import JsonFlag, Value, same
 
 
 def asked(call: Call) -> tuple[str, str, str]:
-    """Return the command as the request that reaches its controller."""
+    """Return the request by which the command reaches its controller."""
     return call.method, call.path, call.body or ""
 
 
@@ -20,7 +21,7 @@ def value_of(place: JsonFlag, yes: bool) -> Value:
 
 
 def put(answer: dict[str, object], field: str, value: object) -> None:
-    """Put a value at its field; list items are not supported."""
+    """Put a value into its field. List items are not supported."""
     first, _, below = field.partition(".")
     if below:
         inner = answer.setdefault(first, {})

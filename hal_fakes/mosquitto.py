@@ -1,4 +1,5 @@
-"""A real broker on 127.0.0.1: mosquitto, in a process that can be killed, frozen and restarted."""
+"""A real broker on 127.0.0.1. It is mosquitto, in a process that can be killed, frozen and
+restarted."""
 
 import shutil
 import signal
@@ -19,7 +20,7 @@ ENDS_WITH_US: Final = ("setpriv", "--pdeathsig", "KILL")
 
 
 class Mosquitto:
-    """A broker at `port`. `lines`: further lines of its configuration, such as those for TLS."""
+    """A broker at `port`. `lines` are further lines of its configuration, such as those for TLS."""
 
     def __init__(self, lines: Sequence[str] = ("allow_anonymous true",)) -> None:
         program = shutil.which("mosquitto", path=PATH)
@@ -40,7 +41,7 @@ class Mosquitto:
         self.start()
 
     def start(self) -> None:
-        """Start the broker, which remembers nothing, and wait until it listens. Raises HalError."""
+        """Start the broker without any memory, and wait until it listens. Raises HalError."""
         self._process = subprocess.Popen(
             self._command,
             stdin=subprocess.DEVNULL,
@@ -54,24 +55,24 @@ class Mosquitto:
             time.sleep(LOOK_S)
 
     def kill(self) -> None:
-        """End the broker by SIGKILL, as a power cut does."""
+        """Kill the broker with SIGKILL, which has the effect of a power cut."""
         process, self._process = self._process, None
         if process is not None:
             process.kill()
             process.wait()
 
     def freeze(self) -> None:
-        """Let the broker do nothing, with every connection open."""
+        """Freeze the broker, so that it does nothing. Every connection stays open."""
         if self._process is not None:
             self._process.send_signal(signal.SIGSTOP)
 
     def thaw(self) -> None:
-        """Let the broker go on."""
+        """Let a frozen broker go on."""
         if self._process is not None:
             self._process.send_signal(signal.SIGCONT)
 
     def close(self) -> None:
-        """End the broker. May be called twice."""
+        """End the broker. The caller may call `close` twice."""
         self.kill()
         self._folder.cleanup()
 

@@ -40,8 +40,8 @@ NEVER: Final = float("inf")
 class MqttStation(Protocol):
     """A device with a plant behind it.
 
-    `asks`: topic -> the message that makes it publish. `commands`: topic and message -> signal, and
-    asserted or not.
+    `asks`: topic -> the message that makes the device publish. `commands`: (topic, message) -> (signal,
+    asserted or not).
     """
 
     plant: Plant
@@ -52,13 +52,14 @@ class MqttStation(Protocol):
         """Obey a command for this signal."""
 
     def echo(self, signal: str) -> str | None:
-        """Return the topic that is published after each command for this signal, changed or not."""
+        """Return the topic on which the device publishes after each command for this signal, even if
+        nothing changed."""
 
     def tick(self) -> None:
-        """Let timers run out. Called often."""
+        """Let timers run out. The site calls this often."""
 
     def states(self) -> dict[str, bytes]:
-        """Return topic -> payload of each state."""
+        """Return topic -> payload, for each state."""
 
 
 def serve(
@@ -72,7 +73,7 @@ def serve(
 
 
 class MqttDevice:
-    """One device's points as a station: relays that publish their states, and contacts."""
+    """One device's points as a station. It has contacts, and relays that publish their states."""
 
     def __init__(self, wiring: PlantWiring, points: Mapping[str, MqttPoint]) -> None:
         self.plant = wiring.plant
@@ -91,7 +92,7 @@ class MqttDevice:
         self._off_at = dict.fromkeys(wiring.outputs, NEVER)
 
     def obey(self, signal: str, asserted: bool) -> None:
-        """Switch a relay, and start its timer again."""
+        """Switch a relay, and restart its timer."""
         now, off_s = time.monotonic(), self._points[signal].switches_off_after_s
         self._on[signal] = asserted
         self._off_at[signal] = now + off_s if asserted and off_s else NEVER
@@ -108,7 +109,7 @@ class MqttDevice:
                 self.obey(name, False)
 
     def states(self) -> dict[str, bytes]:
-        """Return topic -> payload of each state."""
+        """Return topic -> payload, for each state."""
         levels = {**self._wiring.levels(time.monotonic()), **self._on}
         groups: dict[tuple[str, str], list[tuple[MqttPoint, bool]]] = {}
         for name, point in self._points.items():
@@ -128,7 +129,7 @@ class MqttDevice:
 
 
 class MqttSite:
-    """A broker with its devices. `replace`: replacements for the bus's settings."""
+    """A broker with its devices. `replace` holds the replacements for the bus's settings."""
 
     def __init__(
         self, settings: MqttSettings, stations: Sequence[PlantWiring | MqttStation]
@@ -160,7 +161,7 @@ class MqttSite:
         self._thread.start()
 
     def close(self) -> None:
-        """End the devices and the broker. May be called twice."""
+        """End the devices and the broker. The caller may call `close` twice."""
         if self._closed.is_set():
             return
         self._closed.set()
@@ -256,7 +257,7 @@ class MqttSite:
 
     @contextlib.contextmanager
     def _slow(self) -> Iterator[None]:
-        """Let the broker work for a moment at a time, with long rests between."""
+        """Let the broker work for short moments, with long rests between them."""
         over = threading.Event()
 
         def rest() -> None:
@@ -274,7 +275,7 @@ class MqttSite:
 
     @contextlib.contextmanager
     def _garbage(self) -> Iterator[None]:
-        """Put a server that speaks something else in the broker's place."""
+        """Replace the broker by a server that speaks another protocol."""
         with self._off(), socket.create_server(("127.0.0.1", self._broker.port)) as server:
             threading.Thread(target=self._talk, args=(server,), daemon=True).start()
             yield
@@ -290,7 +291,7 @@ class MqttSite:
 
     @contextlib.contextmanager
     def _wrong(self) -> Iterator[None]:
-        """Restart the broker with retained states alone; the devices stay away."""
+        """Restart the broker with nothing but retained states. The devices stay away."""
         self._detach()
         self._broker.kill()
         self._broker.start()
@@ -302,7 +303,8 @@ class MqttSite:
 
 
 def _value(group: Sequence[tuple[MqttPoint, bool]]) -> object:
-    """Return the value of a field that these points read: a word that is right for all of them."""
+    """Return the value of a field that several points read. The value is a word that is right for all
+    of them."""
     points = [point for point, _ in group]
     asserted = [point for point, on in group if on]
     if not points[0].when:
@@ -313,7 +315,7 @@ def _value(group: Sequence[tuple[MqttPoint, bool]]) -> object:
 
 
 def plain(value: object) -> bytes:
-    """Encode a payload: a text as it is, anything else as JSON."""
+    """Encode a payload. A text stays as it is; any other value becomes JSON."""
     return value.encode() if isinstance(value, str) else json.dumps(value).encode()
 
 

@@ -1,4 +1,4 @@
-"""A charging station behind an MQTT broker: it publishes its plant's state on the YAML's topics."""
+"""A charging station behind an MQTT broker. It publishes its plant's state on the YAML's topics."""
 
 import json
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ EFFECTS: dict[StationCommand, tuple[str, bool]] = {
     "range_check": ("range_check", True),
     "clear_error": ("clear_error", True),
 }
-"""Command -> signal of the plant, and asserted or not."""
+"""Command -> (signal of the plant, asserted or not)."""
 
 
 class FakeMqttCharger(FakeJsonCharger):
@@ -34,7 +34,7 @@ class FakeMqttCharger(FakeJsonCharger):
         }
 
     def echo(self, signal: str) -> str | None:
-        """Return None: the station publishes a state only when it changes."""
+        """Return None, because the station publishes a state only when the state changes."""
         return None
 
     def states(self) -> dict[str, bytes]:

@@ -1,4 +1,4 @@
-"""Plants in real time: one lock around them, and one thread that runs each event when it is due.
+"""Plants in real time. One lock guards them, and one thread runs each event when it is due.
 
 The thread sleeps until the next event of any plant, so an idle simulation costs nothing.
 """
@@ -11,9 +11,10 @@ from hal_fakes.plants.plant import Edge, FailureMode, Plant
 
 
 class RealTime:
-    """A running world. `plants` are views that any thread may call.
+    """A running world. `plants` are views of the plants that any thread may call.
 
-    `on_step` callbacks run after each step with the lock held: GPIO pins take their levels there.
+    `on_step` callbacks run after each step, and hold the lock. GPIO pins take their levels in such a
+    callback.
     """
 
     def __init__(self, plants: Mapping[str, Plant]) -> None:
@@ -29,7 +30,7 @@ class RealTime:
         self._thread.start()
 
     def stir(self) -> None:
-        """Recompute the next event, because a plant was driven."""
+        """Compute the next event again, because a plant was driven."""
         with self.lock:
             self._stirred = True
             self._due.notify()
@@ -41,7 +42,7 @@ class RealTime:
                 self.stir()
 
     def close(self) -> None:
-        """Stop time. May be called twice."""
+        """Stop time. The caller may call `close` twice."""
         with self.lock:
             self._closed = True
             self._due.notify()
@@ -69,7 +70,7 @@ def _timeout(next_at: float) -> float | None:
 
 
 class _Serialised:
-    """One plant behind the world's lock; driving it also stirs the world."""
+    """One plant behind the world's lock. Driving the plant also stirs the world."""
 
     def __init__(self, plant: Plant, world: RealTime) -> None:
         self.name = plant.name

@@ -1,11 +1,11 @@
-"""The hardware of `rmf-bridge run FILE --simulate`: a plant for each device behind its bus.
+"""The hardware of `rmf-bridge run FILE --simulate`. Each device has a plant behind its bus.
 
 If possible, a far side is a child process on 127.0.0.1 (`hal_fakes/__main__.py`), and the real bus is
 pointed there. GPIO pins cannot leave a process, so their fake lives in the daemon's. If a device has
 inputs on another bus, its plant stands behind both: then all far sides live in the daemon's process.
 
-Each bus has a control socket in the runtime directory: `plant.sock`, or `plant-<bus>.sock` where
-the file has several buses.
+Each bus has a control socket in the runtime directory. The socket is `plant.sock`, or
+`plant-<bus>.sock` if the file has several buses.
 """
 
 import contextlib
@@ -27,24 +27,27 @@ from hal_fakes.realtime import RealTime
 
 LogFormat = Literal["text", "json"]
 READY_S = 15.0
-"""Time limit (s) for a child's start (a busy Raspberry Pi imports slowly)."""
+"""The time limit (s) for a child's start. A busy Raspberry Pi imports slowly."""
 STAND_IN = "STAND-IN: rmf_adapter is not installed: no RMF directs these robots, and they patrol"
 PATIENCE_S = 1.5
-"""A simulated bus waits at least this long (s) for an answer: its far side shares this machine,
-which may be busy. The wait is no longer, because a call may take only half of the shortest
+"""The least time (s) for which a simulated bus waits for an answer. The far side shares this machine,
+which may be busy. The time is no longer, because a call may take only half of the shortest
 WatchdogSec (bridges/runtime/drop_in.py)."""
 
 
 class Simulation:
-    """The far sides of a file's buses. Far sides in separate processes start while the daemon starts.
+    """The far sides of a file's buses. Far sides in separate processes start at the same time as the
+    daemon.
 
-    Make it before the daemon changes directory: the file's relative paths must still be valid.
+    Make a Simulation before the daemon changes its directory, because the file's relative paths must be
+    valid.
     """
 
     def __init__(
         self, config: Config, runtime_dir: Path, *, log_format: LogFormat | None = None
     ) -> None:
-        """Start the far sides. `log_format`: a child's format for logging presses; None: no log."""
+        """Start the far sides. `log_format` is the format in which a child logs presses; None means no
+        log."""
         self._log = ["--log-format", log_format] if log_format else []
         self._config = config
         self._file = str(Path(config.path).resolve())
@@ -76,7 +79,7 @@ class Simulation:
         return StandIn()
 
     def close(self) -> None:
-        """End every fake. Close the buses first. May be called twice."""
+        """End every fake. Close the buses first. The caller may call `close` twice."""
         self._open.close()
 
     def socket_path(self, name: str) -> Path:
@@ -85,7 +88,8 @@ class Simulation:
         return self._runtime_dir / (f"plant-{name}.sock" if several else "plant.sock")
 
     def _has_process(self, name: str) -> bool:
-        """Has the bus's fake a process? This is found without importing the fake and its libraries."""
+        """Does the bus's fake run in a process of its own? The answer needs no import of the fake or
+        its libraries."""
         bus_type = self._config.bus_type(name)
         return bool(bus_type.fake) and not bus_type.fake_inside and self._shared is None
 
@@ -123,7 +127,7 @@ class Simulation:
             ],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            start_new_session=True,  # Ctrl-C in a terminal is for the daemon alone
+            start_new_session=True,  # Ctrl-C in a terminal must reach only the daemon
         )
         self._open.callback(_end, child)
         return child
@@ -153,7 +157,7 @@ def _first_line(child: "subprocess.Popen[bytes]", bus_name: str) -> dict[str, ob
 
 
 def _end(child: "subprocess.Popen[bytes]") -> None:
-    """End a child by closing its standard input; kill it if that fails."""
+    """End a child by closing its standard input. Kill the child if it does not end."""
     assert child.stdin is not None
     assert child.stdout is not None
     with contextlib.suppress(OSError):

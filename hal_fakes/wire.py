@@ -1,4 +1,4 @@
-"""The wire of the demos and the tests: `dds` where available, else `zenoh`."""
+"""The wire of the demos and the tests. It is `dds` if available, otherwise `zenoh`."""
 
 import os
 from typing import Literal
@@ -11,7 +11,8 @@ Wire = Literal["dds", "zenoh"]
 
 
 def wire() -> Wire:
-    """Return the environment's TRANSPORT, else a wire that runs here."""
+    """Return the wire in the environment variable TRANSPORT; without one, a wire that runs on this
+    machine."""
     named = os.environ.get("TRANSPORT") or runs_here()
     if named not in ("dds", "zenoh"):
         raise TransportError(f"TRANSPORT is {named!r}: dds or zenoh")
@@ -19,11 +20,12 @@ def wire() -> Wire:
 
 
 def runs_here() -> Wire:
-    """Return dds if cyclonedds imports, else zenoh, as `auto` does on a machine without ROS."""
+    """Return dds if cyclonedds can be imported, otherwise zenoh. `auto` does the same on a machine
+    without ROS."""
     return "zenoh" if missing_of_dds() else "dds"
 
 
 def join(name: str, domain_id: int) -> Transport:
-    """Join as a node of RMF's newest release on this wire, on this machine alone."""
+    """Join the graph on this wire, only on this machine, as a node of RMF's newest release."""
     rmf = Rmf(transport=wire(), domain_id=domain_id, release="kilted")
     return open_transport(rmf, name, localhost=True)

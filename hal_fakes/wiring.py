@@ -1,6 +1,6 @@
-"""The wires between a plant's signals and a bus's points (with addresses and levels).
+"""The wires between a plant's signals and a bus's points. Points have addresses and levels.
 
-For buses with points (GPIO, Modbus). `plants/contact.py` describes how wires fail.
+This is for buses with points (GPIO, Modbus). `plants/contact.py` describes how wires fail.
 """
 
 from collections.abc import Callable, Iterable
@@ -10,9 +10,10 @@ from hal_fakes.plants.plant import Plant
 
 
 class PlantWiring:
-    """The wires between one plant and one bus. `canonical` is the bus's spelling of a point.
+    """The wires between one plant and one bus. `canonical` returns the bus's spelling of a point.
 
-    `clears_s`: how soon a module clears the coil of a call that its controller has taken; None: never.
+    `clears_s`: the time (s) after which a module clears the coil of a call that its controller has
+    taken. None means never.
     """
 
     def __init__(
@@ -30,11 +31,12 @@ class PlantWiring:
         self.flashes = {canonical(w.flash.point): canonical(w.point) for w in wires if w.flash}
 
     def levels(self, now: float) -> dict[str, bool]:
-        """Return every input's level (True is high) by canonical point, at `now` (monotonic s)."""
+        """Return canonical point -> level (True is high) for every input, at `now` (monotonic s)."""
         self.plant.advance(now)
         return {p: w.level(self.plant.sense(w.signal)) for p, w in self.inputs.items()}
 
     def drive(self, point: str, level: bool, now: float) -> None:
-        """Set an output to the bus's level at `now`. Raises KeyError if it is not wired."""
+        """Set an output to this level of the bus at `now`. Raises KeyError if the output is not
+        wired."""
         wire = self.outputs[point]
         self.plant.drive(wire.signal, wire.asserted(level), now)

@@ -1,6 +1,7 @@
-"""The far side of a `can` bus, across processes: controllers behind an slcan adapter on a pty.
+"""The far side of a `can` bus across processes: controllers behind an slcan adapter on a
+pseudo-terminal.
 
-`side.py` lists the failures of the bus, `canopen_rcu.py` those of a CANopen receiver,
+`side.py` lists the failures of the bus, `canopen_rcu.py` those of a CANopen receiver, and
 `frame_charger.py` those of a charger with its own frames.
 """
 

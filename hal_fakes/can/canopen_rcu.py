@@ -46,14 +46,14 @@ class CanOpenRcu:
         self._send: Send | None = None
 
     def hear(self, message: can.Message, now: float, send: Send) -> None:
-        """Take a request, if it is for this node."""
+        """Take a request, if the request is for this node."""
         if self.plant.failures.get("node") in ("off", "stuck") or message.is_extended_id:
             return
         self._send = send
         self._network.notify(message.arbitration_id, bytearray(message.data), now)
 
     def tick(self, now: float, send: Send) -> None:
-        """Send the heartbeat."""
+        """Send the heartbeat if it is due."""
         off = self.plant.failures.get("node") == "off"
         if off and not self._was_off:
             self.plant.drive("power", False, now)
@@ -70,13 +70,13 @@ class CanOpenRcu:
         send(frame(0x700 + self._id, beat))
 
     def reply(self, can_id: int, answer: bytes) -> None:
-        """Send the library's answer, spoiled by the ordered failure."""
+        """Send the library's answer. An ordered failure spoils the answer first."""
         mode = self.plant.failures.get("node")
         if mode == "garbage":
             answer = answer[:5]
         elif mode == "wrong":
             answer = answer[:3] + bytes((answer[3] ^ 0x40,)) + answer[4:]
-        assert self._send  # there is no answer before a request
+        assert self._send  # an answer always comes after a request, which sets this
         self._send(frame(can_id, answer), late=mode == "slow")
 
     def _reading(self) -> Reading:
@@ -100,7 +100,7 @@ class CanOpenRcu:
 
 
 class _Network(canopen.Network):
-    """The library's network without its bus and its threads."""
+    """The library's network, without a bus and without threads."""
 
     def __init__(self, rcu: CanOpenRcu) -> None:
         super().__init__()

@@ -1,13 +1,13 @@
 """A charger with its maker's own CAN frames: a plant behind the driver's map.
 
-It charges while every frame of its map comes on time with the values of `on`. It stops when a frame has
-the values of `off`, or is missing for three periods. A busy machine delays this station as well as the
-daemon, so a long gap between two looks counts as one short gap. If the map has wake frames, the charger
-sleeps until a wake frame comes, and sleeps again after being off.
+The charger charges while every frame of its map comes on time with the values of `on`. It stops when a
+frame has the values of `off`, or is missing for three periods. A busy machine delays this station as
+well as the daemon. So a long gap between two looks of the station counts as one short gap. If the map
+has wake frames, the charger sleeps until a wake frame comes, and sleeps again after it was off.
 
-Failing part `node`, in addition to those of plant and bus: `off` is silent, `stuck` repeats its last
-status, `slow` sends a status every two seconds, `garbage` sends frames of six bytes, `wrong` an
-unlisted state.
+The part `node` can fail in addition to the parts of plant and bus. `off` is silent. `stuck` repeats its
+last status. `slow` sends a status every two seconds. `garbage` sends frames of six bytes. `wrong` sends
+an unlisted state.
 """
 
 import time
@@ -40,7 +40,7 @@ FLAGS: Final = {
     "too_far": "BadCoilPosition",
     "too_near": "BadCoilPosition",
 }
-"""The plant's faults and their error signals; no signal for foreign objects is published."""
+"""The plant's faults -> their error signals. The maker publishes no signal for foreign objects."""
 ROBOTS_FAULTS: Final = frozenset(FLAGS) - {"transmitter_fault", "foreign_object"}
 
 
@@ -64,7 +64,7 @@ class FrameCharger:
         self._status: list[can.Message] = []
 
     def hear(self, message: can.Message, now: float, send: Send) -> None:
-        """Take a frame that keeps the charge going, or ends the charge."""
+        """Take a frame that keeps the charge going or ends the charge."""
         self._look(now)
         extended = dbc.EXTENDED if message.is_extended_id else 0
         heard = message.arbitration_id | extended
@@ -82,7 +82,7 @@ class FrameCharger:
         self.plant.drive("power", self._fed(), now)
 
     def tick(self, now: float, send: Send) -> None:
-        """Stop if the frames for charging are missing; send the status."""
+        """Stop the charge if its frames are missing. Send the status."""
         self._look(now)
         mode = self.plant.failures.get("node")
         self.plant.drive("power", self._fed() and mode != "off", now)
@@ -98,7 +98,7 @@ class FrameCharger:
             send(_short(message) if mode == "garbage" else message)
 
     def _look(self, now: float) -> None:
-        """Count the time for which this station has watched the bus."""
+        """Add up the time during which this station has watched the bus."""
         self._watched_s += min(now - self._looked_at, STATUS_S)
         self._looked_at = now
 
@@ -160,7 +160,8 @@ class FrameCharger:
     def _by_rules(
         self, reading: Reading, natural: Mapping[str, float], wrong: bool
     ) -> dict[str, float]:
-        """Return values for signals of rules, error numbers and error bits, without error flags."""
+        """Return values for the signals of rules, error numbers and error bits. Error flags are left
+        out."""
         known = self._map
         flags = (*known.errors.station, *known.errors.robot)
         numbers = StationErrors(codes=known.errors.codes, bits=known.errors.bits)
@@ -172,7 +173,8 @@ class FrameCharger:
         return {at: float(value) for at, value in (found or {}).items() if at not in flags}
 
     def _code(self, state: State, reading: Reading) -> int:
-        """Return the first code of the plant's activity, or of the nearest activity in the map."""
+        """Return the first code of the plant's activity. If the map has none, return that of the
+        nearest activity."""
         lists = state.codes.lists()
         codes = lists[reading.activity] or lists[NEAREST.get(reading.activity, Activity.ERROR)]
         return codes[0]

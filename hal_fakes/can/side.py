@@ -1,4 +1,4 @@
-"""The far side of a CAN bus: a medium with stations, in their own thread.
+"""The far side of a CAN bus: a medium with stations, in a thread of their own.
 
 The medium is python-can's `virtual` bus within one process, or an slcan adapter on a pseudo-terminal
 across processes (`hal_fakes/can/slcan_port.py`). The part `bus` of any plant on the medium fails as
@@ -7,8 +7,8 @@ buses do:
 - `off`: the adapter is unplugged; a virtual bus is silent
 - `stuck`: nothing passes in either direction
 - `slow`: every frame from the far side comes too late
-- `garbage`: noise: bytes that are no slcan, or frames with random ids and content
-- `wrong`: the controller reports bus-off; an adapter cannot report, and passes only foreign frames
+- `garbage`: noise, which is bytes that are no slcan, or frames with random ids and content
+- `wrong`: the controller reports bus-off; an adapter cannot report, so it passes only foreign frames
 """
 
 import heapq
@@ -25,10 +25,10 @@ from drivers.hal.can import CanSettings
 from hal_fakes.plants.plant import FailureMode, Plant
 
 LOOK_S: Final = 0.02
-"""Greatest delay (s) of an ordered failure, a heartbeat or a status frame."""
+"""The maximum delay (s) of an ordered failure, a heartbeat or a status frame."""
 BUS_OFF: Final = 0x40
 SLOWNESS: Final = 1.5
-"""Delay of a slow answer, in multiples of the client's timeout."""
+"""The delay of a slow answer, as a multiple of the client's timeout."""
 
 
 def slow_s(settings: CanSettings) -> float:
@@ -37,7 +37,7 @@ def slow_s(settings: CanSettings) -> float:
 
 
 class Medium(Protocol):
-    """The wire. `replace`: replacements for the bus's settings."""
+    """The wire. `replace` holds the replacements for the bus's settings."""
 
     replace: dict[str, object]
 
@@ -45,24 +45,24 @@ class Medium(Protocol):
         """Return the daemon's next frame; None if no frame comes within `wait_s`."""
 
     def send(self, message: can.Message) -> None:
-        """Send to the daemon. The frame is lost if no program has the bus open."""
+        """Send a frame to the daemon. The frame is lost if no program has the bus open."""
 
     def fail(self, mode: FailureMode | None) -> None:
-        """Fail in this way from now on; None ends the failure. Called often."""
+        """Fail in this way from now on; None ends the failure. The far side calls this often."""
 
     def close(self) -> None:
-        """End. May be called twice."""
+        """End the medium. The caller may call `close` twice."""
 
 
 class Send(Protocol):
-    """A station's sending function."""
+    """The function with which a station sends."""
 
     def __call__(self, message: can.Message, late: bool = False) -> None:
-        """Send now; `late`: after the daemon has stopped waiting."""
+        """Send a frame now. With `late`, send it after the daemon has stopped waiting."""
 
 
 class CanStation(Protocol):
-    """One controller on the bus; its plant is behind it."""
+    """One controller on the bus, with its plant behind it."""
 
     plant: Plant
 
@@ -70,11 +70,11 @@ class CanStation(Protocol):
         """Take a frame from the daemon."""
 
     def tick(self, now: float, send: Send) -> None:
-        """Send what is due; called often."""
+        """Send every frame that is due. The far side calls this often."""
 
 
 class VirtualBus:
-    """python-can's `virtual` bus, opened by both sides under the name `channel`.
+    """python-can's `virtual` bus. Both sides open the bus under the name `channel`.
 
     `interface`: another interface of python-can, such as `socketcan` with the channel vcan0.
     """
@@ -90,12 +90,13 @@ class VirtualBus:
         return self._bus.recv(wait_s) if self._bus else None
 
     def send(self, message: can.Message) -> None:
-        """Send to every program that has the channel open."""
+        """Send a frame to every program that has the channel open."""
         if self._bus:
             self._bus.send(message)
 
     def fail(self, mode: FailureMode | None) -> None:
-        """Send noise while the mode is `garbage`. Report each bus-off once, and its end once."""
+        """Send noise in the mode `garbage`. Report each bus-off once, and the end of each bus-off
+        once."""
         if mode == "garbage":
             self.send(any_frame(self._noise))
         if (mode == "wrong") != self._off_told:
@@ -121,9 +122,9 @@ def any_frame(noise: random.Random) -> can.Message:
 
 
 class CanFarSide:
-    """A running far side. `replace`: replacements for the bus's settings.
+    """A running far side. `replace` holds the replacements for the bus's settings.
 
-    `slow_s`: delay of a frame sent late, or on a slow bus (s).
+    `slow_s`: the delay (s) of a frame that is sent late, or on a slow bus.
     """
 
     def __init__(self, medium: Medium, stations: Sequence[CanStation], slow_s: float) -> None:
@@ -138,7 +139,7 @@ class CanFarSide:
         self._thread.start()
 
     def close(self) -> None:
-        """End. May be called twice."""
+        """End the far side. The caller may call `close` twice."""
         self._closed.set()
         self._thread.join()
         self._medium.close()

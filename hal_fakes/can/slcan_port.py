@@ -1,9 +1,10 @@
-"""An slcan adapter behind a pseudo-terminal (LAWICEL): frames as lines of text, for another process.
+"""An slcan adapter behind a pseudo-terminal (LAWICEL). It carries frames as lines of text to another
+process.
 
     t123 2 0102 CR     frame 0x123 with two bytes; T and eight digits for an id of 29 bits
     Sn CR, O CR, C CR  bitrate, open, close
 
-The adapter acknowledges a frame with `z` or `Z`, and passes frames only while it is open.
+The adapter acknowledges a frame with `z` or `Z`. It passes frames only when it is open.
 """
 
 import os
@@ -26,7 +27,7 @@ DIGITS: Final = {"t": 3, "T": 8}
 
 
 class SlcanPort:
-    """A medium (`hal_fakes.can.side.Medium`). `settings`: the bus's own `slcan`, if it has one."""
+    """A medium (`hal_fakes.can.side.Medium`). `settings` is the bus's `slcan`, if the bus has one."""
 
     def __init__(self, settings: Slcan | None = None) -> None:
         self._directory = tempfile.TemporaryDirectory(prefix="rmf-slcan-")
@@ -41,7 +42,7 @@ class SlcanPort:
         self._open = False
 
     def receive(self, wait_s: float) -> can.Message | None:
-        """Return the daemon's next frame; obey commands."""
+        """Return the daemon's next frame. Obey commands that come before the frame."""
         while b"\r" not in self._heard:
             wire = self.adapter.wire
             readable = select.select([wire] if wire is not None else [], [], [], wait_s)[0]
@@ -55,14 +56,13 @@ class SlcanPort:
         return self._obey(line.decode("ascii", "replace"))
 
     def send(self, message: can.Message) -> None:
-        """Send to the daemon."""
+        """Send a frame to the daemon."""
         if self._open and not self._others:
             self._write(encoded(message))
 
     def fail(self, mode: FailureMode | None) -> None:
-        """`off` unplugs the adapter, `garbage` sends noise, `wrong` passes only other stations'
-        frames.
-        """
+        """Fail in this way: `off` unplugs the adapter, `garbage` sends noise, `wrong` passes only other
+        stations' frames."""
         if (mode == "off") != (self.adapter.wire is None):
             self._heard, self._open = b"", False
             (self.adapter.pull if mode == "off" else self.adapter.plug)()
@@ -73,7 +73,7 @@ class SlcanPort:
             self._write(encoded(any_frame(self._noise)))
 
     def close(self) -> None:
-        """Unplug permanently. May be called twice."""
+        """Unplug the adapter permanently. The caller may call `close` twice."""
         self.adapter.pull()
         self._directory.cleanup()
 
@@ -91,20 +91,20 @@ class SlcanPort:
 
     def _write(self, text: bytes) -> None:
         wire = self.adapter.wire
-        with suppress(OSError):  # without a reader the bytes are lost, as on a bus
+        with suppress(OSError):  # if nobody reads, the bytes are lost, as on a bus
             if wire is not None:
                 os.write(wire, text)
 
 
 def encoded(message: can.Message) -> bytes:
-    """Return the line for a frame."""
+    """Return the line of text for a frame."""
     letter = "T" if message.is_extended_id else "t"
     digits = f"{message.arbitration_id:0{DIGITS[letter]}X}"
     return f"{letter}{digits}{message.dlc}{bytes(message.data).hex().upper()}\r".encode()
 
 
 def decoded(line: str) -> can.Message:
-    """Return the frame in a line. Raises ValueError, IndexError."""
+    """Return the frame in a line of text. Raises ValueError or IndexError."""
     size = DIGITS[line[0]]
     count = int(line[1 + size])
     data = bytes.fromhex(line[2 + size : 2 + size + 2 * count])

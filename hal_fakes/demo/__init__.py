@@ -1,7 +1,7 @@
 """`make demo` and `make demo-charging`: daemons on fake hardware and RMF, on a real wire.
 
-`python -m hal_fakes.demo` starts the daemons of one demo and plays RMF to them: a robot goes through a
-door, rides a lift and charges (`ride`), or three robots share two chargers (`charging`).
+`python -m hal_fakes.demo` starts the daemons of one demo and plays RMF to them. In `ride` a robot goes
+through a door, rides a lift and charges. In `charging` three robots share two chargers.
 
     daemons.py   the daemons' processes, and the control sockets of their plants
     journal.py   events, and their printed lines

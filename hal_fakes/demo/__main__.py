@@ -1,5 +1,5 @@
-"""`python -m hal_fakes.demo [ride|charging|page]`: exit code 0 after a correct day, 1 with the
-reason, 130 after Ctrl-C. Nothing is left running in any case."""
+"""`python -m hal_fakes.demo [ride|charging|page]`: the exit code is 0 after a correct day, 1 with the
+reason after an error, and 130 after Ctrl-C. The demo never leaves a process running."""
 
 import argparse
 import sys

@@ -1,7 +1,7 @@
-"""`make demo-page`: two lifts, two doors, two chargers, five robots riding endlessly, and the page.
+"""`make demo-page`: two lifts, two doors, two chargers, five robots that ride endlessly, and the page.
 
-The daemons and the page are processes of their own. This process plays the fleet adapters, lets
-something fail every minute, and ends with Ctrl-C.
+The daemons and the page are processes of their own. This process plays the fleet adapters, lets a part
+fail every minute, and ends with Ctrl-C.
 """
 
 import secrets
@@ -36,7 +36,7 @@ FAULTS: Final = (
     (PAD_A, "fail", "server", "off", "ok"),
     (LIFT2, "fail", "unit", "off", "ok"),
 )
-"""Device, order, part or signal, mode, and the mode that ends the fault."""
+"""The faults in their order: device, order, part or signal, mode, and the mode that ends the fault."""
 FAULT_EVERY_S, FAULT_LASTS_S = 60.0, 15.0
 DRIVES_S: Final = 3.0
 CHARGES_S: Final = 20.0
@@ -56,7 +56,7 @@ class Rider:
         self._until = 0.0
 
     def go_on(self, now: float) -> None:
-        """Begin the next step, if the present step is done."""
+        """Begin the next step, if the present step is over."""
         match self._step:
             case Phase():
                 done = self.robot.done
@@ -76,7 +76,8 @@ class Rider:
 def errands(
     robot: RobotContext, lift: str, door: str, floors: tuple[str, str], levels: dict[str, str]
 ) -> Iterator[Step]:
-    """Yield steps endlessly: through a door, up or down in a lift, a rest. `levels`: robot -> level."""
+    """Yield the robot's steps endlessly: through a door, up or down in a lift, a rest. `levels` is
+    robot -> level."""
     there = cycle((floors, floors[::-1]))
     for start, goal in there:
         yield DoorOpen(door)
@@ -94,7 +95,7 @@ def errands(
 
 
 def charges(world: World, robot: str, charger: str) -> Iterator[Step]:
-    """Yield steps endlessly: onto the pad, a while of charging, off the pad."""
+    """Yield the robot's steps endlessly: onto the pad, some charging, off the pad."""
     numbers = count(1)
     request_at = [0.0]
 
@@ -120,7 +121,7 @@ def charges(world: World, robot: str, charger: str) -> Iterator[Step]:
 
 
 def live(world: World) -> None:
-    """Play endlessly."""
+    """Play the day endlessly."""
     rides = (
         ("R1", LIFT1, WARD, ("L1", "L3")),
         ("R2", LIFT1, SIDE, ("L2", "L4")),
@@ -188,7 +189,7 @@ def _fleet(riders: list[Rider], levels: Mapping[str, str], now: float) -> d.Flee
 
 
 def dawns(world: World) -> bool:
-    """Is every daemon up, with a state from its sensors?"""
+    """Is every daemon up, and has it published a state from its sensors?"""
     devices = (LIFT1, LIFT2, WARD, SIDE, PAD_A, PAD_E)
     return all(world.journal.latest(device) is not None for device in devices)
 

@@ -98,7 +98,7 @@ def _waits(world: World, fleets: DemoFleets, who: str, why: str, within_s: float
 
 
 def _mended(world: World, charger: str) -> None:
-    """Mend and reset as a technician does, with `rmf-bridge reset`."""
+    """Mend the charger, and reset its daemon as a technician does, with `rmf-bridge reset`."""
     world.note("is cooled and reset by the technician", charger)
     world.press(charger, "over_temperature", False)
     world.daemons[charger].reset()
@@ -198,11 +198,11 @@ def _robot_faulty(world: World, fleets: DemoFleets) -> None:
 # --- the verdict: pure -------------------------------------------------------------------------
 
 CHARGED: Final = {A: [ONE, TWO, ONE, ONE, ONE, ONE], B: [PORTER, TWO, ONE]}
-"""The only charges allowed: robot and charger, in order."""
+"""The only charges that are allowed. Each charger has its robots in their order."""
 
 
 def problems(journal: Journal) -> list[str]:
-    """Return all errors of the day; empty if it went right."""
+    """Return all errors of the day. The list is empty after a correct day."""
     states = [state for state in journal.states if isinstance(state, d.ChargerState)]
     return [*_charged(states), *_shared(states), *_unverified(states)]
 
@@ -216,7 +216,7 @@ def _charged(states: list[d.ChargerState]) -> Iterable[str]:
 
 
 def _shared(states: list[d.ChargerState]) -> Iterable[str]:
-    """Find robots on two chargers at once, by the chargers' states."""
+    """Yield an error for each robot that is on two chargers at once, by the chargers' states."""
     latest: dict[str, d.ChargerState] = {}
     for state in states:
         latest[state.charger_name] = state
@@ -227,7 +227,7 @@ def _shared(states: list[d.ChargerState]) -> Iterable[str]:
 
 
 def _unverified(states: list[d.ChargerState]) -> Iterable[str]:
-    """Find charges that the coordinator did not request."""
+    """Yield an error for each charge that the coordinator did not request."""
     for state in states:
         if _charging(state) and not state.request_id.startswith("charger_coordinator/"):
             yield f"{state.charger_name} charged for {state.request_id or 'no request'}"

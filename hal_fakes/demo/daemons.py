@@ -1,4 +1,5 @@
-"""The demo's daemons: real processes, and the control sockets of the plants behind them."""
+"""The demo's daemons. They are real processes, and the control sockets lead to the plants behind
+them."""
 
 import os
 import signal
@@ -22,13 +23,13 @@ TAIL = 15
 
 
 class DemoFailed(Exception):
-    """The demo failed; the text names the missing event."""
+    """The error of a demo that failed. Its text names the missing event."""
 
 
 class Program:
-    """One `rmf-bridge …`, in its own session.
+    """One `rmf-bridge …` in a session of its own.
 
-    So Ctrl-C in the terminal reaches only the demo, which stops every program in order.
+    So Ctrl-C in the terminal reaches only the demo. The demo stops every program in order.
     """
 
     def __init__(self, name: str, log: Path, words: Iterable[str], domain_id: int) -> None:
@@ -57,7 +58,7 @@ class Program:
         return "\n".join(self.log.read_text(errors="replace").splitlines()[-TAIL:])
 
     def ask_to_stop(self) -> None:
-        """Send SIGTERM: the daemon switches outputs off and leaves the graph."""
+        """Send SIGTERM. The daemon then switches its outputs off and leaves the graph."""
         if not self._exited():
             os.kill(self._process.pid, signal.SIGTERM)
 
@@ -70,7 +71,8 @@ class Program:
         self._process.wait()
 
     def _exited(self) -> bool:
-        """Has the program exited? It is not reaped: pid and session id stay reserved until `end`."""
+        """Has the program exited? It is not reaped, so its pid and session id stay reserved until
+        `end`."""
         if self._process.returncode is not None:
             return True
         look = os.WEXITED | os.WNOHANG | os.WNOWAIT
@@ -86,13 +88,13 @@ class DaemonProcess(Program):
         super().__init__(file.stem, directory / f"{file.stem}.log", words, domain_id)
 
     def follow(self, tell: Callable[[Edge], None]) -> None:
-        """Call `tell`, on a thread, with every edge of the daemon's plants from now on."""
+        """Call `tell` for every edge of the daemon's plants from now on. A thread makes the calls."""
         caller = self._caller()
         caller.order("follow")
         threading.Thread(target=_read, args=(caller, tell), daemon=True).start()
 
     def order(self, line: str) -> None:
-        """Give the daemon's plants one order. Raises DemoFailed if they refuse."""
+        """Give the daemon's plants one order. Raises DemoFailed if the simulation refuses the order."""
         with self._caller() as caller:
             try:
                 caller.order(line)
@@ -100,7 +102,7 @@ class DaemonProcess(Program):
                 raise DemoFailed(str(error)) from None
 
     def reset(self) -> None:
-        """Reset as `rmf-bridge reset` does."""
+        """Reset the daemon as `rmf-bridge reset` does."""
         if not self._exited():
             os.kill(self._process.pid, signal.SIGUSR1)
 
@@ -117,7 +119,7 @@ class DaemonProcess(Program):
 
 
 class PageProcess(Program):
-    """`rmf-bridge page`; user `demo` may log in."""
+    """`rmf-bridge page`. The user `demo` may log in."""
 
     def __init__(self, directory: Path, domain_id: int, password: str) -> None:
         self._password = password
@@ -129,7 +131,7 @@ class PageProcess(Program):
         super().__init__("page", directory / "page.log", words, domain_id)
 
     def address(self) -> str:
-        """Return the page's address, once logged."""
+        """Return the page's address after the page has logged it."""
         deadline = time.monotonic() + CONNECT_WITHIN_S
         while not (said := [line for line in self.tail().splitlines() if "http://" in line]):
             self.check()
@@ -140,7 +142,7 @@ class PageProcess(Program):
 
 
 def _page_port() -> str:
-    """Return PAGE_PORT if it is set, else 8080, or 0 (any free port) if 8080 is taken."""
+    """Return PAGE_PORT if it is set, otherwise 8080. If 8080 is taken, return 0 (any free port)."""
     if given := os.environ.get("PAGE_PORT"):
         return given
     try:
@@ -157,7 +159,7 @@ def _read(caller: Caller, tell: Callable[[Edge], None]) -> None:
 
 
 def stop_all(daemons: Iterable[Program], within_s: float = STOP_WITHIN_S) -> None:
-    """End every daemon, within `within_s` or by force."""
+    """End every daemon. A daemon that still runs after `within_s` seconds is killed."""
     daemons = list(daemons)
     for daemon in daemons:
         daemon.ask_to_stop()

@@ -1,6 +1,6 @@
-"""Run a demo: start the daemons, play the day, give the verdict, leave nothing running.
+"""Runs a demo: starts the daemons, plays the day, gives the verdict, and leaves no process running.
 
-Exit code 0 after a correct day, 1 with the reason, 130 after Ctrl-C.
+The exit code is 0 after a correct day, 1 with the reason after an error, and 130 after Ctrl-C.
 """
 
 import shutil
@@ -32,17 +32,24 @@ Failure = tuple[str, str, str]
 
 
 class Interrupted(Exception):
-    """Ctrl-C, or another signal to end."""
+    """The end of a demo by Ctrl-C or another signal."""
 
 
 @dataclass(frozen=True, slots=True)
 class Demo:
-    """`files`: device -> its daemon's YAML. `dawn`: the state of everything in the morning, in words;
-    `dawns` checks it. `live`: the day itself; raises DemoFailed when an awaited event is late.
-    `problems`: the errors of the day, from the journal alone. `right`: the day in a sentence.
-    `outcomes`: the results of the parts of the day, if the summary lists them.
-    `page_password`: the page is served too; user `demo` may log in with this password.
-    `publishes`: the topics of RMF's side; without the supervisors' topics if real supervisors run."""
+    """One demo.
+
+    - `files`: device -> its daemon's YAML.
+    - `dawn`: the state of everything in the morning, in words. `dawns` checks this state.
+    - `live`: the day itself. It raises DemoFailed when an awaited event is late.
+    - `problems`: the errors of the day, from the journal alone.
+    - `right`: a sentence that sums up a correct day.
+    - `outcomes`: the results of the parts of the day, if the summary lists them.
+    - `page_password`: if given, the page is served too, and the user `demo` may log in with this
+      password.
+    - `publishes`: the topics that RMF's side publishes. The supervisors' topics are left out if real
+      supervisors run.
+    """
 
     files: dict[str, Path]
     dawn: str
@@ -56,9 +63,9 @@ class Demo:
 
 
 class DemoRun:
-    """One run of a demo; `failures` are set before the day begins.
+    """One run of a demo. `failures` are set before the day begins.
 
-    `patience`: factor on every step's time limit.
+    `patience`: a factor on every step's time limit.
     """
 
     def __init__(self, demo: Demo, failures: Sequence[Failure] = (), patience: float = 1.0) -> None:
@@ -74,7 +81,7 @@ class DemoRun:
         self._interrupted = False
 
     def play(self) -> int:
-        """Return the exit code; keep the daemons' logs only after an error."""
+        """Play the demo and return its exit code. Keep the daemons' logs only after an error."""
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._interrupt)
         directory = Path(tempfile.mkdtemp(prefix="rmf-demo-"))
@@ -128,7 +135,8 @@ class DemoRun:
 
     @contextmanager
     def _up(self, directory: Path) -> Iterator[Transport]:
-        """Start every daemon on a private domain and loopback; yield RMF's side on the same graph."""
+        """Start every daemon on a private domain and on loopback. Yield RMF's side on the same
+        graph."""
         domain = free_domain()
         count = len(self.demo.files)
         begun = f"{count} daemons on fake hardware, {wire()}, domain {domain}, loopback only"
@@ -149,7 +157,8 @@ class DemoRun:
             transport.close()
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
-        """Only note the signal: the step under way is completed first, so nothing is left behind."""
+        """Record the signal, and do nothing else. The present step is completed first, so no process is
+        left behind."""
         self._interrupted = True
 
     def _check(self) -> None:
@@ -173,7 +182,7 @@ class DemoRun:
 
 
 def _columns() -> int:
-    """Return the terminal's width; 0 for a pipe or file."""
+    """Return the terminal's width in characters. Return 0 for a pipe or file."""
     return columns_of(sys.stdout)
 
 

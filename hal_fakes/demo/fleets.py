@@ -1,7 +1,7 @@
-"""The fleets of `make demo-charging` and the pads that their robots stand on.
+"""The fleets of `make demo-charging`, and the pads that their robots stand on.
 
-A robot that arrives at a charger's waypoint stands on that charger's pad, and the battery fills while
-the charger reports CHARGING. The first fleet's finishing request is `charge`, the second fleet's is
+A robot that arrives at a charger's waypoint stands on that charger's pad. Its battery fills while the
+charger reports CHARGING. The first fleet's finishing request is `charge`, and the second fleet's is
 `nothing`.
 """
 
@@ -22,14 +22,13 @@ WARD: Final = "ward"
 DRIVE_S: Final = 1.0
 FILLS_PER_S: Final = 15.0
 CONFIGURED: Final = {"tiny": Path(__file__).parents[2] / "config" / "fleet_tiny.yaml"}
-"""Fleets made from their adapter's configuration; other fleets have only FINISHING."""
+"""Fleet -> its adapter's configuration. A fleet that is missing here has only FINISHING."""
 FINISHING: Final[dict[str, Finishing]] = {"porter": "nothing"}
 
 
 class DemoFleets(Party):
-    """Both fleets, as one party on RMF's side, and the coordinator's diagnostics: `queue` is its queue,
-    `shown` has all keys and values.
-    """
+    """Both fleets as one party on RMF's side, with the coordinator's diagnostics. `queue` is the
+    coordinator's queue. `shown` has all keys and values of the diagnostics."""
 
     subscribes: Sequence[AnyTopic] = (CHARGING_ASSIGNMENTS, DIAGNOSTICS)
 
@@ -57,7 +56,7 @@ class DemoFleets(Party):
         return [said for fleet in self.fleets.values() for said in fleet.hear(message, now)]
 
     def tick(self, now: float) -> list[Said]:
-        """Drive robots on, fill batteries, move robots onto and off pads."""
+        """Drive robots on, fill batteries, and move robots onto and off pads."""
         said = [said for fleet in self.fleets.values() for said in fleet.tick(now)]
         self._fill(now)
         for who in self._who.values():
@@ -75,7 +74,7 @@ class DemoFleets(Party):
         return self.fleets[self._who[who].fleet].robots[who]
 
     def needs(self, who: str, percent: float) -> None:
-        """Let RMF find the robot's battery low."""
+        """Lower the robot's battery, so that RMF finds it low."""
         self.world.note(f"is at {percent:.0f} %: its fleet begins a ChargeBattery", who)
         self.fleets[self._who[who].fleet].charge(who, self.world.wall(), percent)
 
@@ -85,7 +84,7 @@ class DemoFleets(Party):
         self.fleets[self._who[who].fleet].works(who, place, self.world.wall())
 
     def rests(self, who: str, percent: float) -> None:
-        """End the robot's work."""
+        """End the robot's work, with this charge of its battery."""
         robot, fleet = self.robot(who), self.fleets[self._who[who].fleet]
         robot.battery_percent = percent
         finishing = f"finishing_request: {fleet.finishing}"
@@ -100,7 +99,7 @@ class DemoFleets(Party):
     # ---- inside
 
     def _diagnosed(self, message: d.DiagnosticArray) -> None:
-        """Note the coordinator's queue when it changes."""
+        """Record the coordinator's queue when it changes."""
         for status in message.status:
             values = {pair.key: pair.value for pair in status.values}
             if values.get("kind") == "charger_coordinator" and "queue" in values:
@@ -117,7 +116,7 @@ class DemoFleets(Party):
                 robot.battery_percent = min(100.0, percent)
 
     def _stands(self, who: RobotName) -> None:
-        """Put robots onto pads, and take them off."""
+        """Put a robot onto the pad of its charger, and take a robot that has left off its pad."""
         before = self._on_pad.get(who.name)
         charger = self._stations.get((who.fleet, self.robot(who.name).place))
         if charger == before:
@@ -144,11 +143,11 @@ def _fleet(name: str, site: CoordinatorSettings) -> FleetAdapter:
 def tutorial_fleet(
     file: Path, graph: Graph, drive_s: float, only: Collection[str] = ()
 ) -> FleetAdapter:
-    """Make a fleet from its adapter's configuration file (in the form of RMF's tutorial), each
-    robot at its charger's waypoint. Raises SettingsError, or ValueError.
+    """Make a fleet from its adapter's configuration file (in the form of RMF's tutorial). Each robot
+    begins at its charger's waypoint. Raises SettingsError or ValueError.
 
-    `graph`: its navigation graph. `drive_s`: the time of every drive. `only`: these robots; empty: all
-    of the file.
+    `graph`: the fleet's navigation graph. `drive_s`: the time (s) of every drive. `only`: the robots to
+    take from the file; if empty, all of them.
     """
     found = load_fleet(str(file))
     places: dict[str, str] = {}

@@ -1,4 +1,4 @@
-"""The demo's events in order of time, with one readable line for each."""
+"""The demo's events in the order of time. Each event has one readable line."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -12,7 +12,8 @@ from hal_fakes.plants.plant import Edge
 
 What = Literal["robot", "request", "relay", "sensor", "state", "place", "alert", "demo"]
 SETTLES_S = 0.15
-"""How long lines wait to be sorted (s): events arrive on several ways, each stamped at its source."""
+"""The time (s) for which a line waits for sorting. Events arrive on several ways, and each source
+stamps its own events."""
 COLOURS = {
     "request": 36,
     "relay": 33,
@@ -26,7 +27,7 @@ COLOURS = {
 
 @dataclass(frozen=True, slots=True)
 class JournalLine:
-    """One printed line; `at` is monotonic s."""
+    """One printed line. `at` is in monotonic seconds."""
 
     at: float
     what: What
@@ -34,8 +35,8 @@ class JournalLine:
     text: str
 
     def render(self, began_at: float, *, colour: bool, columns: int = 0) -> str:
-        """`   1.234 s  state    Lift1       car at L1, door open, mode AGV`. `columns`: the terminal's
-        width; 0 for one line of any length."""
+        """Return a line such as `   1.234 s  state    Lift1       car at L1, door open, mode AGV`.
+        `columns` is the terminal's width; 0 allows a line of any length."""
         start = f"{self.at - began_at:8.3f} s  "
         body = f"{self.what:<7}  {self.device:<10}  {self.text}"
         if columns:
@@ -45,7 +46,7 @@ class JournalLine:
 
 
 class Journal:
-    """All events. Repeats are kept and counted, but not printed."""
+    """All events. Repeats are kept and counted, but are not printed."""
 
     def __init__(
         self,
@@ -67,27 +68,27 @@ class Journal:
         self._told: dict[tuple[str, str], str] = {}
 
     def edge(self, edge: Edge) -> None:
-        """Note a change of a daemon's relay or of a plant's contact."""
+        """Record a change of a daemon's relay or of a plant's contact."""
         self.edges.append(edge)
         value = ("off", "on")[edge.value] if isinstance(edge.value, bool) else edge.value
         self._add(JournalLine(edge.at, edge.what, edge.device, f"{edge.signal} {value}"))
 
     def request(self, message: Requested, at: float) -> None:
-        """Note a request to a node."""
+        """Record a request to a node."""
         self.requests.append(message)
         self._once(JournalLine(at, "request", words.device(message), words.request(message)))
 
     def state(self, message: Stated, at: float) -> None:
-        """Note a node's state."""
+        """Record a node's state."""
         self.states.append(message)
         self._once(JournalLine(at, "state", words.device(message), words.described(message)))
 
     def note(self, what: What, text: str, at: float, device: str = "") -> None:
-        """Note a robot's action or destination, a person's alert, or a step of the demo."""
+        """Record a robot's action or destination, a person's alert, or a step of the demo."""
         self._add(JournalLine(at, what, device, text))
 
     def forget(self) -> None:
-        """Keep only each device's latest events, for an endless demo."""
+        """Drop all events except each device's latest. An endless demo needs this."""
         latest = {words.device(state): state for state in self.states}
         self.states[:] = latest.values()
         self.edges.clear()
@@ -102,7 +103,7 @@ class Journal:
             self._write(shown + "\n")
 
     def begin_day(self) -> None:
-        """Start the counts: keep only the last state of each device."""
+        """Start the counts. Drop all states except each device's last."""
         self.states = [*{words.device(state): state for state in self.states}.values()]
         self.edges, self.requests = [], []
 
@@ -123,7 +124,7 @@ class Journal:
         return counts
 
     def _once(self, line: JournalLine) -> None:
-        """Add a line, unless it equals the device's last line of this sort."""
+        """Add a line, unless the line equals the device's last line of this sort."""
         key = (line.what, line.device)
         if self._told.get(key) != line.text:
             self._told[key] = line.text

@@ -1,5 +1,5 @@
-"""`make demo`: a robot's day, through a door, up in a lift and to a charger, as a fleet adapter drives
-it; and the verdict, from the journal alone."""
+"""`make demo`: a robot's day. A fleet adapter drives the robot through a door, up in a lift and to a
+charger. The verdict uses the journal alone."""
 
 from collections.abc import Iterable
 from itertools import groupby
@@ -25,7 +25,7 @@ CHARGE_S: Final = 3.0
 
 
 def dawns(world: World) -> bool:
-    """Is every daemon up and listening, with its sensors' state published?"""
+    """Is every daemon up and listening, and has it published its sensors' state?"""
     lift = world.journal.latest(LIFT)
     return (
         world.listened_to(topics.LIFT_REQUESTS, topics.DOOR_REQUESTS, topics.CHARGER_REQUESTS)
@@ -53,7 +53,7 @@ def live(world: World) -> None:
 def _phase(
     world: World, robot: RobotContext, phase: Phase, text: str, within_s: float, what: str
 ) -> None:
-    """Let the robot's fleet adapter begin a phase, and end it."""
+    """Let the robot's fleet adapter begin a phase, and wait for the end of the phase."""
     world.note(text, SESSION)
     world.say(robot.begin(phase, world.wall()))
     world.until(lambda: robot.done, within_s, what)
@@ -122,12 +122,12 @@ RELAYS = {
         ("agv_mode_request", False),
     ],
 }
-"""All the relay edges that the day must have."""
+"""Device -> the relay edges that the day must have, and no others."""
 CHARGING = ["IDLE", "ASSIGNED", "CHARGING", "RELEASED", "IDLE"]
 
 
 def problems(journal: Journal) -> list[str]:
-    """Return all errors of the day; empty if it went right."""
+    """Return all errors of the day. The list is empty after a correct day."""
     return [*_relays(journal), *_door(journal), *_lift(journal), *_charger(journal)]
 
 
@@ -181,7 +181,7 @@ def _charger(journal: Journal) -> Iterable[str]:
 
 
 def _in_order(values: Iterable[str]) -> list[str]:
-    """Return the items without repeats."""
+    """Return the items in their order, each only once."""
     return [value for value, _ in groupby(values)]
 
 

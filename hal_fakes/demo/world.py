@@ -1,7 +1,7 @@
 """RMF's side of a demo on a real graph: supervisors, fleet adapters, robots, and the messages heard.
 
-Requests go the whole way through RMF: a fleet adapter publishes on the adapter topics; the supervisor
-hears them on the wire and publishes on the daemon's topic.
+Requests go the whole way through RMF. A fleet adapter publishes on the adapter topics. The supervisor
+hears these messages on the wire, and publishes on the daemon's topic.
 """
 
 import time
@@ -43,10 +43,10 @@ LOOK_EVERY_S: Final = 0.05
 
 
 class World:
-    """One inbox for messages and edges; the day waits in `until`, and meanwhile RMF works.
+    """One inbox for messages and edges. The day waits in `until`, and RMF works during the wait.
 
-    `places`: each robot's assigned place to charge or wait. `alerts`: texts for a person.
-    `page`: the page's address line, if there is a page.
+    `places`: robot -> its assigned place to charge or wait. `alerts`: texts for a person. `page`: the
+    line with the page's address, if there is a page.
     """
 
     def __init__(
@@ -59,10 +59,9 @@ class World:
         *,
         publishes: Iterable[AnyTopic] = PUBLISHED,
     ) -> None:
-        """Join the graph. `check`: called all the time; raises when the demo must end. `patience`:
-        factor on the time limits of `until`. `publishes`: the topics published here; a supervisor that
-        hears another publisher of its topics waits.
-        """
+        """Join the graph. `check` is called all the time, and raises when the demo must end. `patience`
+        is a factor on the time limits of `until`. `publishes` are the topics published from here. A
+        supervisor waits if it hears another publisher on its topics."""
         self.daemons = daemons
         self.journal = journal
         self.places: dict[str, str] = {}
@@ -78,11 +77,11 @@ class World:
         }
         self._heard: set[str] = set()
         self._hear(*STATES, topics.CHARGING_ASSIGNMENTS, topics.ALERT)
-        for topic in TO_DAEMONS:  # our own messages are noted on sending
+        for topic in TO_DAEMONS:  # our own messages are recorded when we send them
             transport.subscribe(topic, self._to_inbox(topic), others_only=True)
 
     def edge(self, edge: Edge) -> None:
-        """Note a plant's edge; from any thread."""
+        """Record a plant's edge. Any thread may call this."""
         self._inbox.put(lambda: self.journal.edge(edge))
 
     def join(self, *parties: Party) -> None:
@@ -93,7 +92,7 @@ class World:
     # ---- questions of the day
 
     def wall(self) -> float:
-        """RMF's clock (s since the epoch)."""
+        """Return the time of RMF's clock (s since the epoch)."""
         return time.time()
 
     def listened_to(self, *to: AnyTopic) -> bool:
@@ -106,7 +105,7 @@ class World:
         return isinstance(latest, d.DoorState) and latest.current_mode.value == mode
 
     def charger_is(self, charger: str, state: str, robot: str = "", error: str = "") -> bool:
-        """Has the charger's last state these values: state, robot, part of the error message?"""
+        """Has the charger's last state this state and robot, and this text in its error message?"""
         latest = self.journal.latest(charger)
         return (
             isinstance(latest, d.ChargerState)
@@ -122,7 +121,7 @@ class World:
     # ---- actions of the day
 
     def say(self, said: Iterable[Said]) -> None:
-        """Publish these messages, and note messages to a daemon in the journal."""
+        """Publish these messages. Record messages to a daemon in the journal."""
         for topic, message in said:
             if topic in TO_DAEMONS:
                 assert isinstance(message, Requested)
@@ -130,20 +129,20 @@ class World:
             self._publishers[topic.name].publish(message)
 
     def press(self, device: str, signal_name: str, on: bool) -> None:
-        """Act on a plant as a person or the building."""
+        """Act on a plant as a person does, or as the building does."""
         self.daemons[device].order(f"press {device} {signal_name} {'on' if on else 'off'}")
 
     def fail(self, device: str, part: str, mode: str) -> None:
-        """Let a part of a plant fail, or mend it (`ok`)."""
+        """Let a part of a plant fail. The mode `ok` mends the part."""
         self.daemons[device].order(f"fail {device} {part} {mode}")
 
     def note(self, text: str, who: str = "") -> None:
-        """Note a line about a robot or the demo."""
+        """Add a line about a robot or the demo to the journal."""
         self.journal.note("robot" if who else "demo", text, time.monotonic(), who)
 
     @contextmanager
     def leg(self, name: str, text: str = "") -> Iterator[None]:
-        """Time a part of the day; announce it if there is a text."""
+        """Time a part of the day. If there is a text, announce the part with it."""
         began_at = time.monotonic()
         if text:
             self.note(f"-- {name}: {text}")
@@ -156,9 +155,9 @@ class World:
     def until(
         self, ready: Callable[[], bool], within_s: float, what: str, repeat: Said | None = None
     ) -> None:
-        """Run until `ready`. `repeat`: messages to publish now and every second.
+        """Run until `ready()`. `repeat`: messages to publish now and then every second.
 
-        Raises DemoFailed with `what` after `within_s` times the patience.
+        Raises DemoFailed with the text `what` after `within_s` times the patience.
         """
         within_s *= self._patience
         deadline = time.monotonic() + within_s
@@ -172,7 +171,7 @@ class World:
             self._turn(LOOK_EVERY_S)
 
     def shows(self, what: str, ready: Callable[[], bool], within_s: float = 10.0) -> None:
-        """Wait for this fact, and print it. Raises DemoFailed after the time limit."""
+        """Wait for this fact, and print the fact. Raises DemoFailed after the time limit."""
         self.until(ready, within_s, what)
         self.note(f"   so: {what}")
 

@@ -1,16 +1,16 @@
 """The far side of a `modbus` bus: a real pymodbus TCP server on 127.0.0.1, as a gateway with units.
 
-A bus on a serial line has its own far side, `hal_fakes/modbus/rtu.py`.
+A bus on a serial line has a far side of its own, `hal_fakes/modbus/rtu.py`.
 
 Each device's points are bits of its units, with the plant behind them. As at a gateway, an unknown
-address gets exception 2 and an unknown unit exception 11. On command (`fail DEVICE unit|server MODE`)
-one unit, or the server with all units, is
+address gets exception 2, and an unknown unit gets exception 11. The order `fail DEVICE unit|server
+MODE` lets one unit, or the server with all units, fail:
 
 - `off`: the unit is silent; the server refuses and drops connections
-- `stuck`: the unit's inputs stay as they were; the server takes requests and never answers
+- `stuck`: the unit's inputs stay unchanged; the server takes requests and never answers
 - `slow`: the reply comes after the client has stopped waiting
-- `garbage`: bytes that are no Modbus, or half a reply
-- `wrong`: the unit answers exception 4, the server for another transaction, or as another unit
+- `garbage`: the reply is bytes that are no Modbus, or half a reply
+- `wrong`: the unit answers exception 4; the server answers for another transaction, or as another unit
 """
 
 import asyncio
@@ -33,7 +33,7 @@ from hal_fakes.modbus.units import FakeUnits, FarSide
 
 _aiohttp = sys.modules.get("aiohttp")
 sys.modules["aiohttp"] = None  # type: ignore[assignment]  # as if it were not installed
-try:  # pymodbus would import aiohttp for an unused page: half of a start's time
+try:  # otherwise pymodbus imports aiohttp, which takes half of a start's time
     from pymodbus.server import ModbusTcpServer
 finally:
     del sys.modules["aiohttp"]
@@ -42,9 +42,9 @@ finally:
 
 TRANSACTION: Final = 0
 UNIT: Final = 6
-"""Positions of transaction number and unit in a reply on TCP."""
+"""The positions (bytes) of transaction number and unit in a reply on TCP."""
 LOOK_S: Final = 0.02
-"""Greatest delay (s) with which the server obeys `off`."""
+"""The maximum delay (s) with which the server obeys `off`."""
 READY_S: Final = 10.0
 
 
@@ -62,9 +62,10 @@ logging.getLogger("pymodbus").setLevel(logging.WARNING)  # a daemon's log may be
 
 
 class ModbusServer:
-    """A running server, with an asyncio loop in its own thread.
+    """A running server, whose asyncio loop has a thread of its own.
 
-    `replace`: replacements for the bus's settings. `devices`: may be the units of another way to them.
+    `replace`: the replacements for the bus's settings. `devices`: the units; another server may serve
+    the same units.
     """
 
     def __init__(self, devices: Iterable[FarSide] | FakeUnits, slow_s: float) -> None:
@@ -72,7 +73,7 @@ class ModbusServer:
         self._noise = random.Random("modbus")
         self._kinds = itertools.cycle((0, 1))
         self._port = 0
-        self._server: Any = None  # pymodbus has no types for its sockets, or for our context
+        self._server: Any = None  # pymodbus's sockets and our context have no types
         self._closed = False
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="modbus", daemon=True)
@@ -82,7 +83,7 @@ class ModbusServer:
         self.replace: dict[str, object] = {"tcp": {"host": "127.0.0.1", "port": self._port}}
 
     def close(self) -> None:
-        """Close every connection. May be called twice."""
+        """Close every connection. The caller may call `close` twice."""
         if self._closed:
             return
         self._closed = True
@@ -111,10 +112,10 @@ class ModbusServer:
         if self._server is not None:
             server, self._server = self._server, None
             await server.shutdown()
-        await asyncio.sleep(0)  # the connections close in the loop's next round
+        await asyncio.sleep(0)  # the connections close in the next round of the loop
 
     async def _look(self) -> None:
-        """Stop or start the server as ordered, and let watchdogs trip."""
+        """Stop or start the server as ordered. Let watchdogs trip."""
         while True:
             self.units.tick()
             off = self.units.failure("server") == "off"
@@ -139,7 +140,8 @@ class ModbusServer:
 
 
 def _placeholder() -> SimDevice:
-    """Make the registers that pymodbus demands; the plants have the real registers."""
+    """Make the registers that pymodbus demands. They are unused, because the plants have the real
+    registers."""
     return SimDevice(0, simdata=SimData(0, datatype=DataType.REGISTERS))
 
 

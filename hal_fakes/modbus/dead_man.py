@@ -1,9 +1,9 @@
 """The watchdog of a simulated I/O module, as in couplers of the WAGO 750 series.
 
-Its holding registers: 0x1000 time (x 100 ms), 0x1003 trigger, 0x1006 state (0 stopped, 1 running,
-2 tripped), 0x1007 restart. A trigger counts if its value differs from the last trigger's; the first
-trigger starts the watchdog. When the watchdog trips, the module's coils go off, and writes to coils get
-exception 4 until the watchdog is restarted.
+Its holding registers are 0x1000 time (x 100 ms), 0x1003 trigger, 0x1006 state (0 stopped, 1 running, 2
+tripped), and 0x1007 restart. A trigger counts if its value differs from the last trigger's value. The
+first trigger starts the watchdog. When the watchdog trips, the module's coils go off. After a trip
+writes to coils get exception 4 until the watchdog is restarted.
 """
 
 from typing import Final
@@ -31,7 +31,7 @@ class ModuleWatchdog:
 
     @property
     def tripped(self) -> bool:
-        """Are the outputs off, and refused?"""
+        """Are the outputs off, and are writes to them refused?"""
         return self._registers[STATE] == TRIPPED
 
     def get(self, point: Point, now: float) -> int:
@@ -39,7 +39,7 @@ class ModuleWatchdog:
         return self._registers[point.address]
 
     def set(self, point: Point, value: int, now: float) -> bool:
-        """Write a register; False if it cannot be written now."""
+        """Write a register. Return False if the register cannot be written now."""
         state = self._registers[STATE]
         if point.address == STATE or (point.address == TIME and state == RUNNING):
             return False
@@ -52,11 +52,11 @@ class ModuleWatchdog:
         return True
 
     def expire(self) -> None:
-        """Make the watchdog trip at the next look."""
+        """Make the watchdog trip when it is looked at next."""
         self._due_at = 0.0
 
     def trips(self, now: float) -> bool:
-        """Does the watchdog trip at `now`? True once for each trip."""
+        """Does the watchdog trip at `now`? The answer is True once for each trip."""
         if self._registers[STATE] != RUNNING or now < self._due_at:
             return False
         self._registers[STATE] = TRIPPED

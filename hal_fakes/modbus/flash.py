@@ -1,4 +1,5 @@
-"""The far side of a module-timed pulse; pymodbus's own server would take any coil value as 1."""
+"""The far side of a pulse that the module times. pymodbus's own server would take any coil value as
+1."""
 
 import struct
 from typing import Final
@@ -13,10 +14,10 @@ COIL_VALUES: Final = (0xFF00, 0)
 
 
 class TimedCoilRequest(WriteSingleCoilRequest):
-    """Function 5, with the value as sent. A value other than on or off makes `FakeUnits` flash."""
+    """Function 5 with the value that was sent. A value other than on or off makes `FakeUnits` flash."""
 
     def decode(self, data: bytes) -> None:
-        """Keep the value."""
+        """Decode the request, and keep its value."""
         super().decode(data)
         self.registers = [int.from_bytes(data[2:4], "big")]
 

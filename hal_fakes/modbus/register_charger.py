@@ -1,4 +1,4 @@
-"""A charging station on registers: its plant's state in the numbers of its map."""
+"""A charging station on registers. It shows its plant's state in the numbers of its map."""
 
 from bridges.kinds.charger.signals import Activity
 from drivers.charger.register import POWER, RegisterChargerSettings, cells, charger_map, orders
@@ -28,7 +28,7 @@ class FakeRegisterCharger:
         self.outputs = frozenset(self._orders)
 
     def get(self, point: Point, now: float) -> int:
-        """Return the register at `now` (monotonic s); several values may share a register."""
+        """Return the register at `now` (monotonic s). Several values may share a register."""
         if point in self._written:
             return self._written[point]
         self.plant.advance(now)
@@ -42,7 +42,7 @@ class FakeRegisterCharger:
         return word
 
     def set(self, point: Point, value: int, now: float) -> bool:
-        """Write a value; False if not writable."""
+        """Write a value. Return False if the point cannot be written."""
         if point not in self._written:
             return False
         self._written[point] = value

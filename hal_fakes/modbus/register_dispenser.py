@@ -1,4 +1,5 @@
-"""A dispenser or ingestor behind a PLC's registers: its plant's contacts as the map's status number."""
+"""A dispenser or ingestor behind a PLC's registers. The map's status number shows the plant's
+contacts."""
 
 from drivers.dispenser.register import RegisterWorkcellSettings, points
 from drivers.hal.modbus.points import Point
@@ -8,18 +9,19 @@ from hal_fakes.plants import dispenser
 from hal_fakes.plants.plant import Plant
 
 NONSENSE = 65535
-"""The status of a PLC that boots, and of a fault for which the map has no number."""
+"""The status of a PLC that boots. It also stands for a fault that has no number in the map."""
 
 
 def contacts(settings: RegisterWorkcellSettings) -> list[Wire]:
-    """Return the PLC's own contacts and relay, for the plant: they can fail as our wires can."""
+    """Return the PLC's own contacts and relay. The plant needs them, because they can fail as our wires
+    can."""
     at = points(settings)
     inputs = [Wire(s, "in", str(at["status"]), "high") for s in ("done", "busy", "ready", "fault")]
     return [*inputs, Wire("start", "out", str(at["command"]), "high")]
 
 
 class FakeRegisterWorkcell:
-    """The cells of one PLC, at `unit`. `points`: all cells, including `outputs`."""
+    """The cells of one PLC, at `unit`. `points` are all cells, with `outputs` among them."""
 
     def __init__(self, plant: Plant, settings: RegisterWorkcellSettings) -> None:
         self.plant = plant
@@ -37,7 +39,7 @@ class FakeRegisterWorkcell:
         return self._state() if point == self._status else self.written[point]
 
     def set(self, point: Point, value: int, now: float) -> bool:
-        """Write a value; False if not writable."""
+        """Write a value. Return False if the point cannot be written."""
         if point not in self.outputs:
             return False
         self.written[point] = value

@@ -1,6 +1,6 @@
-"""A door operator behind Modbus registers: its plant's contacts in the numbers of its register map.
+"""A door operator behind Modbus registers. The numbers of its register map show the plant's contacts.
 
-The operator knows only its end positions, 0 and 100; between them its position is the number for
+The operator knows only its end positions, 0 and 100. Between the ends its position is the number for
 `unknown`, or 50.
 """
 
@@ -17,7 +17,8 @@ NONSENSE = 65535
 
 
 def contacts(settings: RegisterDoorSettings) -> list[Wire]:
-    """Return the operator's own contacts and relay, for the plant: they can fail as our wires can."""
+    """Return the operator's own contacts and relay. The plant needs them, because they can fail as our
+    wires can."""
     at = points(settings)
     signals = {"opened": "status", "closed": "status", "obstruction": "obstruction"}
     inputs = [Wire(s, "in", str(at[part]), "high") for s, part in signals.items() if part in at]
@@ -25,7 +26,7 @@ def contacts(settings: RegisterDoorSettings) -> list[Wire]:
 
 
 class FakeRegisterDoor:
-    """The cells of one operator, at `unit`. `points`: all cells, including `outputs`."""
+    """The cells of one operator, at `unit`. `points` are all cells, with `outputs` among them."""
 
     def __init__(self, plant: Plant, settings: RegisterDoorSettings) -> None:
         self.plant = plant
@@ -46,7 +47,7 @@ class FakeRegisterDoor:
         return value
 
     def set(self, point: Point, value: int, now: float) -> bool:
-        """Write a value; False if not writable."""
+        """Write a value. Return False if the point cannot be written."""
         if point != self._parts["command"]:
             return False
         self._command = value

@@ -1,7 +1,8 @@
-"""A lift's gateway: its plant's contacts in the numbers of its register map, its commands as relays.
+"""A lift's gateway. The numbers of its register map show the plant's contacts, and its commands act as
+relays.
 
-Behind the gateway is a lift on contacts: one for each floor, two for a door, one for each hazard. These
-contacts can be cut, as our wires can.
+Behind the gateway is a lift on contacts: one contact for each floor, two for a door, one for each
+hazard. These contacts can be cut, as our wires can.
 """
 
 import math
@@ -31,7 +32,7 @@ from hal_fakes.plants.lift import LiftPace, LiftPlant
 from hal_fakes.plants.plant import Plant
 
 NONSENSE = 65535
-"""The whole register's value for a door that is open and closed at once."""
+"""The value of the whole register for a door that is open and closed at once."""
 
 
 def contacts(settings: RegisterLiftSettings) -> dry_contact.DryContactLiftSettings:
@@ -72,9 +73,10 @@ def contacts(settings: RegisterLiftSettings) -> dry_contact.DryContactLiftSettin
 
 
 class FakeRegisterLift:
-    """The cells of one gateway, at `unit`. `points`: all cells, including `outputs`.
+    """The cells of one gateway, at `unit`. `points` are all cells, with `outputs` among them.
 
-    `clears_s`: how soon the gateway clears the place of a call that it has taken; None: never.
+    `clears_s`: the time (s) after which the gateway clears the place of a call that it has taken. None
+    means never.
     """
 
     def __init__(
@@ -108,7 +110,7 @@ class FakeRegisterLift:
         return value
 
     def set(self, point: Point, value: int, now: float) -> bool:
-        """Write a value; False if not writable. Relays go off before other relays go on."""
+        """Write a value. Return False if the point cannot be written. Relays that go off come first."""
         if point not in self._written:
             return False
         self._written[point] = value
@@ -120,7 +122,7 @@ class FakeRegisterLift:
         return True
 
     def _relays(self, point: Point, value: int) -> Iterator[tuple[str, bool]]:
-        """Return the relays that this value switches on or off."""
+        """Yield (relay, on or off) for each relay that this value switches."""
         commands = self._map.commands
         for signal, _, command in commands.singles():
             if point_at(self.unit, place_of(command)) == point:

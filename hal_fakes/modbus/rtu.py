@@ -1,17 +1,18 @@
 """The far side of a serial `modbus` bus: units on RS-485 behind a pseudo-terminal.
 
 An absent unit is silent. A pseudo-terminal has no baud rate, so this file delays each byte by its time
-on the wire. A request ends with 3.5 characters of silence; then the reply begins.
-With `ignore_echo` in the settings the adapter echoes. `port` is a link that stays the same when the
-adapter is unplugged and plugged in, as in /dev/serial/by-id. On command (`fail DEVICE unit|server
-MODE`) one unit, or the server (the line with all units), is
+on the wire. A request ends with 3.5 characters of silence. Then the reply begins. If the settings have
+`ignore_echo`, the adapter echoes. `port` is a link that stays the same when the adapter is unplugged
+and plugged in, as in /dev/serial/by-id. The order `fail DEVICE unit|server MODE` lets one unit, or the
+server (the line with all units), fail:
 
 - `off`: the unit is silent; the server's adapter is unplugged
-- `stuck`: the unit's inputs stay as they were; the line is cut, and silent
+- `stuck`: the unit's inputs stay unchanged; the line is cut, and silent
 - `slow`: the reply comes after the client has stopped waiting
-- `garbage`: a wrong CRC, or half a frame
-- `wrong`: every bit set, in the name of another unit, or of another function; or exception 4; or, on a
-  line, our own request comes back before the reply, as from an adapter that echoes unannounced
+- `garbage`: the reply has a wrong CRC, or is half a frame
+- `wrong`: the reply has every bit set, comes in the name of another unit or of another function, or is
+  exception 4; on a line, our own request may come back before the reply, as from an adapter that echoes
+  unannounced
 """
 
 import asyncio
@@ -41,12 +42,12 @@ from hal_fakes.modbus.units import FakeUnits, FarSide
 from hal_fakes.plants.plant import FailureMode
 
 LOOK_S: Final = 0.02
-"""Greatest delay (s) before an adapter is unplugged."""
+"""The maximum delay (s) before an adapter is unplugged."""
 READY_S: Final = 10.0
 
 
 class SerialAdapter:
-    """A pseudo-terminal as a serial adapter: `path` leads to it while it is plugged in."""
+    """A pseudo-terminal as a serial adapter. `path` leads to the adapter while it is plugged in."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -54,18 +55,18 @@ class SerialAdapter:
 
     @property
     def wire(self) -> int | None:
-        """Return the descriptor of the line's side; None while unplugged."""
+        """Return the file descriptor of the line's side. Return None if the adapter is unplugged."""
         return self._ends[0] if self._ends else None
 
     def plug(self) -> None:
-        """Appear under the same path, as another device."""
+        """Plug the adapter in. It appears under the same path, as another device."""
         self._ends = pty.openpty()
         tty.setraw(self._ends[1])
         os.set_blocking(self._ends[0], False)
         self.path.symlink_to(os.ttyname(self._ends[1]))
 
     def pull(self) -> None:
-        """Vanish, even while a program has it open. May be called twice."""
+        """Unplug the adapter, even if a program has it open. The caller may call `pull` twice."""
         ends, self._ends = self._ends, None
         for end in ends or ():
             os.close(end)
@@ -73,9 +74,9 @@ class SerialAdapter:
 
 
 class RtuLine:
-    """A running line with its own thread. `replace`: replacements for the bus's settings.
+    """A running line with a thread of its own. `replace` holds the replacements for the bus's settings.
 
-    `slow_s`: a slow reply's delay (s). `requests`: every frame heard so far.
+    `slow_s`: a slow reply's delay (s). `requests`: every frame that the line has received.
     """
 
     def __init__(
@@ -108,7 +109,7 @@ class RtuLine:
         self._thread.start()
 
     def close(self) -> None:
-        """Pull the adapter and end. May be called twice."""
+        """Unplug the adapter, and end the line. The caller may call `close` twice."""
         if self._closed.is_set():
             return
         self._closed.set()
@@ -129,7 +130,7 @@ class RtuLine:
                 self._hear(frame)
 
     def _look(self) -> None:
-        """Pull or plug the adapter as told, and let watchdogs trip."""
+        """Unplug or plug the adapter as ordered. Let watchdogs trip."""
         self.units.tick()
         pulled = self.units.failure("server") == "off"
         if pulled != (self.adapter.wire is None):
@@ -156,7 +157,7 @@ class RtuLine:
         return min(LOOK_S, max(0.0, next_at - time.monotonic()))
 
     def _put(self, frame: bytes, begun_at: float) -> None:
-        """Let each byte arrive when its last bit does."""
+        """Let each byte arrive at the time of its last bit."""
         for i, byte in enumerate(frame):
             at = begun_at + (i + 1) * self._settings.character_s
             heapq.heappush(self._due, (at, next(self._order), bytes((byte,))))
@@ -171,7 +172,8 @@ class RtuLine:
     # ---- the units: frames and their meaning
 
     def _hear(self, frame: bytes) -> None:
-        """Handle a complete request. Its reply, if any, begins now, or later if the unit is slow."""
+        """Handle a complete request. If there is a reply, it begins now, or later if the unit is
+        slow."""
         self.requests.append(frame)
         unit = frame[0]
         modes = {self.units.failure("server"), self.units.failure("unit", unit)} - {None}
@@ -184,7 +186,7 @@ class RtuLine:
         self._put(reply, heard_at + (self._slow_s if "slow" in modes else 0.0))
 
     def _reply(self, frame: bytes) -> bytes:
-        """Return the unit's reply; no reply to a broken frame."""
+        """Return the unit's reply. Return b"" for a broken frame, which has no reply."""
         crc = int.from_bytes(frame[-2:], "big")
         if len(frame) < 4 or not FramerRTU.check_CRC(frame[:-2], crc):
             return b""
@@ -200,7 +202,8 @@ class RtuLine:
         return self._framer.buildFrame(response)
 
     def _spoiled(self, mode: FailureMode | None, reply: bytes) -> bytes:
-        """Spoil the reply by this mode. Each mode has several ways, used in turn."""
+        """Spoil the reply as this failure mode does. Each mode has several ways, which are used in
+        turn."""
         if mode == "garbage":
             broken = bytes((reply[-1] ^ 0x55,))
             return reply[:-1] + broken if next(self._kinds) % 2 else reply[: len(reply) // 2]

@@ -1,4 +1,4 @@
-"""The units behind pymodbus's servers: bits and registers with plants behind them, and their failures.
+"""The units behind pymodbus's servers. Their bits and registers have plants behind them, and can fail.
 
 A gateway (`hal_fakes/modbus/__init__.py`) and a serial line (`hal_fakes/modbus/rtu.py`) share this
 code.
@@ -21,7 +21,8 @@ Part = Literal["unit", "server"]
 
 
 class UnitCells(Protocol):
-    """Registers and bits of one unit, with a plant behind them. `outputs`: the writable cells."""
+    """Registers and bits of one unit, with a plant behind them. `outputs` are the cells that can be
+    written."""
 
     unit: int
     points: frozenset[Point]
@@ -29,17 +30,17 @@ class UnitCells(Protocol):
 
     @property
     def plant(self) -> Plant | None:
-        """Return the plant; None for registers of the module itself."""
+        """Return the plant. Return None for registers that belong to the module itself."""
 
     def get(self, point: Point, now: float) -> int:
         """Return this point's value at `now` (monotonic s)."""
 
     def set(self, point: Point, value: int, now: float) -> bool:
-        """Write a value; False if this point cannot be written."""
+        """Write a value. Return False if this point cannot be written."""
 
 
 FarSide: TypeAlias = PlantWiring | UnitCells
-"""The possible contents of a unit."""
+"""The types of things that a unit may contain."""
 
 TABLES: Final[dict[int, Table]] = {
     1: "coil",
@@ -51,13 +52,13 @@ TABLES: Final[dict[int, Table]] = {
     15: "coil",
     16: "holding register",
 }
-"""Function -> its table."""
+"""Number of a function -> the table that it reads or writes."""
 
 
 class FakeUnits:
-    """All units, as pymodbus's server reads and writes them. `slow_s`: a slow reply's delay (s).
+    """All units, as pymodbus's server reads and writes them. `slow_s` is a slow reply's delay (s).
 
-    Coils keep the written value; inputs show the plants' contacts.
+    Coils keep the written value. Inputs show the plants' contacts.
     """
 
     def __init__(self, devices: Iterable[FarSide], slow_s: float) -> None:
@@ -99,13 +100,13 @@ class FakeUnits:
                 self._plants[unit].append(device.plant)
 
     def tick(self) -> None:
-        """Let due watchdogs trip and due pulses end; called often."""
+        """Let due watchdogs trip, and end due pulses. The server calls this often."""
         now = time.monotonic()
         for coil in [coil for coil, at in self._off_at.items() if at <= now]:
             self._set(coil, False)
         for coil in [coil for coil, at in self._clear_at.items() if at <= now]:
             del self._clear_at[coil]
-            self._coils[coil] = False  # the controller keeps the call until our release
+            self._coils[coil] = False  # the controller still keeps the call
         for dead_man in self._dead_men:
             if dead_man.trips(now):
                 for point, (wiring, name) in self._at.items():
@@ -113,7 +114,7 @@ class FakeUnits:
                         wiring.drive(name, False, now)
 
     def failure(self, part: Part, unit: int | None = None) -> FailureMode | None:
-        """Return the failure of the server, or of this unit; None if sound."""
+        """Return the failure of the server, or of this unit. Return None if it works."""
         modes = (plant.failures.get(part) for plant in self._plants.get(unit, ()))
         return next((mode for mode in modes if mode is not None), None)
 
@@ -143,7 +144,8 @@ class FakeUnits:
         return None
 
     async def flash(self, unit: int, address: int, tenths: int) -> ExcCodes | None:
-        """Switch a coil on for this long (0.1 s); exception 3 where no pulse can be requested."""
+        """Switch a coil on for this time (in 0.1 s). Return exception 3 if the coil cannot make a
+        pulse."""
         coil = self._flashes.get(Point(unit, "coil", address))
         points = await self._points(unit, 5, coil.address if coil else address, 1)
         if isinstance(points, ExcCodes):
@@ -176,7 +178,8 @@ class FakeUnits:
     async def _points(
         self, unit: int, function: int, address: int, count: int
     ) -> list[Point] | ExcCodes:
-        """Return a request's points, or its exception code. Raises NoSuchIdException for silence."""
+        """Return a request's points, or its exception code. Raise NoSuchIdException for a unit that
+        stays silent."""
         table = TABLES.get(function)
         if table is None:
             return ExcCodes.ILLEGAL_FUNCTION

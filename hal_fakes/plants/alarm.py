@@ -1,8 +1,8 @@
-"""An alarm panel: contacts that people and the building press; nothing moves.
+"""An alarm panel. Its contacts change only when people or the building press them; nothing moves.
 
 To press: each source (`fire_panel on`), and `drill`. A loop that is cut (`fail fire_panel off`), that
 jams (`stuck`) or chatters (`garbage`) fails as every wire does (`contact.py`). At a Modbus module
-`unit` and `server` fail too: `off` is a panel that goes silent.
+`unit` and `server` can fail too. With `off` the panel goes silent.
 """
 
 from collections.abc import Iterable
@@ -14,7 +14,7 @@ from hal_fakes.plants.machine import WiredPlant
 
 
 class PanelPlant(WiredPlant):
-    """The panel. `parts`: the parts of its controller that can fail."""
+    """The panel. `parts` are the parts of its controller that can fail."""
 
     def __init__(self, name: str, wires: Iterable[Wire] = (), parts: Iterable[str] = ()) -> None:
         wired = list(wires)
@@ -25,10 +25,10 @@ class PanelPlant(WiredPlant):
         return self.pressed[signal]
 
     def run(self) -> None:
-        """Do nothing: a panel changes only when it is pressed."""
+        """Do nothing, because a panel changes only when somebody presses it."""
 
     def event_at(self) -> float:
-        """Return inf."""
+        """Return inf, because nothing happens by itself."""
         return float("inf")
 
 

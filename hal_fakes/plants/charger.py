@@ -45,7 +45,8 @@ RANGE_CHECK_S: Final = 0.3
 EMPTY_V, FULL_V, CURRENT_A = 24.0, 29.2, 30.0
 HOT_C, COOLED_C, UNCOOLED_C = 97.0, 60.0, 140.0
 FIRST, STRANGER = "4711", "815"
-"""The receivers of a `robot` (if the YAML lists no receivers) and of a `stranger`."""
+"""The ids of two receivers: that of a `robot`, if the YAML lists no receivers, and that of a
+`stranger`."""
 
 PARTS: Final = ("pad", "receiver", "fan", "battery", "thermometer")
 CAUSES: Final = ("foreign_object", "over_temperature", "transmitter_fault")
@@ -66,13 +67,18 @@ RANGES: Final = {"in": True, "out": False, "failed": False}
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """A controller's knowledge at one instant.
+    """The controller's knowledge at one instant.
 
-    `progress`: the activity's progress, 0-1. `faults`: keys of TEXTS. `here`: is a robot on the pad?
-    `receiver`: its receiver's id, or "". `couples`: could current flow now? `range_result`: the last
-    range check's result: `none`, `ongoing`, `in`, `out` or `failed`. `in_range`: is that result `in`?
-    Without range checks `couples` counts. `range_ok`: is the robot well placed? `battery`: 0-1.
-    `time_to_full_s`: while current flows.
+    - `progress`: the activity's progress, 0 to 1.
+    - `faults`: keys of TEXTS.
+    - `here`: is a robot on the pad?
+    - `receiver`: the id of its receiver, or "".
+    - `couples`: could current flow now?
+    - `range_result`: the result of the last range check: `none`, `ongoing`, `in`, `out` or `failed`.
+    - `in_range`: is that result `in`? A station without range checks uses `couples` instead.
+    - `range_ok`: is the robot well placed?
+    - `battery`: 0 to 1.
+    - `time_to_full_s`: the time (s) until the battery is full, if current flows.
     """
 
     activity: Activity
@@ -99,7 +105,7 @@ class Reading:
 
     @property
     def robots(self) -> bool:
-        """Is any fault the robot's?"""
+        """Is at least one fault the robot's?"""
         return bool(self.faults & ROBOTS_FAULTS)
 
     @property
@@ -109,12 +115,16 @@ class Reading:
 
 
 class ChargerPlant(WiredPlant):
-    """`battery`: 0-1, of the robot on the pad; meaningless without a robot.
+    """One charger. `battery` is the charge of the robot on the pad, 0 to 1. It is meaningless without a
+    robot.
 
-    `receivers`: id -> robot. `commanded`: the station charges only while `power` is on. `asked`: only a
-    range check shows whether a robot is in range. `cleared`: an error stays until it is cleared.
-    `pace`: how many times faster handshake, movement and stopping are than a real charger's. `wires`:
-    the station's contacts, if any. `links`: the parts of the wire that can fail.
+    - `receivers`: id -> robot.
+    - `commanded`: the station charges only while `power` is on.
+    - `asked`: only a range check shows whether a robot is in range.
+    - `cleared`: an error stays until it is cleared.
+    - `pace`: how many times faster than a real charger handshake, movement and stopping are.
+    - `wires`: the station's contacts, if there are any.
+    - `links`: the parts of the wire that can fail.
     """
 
     def __init__(
@@ -184,11 +194,11 @@ class ChargerPlant(WiredPlant):
         }[signal]
 
     def actuate(self, signal: str, energised: bool) -> None:
-        """Take the enable relay's change."""
+        """Take a change of the enable relay."""
         self.power = energised
 
     def drive(self, signal: str, asserted: bool, now: float) -> None:
-        """Obey a command or the relay. `power` is a level; True triggers any other command."""
+        """Obey a command or the relay. `power` is a level. For any other command, True triggers it."""
         if signal in self._relays:
             super().drive(signal, asserted, now)
             return
@@ -224,7 +234,7 @@ class ChargerPlant(WiredPlant):
             self.battery = self.battery if self._here else 0.0
 
     def run(self) -> None:
-        """End due activities; begin the activities that pad, heat and causes demand."""
+        """End the activities that are due. Begin the activities that pad, heat and causes demand."""
         if self.pad.follow(self.now, bool(self._here), self.failures.get("pad"), self.pace):
             self.note("sensor", "gap_mm", self.pad.gap_mm())
         if self.now >= self._range_until:
@@ -286,7 +296,8 @@ class ChargerPlant(WiredPlant):
             self.note("sensor", "state", str(activity))
 
     def _stop(self) -> None:
-        """End a handshake, or ramp the current down if possible: robot or power is gone."""
+        """End a handshake, or ramp the current down if possible, because the robot or the power is
+        gone."""
         if self.activity is Activity.HANDSHAKE:
             self._enter(Activity.IDLE)
         elif not self._here:

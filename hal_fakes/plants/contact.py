@@ -21,10 +21,10 @@ GARBAGE_S = 0.1
 
 
 class Contact:
-    """One wire: `feed` the true value at one end; `shows` is the value seen at the other end.
+    """One wire. `feed` takes the true value at one end, and `shows` is the value seen at the other end.
 
-    For an input the plant feeds and the bus sees; for an output we feed and the relay sees.
-    Asserted or not, never levels.
+    For an input the plant feeds and the bus sees. For an output we feed and the relay sees. Values are
+    asserted or not; they are never levels.
     """
 
     def __init__(self, wire: Wire, seed: str) -> None:
@@ -44,7 +44,7 @@ class Contact:
         self._settle(now)
 
     def fail(self, mode: FailureMode | None, now: float) -> None:
-        """Fail this way from `now` on; None mends the wire."""
+        """Fail in this way from `now` on. None mends the wire."""
         self.mode = mode
         self._late.clear()
         self._noise_at = now

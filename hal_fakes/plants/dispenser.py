@@ -27,12 +27,14 @@ NEVER: Final = float("inf")
 def build(
     name: str, settings: WorkcellSettings, wires: Iterable[Wire], parts: Iterable[str] = ()
 ) -> "WorkcellPlant":
-    """Build a workcell with these contacts and relays; `parts` of its controller can fail."""
+    """Build a workcell with these contacts and relays. `parts` are the parts of its controller that can
+    fail."""
     return WorkcellPlant(name, wires, steady=settings.pulse_s is None, parts=parts)
 
 
 class WorkcellPlant(WiredPlant):
-    """`moved`: the number of items that left. `steady`: the start must stay on in the cycle."""
+    """One workcell. `moved` is the number of items that left. `steady`: the start must stay on during
+    the cycle."""
 
     def __init__(
         self, name: str, wires: Iterable[Wire], *, steady: bool, parts: Iterable[str] = ()
@@ -84,7 +86,7 @@ class WorkcellPlant(WiredPlant):
             self._left_s, self._ran_at = CYCLE_S, self.now
 
     def run(self) -> None:
-        """Move the item, and start again what a restarted PLC takes for a start."""
+        """Move the item. After a restart of the PLC, begin a new cycle if the start is on."""
         self._move()
         if self.now == self._boots_at and self._on:
             self._begin()
@@ -111,7 +113,8 @@ class WorkcellPlant(WiredPlant):
             self._fault = self._fault and self._on
 
     def event_at(self) -> float:
-        """Return the time of the next event: half of the way, its end, the end of done, a boot."""
+        """Return the time of the next event: half of the way, the end of the way, the end of `done`, or
+        a boot."""
         found = [at for at in (self._done_until, self._boots_at) if at > self.now]
         if speed := self._speed():
             half = self._left_s - CYCLE_S / 2

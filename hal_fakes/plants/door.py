@@ -1,10 +1,12 @@
-"""A pedestrian door with an operator: opens while held or pushed, and closes by itself.
+"""A pedestrian door with an operator. It opens while held or pushed, and closes by itself.
 
 Contacts: `opened` and `closed` at its end positions, `obstruction` (light curtain), `fire` (the
 building's alarm). Relay: `hold_open`. To press: `push` (a person's button or hand), `obstruction`,
-`fire`. Failing part `operator`: `off` and `stuck` stand still, `slow` takes five times as long,
-`wrong` inverts each command, `garbage` stops halfway. At a Modbus module `unit` and `server`
-fail as well (`hal_fakes/modbus/`).
+`fire`.
+
+The part `operator` can fail. `off` and `stuck` stand still, `slow` takes five times as long, `wrong`
+inverts each command, and `garbage` stops halfway. At a Modbus module `unit` and `server` can fail as
+well (`hal_fakes/modbus/`).
 """
 
 from collections.abc import Iterable
@@ -25,16 +27,17 @@ BUTTONS: Final = ("fire", "obstruction", "push")
 def build(
     name: str, settings: DoorSettings, wires: Iterable[Wire], parts: Iterable[str] = ()
 ) -> "DoorPlant":
-    """Build a door with these contacts and this relay; `parts` of its controller can fail."""
+    """Build a door with these contacts and this relay. `parts` are the parts of its controller that can
+    fail."""
     every_s = settings.pulse.every_s if settings.pulse else 0.0
     return DoorPlant(name, wires, auto_close_s=max(AUTO_CLOSE_S, every_s), parts=parts)
 
 
 class DoorPlant(WiredPlant):
-    """The door: `position` is 0 when closed and 1 when open.
+    """The door. `position` is 0 when closed and 1 when open.
 
-    `open_s`, `close_s`: the times of a whole travel (s). `auto_close_s`: the operator's wait before it
-    closes a released door. `parts`: the parts of the controller that can fail.
+    `open_s`, `close_s`: the times (s) of a whole travel. `auto_close_s`: the operator's wait (s) before
+    it closes a released door. `parts`: the parts of the controller that can fail.
     """
 
     def __init__(
@@ -72,7 +75,7 @@ class DoorPlant(WiredPlant):
         self._held = energised
 
     def run(self) -> None:
-        """Move to the present position, then decide on the next movement."""
+        """Move the door to its position at the present time. Then decide on the next movement."""
         self._move()
         in_the_way = self.pressed["obstruction"] and self.position > 0
         wanted = self._held or self.pressed["push"] or in_the_way
@@ -82,7 +85,7 @@ class DoorPlant(WiredPlant):
         self._steer(1 if wanted or self.now < self._close_at else -1)
 
     def event_at(self) -> float:
-        """Return the time of arrival at an end position, or of the start of closing."""
+        """Return the time when the door arrives at an end position, or when it starts to close."""
         waits = not self._wanted and self.now < self._close_at
         return min(self._arrives_at, self._close_at if waits else float("inf"))
 

@@ -45,7 +45,8 @@ FAILS: dict[str, tuple[FailureMode, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class LiftPace:
-    """Durations (s): a floor's and a door's travel, granting AGV mode, a door's stay at a landing."""
+    """Durations (s): a floor's travel, a door's travel, the granting of AGV mode, and a door's stay at
+    a landing."""
 
     floor_s: float = 2.0
     door_s: float = 1.0
@@ -68,7 +69,7 @@ class LiftPlant(WiredPlant):
         pace: LiftPace | None = None,
         links: Sequence[str] = (),
     ) -> None:
-        """`links`: the parts of a wire to the controller that can fail besides."""
+        """Make the lift. `links` are further parts that can fail: those of a wire to the controller."""
         self.car = Car()
         self.agv = False
         self._wiring = settings
@@ -97,13 +98,14 @@ class LiftPlant(WiredPlant):
         return self._asserted.get(signal, False)
 
     def actuate(self, signal: str, energised: bool) -> None:
-        """Take a change of our relay; a call counts once its relay has been stable for a moment."""
+        """Take a change of our relay. A call counts only after its relay has been stable for a
+        moment."""
         (self._on.add if energised else self._on.discard)(signal)
         if signal.startswith("call_"):
             self._seen, self._seen_at = self._called(), self.now + CALL_SETTLES_S
 
     def act(self, signal: str, asserted: bool) -> None:
-        """Call the car to a landing as a person; without effect in AGV mode."""
+        """Call the car to a landing as a person does. In AGV mode this has no effect."""
         if signal.startswith("hall_") and asserted and not self.agv:
             self._people.append(self._levels.index(signal.removeprefix("hall_")))
 
@@ -114,13 +116,13 @@ class LiftPlant(WiredPlant):
         super().fail(part, mode)
 
     def run(self) -> None:
-        """Run all due events, then their consequences."""
+        """Run all due events, then the effects that follow from the events."""
         for door in self.doors.values():
             door.run(self.now)
         self._take_call()
         self.car.run(self.now, self._goal(), self._floor_s())
         self._arrive()
-        self._grant()  # possible after an arrival, and may bring a call to this landing
+        self._grant()  # AGV mode may be possible after an arrival, and may bring a call
         self._arrive()
         for side, door in self.doors.items():
             turned = self.failures.get(f"{PREFIX[side]}door_operator") == "wrong"
@@ -141,7 +143,8 @@ class LiftPlant(WiredPlant):
         return any(self.pressed.get(h, False) for h in hazards)
 
     def _called(self) -> int | None:
-        """Return the landing whose call is on; None without a call, or for a code of no landing."""
+        """Return the landing whose call is on. Return None without a call, and for a code that is no
+        landing's."""
         code = self._wiring.call_code
         for i, level in enumerate(self._levels):
             lines = code.lines(level) if code else {f"call_{level}": True}
@@ -153,12 +156,12 @@ class LiftPlant(WiredPlant):
     def _take_call(self) -> None:
         if self._seen_at <= self.now:
             self._seen_at = NEVER
-            if self._seen is not None:  # a call counts in AGV mode, and requests AGV mode anew
+            if self._seen is not None:  # a call counts in AGV mode, and requests AGV mode again
                 self._call = self._seen
                 self._called_for_agv = True
 
     def _grant(self) -> None:
-        """Grant AGV mode after a while; end it at once."""
+        """Grant AGV mode after some time, but end it at once."""
         failure = self.failures.get("controller")
         taken = self._hazard(*(h for h in Hazard if h is not Hazard.OVERLOAD))
         asked = self._asked() and not taken and failure != "off"
@@ -189,7 +192,7 @@ class LiftPlant(WiredPlant):
         return self._called_for_agv
 
     def _goal(self) -> int | None:
-        """Return the landing to drive to; None: the next possible stop."""
+        """Return the landing to drive to. None means the next landing where the car can stop."""
         if self._hazard(Hazard.FIRE):
             return 0
         if self._hazard(*OPENS_UP):
@@ -211,7 +214,7 @@ class LiftPlant(WiredPlant):
             self._call = None if self.agv else self._call
             del self._people[:1]
         sides = self._sides[self._levels[self.car.floor]]
-        if len(sides) == 1 or not self.agv:  # with two doors, the open relays choose
+        if len(sides) == 1 or not self.agv:  # if there are two doors, the open relays decide
             for side in sides:
                 self.doors[side].dwell_until = self.now + self._pace.dwell_s
 
@@ -283,7 +286,8 @@ class LiftPlant(WiredPlant):
         return codes.lines("service", number, len(code.bits))
 
     def _floor_lines(self) -> dict[str, bool]:
-        """Return the floor code; a controller without a code for between floors keeps the last code."""
+        """Return the lines of the floor code. If the controller has no code for between floors, it
+        keeps the last code."""
         shown = self.car.shown
         try:
             self._code = self._wiring.floor_code.show(

@@ -4,12 +4,14 @@ from typing import Literal
 
 NEVER = float("inf")
 
-# A floor's travel: the car still shows the floor that it leaves, then no floor, then the next floor.
+# The parts of a floor's travel, with their shares of its time. The car first shows the floor that it
+# leaves, then no floor, then the next floor.
 LEGS = {"leaving": 0.25, "between": 0.5, "arriving": 0.25}
 
 
 class Car:
-    """`floor`: the landing's index, 0 for the lowest; `leg`: the present part of the way."""
+    """The car. `floor` is the landing's index, 0 for the lowest. `leg` is the present part of the
+    way."""
 
     def __init__(self) -> None:
         self.floor = 0
@@ -29,7 +31,8 @@ class Car:
         return None if self.leg == "between" else self.floor
 
     def run(self, now: float, goal: int | None, floor_s: float | None) -> None:
-        """Travel on. `floor_s`: the time (s) for a floor; None: the car is stuck."""
+        """Travel on until `now`. `floor_s` is the time (s) for a floor; None means that the car is
+        stuck."""
         if floor_s is None:
             self._frozen = True
             return
@@ -40,7 +43,7 @@ class Car:
             self._next_leg(goal, floor_s)
 
     def depart(self, now: float, goal: int, floor_s: float | None) -> None:
-        """Leave the landing, towards another. A stuck car stays."""
+        """Leave the landing for another landing. A stuck car stays."""
         if floor_s is not None:
             self.course = 1 if goal > self.floor else -1
             self._begin("leaving", now, floor_s)
@@ -68,7 +71,7 @@ class Car:
 
 
 class CarDoor:
-    """One door of the car with its landing door. `dwell_until`: the door stays open until then."""
+    """One door of the car with its landing door. The door stays open until `dwell_until`."""
 
     def __init__(self) -> None:
         self.dwell_until = 0.0
@@ -80,7 +83,7 @@ class CarDoor:
 
     @property
     def opened(self) -> bool:
-        """Is the door fully open, by its limit contact?"""
+        """Does the limit contact show a fully open door?"""
         return self._position == 1.0 and not self._course
 
     @property
@@ -99,7 +102,7 @@ class CarDoor:
         self._since = now
 
     def steer(self, now: float, open_it: bool, travel_s: float | None) -> None:
-        """Move towards open or closed; None: stop the operator."""
+        """Move towards open or closed. If `travel_s` is None, the operator stands still."""
         goal = 1.0 if open_it else 0.0
         if travel_s is None or self._position == goal:
             self._course, self.due_at = 0, NEVER

@@ -1,8 +1,8 @@
-"""The common base of plants: a record of edges, failing wires, failing parts, a clock.
+"""The common base of plants: a record of edges, failing wires, failing parts, and a clock.
 
-A kind's plant derives from WiredPlant and adds its physics. Edges are those of the terminal block: a
-relay as we drove it, a contact as its wire showed it. So the edge of a cut wire is recorded like any
-other edge.
+A kind's plant derives from WiredPlant and adds its physics. Edges are those of the terminal block. For
+a relay, the edge is the change that we drove. For a contact, it is the change that its wire showed. So
+the edge of a cut wire is recorded like any other edge.
 """
 
 from abc import ABC, abstractmethod
@@ -19,11 +19,13 @@ EDGES_KEPT = 100_000
 class WiredPlant(ABC):
     """Every plant (`hal_fakes.plants.plant.Plant`) without its physics.
 
-    `wires`: the driver's wiring table of this device; empty where the controller has no contacts.
-    `parts`: parts that can fail besides wires (`car`, `door_operator`); the plant reads `failures`.
-    `buttons`: signals that can be pressed; `pressed`: button -> is it pressed?
-    Wires to an I/O module add its parts `unit` and `server` (`hal_fakes/modbus/`); other far sides add
-    theirs by `add_parts`.
+    - `wires`: the driver's wiring table of this device. It is empty if the controller has no contacts.
+    - `parts`: the parts that can fail besides wires (`car`, `door_operator`). The plant reads
+      `failures`.
+    - `buttons`: the signals that can be pressed. `pressed`: button -> is it pressed?
+
+    Wires to an I/O module add the module's parts `unit` and `server` (`hal_fakes/modbus/`). Other far
+    sides add their parts with `add_parts`.
     """
 
     def __init__(
@@ -57,18 +59,18 @@ class WiredPlant(ABC):
         """Is this contact of the controller really asserted?"""
 
     def actuate(self, signal: str, energised: bool) -> None:  # noqa: B027
-        """Take a change of our relay at `self.now`. Most plants need nothing here."""
+        """Take a change of our relay at `self.now`. Most plants do nothing at this call."""
 
     @abstractmethod
     def run(self) -> None:
-        """Run the physics at `self.now`: every due event. May be called at any time."""
+        """Run every event that is due at `self.now`. The caller may call `run` at any time."""
 
     @abstractmethod
     def event_at(self) -> float:
-        """Return the time of the next event (s), or inf. After `run` at that time the event is over."""
+        """Return the time (s) of the next event, or inf. After `run` at that time the event is over."""
 
     def act(self, signal: str, asserted: bool) -> None:  # noqa: B027
-        """Take a press or release. Most plants need only `pressed`."""
+        """Take a press or release. Most plants only read `pressed`."""
 
     # ---- the Plant protocol
 
@@ -81,7 +83,7 @@ class WiredPlant(ABC):
             self._settle()
 
     def advance(self, now: float) -> None:
-        """Do everything due until `now`, each at its own time. Time never goes back.
+        """Run every event that is due until `now`, each at its own time. Time never goes back.
 
         Between two events nothing visible changes.
         """
@@ -97,19 +99,19 @@ class WiredPlant(ABC):
         return self._sensors[signal].shows
 
     def reading(self) -> object:
-        """Return None: the plant has contacts alone."""
+        """Return None, because the plant has only contacts."""
         return None
 
     def next_at(self) -> float:
-        """Return the time of the next change without a command (s), or inf."""
+        """Return the time (s) of the next change that comes without a command, or inf."""
         return min([self.event_at(), *(contact.next_at() for contact in self._broken)])
 
     def add_parts(self, parts: Iterable[str]) -> None:
-        """Let the plant fail by these parts of the far side as well."""
+        """Add parts of the far side that can fail for this plant."""
         self._parts |= {*parts}
 
     def fail(self, part: str, mode: FailureMode | None) -> None:
-        """Make a wire or part fail; None mends it. Raises ValueError with the known parts."""
+        """Make a wire or part fail. None mends it. Raises ValueError with the known parts."""
         contact = self._sensors.get(part) or self._relays.get(part)
         if contact is None and part not in self._parts:
             known = ", ".join(self.names()["fail"])
@@ -132,7 +134,8 @@ class WiredPlant(ABC):
         return {"press": list(self.pressed), "fail": parts}
 
     def press(self, signal: str, asserted: bool, now: float) -> None:
-        """Act as a person or the building. Raises ValueError with the known signals."""
+        """Press or release a signal, as a person or the building does. Raises ValueError with the known
+        signals."""
         if signal not in self.pressed:
             known = ", ".join(self.pressed)
             raise ValueError(f"{self.name} has no {signal!r} to press; there are {known}")
@@ -146,7 +149,7 @@ class WiredPlant(ABC):
     def note(
         self, what: Literal["relay", "sensor"], signal: str, value: bool | int | str | float
     ) -> None:
-        """Record an edge at `self.now` and tell the listeners."""
+        """Record an edge at `self.now`, and tell the listeners."""
         edge = Edge(self.now, self.name, what, signal, value)
         self.edges.append(edge)
         if len(self.edges) > EDGES_KEPT:
@@ -155,7 +158,7 @@ class WiredPlant(ABC):
             self.on_edge(edge)
 
     def _settle(self) -> None:
-        """Pass relays to the controller, run the physics, pass the contacts to us."""
+        """Pass relays to the controller, run the physics, and pass the contacts to the bus."""
         self._settled = True
         for signal, relay in self._relays.items():
             relay.feed(self._driven[signal], self.now)

@@ -17,7 +17,7 @@ CLEARANCE_MM: Final = 60.0
 RISE_MM: Final = 40.0
 RISE_S: Final = 0.4
 HEIGHTS_MM: Final[dict[FailureMode | None, float]] = {"off": 0.0, "garbage": 20.0, "wrong": 52.0}
-"""The height of a pad that does not reach RISE_MM."""
+"""Failure -> the height (mm) of the pad, which does not reach RISE_MM or rises beyond it."""
 GAP_MM: Final = (10.0, 30.0)
 """The range of gaps (mm) at which pad and receiver can couple."""
 
@@ -27,7 +27,7 @@ WARMS_IN_S: Final = 20.0
 
 
 class LiftingPad:
-    """`rises_until`: monotonic s, or inf."""
+    """The pad. `rises_until` is in monotonic seconds, or inf."""
 
     def __init__(self) -> None:
         self.rises_until = NEVER
@@ -46,7 +46,8 @@ class LiftingPad:
         return GAP_MM[0] <= self.gap_mm() <= GAP_MM[1]
 
     def follow(self, now: float, robot: bool, mode: FailureMode | None, pace: float) -> bool:
-        """Rise to a robot, sink without a robot. True if the pad has just risen."""
+        """Rise to a robot; without a robot, sink. Return True if the pad has just arrived at the
+        top."""
         goal = HEIGHTS_MM.get(mode, RISE_MM) if robot else 0.0
         if mode == "stuck" or self._height_mm == goal:
             self.rises_until = NEVER
@@ -61,7 +62,7 @@ class LiftingPad:
 
 
 class Coil:
-    """The coil; its temperature approaches the balance of heating and cooling."""
+    """The coil. Its temperature approaches the balance of heating and cooling."""
 
     def __init__(self) -> None:
         self._at, self._celsius, self._goal = 0.0, AMBIENT_C, AMBIENT_C
@@ -76,7 +77,8 @@ class Coil:
         return self._goal + (self._celsius - self._goal) * rest
 
     def trips_at(self) -> float:
-        """Return the time at which the coil gets too hot, or cool enough again (s), or inf."""
+        """Return the time (s) when the coil gets too hot, or cool enough again; inf if neither
+        comes."""
         if (self._goal > TRIP_C) == (self._celsius >= TRIP_C):
             return NEVER
         rest = (self._goal - TRIP_C) / (self._goal - self._celsius)

@@ -1,6 +1,6 @@
-"""The protocol of plants: physics driven by commands and time, with recorded edges and failures.
+"""The protocol of plants. Commands and time drive their physics. Edges and failures are recorded.
 
-`machine.py` implements all but the physics. A kind's plants are in `<kind>.py`.
+`machine.py` implements everything except the physics. A kind's plants are in `<kind>.py`.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -13,7 +13,8 @@ FAILURE_MODES: tuple[FailureMode, ...] = ("off", "stuck", "slow", "garbage", "wr
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """One change at `at` (monotonic or virtual s): a relay that we drove, a sensor that moved."""
+    """One change at `at` (monotonic or virtual s), of a relay that we drove or of a sensor that
+    moved."""
 
     at: float
     device: str
@@ -23,9 +24,9 @@ class Edge:
 
 
 class Plant(Protocol):
-    """One lift, door or charger. Signals are logical here (asserted or not); levels are the wire's.
+    """One lift, door or charger. Signals are asserted or not; levels belong to the wire.
 
-    Not thread-safe: the far side of the wire serialises the calls.
+    A plant is not thread-safe. The far side of the wire makes one call at a time.
     """
 
     name: str
@@ -34,7 +35,8 @@ class Plant(Protocol):
 
     @property
     def failures(self) -> Mapping[str, FailureMode]:
-        """Part -> failure mode. The far side of a bus reads the failures of its parts here."""
+        """Return part -> failure mode. The far side of a bus reads the failures of its own parts from
+        this."""
 
     def drive(self, signal: str, asserted: bool, now: float) -> None:
         """Take a change of our relay."""
@@ -43,22 +45,24 @@ class Plant(Protocol):
         """Let the physics run until `now`."""
 
     def sense(self, signal: str) -> bool:
-        """Is this contact asserted, as the wire shows it (failures included)?"""
+        """Is this contact asserted, as the wire shows it with the wire's failure?"""
 
     def reading(self) -> object:
-        """Return the reading of a controller without contacts; None if it has contacts alone."""
+        """Return the reading of a controller without contacts. Return None if the plant has only
+        contacts."""
 
     def next_at(self) -> float:
-        """Return the time of the next change without a command (monotonic s), or inf."""
+        """Return the time (monotonic s) of the next change that comes without a command, or inf."""
 
     def add_parts(self, parts: Iterable[str]) -> None:
-        """Let the plant fail by these parts of the far side as well."""
+        """Add parts of the far side that can fail for this plant."""
 
     def fail(self, part: str, mode: FailureMode | None) -> None:
-        """Make a signal or part fail; None mends it. Raises ValueError with the known parts."""
+        """Make a signal or part fail. None mends it. Raises ValueError with the known parts."""
 
     def names(self) -> Mapping[str, list[str]]:
         """Return the names for `press` and `fail`."""
 
     def press(self, signal: str, asserted: bool, now: float) -> None:
-        """Act as a person or the building: a fire alarm, a key switch, an obstruction."""
+        """Press or release a signal as a person or the building does: a fire alarm, a key switch, an
+        obstruction."""

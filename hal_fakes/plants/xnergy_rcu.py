@@ -1,4 +1,4 @@
-"""Xnergy's receiver (RCU) in front of the plant: its numbers, common to CANopen and Modbus."""
+"""Xnergy's receiver (RCU) in front of the plant. CANopen and Modbus share its numbers."""
 
 from typing import Final
 
@@ -12,7 +12,7 @@ from hal_fakes.plants.pad import AMBIENT_C
 from hal_fakes.plants.plant import Plant
 
 SIGNALS: Final = {ENABLE: "power", CHECK_RANGE: "range_check"}
-"""Writable objects, and their effects on the plant."""
+"""Writable object -> the signal of the plant that it drives."""
 HANDSHAKE: Final = (1, 2, 3, 4)
 STATES: Final = {
     Activity.IDLE: 0,
@@ -35,7 +35,8 @@ RANGES: Final = {"none": 0, "ongoing": 0, "in": IN_RANGE, "out": 2, "failed": 24
 
 
 def words(reading: Reading, latched: int = 0) -> dict[str, int]:
-    """Return the words under their names of `drivers.charger.xnergy`. `latched`: earlier errors."""
+    """Return the words under their names in `drivers.charger.xnergy`. `latched` holds earlier
+    errors."""
     now = sum(ERRORS[fault] for fault in reading.faults)
     shadow = now | latched
     return {
@@ -67,7 +68,7 @@ def rcu_plant(name: str, *links: str) -> ChargerPlant:
 class ModbusRcu:
     """The registers and coils of one receiver, with a plant behind them (`hal_fakes.modbus.units`).
 
-    `points`: all cells, including `outputs`; `unit`: the receiver's unit.
+    `points`: all cells, with `outputs` among them. `unit`: the receiver's unit id.
     """
 
     def __init__(self, plant: Plant, settings: ModbusChargerSettings) -> None:
@@ -91,7 +92,7 @@ class ModbusRcu:
         return found[self._names[point]] & 0xFFFF
 
     def set(self, point: Point, value: int, now: float) -> bool:
-        """Write a value; False if not writable."""
+        """Write a value. Return False if the point cannot be written."""
         if point not in self._coils:
             return False
         self._coils[point] = value
