@@ -67,7 +67,8 @@ def timer_unseen(call: Call, off_s: float) -> str:
     if {off_s, 1000 * off_s}.intersection(map(float, numbers)):
         return ""
     return (
-        f"no timer of {off_s:g} s (switches_off_after_s) can be seen in {written}: compare the two"
+        f"no timer of {off_s:g} s (switches_off_after_s) can be seen in {written}: compare the command"
+        " with switches_off_after_s"
     )
 
 

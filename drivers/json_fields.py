@@ -41,8 +41,8 @@ class JsonFlag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ]
     when: Annotated[
         list[Value],
-        tells("""the values that mean yes; every other value means no. Without it the field must be
-        true or false."""),
+        tells("""the values that mean yes. Every other value means no. Without `when` the field must
+        be true or false."""),
     ] = []
 
 

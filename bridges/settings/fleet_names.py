@@ -166,7 +166,7 @@ class _Comparing:
             text = f"{hz:g} Hz is too seldom for the coordinator to see the robots: write 1 or more"
             self._theirs("errors", ("rmf_fleet", "publish_fleet_state"), text)
         if self._fleet.fleet.account_for_battery_drain is False:
-            text = "without it RMF never sends a robot to charge: write true"
+            text = "without this key RMF never sends a robot to charge: write true"
             self._theirs("errors", ("rmf_fleet", "account_for_battery_drain"), text)
 
     def positions(self, building: BuildingMap | None) -> None:

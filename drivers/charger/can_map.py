@@ -116,19 +116,20 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = None
     out_of_range: Annotated[
         Signal | None,
-        tells("""not 0 while the robot stands where it cannot be charged. A signal that is in `errors`
-        too counts as an error only in an error state: a robot that has not arrived yet is no
-        error."""),
+        tells("""not 0 while the robot stands out of the charger's range. If `errors` has this
+        signal too, the signal counts as an error only in an error state, because a robot that has
+        not arrived yet is no error."""),
     ] = None
     range_ok: Annotated[
         Signal | None,
-        tells("""for a charger that always reports this: not 0 while the robot stands where it can
-        be charged. There is no power while the signal is 0, and no reading without its frame."""),
+        tells("""not 0 while the robot stands within the charger's range. Give this signal if the
+        charger always reports it. While the signal is 0 there is no power, and without its frame
+        there is no reading."""),
     ] = None
     at_height: Annotated[
         Signal | None,
-        tells("""not 0 while the charger's moving pad is in its charging position. There is no power
-        while the signal is 0, and no reading without its frame."""),
+        tells("""not 0 while the charger's moving pad is in its charging position. While the signal
+        is 0 there is no power, and without its frame there is no reading."""),
     ] = None
     temperatures: Annotated[
         dict[Name, Signal],

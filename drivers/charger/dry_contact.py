@@ -49,7 +49,7 @@ class ChargerInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unkno
     at_height: Annotated[
         Input | None,
         tells("""the station's moving pad is in its charging position. Without this signal there is
-        no power; a loss of the signal while current flows is a fault."""),
+        no power. A loss of the signal while current flows is a fault."""),
     ] = None
     range_ok: Annotated[
         Input | None,

@@ -29,8 +29,8 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ] = "error_msg"
     error_texts: Annotated[
         dict[Word, TextMeans],
-        tells("""text -> the side of the error, `station` or `robot`; or `none` for a text that
-        means no error (`OK`). For other texts `codes` gives the side, if it can."""),
+        tells("""text -> the side of the error, `station` or `robot`. Write `none` for a text that
+        means no error (`OK`). For any other text `codes` may give the side."""),
     ] = {}
     receiver_id: Annotated[
         Field | None, tells('the id of the receiver on the pad; null or "" without a receiver.')
@@ -40,13 +40,13 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     )
     range_ok: Annotated[
         JsonFlag | None,
-        tells("""the robot stands where it can be charged; for a station that always reports this.
-        Unless the flag is true there is no power."""),
+        tells("""the robot stands within the station's range. Give this flag if the station always
+        reports it. There is power only while the flag is true."""),
     ] = None
     at_height: Annotated[
         JsonFlag | None,
-        tells("""the station's moving pad is in its charging position. Unless the flag is true there
-        is no power; a loss of the flag while current flows is a fault."""),
+        tells("""the station's moving pad is in its charging position. There is power only while the
+        flag is true. A loss of the flag while current flows is a fault."""),
     ] = None
     volts: Annotated[JsonNumber | None, tells("the voltage at the battery.")] = None
     amps: Annotated[JsonNumber | None, tells("the current into the battery.")] = None

@@ -43,8 +43,8 @@ class JsonChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unk
     fields: Annotated[Fields, tells("the fields of the answer.")] = Fields()
     switches_off_after_s: Annotated[
         Timeout | None,
-        tells("""the timer that `start` sets; the power goes off this long after the last `start`,
-        so `start` is sent in every scan while the power is on."""),
+        tells("""the timer that `start` sets. The power goes off this long after the last `start`,
+        so the driver sends `start` in every scan while the power is on."""),
     ] = None
 
     def command(self, name: StationCommand) -> Any:

@@ -28,7 +28,9 @@ class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     words: Annotated[Literal[1, 2], tells("the number of registers: 2 for 32 bits.")] = 1
     low_first: Annotated[bool, tells("the first of the two registers holds the low word.")] = False
     signed: Annotated[bool, tells("the number is signed (two's complement).")] = False
-    bit: Annotated[LongBit | None, tells("only this bit of the number; 0 is the least.")] = None
+    bit: Annotated[
+        LongBit | None, tells("only this bit of the number; 0 is the least significant.")
+    ] = None
     scale: Annotated[
         float, tells("the factor from the maker's unit to ours (0.1 for tenths of an ampere).")
     ] = 1.0
@@ -79,7 +81,7 @@ class Power(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_fields=True
     start: Annotated[Word, tells("the value that lets the station charge.")]
     stop: Annotated[Word, tells("the value that keeps the station from charging.")]
     read_back: Annotated[
-        bool, tells("false where the command can only be written; then every scan writes it.")
+        bool, tells("false if the command cannot be read back; then every scan writes the command.")
     ] = True
 
 
@@ -95,12 +97,12 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     values: Annotated[
         dict[Name, RegisterNumber],
         msgspec.Meta(min_length=1),
-        tells("""name -> its place. `state` is the number that `codes` lists; `volts`, `amps`,
-        `battery_percent` and `time_to_full_s` are shown; `receiver` is the id of the receiver on
-        the pad, 0 for none; `in_range` is not 0 while a robot stands where it can be charged.
-        `range_ok` is the same for a station that reports it without a range check; `at_height` is
-        not 0 while the station's moving pad is in its charging position. While `range_ok` or
-        `at_height` is 0 there is no power. Rules and errors may use any name."""),
+        tells("""name -> its place. `state` is the number that `codes` lists. `volts`, `amps`,
+        `battery_percent` and `time_to_full_s` are shown. `receiver` is the id of the receiver on
+        the pad, 0 for none. `in_range` is not 0 while a robot stands within the station's range.
+        `range_ok` is the same for a station that reports the range without a range check.
+        `at_height` is not 0 while the station's moving pad is in its charging position. While
+        `range_ok` or `at_height` is 0 there is no power. Rules and errors may use any name."""),
     ]
     codes: Annotated[
         Codes | None, tells("the meanings of `state`'s numbers; not needed with `rules`.")

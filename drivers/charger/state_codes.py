@@ -40,7 +40,7 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     station_error: Annotated[
         list[Code],
         tells("""out of service by an error that the maker assigns to the station. With this key,
-        errors of either side may be in `error`."""),
+        `error` may list errors of either side."""),
     ] = []
     robot_error: Annotated[
         list[Code], tells("an error of the robot's side: the station itself is well.")

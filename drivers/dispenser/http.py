@@ -49,8 +49,8 @@ class HttpWorkcellSettings(WorkcellSettings, frozen=True, kw_only=True, forbid_u
     inputs: Annotated[WorkcellInputFields, tells("the fields of that answer.")]
     start: Annotated[
         Call,
-        tells("""starts one cycle. In its body the values "$guid", "$type_guid", "$quantity" and
-        "$compartment" stand for those of the request."""),
+        tells("""starts one cycle. The driver replaces the texts "$guid", "$type_guid", "$quantity"
+        and "$compartment" in its body by the values of the request."""),
     ]
     stop: Annotated[
         Call | None,

@@ -53,9 +53,9 @@ class Hold(Output, frozen=True, forbid_unknown_fields=True):
 
     flash: Annotated[
         Point | None,
-        tells("""the place of a Modbus module where each `pulse` is requested and timed by the
-        module, in tenths of a second: `unit 1 coil 0x200` for the first relay of a Waveshare Modbus
-        RTU Relay."""),
+        tells("""the place of a Modbus module that times each `pulse` itself, in tenths of a second.
+        The driver requests the pulse there. An example is `unit 1 coil 0x200`, for the first relay
+        of a Waveshare Modbus RTU Relay."""),
     ] = None
 
 

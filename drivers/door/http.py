@@ -53,8 +53,8 @@ class HttpDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_f
     ] = None
     switches_off_after_s: Annotated[
         Timeout | None,
-        tells("""the relay's own timer, as `hold` sets it (`…&toggle_after=10`): it switches the
-        relay off this long after the last `hold`."""),
+        tells("""the time of the relay's own timer, which `hold` sets (`…&toggle_after=10`). The
+        timer switches the relay off this long after the last `hold`."""),
     ] = None
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:

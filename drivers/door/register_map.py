@@ -43,10 +43,12 @@ class DoorPosition(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=
         Word | None, tells("the number for an unknown position; then only the status counts.")
     ] = None
     open_from: Annotated[
-        Percent, tells("below this the door does not count as open, whatever the status.")
+        Percent,
+        tells("below this position the door does not count as open, whatever the status says."),
     ] = 95
     closed_to: Annotated[
-        Percent, tells("above this the door does not count as closed, whatever the status.")
+        Percent,
+        tells("above this position the door does not count as closed, whatever the status says."),
     ] = 5
 
     def problems(self) -> Remarks:
@@ -80,7 +82,7 @@ class HoldCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_field
     ]
     read_back: Annotated[
         bool,
-        tells("""false where the command can only be written; then every scan writes the command, and
+        tells("""false if the command cannot be read back. Then every scan writes the command, and
         nothing proves that the operator accepted it."""),
     ] = True
 

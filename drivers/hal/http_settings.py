@@ -47,18 +47,18 @@ class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
     ] = None
     accept_unencrypted: Annotated[
         Name | None,
-        tells("""the reason why a token or a password may go over the network unencrypted, which
-        `check` prints."""),
+        tells("""the reason why a token or a password may go over the network unencrypted. `check`
+        prints the reason."""),
     ] = None
     push_path: Annotated[
         Path | None,
-        tells("""a WebSocket below `api_base`: at each of its messages the controller is read at once.
-        The message itself is never believed."""),
+        tells("""a WebSocket below `api_base`. At each of its messages the driver reads the
+        controller at once. The content of the message is not used."""),
     ] = None
     ca_file: Annotated[
         AbsolutePath | None,
-        tells("""with https, a PEM file with the certificate of the controller or of its authority;
-        when absent, the public authorities count."""),
+        tells("""with https, a PEM file with the certificate of the controller or of its authority.
+        Without this file the public authorities are trusted."""),
     ] = None
 
     def problems(self) -> Remarks:

@@ -64,8 +64,8 @@ class Output(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     active: Annotated[Active, tells("the level of an asserted output.")]
     read_back: Annotated[
         bool,
-        tells("""`false` for a coil that can only be written, or that the controller clears by itself;
-        then every scan writes the coil, and nothing proves its level. Refused on GPIO."""),
+        tells("""`false` for a coil that cannot be read back, or that the controller clears by
+        itself. Then every scan writes the coil, and nothing proves its level. Refused on GPIO."""),
     ] = True
 
     def wire(

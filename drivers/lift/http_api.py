@@ -38,8 +38,8 @@ class HeldCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     ask: Annotated[Call, tells("asks for it.")]
     release: Annotated[
         Call | None,
-        tells("""ends it. Without `release` the request lasts for a moment at the gateway, and is
-        repeated in each scan while the command is on."""),
+        tells("""ends the request. Without `release` the request lasts only a moment at the gateway,
+        and the driver repeats it in each scan while the command is on."""),
     ] = None
     shown: Annotated[
         JsonFlag | None,
@@ -47,8 +47,8 @@ class HeldCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     ] = None
     switches_off_after_s: Annotated[
         Timeout | None,
-        tells("""the gateway's own timer: it ends the command this long after the last `ask`, which
-        is sent in each scan."""),
+        tells("""the time of the gateway's own timer. The timer ends the command this long after the
+        last `ask`. The driver sends `ask` in each scan."""),
     ] = None
 
     def is_renewed(self) -> bool:
@@ -128,8 +128,8 @@ class LiftApi(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     state_parts: Annotated[
         dict[Part, Call],
         msgspec.Meta(max_length=8),
-        tells("""name -> a request that reads a part of the state; the fields of its answer begin with
-        that name (`car.floor`). Give either `state_parts` or `state_path`."""),
+        tells("""name -> a request that reads a part of the state. The fields of its answer begin
+        with this name (`car.floor`). Give either `state_parts` or `state_path`."""),
     ] = {}
     state: Annotated[JsonLiftState, tells("the fields of the answers.")]
     commands: Annotated[LiftCommands, tells("the commands to the gateway.")]

@@ -22,8 +22,8 @@ from drivers.lift.register_parts import (
     place_of,
 )
 
-READ_BACK: Final = tells("""`read_back` for this command alone. `false` also suits a gateway that takes
-    a call and then clears the call's place by itself.""")
+READ_BACK: Final = tells("""`read_back` for this command alone. Also write `false` if the gateway
+takes a call and then clears the call's place by itself.""")
 
 
 class LiftCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -34,8 +34,8 @@ class LiftCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_field
 
     at: Annotated[
         Place,
-        tells("""`coil N` or `holding register N`. Commands may share a register: their values are
-        joined, bit by bit."""),
+        tells("""`coil N` or `holding register N`. Commands may share a register. Their values are
+        then joined, bit by bit."""),
     ]
     ask: Annotated[Word, tells("the value of the request.")] = 1
     release: Annotated[Word, tells("the value for no request, its safe value.")] = 0
@@ -80,8 +80,8 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     call: Annotated[CallCommand | None, tells("calls as numbers in one register.")] = None
     read_back: Annotated[
         bool,
-        tells("""false where commands can only be written; then every scan writes them, and nothing
-        proves that the gateway accepted them."""),
+        tells("""false if commands cannot be read back. Then every scan writes the commands, and
+        nothing proves that the gateway accepted them."""),
     ] = True
 
     def singles(self) -> Iterator[tuple[str, tuple[str, ...], LiftCommand]]:

@@ -74,8 +74,8 @@ class ServiceCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     bits: Annotated[list[LiftInput], tells("least significant first.")]
     codes: Annotated[
         dict[Number, ServiceState],
-        tells("""number -> state; every number must be listed. Write `fault` for a number that the
-        controller never shows: then a line is broken, and the lift is out of service."""),
+        tells("""number -> state. List every number. Write `fault` for a number that the controller
+        never shows. Such a number means that a line is broken, and takes the lift out of service."""),
     ]
 
     def means(self, number: int) -> str:

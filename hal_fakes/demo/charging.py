@@ -1,10 +1,17 @@
 """`make demo-charging`: the numbered scenarios of shared chargers, and the verdict on each.
 
 Two chargers on HTTP and the coordinator are processes of their own. This process plays two fleets of
-two brands, an operator and a technician. The scenarios: a robot charged by the schedule (1), requests
-of a robot and of an operator (2), more robots than chargers and a blocked pad (3), a robot at the wrong
-charger (4), chargers that overheat (5a), and a robot that cannot be charged (5b). A line that begins
-with `so:` is an awaited fact: without it the demo ends with exit code 1.
+two brands, an operator and a technician. The scenarios are:
+
+- (1) the schedule charges a robot;
+- (2) a robot and an operator request a charge;
+- (3) there are more robots than chargers, and a pad is blocked;
+- (4) a robot stands at the wrong charger;
+- (5a) chargers overheat;
+- (5b) a robot cannot be charged.
+
+A line that begins with `so:` is an awaited fact. If the fact does not come, the demo ends with exit
+code 1.
 """
 
 from collections.abc import Iterable

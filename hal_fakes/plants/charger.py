@@ -1,27 +1,35 @@
 """A wireless charger on any wire: its pad, the robot on the pad, battery and heat.
 
-To press: `robot` (a robot stands on the pad), or a robot of the YAML's `receivers` by its name
-(`tiny/AMR02`), or a `stranger`. Several robots may stand there; the station sees the last that came.
-`misparked`: the robot stands off centre. `foreign_object` (something lies on the pad),
-`over_temperature`, `transmitter_fault`. A robot comes with its battery 40 % full. The pad rises to the
-robot; the station shakes hands, charges, ramps down when the battery is full, waits, and is idle again
-until another robot comes. Current warms the coil, and a fan cools it. An error stays until its cause is
-gone and the error is cleared or, if no command clears it, the power is off; a robot's error
-(ROBOTS_FAULTS) stays until the robot leaves.
+To press:
 
-To drive: `clear_error`, and on a commanded station `power` (needed for charging) and `range_check`
-(its result comes a moment later; a station without range checks knows at once). On
-contacts: the relay `enable`; `charging` while current flows, `ready` while current could flow, `fault`
-in an error, `at_height` and `range_ok` of the pad.
+- `robot`: a robot stands on the pad. If the YAML has `receivers`, press a robot's name (`tiny/AMR02`)
+  instead, or `stranger` for an unknown robot. If several robots stand there, the station sees the
+  last that came.
+- `misparked`: the robot stands off centre.
+- `foreign_object`: an object lies on the pad.
+- `over_temperature`, `transmitter_fault`: errors of the station.
 
-Failing parts, with the effects of `off`, `stuck`, `slow`, `garbage` and `wrong`; `pad` is in `pad.py`:
+A robot comes with its battery 40 % full. The pad rises to the robot, and the station shakes hands and
+charges. When the battery is full, the station ramps down and waits. It is idle again until another
+robot comes. Current warms the coil, and a fan cools the coil.
+
+An error stays until its cause is gone and the error is cleared. If no command clears errors, switching
+the power off does. A robot's error (ROBOTS_FAULTS) stays until the robot leaves.
+
+To drive: `clear_error`. A commanded station also has `power`, which charging needs, and `range_check`,
+whose result comes a moment later. A station without range checks knows the range at once. A station on
+contacts has the relay `enable`. Its contacts are `charging` (current flows), `ready` (current could
+flow), `fault` (an error), and `at_height` and `range_ok` of the pad.
+
+These parts can fail, with the effects of `off`, `stuck`, `slow`, `garbage` and `wrong`; `pad` is in
+`pad.py`:
 
 |          | off              | stuck            | slow         | garbage          | wrong         |
 | receiver | never answers    | in the handshake | 10 x as long | contact is lost  | wrong answer  |
 | battery  | draws no current | never fills      | fills slowly | draws no current | comes full    |
 
-A failing `fan` lets the coil heat up, and a failing `thermometer` is an error, whatever the mode.
-The parts of the wire (`server`, `node`, ...) fail at its far side.
+In any failure mode, a failing `fan` lets the coil heat up, and a failing `thermometer` is an error. The
+parts of the wire (`server`, `node`, ...) fail at its far side.
 """
 
 from collections.abc import Iterable, Mapping

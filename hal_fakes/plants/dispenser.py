@@ -1,11 +1,17 @@
 """A dispenser or ingestor: a conveyor that moves one item in each cycle, behind a small PLC.
 
-Contacts: `ready`, `busy`, `done` (on until the start is off, and at least DONE_S), `fault`. Relays:
-`start`, and `select_…` for each sort. With a steady start the conveyor stops when the start goes off.
-The edge `moved` counts the items that really left. To press: `hatch` (somebody has it open: not ready,
-and a running cycle stands still), `restart` (the PLC restarts: it forgets its cycle, and takes a start
-that is still on for a new one), `fault`. Failing part `conveyor`: `off` and `stuck` jam in the middle,
-`slow` takes five times as long, `wrong` reports a fault in the middle, `garbage` ends without `done`.
+The contacts are `ready`, `busy`, `done` and `fault`. `done` is on until the start is off, and for at
+least DONE_S. The relays are `start`, and `select_…` for each sort. If the start must be steady, the
+conveyor stops when the start goes off. The edge `moved` counts the items that really left.
+
+To press:
+
+- `hatch`: somebody has the hatch open. The workcell is not ready, and a running cycle stands still.
+- `restart`: the PLC restarts. It forgets its cycle, and takes a start that is on for a new start.
+- `fault`: the PLC reports a fault.
+
+The part `conveyor` can fail. `off` and `stuck` jam in the middle, `slow` takes five times as long,
+`wrong` reports a fault in the middle, and `garbage` ends without `done`.
 """
 
 from collections.abc import Iterable

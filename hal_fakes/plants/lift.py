@@ -2,20 +2,24 @@
 
 - AGV mode begins some time after its request, once people's calls are done, and never under a hazard.
   AGV mode ends when the request ends or a hazard comes.
-- With `agv_mode: by_call` a call requests AGV mode, and counts until the door at its landing is open
-  and not held (as in open-rmf/mock-lift-io, firmware/Mock-Lift/src/main.cpp).
-- In AGV mode a call brings the car to its landing; there the door opens, and stays open for its dwell
-  time and while its open relay is on. The car leaves with its doors closed.
-- Fire: the car goes to the lowest landing and stays there, open. Emergency, earthquake: the car stops
-  at the next landing and opens. Code blue, out of service, manual: only AGV mode ends.
-- AGV mode lost on the way: the car stops at the next landing and opens for its dwell time.
-- Overload: the car stays at its landing, open.
+- With `agv_mode: by_call` a call requests AGV mode. The call counts until the door at its landing is
+  open and not held (as in open-rmf/mock-lift-io, firmware/Mock-Lift/src/main.cpp).
+- In AGV mode a call brings the car to its landing, and the door opens. The door stays open for its
+  dwell time, and as long as its open relay is on. The car leaves only with its doors closed.
+- Fire: the car goes to the lowest landing and stays there with its door open. Emergency and earthquake:
+  the car stops at the next landing and opens. Code blue, out of service and manual: AGV mode ends, and
+  nothing else happens.
+- If AGV mode is lost on the way, the car stops at the next landing and opens for its dwell time.
+- Overload: the car stays at its landing with its door open.
 
 To press: each wired hazard, `hall_<landing>` (a person's call), `obstruction`, `rear_obstruction`.
-Failing parts: `car` (`off`, `stuck`: stands still; `slow`; `wrong`: goes a floor too far),
-`door_operator` and `rear_door_operator` (`off`, `stuck`: stands; `slow`; `wrong`: inverted),
-`controller` (`off`: no AGV mode; `stuck`: AGV mode stays as it is; `slow`). Wires fail as in
-`hal_fakes/plants/contact.py`.
+
+These parts can fail, with these effects. Wires fail as in `hal_fakes/plants/contact.py`.
+
+- `car`: `off` and `stuck` stand still, `slow` is slow, `wrong` goes a floor too far.
+- `door_operator` and `rear_door_operator`: `off` and `stuck` stand still, `slow` is slow, `wrong`
+  inverts.
+- `controller`: `off` never grants AGV mode, `stuck` leaves AGV mode unchanged, `slow` is slow.
 """
 
 from collections.abc import Sequence

@@ -173,7 +173,7 @@ def test_settings_that_cannot_be_right_are_named_where_they_stand(
         ),
         (
             "account_for_battery_drain: False",
-            "config.yaml:3:3: without it RMF never sends a robot to charge: write true",
+            "config.yaml:3:3: without this key RMF never sends a robot to charge: write true",
         ),
     ],
 )

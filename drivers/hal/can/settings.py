@@ -42,7 +42,7 @@ class Slcan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     baudrate: Annotated[
         int,
         msgspec.Meta(ge=9600, le=3_000_000, extra={"unit": "Bd"}),
-        tells("the rate of the serial port; USB adapters take any."),
+        tells("the rate of the serial port; USB adapters accept any rate."),
     ] = 115_200
 
 

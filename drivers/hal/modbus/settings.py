@@ -36,8 +36,8 @@ class ModbusSettings(
     without_watchdog: Annotated[
         dict[Unit, Name],
         tells("""unit -> why its outputs may keep their value when the daemon's machine or the
-        network dies, or how the unit drops its outputs (`its web page: all off after 5 s without a
-        master`)."""),
+        network dies. Or write how the unit drops its outputs (`its web page: all off after 5 s
+        without a master`)."""),
     ] = msgspec.field(default_factory=dict)
 
     def problems(self) -> Remarks:

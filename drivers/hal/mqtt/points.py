@@ -45,8 +45,8 @@ class MqttPoint(
     ] = []
     stale_after_s: Annotated[
         Age | None,
-        tells("""the age from which a state is unknown: longer than the device's own period, or than
-        the time in which it answers `ask`."""),
+        tells("""the age from which a state is unknown. Write more than the device's own period, or
+        than the time in which the device answers `ask`."""),
     ] = None
     ask: Annotated[
         Ask | None, tells("a message, sent in every scan, that makes the device publish its state.")
@@ -60,8 +60,9 @@ class MqttPoint(
     ] = 2.0
     switches_off_after_s: Annotated[
         Timeout | None,
-        tells("""the relay's own timer: it switches the relay off this long after the last message
-        that switched it on. That message is sent in every scan while the relay is on."""),
+        tells("""the time of the relay's own timer. The timer switches the relay off this long after
+        the last message that switches it on. The driver sends this message in every scan while the
+        relay is on."""),
     ] = None
     without_timer: Annotated[
         Name | None, tells("why this relay may stay on when the network or the broker fails.")

@@ -27,8 +27,8 @@ class BrokerTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
     ca_file: Annotated[
         AbsolutePath | None,
-        tells("""a PEM file with the certificate of the broker or of its authority; when absent, the
-        public authorities count."""),
+        tells("""a PEM file with the certificate of the broker or of its authority. Without this
+        file the public authorities are trusted."""),
     ] = None
     certificate_file: Annotated[
         AbsolutePath | None, tells("a PEM file with our certificate, for a broker that wants one.")
@@ -57,9 +57,11 @@ class MqttSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
     version: Annotated[
         Literal["5", "3.1.1"],
         tells("""the version of MQTT. Only with 5 does the broker hold long payloads back, drop a
-        command that cannot be delivered at once, and tell us that no device receives it."""),
+        command that it cannot deliver at once, and report that no device receives a command."""),
     ] = "5"
-    tls: Annotated[BrokerTls | None, tells("encryption, and who is trusted.")] = None
+    tls: Annotated[BrokerTls | None, tells("encryption, and the authorities that are trusted.")] = (
+        None
+    )
     user: Annotated[Name | None, tells("our name at the broker.")] = None
     password_file: Annotated[
         Name | None, tells("a file with our password, which only the daemon may read.")
@@ -76,7 +78,7 @@ class MqttSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
     timeout_s: Annotated[
         Confirmation, tells("how long a connection, or the broker's confirmation, may take.")
     ] = 1.0
-    scan_s: Annotated[Period, tells("how often the states are judged, and asked for.")] = 0.5
+    scan_s: Annotated[Period, tells("how often the states are checked, and asked for.")] = 0.5
     points: Annotated[
         dict[Name, MqttPoint], tells("name -> a contact or relay, for `point:` of a device.")
     ] = msgspec.field(default_factory=dict)

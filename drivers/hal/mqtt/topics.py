@@ -58,8 +58,8 @@ class StateTopic(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     topic: Annotated[Topic, tells("where the state is published.")]
     stale_after_s: Annotated[
         Age,
-        tells("""the age from which a state is unknown: longer than the device's own period, or than
-        the time in which it answers `ask`."""),
+        tells("""the age from which a state is unknown. Write more than the device's own period, or
+        than the time in which the device answers `ask`."""),
     ]
     ask: Annotated[
         Ask | None, tells("a message, sent in every scan, that makes the device publish its state.")
