@@ -156,7 +156,7 @@ def test_a_topic_that_we_may_not_read_is_named(guarded: Mosquitto, tmp_path: Pat
         bus.up()
         wait_until(lambda: reason(bus, STATE), "a reason")
         assert reason(bus, STATE).startswith(
-            ("the broker does not let us read relay/state", "nothing was published on relay/state")
+            ("the broker does not let us read relay/state", "nothing has come on relay/state")
         )
 
 
