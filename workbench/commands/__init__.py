@@ -1,1 +1,1 @@
-"""The subcommands of `rmf-bridge` that no daemon needs, one file each."""
+"""Subcommands of `rmf-bridge` that run apart from a daemon. Each has a file here."""

@@ -1,7 +1,8 @@
 """`rmf-bridge doctor FILE`: find and explain the obstacles to a working bridge on this machine.
 
-For the target machine, before and after installing. The doctor only reads, except that `--kill-test`
-switches one output. It opens no bus of a running service. Its subjects: `commissioning/doctor/`.
+Run `doctor` on the target machine, before and after installing. The doctor only reads; only
+`--kill-test` switches an output, and one output alone. The doctor opens no bus that a running service
+uses. `commissioning/doctor/` has the examinations, one file for each subject.
 """
 
 import argparse
@@ -83,8 +84,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0: all well, 1: warnings or unknown facts, 2: wrong, 64: not confirmed, 78: wrong YAML."""
-    log.start("CRITICAL")  # the findings say what the buses would log
+    """Return 0: all well, 1: warnings or unknown facts, 2: something is wrong, 64: not confirmed, 78:
+    wrong YAML."""
+    log.start("CRITICAL")  # the findings already say what the buses would log
     try:
         config = load(args.file)
         config = replace(config, rmf=overridden(config.rmf, args))
@@ -130,7 +132,7 @@ def _building(file: str | None) -> "BuildingMap | None":
 
 
 def _not_confirmed(config: Config, args: argparse.Namespace) -> str:
-    """Return why no output may be switched on; "" if allowed."""
+    """Return why the kill test may not switch the output on; "" if the person confirmed."""
     from workbench.commissioning.doctor.victim import step_called
 
     try:

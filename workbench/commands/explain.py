@@ -1,6 +1,7 @@
-"""`rmf-bridge explain`: why a robot waits for a lift, a door or a charger, in one screen of sentences.
+"""`rmf-bridge explain`: say why a robot waits for a lift, a door or a charger, in one screen of
+sentences.
 
-From a recording, or live from the graph. `workbench/explain/` makes the sentences.
+The messages come from a recording, or live from the graph. `workbench/explain/` makes the sentences.
 """
 
 import argparse
@@ -71,8 +72,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0; 1 if the device or RMF was not heard or the graph cannot be joined; 66 if FILE is
-    no readable recording."""
+    """Return 0; 1 if the device or RMF was not heard, or the graph cannot be joined; 66 if FILE is no
+    readable recording."""
     if (args.file is None) == (args.live is None):
         complain("explain", "name either a FILE or --live DEVICE")
         return 2
@@ -87,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
 
 
-# ---- a recording
+# ---- from a recording
 
 
 def _recorded(args: argparse.Namespace) -> int:
@@ -109,7 +110,7 @@ def _recorded(args: argparse.Namespace) -> int:
 
 
 def _all(site: HeardDevices, devices: list[tuple[Kind, str]], *, as_json: bool) -> int:
-    """Print each device in a line, or as JSON."""
+    """Print a line for each device, or print all devices as JSON."""
     told = [site.explain(kind, name, None, faults.for_explain()) for kind, name in devices]
     if as_json:
         print(json.dumps([asdict(one) for one in told]))
@@ -121,7 +122,7 @@ def _all(site: HeardDevices, devices: list[tuple[Kind, str]], *, as_json: bool) 
 
 
 def _one(site: HeardDevices, args: argparse.Namespace) -> int:
-    """Print the named device, or the only device."""
+    """Print the explanation of the named device, or of the only device."""
     name = args.device or args.live or site.devices()[0][1]
     kinds = [args.kind] if args.kind else site.kinds(name) or ["lift"]
     if len(kinds) > 1:
@@ -143,7 +144,7 @@ def _tell(found: Explanation, *, as_json: bool) -> None:
     sys.stdout.flush()
 
 
-# ---- the graph
+# ---- from the live graph
 
 
 def _live(args: argparse.Namespace) -> int:
@@ -158,7 +159,7 @@ def _live(args: argparse.Namespace) -> int:
 
 
 def _listen(ear: Ear, past: Ear, site: HeardDevices, for_s: float) -> None:
-    """Listen for this time (s). `past` hears the requests that fleet adapters have retained too."""
+    """Listen for `for_s` seconds. `past` also hears the requests that fleet adapters sent before."""
     until = time.monotonic() + for_s
     site.pass_time(time.monotonic(), time.time())
     while (left_s := until - time.monotonic()) > 0:
@@ -171,7 +172,7 @@ def _listen(ear: Ear, past: Ear, site: HeardDevices, for_s: float) -> None:
 
 
 def _follow(ear: Ear, past: Ear, site: HeardDevices, args: argparse.Namespace) -> None:
-    """Print each change, until Ctrl-C."""
+    """Print each changed explanation, until Ctrl-C."""
     told: object = None
     _listen(ear, past, site, args.for_s)
     while True:

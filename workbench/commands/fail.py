@@ -1,4 +1,4 @@
-"""`rmf-bridge fail FILE PART MODE`: in a simulation, a wire or a part of the device fails."""
+"""`rmf-bridge fail FILE PART MODE`: make a wire or a part of a simulated device fail."""
 
 import argparse
 
@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0; 1 if the part cannot fail like this; 69 if no simulation of the file runs."""
+    """Return 0; 1 if the part cannot fail in this way; 69 if no simulation of the file runs."""
     if args.part is None:
         return tell(args, "fail")
     if args.mode is None:

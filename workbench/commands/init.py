@@ -1,6 +1,7 @@
 """`rmf-bridge init FILE`: write a first YAML for the device in front of you.
 
-The command asks, or takes answers as options. The new file passes `check`; no file is overwritten.
+The command asks for the answers, or takes them from options. The new file passes `check`. The command
+never overwrites a file.
 """
 
 import argparse
@@ -33,14 +34,14 @@ from workbench.commissioning.init.answers import (
 EX_USAGE, EX_NOINPUT, EX_CANTCREAT, EX_INTERRUPTED = 64, 66, 73, 130
 TABLE: Final = (*gateway.PLACES, *gateway.NUMBERS)
 Given = dict[str, Any]
-"""Answers so far, by their names in DraftAnswers."""
+"""Answers so far. Each key is the answer's name in DraftAnswers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """One question: its name in DraftAnswers, its text and its condition.
+    """A question: its name in DraftAnswers, its text and its condition.
 
-    `offered`: the default answer. `choices`: the possible answers; () for any text.
+    `offered` is the default answer. `choices` are the possible answers; () allows any text.
     """
 
     name: str
@@ -60,7 +61,7 @@ def _is_lift_on_contacts(given: Given) -> bool:
 
 
 def _in_table(name: str, given: Given) -> bool:
-    """Is this part of the register table needed?"""
+    """Does the draft need this part of the register table?"""
     if given["wiring"] != "gateway":
         return False
     if name == "motion_numbers":
@@ -191,8 +192,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0; 64: answers missing or contradictory; 66: unreadable map; 73: the file exists."""
-    if os.path.lexists(args.file):  # before the first question
+    """Return 0; 64: an answer is missing, or answers contradict; 66: unreadable map; 73: the file
+    exists."""
+    if os.path.lexists(args.file):  # before the first question, so that nobody answers in vain
         return _there_already(args.file)
     if why := no_folder(args.file):
         return not_written(args.file, why)
@@ -216,7 +218,7 @@ def _there_already(file: Path) -> int:
 
 
 def _written(file: Path, given: Given) -> int:
-    """Write the draft, if `check` finds no error in it."""
+    """Write the draft if `check` finds no error in the draft. Return the exit code."""
     try:
         text = draft(answers(given))
         understood(file, text.encode())
@@ -238,7 +240,8 @@ def _written(file: Path, given: Given) -> int:
 
 
 def answered(args: argparse.Namespace, found: BuildingMap | None) -> Given:
-    """Return every answer, by option, else by map, else by the person. Raises Impossible."""
+    """Return every answer: from its option, else from the map, else from the person. Raises
+    Impossible."""
     given: Given = {}
     for question in QUESTIONS:
         if not _needed(question, given, args):
@@ -300,7 +303,7 @@ def _ask(question: Question, offered: str, given: Given, found: BuildingMap | No
 
 
 def answers(given: Given) -> DraftAnswers:
-    """Convert the answers for the draft. Raises Impossible with the remedy."""
+    """Convert the answers to the draft's types. Raises Impossible with the remedy."""
     told = dict(given)
     for name, most in (("unit", 247), ("domain_id", 232)):
         if name in told:
@@ -326,7 +329,7 @@ def _number(name: str, text: str, most: int) -> int:
 
 
 def write(path: Path, text: str) -> None:
-    """Write a new file. Raises OSError if it exists or cannot be written."""
+    """Write a new file. Raises OSError if the file exists or cannot be written."""
     with path.open("x", encoding="utf-8") as out:
         out.write(text)
 

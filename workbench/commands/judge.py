@@ -1,6 +1,6 @@
 """`rmf-bridge judge`: check any lift, door or charger node, or a fleet adapter, against RMF's contract.
 
-`workbench/judge/` has the laws and the plays; here are the options, the graph, the clock and the
+`workbench/judge/` has the laws and the plays. This file has the options, the graph, the clock and the
 verdict. Exit code 0: every observed law is kept. 1: a law is broken. 2: a wrong command line. 66: the
 recording cannot be read. 69: nothing was heard, the graph cannot be joined, or the play was not
 performed.
@@ -60,7 +60,7 @@ BESIDE: dict[str, tuple[str, ...]] = {
     "fleet": (topics.ADAPTER_LIFT_REQUESTS.name, topics.ADAPTER_DOOR_REQUESTS.name),
     "coordinator": (topics.CHARGER_REQUESTS.name, topics.CHARGER_CANCELS.name),
 }
-"""Nodes whose topics a play may share, with `--beside`."""
+"""Topics that a play may share with another node, if `--beside` names the node."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -142,7 +142,7 @@ def _add_plays(parser: argparse.ArgumentParser) -> None:
 
 
 def performance_of(args: argparse.Namespace) -> Scenario | None:
-    """Return the play; None to listen only. Contradictory options end with exit code 2."""
+    """Return the play, or None to listen only. Exit with code 2 if options contradict."""
     kinds: dict[JudgedKind, bool] = {
         "lift": args.ride is not None,
         "door": args.passages is not None,
@@ -175,12 +175,12 @@ def performance_of(args: argparse.Namespace) -> Scenario | None:
 
 
 def words_of(args: argparse.Namespace) -> str:
-    """Name the device in words."""
+    """Return the device's kind and name for messages."""
     return f"the {args.kind} {shown(args.name)}"
 
 
 def run(args: argparse.Namespace) -> int:
-    """Listen, play or read, and judge."""
+    """Listen, play or read a recording; then judge. Return the exit code."""
     if args.laws:
         print(markdown(args.kind))
         return 0
@@ -230,7 +230,7 @@ def _live(args: argparse.Namespace, performance: Scenario | None) -> int:
 
 
 def _begins(args: argparse.Namespace, performance: Scenario | None) -> str:
-    """Tell the waiting user what is being judged."""
+    """Return the first line, which tells the waiting user what the program does."""
     if performance is not None:
         return f"plays with {words_of(args)}; Ctrl-C releases the device, and judges"
     until = "until Ctrl-C" if args.for_s == NEVER else f"for {args.for_s:g} s"
@@ -254,7 +254,7 @@ def tell(found: Judgement, args: argparse.Namespace) -> int:
 
 
 class Live:
-    """The live graph: messages heard, in order of arrival, and messages published."""
+    """The live graph: hears messages in order of arrival, and publishes a play's messages."""
 
     def __init__(
         self,
@@ -276,7 +276,7 @@ class Live:
         self._looked_at = 0.0
 
     def strangers(self) -> str:
-        """Return other publishers on the play's topics."""
+        """Name the other nodes that publish on the play's topics; "" if there are none."""
         found = [name for name in self._sole if self._ear.ends[name].matched()]
         if not found:
             return ""
@@ -285,7 +285,7 @@ class Live:
         return f"other nodes publish on {', '.join(found)}: to play nevertheless, add {beside}"
 
     def judge(self, judging: JudgeRun) -> None:
-        """Run until there is a verdict. However a play ends, it first releases the device."""
+        """Run until there is a verdict. A play always releases the device before the play ends."""
         judging.begin(time.monotonic(), time.time())
         try:
             with _told_to_end() as told:
@@ -323,7 +323,8 @@ class Live:
 
 @contextmanager
 def _told_to_end() -> Iterator[Callable[[], bool]]:
-    """Has Ctrl-C, SIGTERM or SIGHUP come? Such a signal never interrupts the present step."""
+    """Yield a question: has Ctrl-C, SIGTERM or SIGHUP come? Such a signal does not interrupt the
+    current step."""
     told: list[int] = []
     with ended_by(lambda number, _: told.append(number)):
         yield lambda: bool(told)

@@ -1,6 +1,6 @@
 """`rmf-bridge mqtt-out`: publish the lifts, doors and chargers of RMF's graph to an MQTT broker.
 
-It only publishes: it subscribes to no topic, so nobody can command anything through it. The broker must
+The command subscribes to no topic, so nobody can command a device through the broker. The broker must
 speak MQTT 5. `workbench/graph/retained.py` makes the messages.
 """
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 TURN_S: Final = 0.5
 KEEPALIVE_S: Final = 10
 WAITING: Final = 5000
-"""The most messages that wait for a slow broker; further ones are tried again in the next turn."""
+"""Maximum number of messages that wait for a slow broker. The next turn tries the rest again."""
 LEAVES_S: Final = 2.0
 PORTS: Final = {False: 1883, True: 8883}
 
@@ -110,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _unsafe(args: argparse.Namespace) -> str:
-    """Return why these options are refused; "" if they are not."""
+    """Return why the program refuses these options; "" for safe options."""
     if bool(args.user) != bool(args.password_file):
         return "--user and --password-file need each other"
     if args.ca_file and not args.tls:
@@ -150,10 +150,11 @@ def publish(transport: Transport, broker: "Broker", retainer: Retainer) -> None:
 
 
 class Broker:
-    """A connection to a broker, made again by paho-mqtt whenever it is lost."""
+    """A connection to a broker. paho-mqtt connects again after each loss."""
 
     def __init__(self, args: argparse.Namespace, status: str) -> None:
-        """Begin to connect. Raises ImportError, SecretError, or OSError for an unreadable `ca_file`."""
+        """Begin to connect. Raises ImportError without paho-mqtt, SecretError for an unusable password
+        file, and OSError for an unreadable `ca_file`."""
         from paho.mqtt.client import Client, MQTTv5
         from paho.mqtt.enums import CallbackAPIVersion
 
@@ -184,7 +185,8 @@ class Broker:
         return new
 
     def gives(self, message: Retained) -> bool:
-        """Give a message to the broker. False without a connection, or if too many messages wait."""
+        """Give a message to the broker. Return False without a connection, or if too many messages
+        wait."""
         from paho.mqtt.packettypes import PacketTypes
         from paho.mqtt.properties import Properties
 
@@ -196,9 +198,9 @@ class Broker:
         return info.rc == 0
 
     def close(self) -> None:
-        """Say that nobody publishes any more, and leave. Does not raise."""
+        """Publish that `mqtt-out` has stopped, and disconnect. Does not raise."""
         if self._client.is_connected():
-            with suppress(RuntimeError, ValueError):  # the broker has gone: its last will says so
+            with suppress(RuntimeError, ValueError):  # the broker publishes the will
                 self._client.publish(self._status, "offline", 1, True).wait_for_publish(LEAVES_S)
         self._client.disconnect()
         self._client.loop_stop()
@@ -217,7 +219,8 @@ class Broker:
             self._tell(f"is gone: {reason}")
 
     def _tell(self, trouble: str) -> None:
-        """Print a trouble once, until another or a connection comes."""
+        """Print a trouble, unless it was the last trouble printed. A connection clears the last
+        trouble."""
         if trouble != self._trouble:
             self._trouble = trouble
             complain("mqtt-out", f"broker {self._where} {trouble}")

@@ -1,7 +1,7 @@
-"""`rmf-bridge page`: a web page of RMF's graph, live, or of one recording.
+"""`rmf-bridge page`: serve a web page of RMF's live graph, or of one recording.
 
-The page needs the extra `page` (NiceGUI), which no daemon imports. It listens on 127.0.0.1. For another
-address (`--listen`) it needs a password file or a reverse proxy.
+The page needs the extra `page` (NiceGUI), which no daemon imports. By default the page listens on
+127.0.0.1. Another address (`--listen`) needs a password file or a reverse proxy.
 """
 
 import argparse
@@ -27,7 +27,7 @@ from workbench.graph.join import (
 PORT: Final = 8080
 LOOPBACK: Final = "127.0.0.1"
 RECORDER: Final = Path("/var/lib/rmf-bridge-recorder")
-"""The folder of `rmf-bridge-recorder.service`."""
+"""Folder of recordings that `rmf-bridge-recorder.service` writes."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -76,14 +76,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _incidents() -> Path:
-    """Return the recorder service's folder if this user may read it, else the user's own recorder's."""
+    """Return the folder of the recorder service if this user may read it, else the folder of the user's
+    recorder."""
     if os.access(RECORDER, os.R_OK | os.X_OK):
         return RECORDER
     return directories.state_base() / "recordings"
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 after Ctrl-C or SIGTERM; 64, 66, 69 or 78 with the remedy printed."""
+    """Return 0 after Ctrl-C or SIGTERM; else print the remedy and return 64, 66, 69 or 78."""
     from workbench.page.access import PasswordError, users
 
     log.start()
@@ -112,7 +113,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _serve(args: argparse.Namespace, opened: socket.socket, known: Mapping[str, str]) -> int:
-    """Serve with NiceGUI, imported last, because the import takes seconds on a Raspberry Pi."""
+    """Serve with NiceGUI. The import comes late, because it takes seconds on a Raspberry Pi."""
     try:
         from workbench.page import web
     except ImportError as error:
@@ -127,7 +128,7 @@ def _family(address: str) -> socket.AddressFamily:
 
 
 def _unreadable(recording: Path) -> int:
-    """Return 0 if anything in this recording can be shown, else the exit code."""
+    """Return 0 if the page can show anything of this recording, else the exit code."""
     from workbench.replay.bags import BagError, Notes, all_in
     from workbench.replay.recordings import unreadable
 
@@ -161,7 +162,7 @@ def _add_user(args: argparse.Namespace) -> int:
 
 
 def _unsafe(args: argparse.Namespace) -> str:
-    """Return why the page may not listen there; "" if allowed."""
+    """Return why the page may not listen on the address; "" if allowed."""
     loopback = ipaddress.ip_address(args.listen[0]).is_loopback
     if loopback or args.passwords or args.proxy:
         return ""

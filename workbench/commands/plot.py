@@ -1,7 +1,7 @@
-"""`rmf-bridge plot`: the timeline of a device from a recording, as one file: HTML, SVG or PNG.
+"""`rmf-bridge plot`: draw a device's timeline from a recording into one HTML, SVG or PNG file.
 
-The file needs no network and no script. HTML has the explanation under the picture. resvg, an extra
-that only this file imports, renders the PNG from the SVG.
+The file needs no network and no script. HTML has the explanation under the picture. resvg renders the
+PNG from the SVG. resvg is an extra, and only this module imports it.
 """
 
 import argparse
@@ -29,7 +29,7 @@ NARROWEST, WIDEST = 480, 8000
 
 
 class PlotError(Exception):
-    """No picture can be made. The text gives the remedy."""
+    """Error: no picture can be made. The text gives the remedy."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -94,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _only(args: argparse.Namespace) -> str:
-    """Return the recording's only device. Raises PlotError if there are more."""
+    """Return the name of the recording's only device. Raises PlotError if there are more devices."""
     site = HeardDevices()
     for heard in told_between(args.file, RecordingSpan(args.from_, args.to), "plot", ""):
         site.take(heard)
@@ -108,7 +108,8 @@ def _only(args: argparse.Namespace) -> str:
 
 
 def _read(args: argparse.Namespace, name: str) -> tuple[Timeline, list[str]]:
-    """Return the device's lanes, and its explanation in lines. Raises PlotError without a state."""
+    """Return the device's timeline, and the lines of its explanation. Raises PlotError if the recording
+    has no state of the device."""
     span, site = RecordingSpan(args.from_, args.to), HeardDevices(name)
     drawings = {kind: Drawing(kind, name) for kind in KINDS if args.kind in (None, kind)}
     for heard in told_between(args.file, span, "plot", name):
@@ -136,7 +137,7 @@ def _picture(args: argparse.Namespace, timeline: Timeline, words: list[str]) -> 
 
 
 def _png(picture: str) -> bytes:
-    """Render the PNG. Raises PlotError without resvg."""
+    """Render the SVG as PNG. Raises PlotError without resvg."""
     try:
         import resvg_py
     except ImportError:
@@ -145,7 +146,8 @@ def _png(picture: str) -> bytes:
 
 
 def _page(picture: str, words: list[str], theme: Theme | None) -> Iterator[str]:
-    """Return a page with the picture in it. A narrow screen scrolls the picture."""
+    """Yield the parts of an HTML page with the picture and the words. A narrow screen scrolls the
+    picture."""
     colours = [
         f"body{{background:{PAPER[theme or 'light'][0]};color:{PAPER[theme or 'light'][1]}}}"
     ]
@@ -166,7 +168,7 @@ def _page(picture: str, words: list[str], theme: Theme | None) -> Iterator[str]:
 
 
 def _write(file: Path, content: bytes) -> None:
-    """Write the whole file or no file. Raises PlotError."""
+    """Write the whole file or nothing. Raises PlotError."""
     beside = file.with_name(f".{file.name}.{os.getpid()}")
     try:
         try:

@@ -1,4 +1,4 @@
-"""`rmf-bridge press FILE SIGNAL`: in a simulation, a person or the building acts."""
+"""`rmf-bridge press FILE SIGNAL`: press a button, or change another input, of a simulated device."""
 
 import argparse
 
@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0; 1 if there is no such signal; 69 if no simulation of the file runs."""
+    """Return 0; 1 if the file has no such signal; 69 if no simulation of the file runs."""
     if args.signal is None:
         return tell(args, "press")
     return obey(args, "press", args.signal, args.how)

@@ -1,10 +1,10 @@
 """`rmf-bridge release LIFT`: an operator ends a lift's present session.
 
-This is `send lift LIFT --end` under a name for operators: it sends the holder's END_SESSION to the lift
+`release` does the same as `send lift LIFT --end`: it sends the holder's END_SESSION to the lift
 supervisor until the lift shows the session's end. If the supervisor is missing or does not obey within
-seconds, the request goes directly to the lift's own daemon; if a robot may be in the car, only with
-`--car-empty`. After the end, `release` watches for 5 s, and tells who has the lift and whether
-it moves. A robot that keeps requesting the lift goes to the end of the queue.
+seconds, `release` sends the request directly to the lift's own daemon. If a robot may be in the car,
+the direct request needs `--car-empty`. After the end, `release` watches for 5 s. It then prints who has
+the lift and whether the car moves. A robot that keeps requesting the lift goes to the end of the queue.
 """
 
 import argparse
@@ -13,7 +13,7 @@ from workbench.commands import send
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the lift, and the options common to all senders."""
+    """Add the lift, and the options that all sending commands share."""
     parser.add_argument("name", metavar="LIFT", help="the lift, as RMF names it")
     parser.add_argument(
         "--session", default="", metavar="ID", help="end only this session (default: any)"
@@ -29,5 +29,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the lift showed the session's end, else 1 with the reason, as `send`."""
+    """Return 0 if the lift showed the session's end. Otherwise print the reason and return the exit
+    code of `send`."""
     return send.run(args)

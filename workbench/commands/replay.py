@@ -21,7 +21,7 @@ from workbench.replay.sources import BagError, Notes, NotReplayable
 
 EX_DATAERR, EX_CONFIG = 65, 78
 MOST: Final = 200
-"""At most this many differences are printed."""
+"""Maximum number of differences that `replay` prints."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,8 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0: every decision is the same. 1: a decision differs. 65: not replayable. 66: FILE is no
-    readable recording. 78: a YAML is wrong."""
+    """Return 0: every decision is the same. 1: a decision differs. 65: FILE has nothing to replay. 66:
+    FILE is no readable recording. 78: a YAML is wrong."""
     notes = Notes()
     try:
         head, entries = opened(args.file, notes)
@@ -129,7 +129,7 @@ def _lines(
 
 
 def _changes(differences: list[Difference]) -> Iterator[str]:
-    """Yield a line for each change: when it began, when it was over, and how often it came."""
+    """Yield a line for each change: when it began, when it ended, and how often it came."""
     times: dict[str, list[str]] = {}
     lasts: dict[tuple[str, str], list[str]] = {}
     for one in differences:
@@ -161,7 +161,7 @@ def _part(one: Difference) -> str:
 
 
 def _plain(told: Tree) -> str:
-    """Format a part of a decision for people; `-` for an empty text."""
+    """Format one value of a decision for people; `-` for an empty text."""
     if isinstance(told, list):
         return ", ".join(map(_plain, told)) or "-"
     try:

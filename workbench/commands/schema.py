@@ -1,4 +1,4 @@
-"""`rmf-bridge schema`: the schema of a device YAML, for editors and for the documentation."""
+"""`rmf-bridge schema`: print the schema of a device YAML, for editors and for the documentation."""
 
 import argparse
 import json

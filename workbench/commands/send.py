@@ -1,7 +1,7 @@
-"""`rmf-bridge send`: send one request to a device, as RMF would, and show its effect.
+"""`rmf-bridge send`: send one request to a device, as RMF would, and show the effect.
 
-Exit code 0: the effect was seen. 1: it was not, and the reason is printed. 2: a wrong command line.
-130: Ctrl-C.
+Exit code 0: the effect was seen. 1: no effect was seen, and the reason is printed. 2: a wrong command
+line. 130: Ctrl-C.
 """
 
 import argparse
@@ -44,11 +44,11 @@ STATES = (
     topics.DISPENSER_STATES,
     topics.INGESTOR_STATES,
 )
-"""The states of all kinds, because the given name may belong to another kind."""
+"""State topics of all kinds. The given name may belong to a device of another kind."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add each kind of device, with the options of the graph."""
+    """Add a subcommand for each kind of device, with the options of the graph."""
     kinds = parser.add_subparsers(dest="kind", required=True, metavar="|".join(words.KINDS))
     for kind, (text, example, add) in {
         "lift": (
@@ -78,7 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_shared_arguments(parser: argparse.ArgumentParser, *, direct: bool) -> None:
-    """Add the options for graph and time, and with `direct` the option for the addressee."""
+    """Add the options for graph and time. `direct` adds `--direct`, which bypasses RMF's supervisor."""
     add_graph_arguments(parser)
     parser.add_argument(
         "--timeout",
@@ -153,7 +153,7 @@ def _workcell_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def request_of(args: argparse.Namespace) -> Request:
-    """Return the command line's request. Contradictory options end with exit code 2."""
+    """Return the request of the command line. Exit with code 2 if options contradict."""
     match args.kind:
         case "lift":
             return _lift_request(args)
@@ -201,7 +201,7 @@ def _charger_request(args: argparse.Namespace) -> Request:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Send and wait."""
+    """Send the request, and wait for the effect. Return the exit code."""
     request = request_of(args)
     try:
         with interruptible(), closing(open_graph(args, NODE_NAME)) as transport:
@@ -216,7 +216,7 @@ def run(args: argparse.Namespace) -> int:
     except TransportError as error:
         complain(args.command, error)
         return 1
-    except KeyboardInterrupt:  # before the first request
+    except KeyboardInterrupt:  # Ctrl-C before the first request
         return _interrupted(args.command, sent=False)
 
 
@@ -235,7 +235,10 @@ def send(
     command: str = "send",
     graph: str = "",
 ) -> int:
-    """Return 0 if the effect was seen within `timeout_s`, else 1; 130 after Ctrl-C. `graph`: name."""
+    """Return 0 if the effect was seen within `timeout_s`, else 1; 130 after Ctrl-C.
+
+    `graph` names the graph in messages.
+    """
     exchange = _Exchange(transport, request, timeout_s, out, command, graph)
     try:
         while True:
@@ -299,7 +302,8 @@ class _Exchange:
         return self.publishers[topic.name]
 
     def _listeners(self) -> int:
-        """Count the request's listeners; 0 while the node that would forward the request is missing."""
+        """Count the nodes that listen to the request; 0 if the node that forwards the request is
+        missing."""
         if self.supervisor is not None and not self.supervisor.matched():
             return 0
         return self.publisher.matched()
@@ -327,7 +331,7 @@ class _Exchange:
         self._publisher(topic).publish(message)
 
     def _finish(self, outcome: Fulfilled | Failed) -> int | None:
-        """Tell the outcome; return an exit code, or None to watch the effect of what was sent."""
+        """Print the outcome. Return an exit code, or None to watch the lift a little longer."""
         if isinstance(outcome, Failed):
             complain(self.command, outcome.text)
             return 1
@@ -340,7 +344,7 @@ class _Exchange:
         return None
 
     def _watch(self, now: float) -> int | None:
-        """Tell at the end of the watch what the lift did; the outcome stands."""
+        """Print at the end of the watch what the lift did. The outcome stays the same."""
         if self.watches_until is None or now < self.watches_until:
             return None
         self._line(now, "after", aftermath(self.seen.states_of(d.LiftState)[self._last_before :]))
@@ -354,7 +358,7 @@ class _Exchange:
 
 
 def _boarded(message: d.DiagnosticArray, lift: str) -> str:
-    """Return `boarded` of this lift's own diagnostics; "" for other diagnostics."""
+    """Return the value `boarded` of this lift's own diagnostics; "" for other diagnostics."""
     for status in message.status:
         values = {value.key: value.value for value in status.values}
         if (status.hardware_id, values.get("kind")) == (lift, "lift"):

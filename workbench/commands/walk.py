@@ -1,8 +1,8 @@
 """`rmf-bridge walk FILE`: try every wire of a device with the electrician, and sign the results.
 
-Every input is shown live; a key switches each output on alone, for a few seconds. No daemon may serve
-the device meanwhile. However the walk ends, every output is off: a guard switches the outputs off even
-after a kill -9.
+The screen shows every input live. A key switches one output on, for a few seconds. No daemon may serve
+the device during the walk. Every output is off at the end of the walk: a guard process switches the
+outputs off even after a kill -9.
 """
 
 import argparse
@@ -50,8 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0: all off; 1: not verified off; 64: no terminal or device; 69: in use; 73: no record;
-    78: wrong YAML."""
+    """Return 0: all outputs off; 1: an output not verified off; 64: no terminal or no device; 69:
+    device in use; 73: record not writable; 78: wrong YAML."""
     log.start("WARNING")
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         print("walk needs a terminal: it switches outputs by keys", file=sys.stderr)
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     except NoDevice as error:
         print(error, file=sys.stderr)
         return os.EX_USAGE
-    args.file = args.file.absolute()  # `guarded` changes to another directory
+    args.file = args.file.absolute()  # `guarded` changes the working directory
     end = signals.End()
     signals.ignore_reset()
     try:

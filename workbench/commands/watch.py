@@ -1,7 +1,7 @@
-"""`rmf-bridge watch`: the lifts, doors and chargers of the RMF graph, live, one row each.
+"""`rmf-bridge watch`: show the lifts, doors and chargers of the RMF graph, live, one row each.
 
-`board.py` makes the rows. On a terminal the table is redrawn in place; a pipe gets one line for each
-change. Ctrl-C is the normal end, with exit code 0.
+`board.py` makes the rows. A terminal shows one table that changes in place. A pipe gets one line for
+each change. Ctrl-C is the normal end, with exit code 0.
 """
 
 import argparse
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def listen_on(transport: Transport) -> Ear:
-    """Listen on every topic that `watch` shows."""
+    """Subscribe to every topic that `watch` shows."""
     shown = (
         topics.LIFT_STATES,
         topics.DOOR_STATES,
@@ -105,7 +105,7 @@ def show_once(ear: Ear, seconds: float, out: TextIO, *, as_json: bool = False) -
 
 
 def settled(board: Board, now: float, wall: float) -> list[BoardRow]:
-    """Return the rows, without devices that may still prove to be simulated."""
+    """Return the rows, except devices that later messages may still prove to be simulated."""
     young = board.unsettled(now)
     return [row for row in board.rows(now, wall) if (row.kind, row.name) not in young]
 
@@ -113,7 +113,8 @@ def settled(board: Board, now: float, wall: float) -> list[BoardRow]:
 def show(
     ear: Ear, out: TextIO, *, live: bool, line: Callable[[BoardRow, float], str] = change_line
 ) -> None:
-    """Show the rows until interrupted: redrawn in place, or a line for each change."""
+    """Show the rows until Ctrl-C. `live` redraws the table in place; otherwise print a line for each
+    change."""
     board, rows, drawn = Board(), list[BoardRow](), 0
     next_at = 0.0
     while True:
