@@ -1,4 +1,4 @@
-"""The parts of an answer, and the common part of all kinds' answers."""
+"""Parts of an answer, and the sentences that the answers of all kinds of device share."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,18 +15,21 @@ from workbench.explain.phrases import TimePhrases, lasted, listed
 from workbench.explain.rows import label
 
 Remedies = Mapping[str, tuple[str, str]]
-"""A fault's code -> its likely cause, and what to do."""
+"""Remedies by fault code: the likely cause, and a remedy."""
 SILENCES: Final = ("LIFT_SILENT", "DOOR_SILENT", "STATION_SILENT")
 MOST_NAMES: Final = 8
 RELAYS_OFF: Final = "; its daemon has every relay off"
 LISTENS_S: Final = 2.5
-"""Least listening time (s) for calling something missing."""
+"""Minimum time (s) to listen before a sentence may call a node missing."""
 
 
 @dataclass(slots=True)
 class Answer:
-    """Sentences, RMF's view, and the next step. `because`: the codes of the faults on which the verdict
-    rests; only they keep their remedies, because others may contradict it. None: all keep them."""
+    """Sentences, the fields that RMF checks, and the next step.
+
+    The verdict rests on the faults with the codes in `because`. Only these faults keep their remedies,
+    because other remedies may contradict the verdict. With None, all faults keep their remedies.
+    """
 
     now: list[str] = field(default_factory=list)
     next: list[NextStep] = field(default_factory=list)
@@ -37,7 +40,7 @@ class Answer:
     because: tuple[str, ...] | None = None
 
     def say(self, text: str, who: Who | None = None, do: str = "") -> "Answer":
-        """Add a sentence, and the next step that follows from it."""
+        """Add a sentence, and the next step that follows from the sentence."""
         self.now.append(text)
         return self.acts(who, do) if who else self
 
@@ -49,7 +52,7 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class FileReason:
-    """The reason for which our recorder kept a file: a fixed name, a text, and the time."""
+    """Reason for which our recorder kept a file: a fixed name, a text, and the time."""
 
     code: str
     text: str
@@ -57,11 +60,11 @@ class FileReason:
 
     @property
     def fault(self) -> str:
-        """The code of the fault for which the file was kept; "" for other reasons."""
+        """Code of the fault for which the recorder kept the file; "" for other reasons."""
         return self.text.partition(":")[0] if self.code == FAULT else ""
 
     def told(self, clock: TimePhrases) -> str:
-        """Say why the file was kept, and of which time the rest speaks."""
+        """Say why the recorder kept the file, and at which time the explanation stops."""
         why = {
             FAULT: f"for the fault {self.text}",
             REFUSED: f"because a request was refused: {self.text}",
@@ -73,10 +76,13 @@ class FileReason:
 
 @dataclass(frozen=True, slots=True)
 class OthersHeard:
-    """Everything known besides the device: the names of each kind, the number of messages, the last
-    words of fleet adapters (`ObservedGraph.spoke`), the faults' remedies, and the reason for the file.
-    `senders`: the nodes that publish each topic on a live graph; None for a recording, which does not
-    name them."""
+    """Knowledge besides the device's own messages.
+
+    It has the names of each kind, the number of messages, the last words of fleet adapters
+    (`ObservedGraph.spoke`), the faults' remedies, and the reason for the file. `senders` are the nodes
+    that publish each topic on a live graph. `senders` is None for a recording, because a recording
+    names no nodes.
+    """
 
     names: Mapping[Kind, tuple[str, ...]]
     messages: int
@@ -96,7 +102,7 @@ class OthersHeard:
 
 
 def unheard(device: Device, around: OthersHeard) -> Answer:
-    """Answer for a device without any state."""
+    """Answer for a device of which no state was heard."""
     answer = Answer(since=device.began.at, because=SILENCES)
     others = around.names.get(device.kind, ())
     if not around.messages:
@@ -120,7 +126,7 @@ def unheard(device: Device, around: OthersHeard) -> Answer:
 
 
 def _others(around: OthersHeard) -> str:
-    """`these were heard: lifts Lift2; doors ward`."""
+    """Return the names heard, such as `these were heard: lifts Lift2; doors ward`."""
     parts = [
         f"{kind}s {', '.join(names[:MOST_NAMES])}" for kind, names in around.names.items() if names
     ]
@@ -128,7 +134,8 @@ def _others(around: OthersHeard) -> str:
 
 
 def stopped(device: Device, around: OthersHeard, clock: TimePhrases) -> Answer | None:
-    """Answer for a device whose daemon died, by the file's reason, or whose states have stopped."""
+    """Answer for a device whose states have stopped, or whose daemon died according to the file's
+    reason."""
     last = device.last_state
     if last is not None and around.reason is not None and around.reason.code == DIED:
         return Answer(since=last.at - 60.0, because=()).say(
@@ -150,7 +157,7 @@ def stopped(device: Device, around: OthersHeard, clock: TimePhrases) -> Answer |
 
 
 def old_reading(device: Device, clock: TimePhrases) -> str:
-    """Return the fault in its readings' age; "" if sound."""
+    """Return a sentence that the device's readings are old or missing; "" if the readings are fresh."""
     match device.reading.value:
         case "was never read":
             return f"States of {device.name} come, but its inputs were never read."
@@ -164,14 +171,14 @@ def old_reading(device: Device, clock: TimePhrases) -> str:
 
 
 def say_waits(found: Answer, device: Device, clock: TimePhrases) -> None:
-    """Add our daemons' reasons why a request waits."""
+    """Add the reasons that our daemons give for a waiting request."""
     for kind, text in device.waits_said(clock.now).items():
         whose = "daemon" if kind == device.kind else "supervisor"
         found.say(f"Its {whose} says that the request waits {text}.")
 
 
 def notes(device: Device, clock: TimePhrases) -> tuple[str, ...]:
-    """Add notes on things that may mislead the reader."""
+    """Return notes on conditions that may mislead the reader."""
     found = []
     if device.reading.value == "is from the future":
         ahead = lasted(-device.stamp_age_s)
@@ -194,7 +201,7 @@ def clock_off(claim: DeviceRequester) -> bool:
 
 
 def clock_of(claim: DeviceRequester) -> tuple[str, ...]:
-    """Note that a requester's clock differs, which makes its requests look old or new."""
+    """Note that a requester's clock differs from ours: the requests look too old or too new."""
     if not clock_off(claim):
         return ()
     side = "behind" if claim.stamp_age_s > 0 else "ahead of"
@@ -209,7 +216,7 @@ def clock_of(claim: DeviceRequester) -> tuple[str, ...]:
 def faults(
     device: Device, clock: TimePhrases, remedies: Remedies, because: tuple[str, ...] | None
 ) -> tuple[FaultTold, ...]:
-    """Return the present faults, with their remedies. `because`: as in `Answer`."""
+    """Return the present faults, with their remedies. `because` is the same as in `Answer`."""
     kept = {code: one for code, one in remedies.items() if because is None or code in because}
     return tuple(
         FaultTold(code, detail, clock.since(moment), *kept.get(code, ()))
@@ -218,7 +225,8 @@ def faults(
 
 
 def relays(device: Device, clock: TimePhrases) -> str:
-    """`; its daemon has these on: agv_request, call L3`, or "" if that is not known."""
+    """Return the relays that are on, such as `; its daemon has these on: agv_request, call L3`; "" if
+    unknown."""
     told = device.told("outputs", clock.now)
     shown = [part.removesuffix(" yes") for part in told.split(", ") if not part.endswith(" 0")]
     if not told:

@@ -1,7 +1,7 @@
 """Explain a charger: its holder, and why a robot is not charged, in sentences from its messages.
 
-RMF itself asks no charger for anything; requests come from the charger coordinator, another node or an
-operator, and a refusal is published on `charger_refusals` (`bridges/kinds/charger/refusals.py`).
+RMF itself sends no requests to chargers. Requests come from the charger coordinator, another node or an
+operator. A daemon publishes each refusal on `charger_refusals` (`bridges/kinds/charger/refusals.py`).
 """
 
 from collections.abc import Mapping
@@ -19,17 +19,20 @@ from workbench.explain.phrases import TimePhrases, lasted
 from workbench.explain.rows import label
 
 LONG_S: Final = 120.0
-"""A robot comes to its charger within this time (s), or somebody should look why it does not."""
+"""Time (s) after which somebody should look why a robot has not come to its charger."""
 REFUSED_LATELY_S: Final = 60.0
 
 Coordinator = Mapping[str, str]
-"""The coordinator's diagnostics: each charger's state, and the keys `queue`, `schedule`, `assigns`."""
+"""Diagnostics of the coordinator: each charger's state, and the keys `queue`, `schedule`, `assigns`."""
 
 
 def answer(
     charger: ChargerFacts, clock: TimePhrases, around: common.OthersHeard, coordinator: Coordinator
 ) -> Answer:
-    """Explain the charger at the last message. `coordinator`: its diagnostics now, {} without."""
+    """Explain the charger at the last message.
+
+    `coordinator`: the coordinator's present diagnostics; {} without a coordinator.
+    """
     if charger.last_state is None:
         found = common.unheard(charger, around)
         _refusal(found, charger, clock)
@@ -117,7 +120,7 @@ def _idle(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
 
 
 def _error(found: Answer, charger: ChargerFacts) -> None:
-    """Name the side at fault, by the error's text."""
+    """Name the robot or the station as the side at fault, as far as the error's text tells."""
     text = charger.error.value
     misplaced = misplaced_in(text)
     if misplaced is not None and misplaced.robot is not None:
@@ -162,7 +165,7 @@ def _refusal(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
 
 
 def _coordinated(found: Answer, charger: ChargerFacts, coordinator: Coordinator) -> None:
-    """Add the coordinator's words on this charger, the queue and the schedule."""
+    """Add the coordinator's texts about this charger, the queue and the schedule."""
     of_it = coordinator.get(charger.id, "")
     if of_it:
         found.say(f"The coordinator lists it as {label(of_it)}.")

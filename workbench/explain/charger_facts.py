@@ -1,4 +1,4 @@
-"""One charger's facts from its messages, and its story: requests and refusals."""
+"""Facts about one charger from its messages, and its story: requests and refusals."""
 
 from dataclasses import dataclass
 
@@ -22,7 +22,7 @@ class HeardRefusal:
 
 
 class ChargerFacts(Device, ObservedCharger):
-    """`refusal`: the last one. `charges`: the number begun."""
+    """A charger with its story. `refusal`: the last refusal. `charges`: number of charges begun."""
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
@@ -31,11 +31,11 @@ class ChargerFacts(Device, ObservedCharger):
 
     @property
     def full_in_s(self) -> float:
-        """The time to full, as last published."""
+        """Time (s) until the robot is full, as the charger last published."""
         return in_seconds(self.state.time_to_fully_charged) if self.state else 0.0
 
     def says(self, one: News) -> str:
-        """Return a line of the story; "" for none."""
+        """Return a line of the story; "" if the event is not told."""
         match one.what:
             case "asks" if one.requester:
                 robot = one.requester.wants
@@ -49,12 +49,12 @@ class ChargerFacts(Device, ObservedCharger):
         return ""
 
     def notice(self, one: News) -> None:
-        """Count charges."""
+        """Count the charges that begin."""
         began = one.what == "changed" and self.changed.keys() != {"request"}
         self.charges += began and self.condition.value == "charging"
 
     def refused(self, moment: Moment, refusal: refusals.ChargerRefusal) -> None:
-        """A request was refused, and why."""
+        """Remember a refused request and its reason."""
         who, text = label(refusal.robot), label(refusal.text, 300)
         last = self.refusal
         if last is None or (last.request, last.text) != (label(refusal.request_id), text):

@@ -1,4 +1,4 @@
-"""Facts common to all kinds of device: states and their age, daemons' faults, story."""
+"""Facts that all kinds of device share: states and their age, faults from daemons, and the story."""
 
 import sys
 from abc import abstractmethod
@@ -19,17 +19,21 @@ from workbench.explain.rows import label
 
 MOST_LINES: Final = 600
 LONGEST_DETAIL: Final = 300
-"""Limit of characters of a fault's detail: an HTTP driver's has an address and a reason."""
+"""Maximum length (characters) of a fault's detail. Details of HTTP drivers have an address and a
+reason."""
 BACK_S: Final = 0.2
 BACK_TIMES: Final = 3
 BACK_WITHIN_S: Final = 15.0
-"""Stamps that step back this far (s), this often, within this time (s) come from two nodes."""
+"""Two nodes publish the states if stamps step back by at least BACK_S (s), at least BACK_TIMES times,
+within BACK_WITHIN_S (s)."""
 
 
 class Device(ObservedDevice[Any]):
-    """One device, from its messages, and its story. `name`: in a printable form. `focus`: the session
-    whose last ride's story is kept whole, even if others ride later. `bus_error`: the last one that its
-    daemon noted."""
+    """One device, from its messages, and its story.
+
+    `name` is in a printable form. `focus` is a session; the story of its last ride is kept whole, even
+    if others ride later. `bus_error` is the last bus error that the device's daemon noted.
+    """
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
@@ -41,11 +45,11 @@ class Device(ObservedDevice[Any]):
         self.bus_error = ""
 
     def hear(self, moment: Moment, topic: str, message: d.Message) -> list[News]:
-        """Take a message about the device; add its changes to the story."""
+        """Take a message about the device; add the changes to the story."""
         return self._tell_all(super().hear(moment, topic, message))
 
     def diagnose(self, moment: Moment, status: d.DiagnosticStatus) -> list[News]:
-        """Take our daemon's diagnostics about it; add the changes to the story."""
+        """Take our daemon's diagnostics about the device; add the changes to the story."""
         return self._tell_all(super().diagnose(moment, status))
 
     def _tell_all(self, news: Iterable[News]) -> list[News]:
@@ -65,13 +69,13 @@ class Device(ObservedDevice[Any]):
 
     @abstractmethod
     def says(self, one: News) -> str:
-        """Return a line of the story; "" for none."""
+        """Return a line of the story; "" if the event is not told."""
 
     def notice(self, one: News) -> None:
-        """Count the events told."""
+        """Count the events that the story tells."""
 
     def _reads(self, one: News) -> str:
-        """Return the story line for an event common to all kinds of device."""
+        """Return the story line for an event that all kinds of device have."""
         match one.what:
             case "first state":
                 return f"the first state of {self.name} comes"
@@ -88,31 +92,33 @@ class Device(ObservedDevice[Any]):
         return ""
 
     def tell(self, moment: Moment, text: str) -> None:
-        """Add a line to the story; none for ""."""
+        """Add a line to the story. An empty text adds no line."""
         if not text:
             return
         self.lines.append(StoryLine(moment.at, moment.wall, sys.intern(label(text, 200))))
 
     def lines_since(self, at: float) -> tuple[StoryLine, ...]:
-        """Return the story from this time on."""
+        """Return the story from time `at` (s) on."""
         return tuple(line for line in self.lines if line.at >= at)
 
     def two_nodes(self, now: Moment) -> bool:
-        """Do two publishers take turns, or do the stamps go back and forth, as from two nodes?"""
+        """Do two nodes publish this device's states? Two publishers take turns, or stamps jump back and
+        forth."""
         return (
             len(self.publishers(now)) > 1
             or self.steps_back(now.at, BACK_S, BACK_WITHIN_S) >= BACK_TIMES
         )
 
     def nodes(self, now: Moment) -> list[str]:
-        """Name the nodes that publish its states now, as far as they are known."""
+        """Name the nodes that publish the device's states now, as far as known."""
         if len(senders := {label(one.node) for one in self.publishers(now) if one.node}) > 1:
             return sorted(senders)
         every = (one for one in self.diagnoses.values() if one.is_current(now.at))
         return sorted({one.name.partition(": ")[0] for one in every if one.kind == self.kind})
 
     def note(self, moment: Moment, note: Noted) -> None:
-        """Take a note of its own daemon. Notes are of changes: each holds until the next."""
+        """Take a note of the device's own daemon. A daemon notes changes: a value holds until the next
+        note."""
         if self.noted is None:
             near = moment.at - self.began.at <= SILENT_S
             self.noted = Diagnosis(self.kind, Moment(moment.at, moment.wall, seen=not near))
@@ -130,26 +136,27 @@ class Device(ObservedDevice[Any]):
             self._tell_all(known.refuses(moment, label(note.refused.partition(": ")[0])))
 
     def _daemons(self) -> Iterator[Diagnosis]:
-        """Yield its own daemon's notes, and our daemons' diagnostics."""
+        """Yield the notes of the device's own daemon, then the diagnostics of all our daemons."""
         if self.noted is not None:
             yield self.noted
         yield from self.diagnoses.values()
 
     def heard_from(self, now: Moment) -> Iterator[Diagnosis]:
-        """Return our daemons' present diagnostics, and the notes of the device's own."""
+        """Yield the present diagnostics of our daemons, and the notes of the device's own daemon."""
         return (o for o in self._daemons() if o is self.noted or o.is_current(now.at))
 
     def own(self, now: Moment) -> Diagnosis | None:
-        """Return the present diagnostics of the device's own daemon; None if foreign or silent."""
+        """Return the present diagnostics of the device's own daemon; None if the daemon is silent or
+        not ours."""
         return next((one for one in self.heard_from(now) if one.kind == self.kind), None)
 
     def told(self, key: str, now: Moment) -> str:
-        """Return its own daemon's present value of this key; "" if it is not known."""
+        """Return the present value of this key from the device's own daemon; "" if unknown."""
         own = (one for one in self.heard_from(now) if one.kind == self.kind)
         return next((one.values[key] for one in own if key in one.values), "")
 
     def faults(self, now: Moment) -> dict[str, tuple[str, Moment]]:
-        """Return code -> detail and beginning; the device's own first."""
+        """Return each fault's code -> its detail and beginning. The own daemon's faults come first."""
         found: dict[str, tuple[str, Moment]] = {}
         for one in sorted(self.heard_from(now), key=lambda one: one.kind != self.kind):
             for code, fault in one.faults.items():
@@ -157,12 +164,12 @@ class Device(ObservedDevice[Any]):
         return found
 
     def waits_said(self, now: Moment) -> dict[str, str]:
-        """Return the reasons why requesters wait, by the kind of our daemon that reports them."""
+        """Return why requesters wait, by the kind of our daemon that gives the reason."""
         said = ((one.kind, one.values.get("waits")) for one in self.heard_from(now))
         return {kind: label(text, 200) for kind, text in said if text}
 
     def refusals(self, now: Moment, since: float) -> list[str]:
-        """Return reasons of refusals since then (s), the last first."""
+        """Return the reasons of refusals since time `since` (s), the last first."""
         found = [
             (last.at, reason)
             for one in self.heard_from(now)
@@ -172,7 +179,8 @@ class Device(ObservedDevice[Any]):
         return [reason for _, reason in sorted(found, reverse=True)]
 
     def _fault(self, one: News) -> str:
-        """Tell a fault once, although a daemon first notes and later publishes it."""
+        """Return the story line of a fault. A daemon notes a fault and later publishes it: tell the
+        fault once."""
         found = self.diagnoses[one.who] if one.who else self.noted
         assert found is not None
         if self.notes_faults and one.who and found.kind == self.kind:

@@ -1,11 +1,11 @@
 """The timeline of one device as lanes, for `plot` and the web page.
 
-A lane has one or more rows, such as one for each relay; the spans of a row never overlap. Times are on
-`Heard.at`'s clock. Everything is bounded: the newest spans of a row and the rows with the latest
-news are kept, and `left_out` says how many were dropped.
+A lane has one or more rows, such as one row for each relay. The spans of a row never overlap. Times are
+on `Heard.at`'s clock. Every number of parts has a limit. Each row keeps its newest spans, and each lane
+keeps the rows with the latest news. `left_out` counts the dropped parts.
 
-`Drawing` grows message by message, for a page that is live; `lanes` draws a whole recording. Both
-give a `Timeline` of plain values: `dataclasses.asdict` makes JSON of it.
+`Drawing` grows message by message, for a live page; `lanes` draws a whole recording. Both return a
+`Timeline` of plain values, which `dataclasses.asdict` converts for JSON.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -27,9 +27,9 @@ from workbench.explain.state_tones import tone
 from workbench.explain.timeline import LANES, Lane, LaneName, Level, Timeline, Tone
 
 MOST_ROWS: Final = 12
-"""Limit of a lane's rows: a flood of made-up requesters or faults must not fill a page."""
+"""Maximum number of a lane's rows. A flood of made-up requesters or faults must not fill a page."""
 STAMP: Final = "stamp"
-"""The row of `faults` for states that are too old."""
+"""Name of the row in lane `faults` for states that are too old."""
 AGES: Final = {
     "": "",
     "was never read": "never read",
@@ -37,7 +37,7 @@ AGES: Final = {
     "is from the future": "the stamp is in the future",
 }
 SUPERVISOR: Final = "supervisor"
-"""The row of `requests` for the supervisor's requests to the device's own daemon."""
+"""Name of the row in lane `requests` for the supervisor's requests to the device's own daemon."""
 
 
 def lanes(
@@ -47,7 +47,7 @@ def lanes(
     from_s: float = float("-inf"),
     to_s: float = float("inf"),
 ) -> Timeline:
-    """The timeline of a whole recording, or of a part of it. `heard`: in the order of time."""
+    """Return the timeline of a recording between two times. `heard` is in the order of time."""
     drawing = Drawing(kind, device)
     for one in heard:
         if one.at > to_s:
@@ -57,7 +57,7 @@ def lanes(
 
 
 class Drawing:
-    """A growing timeline of one device. Spans that ended more than `past_s` (s) ago are forgotten."""
+    """A growing timeline of one device. It forgets spans that ended more than `past_s` (s) ago."""
 
     def __init__(self, kind: Kind, device: str, past_s: float = float("inf")) -> None:
         self._kind: Kind = kind
@@ -75,7 +75,7 @@ class Drawing:
         self._said: dict[str, Diagnosis] = {}
 
     def take(self, heard: Heard | Level | Own) -> None:
-        """Take the next message. One out of order in a recording counts as new."""
+        """Take the next message. A recorded message that is out of order counts as new."""
         if isinstance(heard, Own):
             note = noted(heard.topic.rpartition("/")[2], heard.text)
             if note is not None and note.subject == self._device:
@@ -93,7 +93,7 @@ class Drawing:
                 self._hear(heard.topic.rpartition("/")[2], heard.message, heard.wall)
 
     def timeline(self, from_s: float = float("-inf"), to_s: float = float("inf")) -> Timeline:
-        """Return the timeline between these times, and at most until now."""
+        """Return the timeline between these times, up to the last message."""
         if self._began_at is None:
             return Timeline(self._kind, self._device, 0.0, 0.0, 0.0, ())
         to_s = max(self._began_at, min(to_s, self._now))
@@ -111,7 +111,7 @@ class Drawing:
                     yield Lane(name, part, spans, marks, row.left_out)
 
     def _clock(self, heard: Heard) -> None:
-        """Compare the wall clock with the steady one."""
+        """Compare the wall clock with the steady clock, and mark a step of the wall clock."""
         offset = heard.wall - heard.at
         if self._wall and abs(offset - self._wall) > STEP_S:
             self._steps.mark(
@@ -127,7 +127,8 @@ class Drawing:
         *,
         fills: bool = False,
     ) -> LaneRow:
-        """Return the row of this name. Without room, the row silent for the longest is dropped."""
+        """Return the row of this name. A full lane drops the row that was silent for the longest
+        time."""
         rows, part = self._rows[lane], label(part)
         if part not in rows:
             if len(rows) >= MOST_ROWS:
@@ -137,13 +138,13 @@ class Drawing:
         return rows[part]
 
     def _say(self, lane: LaneName, text: str, looks: Tone) -> None:
-        """Set the value of a one-row lane from a state."""
+        """Set the value of a lane with only one row, from a state."""
         self._row(lane, fills=True).say(self._now, label(text), looks)
 
-    # ---- our daemon's notes
+    # ---- notes of our daemon
 
     def _note(self, level: Level) -> None:
-        if level.lane not in self._noted:  # more exact than diagnostics, which come once a second
+        if level.lane not in self._noted:  # notes are more exact than diagnostics at 1 Hz
             self._noted.add(level.lane)
             self._rows[level.lane].clear()
         looks: Tone = "wrong" if level.lane == "faults" else "works"
@@ -186,7 +187,7 @@ class Drawing:
                 self._say("mode", text, tone(d.ChargerStateValue, state.state))
 
     def _age(self, stamped_at: float, wall: float) -> None:
-        """Show an old reading, or one from another clock, as a separate fault."""
+        """Show an old reading, or a reading from another clock, as a separate fault."""
         text = AGES[reading_age(stamped_at, wall)]
         if text or STAMP in self._rows["faults"]:
             self._row("faults", STAMP).say(self._now, text, "wrong")
@@ -206,7 +207,7 @@ class Drawing:
         self._destination = state.destination_floor
 
     def _request(self, topic: str, message: words.Requested) -> None:
-        """Fill a row for each requester, and one for the supervisor, which passes requests on."""
+        """Fill a row for each requester, and a row for the supervisor, which forwards requests."""
         match message:
             case d.LiftRequest():
                 ends = message.request_type == d.LiftRequestType.REQUEST_END_SESSION
@@ -236,7 +237,11 @@ class Drawing:
             row.mark(self._now, label(f"refused: {refusal.text}"), "wrong")
 
     def _heartbeat(self, message: d.SupervisorHeartbeat) -> None:
-        """RMF's own supervisor sends it after requests only: a session lasts until one without it."""
+        """Fill the rows of the sessions that the door supervisor's heartbeat lists.
+
+        RMF's own supervisor sends a heartbeat only after requests. A session lasts until a heartbeat
+        omits it.
+        """
         holders = set(map(label, listed(message, self._device)))
         for who in holders:
             self._row("sessions", who, keeps_s=float("inf")).say(self._now, who, "held")
@@ -245,7 +250,8 @@ class Drawing:
                 row.say(self._now, "", "held")
 
     def _diagnosis(self, status: d.DiagnosticStatus) -> None:
-        """A device and its supervisor may report the same fault; it lasts while either has it."""
+        """Fill the fault rows. A device and its supervisor may report the same fault; the fault lasts
+        while one of the two reports it."""
         now = Moment(self._now, self._wall + self._now)
         ours = about(status) == (self._kind, self._device)
         said = report(self._said, MOST_NODES, status, now) if ours else None
@@ -270,15 +276,16 @@ class Drawing:
 
 
 def _floor(floor: str, runs: Tone) -> Tone:
-    """Return a floor's tone; a lift without motion lines counts as standing if its floor is known."""
+    """Return a floor's tone. A lift without motion lines counts as standing if its floor is known."""
     if not floor:
         return "unknown"
     return "works" if runs == "works" else "calm"
 
 
 def _outputs(told: str) -> Iterator[tuple[str, str]]:
-    """`agv_request yes, call L3` as the status file says it (`bridges.system.log.plain`)."""
+    """Yield each output and its value from a status text, such as `agv_request yes, call L3`
+    (`bridges.system.log.plain`)."""
     for part in told.split(", ") if told != "-" else ():
         name, _, value = part.partition(" ")
-        if value != "0":  # of a counter
+        if value != "0":  # 0 of a counter means off
             yield name, value

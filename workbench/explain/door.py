@@ -1,8 +1,8 @@
 """Explain why a robot waits at a door or a door stays open, in sentences from its messages.
 
-RMF's DoorOpen waits for two things: the door's state OPEN, and a heartbeat of the door supervisor that
-lists the robot for this door. DoorClose waits until no heartbeat lists it (rmf_ros2, DoorOpen.cpp and
-DoorClose.cpp). A robot that drives through says nothing meanwhile.
+RMF's DoorOpen waits for two conditions: the door's state is OPEN, and a heartbeat of the door
+supervisor lists the robot for this door. DoorClose waits until no heartbeat lists the robot (rmf_ros2,
+DoorOpen.cpp and DoorClose.cpp). The robot sends no request while it drives through.
 """
 
 from shlex import quote
@@ -20,17 +20,17 @@ from workbench.explain.phrases import TimePhrases
 
 SETTLES_S: Final = 2.0
 LONG_S: Final = 60.0
-"""The longest time (s) of a robot's drive through a doorway."""
+"""Maximum normal time (s) of a robot's drive through a doorway."""
 OPENS_S, MOVES_S = 5.0, 15.0
-"""A door that nobody holds begins to close, and is closed, within these times (s)."""
+"""Normal times (s) until a door that nobody holds begins to close, and until the door is closed."""
 AWAY: Final = ("offline", "unknown")
 
 
 def answer(
     door: DoorFacts, clock: TimePhrases, around: common.OthersHeard, focus: str = ""
 ) -> Answer:
-    """Explain the door at the last message. `focus`: the requester in question; "" for the
-    waiting one."""
+    """Explain the door at the last message. `focus`: the requester to explain; "" for the requester who
+    waits."""
     if door.last_state is None:
         return _with_askers(common.unheard(door, around), door, clock)
     stopped = common.stopped(door, around, clock)
@@ -95,7 +95,8 @@ def _with_askers(found: Answer, door: DoorFacts, clock: TimePhrases) -> Answer:
 def _fields(
     door: DoorFacts, claim: DeviceRequester, clock: TimePhrases
 ) -> tuple[CheckedField, ...]:
-    """Return the fields that DoorOpen or DoorClose checks, as this requester's fleet adapter sees."""
+    """Return the fields that DoorOpen or DoorClose checks, as the fleet adapter of this requester sees
+    them."""
     told = {
         "door": door.mode.since,
         "heartbeat": door.holders.get(claim.who) or claim.since,
@@ -105,7 +106,7 @@ def _fields(
     )
 
 
-# ---- somebody waits
+# ---- a requester waits
 
 
 def _away(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
@@ -119,7 +120,7 @@ def _away(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
 
 
 def _opens(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
-    """Explain a wait for the door to open."""
+    """Explain why the requester waits for an open door."""
     asked = door.asked
     passed = asked is not None and asked.value == OPEN
     if claim.who not in door.holders and (door.hears_lists or not passed):
@@ -178,7 +179,7 @@ def _not_let_go(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: T
     )
 
 
-# ---- nobody waits
+# ---- no requester waits
 
 
 def _nobody_asks(
@@ -212,10 +213,10 @@ def _nobody_asks(
 def _nobody_tells(
     found: Answer, door: DoorFacts, clock: TimePhrases, around: common.OthersHeard
 ) -> None:
-    """Explain an open door about which nobody says anything.
+    """Explain an open door that nobody is known to hold.
 
-    RMF's supervisor sends a heartbeat after requests only, and CLOSE at each state of an open door that
-    nobody holds (door_supervisor/Node.cpp).
+    RMF's supervisor sends a heartbeat only after requests. It sends CLOSE at each state of an open door
+    that nobody holds (door_supervisor/Node.cpp).
     """
     if clock.now.at - door.began.at < REQUESTER_SILENT_S:
         found.say("Whether a robot holds it is not known yet.", "nobody", "listen for longer")
@@ -248,8 +249,8 @@ def _nobody_tells(
 
 
 def _asked_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
-    """Explain requests heard only on the daemon's own topic: from the supervisor, or from a person
-    with `send --direct`."""
+    """Explain requests heard only on the daemon's own topic. The supervisor sends such requests, or a
+    person does with `send --direct`."""
     assert door.asked is not None
     found.say(
         f"On door_requests {door.asked_by} has asked for OPEN {clock.since(door.asked.since)}."
@@ -260,8 +261,8 @@ def _asked_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
 
 
 def _held_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
-    """Name the holders, and whether they are alive. A robot in a doorway is silent, so silence
-    is normal."""
+    """Name the holders, and the last request of each. Silence is normal, because a robot in a doorway
+    sends nothing."""
     who, since = min(door.holders.items(), key=lambda one: one[1].at)
     claim = door.requesters.get(who)
     last: Moment | None = claim.last if claim else None

@@ -1,4 +1,4 @@
-"""One door's facts from its messages, and its story."""
+"""Facts about one door from its messages, and its story."""
 
 from bridges.observe.device import Check
 from bridges.observe.door import OPEN, SUPERVISOR, ObservedDoor
@@ -10,7 +10,7 @@ from workbench.explain.phrases import lasted
 
 
 class DoorFacts(Device, ObservedDoor):
-    """`passages`: the number of holds that have ended."""
+    """A door with its story. `passages`: number of holds that have ended."""
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
@@ -18,21 +18,22 @@ class DoorFacts(Device, ObservedDoor):
 
     @property
     def asked_by(self) -> str:
-        """The last requester on `door_requests`."""
+        """Name of the last requester on `door_requests`."""
         return "the supervisor" if self.sender == SUPERVISOR else self.sender
 
     @property
     def hears_lists(self) -> bool:
-        """Would the supervisor's heartbeat be heard? A door's own daemon does not record it."""
+        """Would this listener hear the supervisor's heartbeat? The recording of a door's daemon has no
+        heartbeat."""
         return self.last_heartbeat is not None or self.noted is None
 
     def checks(self, one: DeviceRequester) -> tuple[Check, ...]:
-        """List the conditions of this requester's DoorOpen or DoorClose that can be known."""
+        """Return those conditions of this requester's DoorOpen or DoorClose that can be known."""
         found = super().checks(one)
         return tuple(check for check in found if check.name == "door" or self.hears_lists)
 
     def says(self, one: News) -> str:
-        """Return a line of the story; "" for none."""
+        """Return a line of the story; "" if the event is not told."""
         who, by = one.who, one.requester
         match one.what:
             case "passed on":
@@ -51,5 +52,5 @@ class DoorFacts(Device, ObservedDoor):
         return ""
 
     def notice(self, one: News) -> None:
-        """Count holds."""
+        """Count the holds that end."""
         self.passages += one.what == "lost"

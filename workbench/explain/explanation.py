@@ -1,6 +1,6 @@
-"""An explanation as values: for one screen of text, and for JSON by `dataclasses.asdict`.
+"""An explanation as values: for one screen of text, and for JSON through `dataclasses.asdict`.
 
-Every text is one printable line; parts from the network are escaped.
+Every text is one printable line. Parts from the network are escaped.
 """
 
 from dataclasses import dataclass
@@ -18,13 +18,18 @@ Who = Literal[
     "the controller",
     "a person",
 ]
-"""The party that has to act next. `the device's node`: its daemon, ours or another maker's.
-`the controller`: that of the lift, door or charger itself."""
+"""Party that has to act next.
+
+`the device's node` is the device's daemon, ours or another maker's. `the controller` is the controller
+of the lift, door or charger itself.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class CheckedField:
-    """One of RMF's conditions. `wanted`: the value the requester waits for. `met`: is it so?
+    """One of RMF's conditions.
+
+    `wanted`: the value that the requester waits for. `met`: does the present value satisfy RMF?
     `since`: beginning of the present value, in words.
     """
 
@@ -37,7 +42,7 @@ class CheckedField:
 
 @dataclass(frozen=True, slots=True)
 class NextStep:
-    """The next step, and the party that has to act."""
+    """Next step, and the party that has to act."""
 
     who: Who
     what: str
@@ -45,7 +50,8 @@ class NextStep:
 
 @dataclass(frozen=True, slots=True)
 class StoryLine:
-    """One event. `at`: s on the recording's steady clock; `wall`: s since the epoch."""
+    """One event of the story. `at`: seconds on the recording's steady clock. `wall`: seconds since the
+    epoch."""
 
     at: float
     wall: float
@@ -54,7 +60,7 @@ class StoryLine:
 
 @dataclass(frozen=True, slots=True)
 class FaultTold:
-    """A present fault, with its remedy if our table has one."""
+    """A present fault, with a remedy if `faults.yaml` has the fault."""
 
     code: str
     detail: str
@@ -67,8 +73,9 @@ class FaultTold:
 class Explanation:
     """The explanation of one device, at the last message.
 
-    `now`: sentences, the most important first. `asks`: the requester of `fields`. `story`: the
-    ride in question; `left_out`: number of its lines missing. `before`: the events before it.
+    `now`: sentences, the most important first. `asks`: the requester who waits for `fields`. `story`:
+    the events of the explained ride. `left_out`: number of story lines that were dropped. `before`: a
+    summary of the earlier events.
     """
 
     kind: Kind

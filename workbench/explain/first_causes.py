@@ -1,5 +1,8 @@
-"""Causes that come before all others, at every kind of device: two nodes under one name, readings that
-come and go, and the device's own faults. While one of them lasts, nobody else is to blame."""
+"""Causes that come before all others, at every kind of device.
+
+The causes are two nodes under one name, readings that come and go, and the device's own faults. As long
+as one of them lasts, an answer blames nobody else.
+"""
 
 from collections.abc import Mapping
 from typing import Final
@@ -57,14 +60,17 @@ OWN: Final[Mapping[str, tuple[str, str]]] = {
         ("", ""),
     ),
 }
-"""A fault of the device itself, the most telling first: an explanation, and where a person looks; ""
-for the words of `bridges/runtime/faults.yaml`."""
+"""Faults of the device itself, the most telling first.
+
+Each code has an explanation, and the place where a person looks. "" stands for the text in
+`bridges/runtime/faults.yaml`.
+"""
 READINGS: Final = ("INPUTS_NOT_FRESH", "COMMUNICATION_LOST")
 OFFLINE: Final = (*READINGS, "OUTPUTS_NOT_WRITTEN", "MANUAL", "OUT_OF_SERVICE")
-"""Faults that show a device as OFFLINE."""
+"""Faults that make a device OFFLINE."""
 UNSTEADY: Final = "not steady:"
 STALLS_S: Final = 0.5
-"""A reading that is older than another one by this time (s) shows that no new one came."""
+"""Difference (s) between the ages of two readings which shows that no new reading came."""
 
 
 def two_nodes(
@@ -89,11 +95,11 @@ def two_nodes(
 
 
 def comes_and_goes(found: Answer, device: Device, clock: TimePhrases) -> bool:
-    """Explain a device that goes OFFLINE and comes back. True if it does.
+    """Explain a device that goes OFFLINE and comes back. True if the device does so.
 
-    A listener of a few seconds may hear few changes. Its daemon's present word counts too: readings are
-    lost, or inputs are not steady. Old readings, and several inputs that are not steady, show that no
-    new readings came; else an input flickers.
+    A listener of a few seconds may hear few changes, so the present faults from the daemon count too:
+    lost readings or unsteady inputs. Old readings, or several unsteady inputs, show that no new
+    readings came. Otherwise an input flickers.
     """
     ages = device.flaps(clock.now)
     _, unsteady, inputs = device.waits_said(clock.now).get(device.kind, "").partition(UNSTEADY)
@@ -130,8 +136,11 @@ def own_fault(
     shown: str = "",
     end: str = "open",
 ) -> bool:
-    """Explain the most telling fault of the device itself. True if there is one. `shown`, `end`: how
-    its door is shown, and how it should be. A door shown closed has not moved, so no contact is bad."""
+    """Explain the most telling fault of the device itself. True if there is one.
+
+    `shown`: the door's published state. `end`: the state that the door should have. A door shown closed
+    has not moved, so no contact is to blame.
+    """
     present = {code: detail for code, (detail, _) in device.faults(clock.now).items()}
     if around.reason is not None and around.reason.fault:
         present.setdefault(around.reason.fault, around.reason.text.partition(": ")[2])

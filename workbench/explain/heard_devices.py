@@ -1,7 +1,7 @@
 """Sort a graph's messages by device, and explain each device.
 
-`HeardDevices.take` is fed in the order of time and remembers in bounds, so a day's recording takes
-no more memory than a minute's.
+Call `HeardDevices.take` in the order of time. Its memory has a limit: a recording of a day takes no
+more memory than a recording of a minute.
 """
 
 from collections import deque
@@ -37,14 +37,14 @@ from workbench.explain.workcell_facts import DispenserFacts, IngestorFacts, Work
 
 STORY_LINES: Final = 40
 SHOWS_S: Final = 1.5
-"""So long after the reason for a file its effect is in the device's states, which come at 1 Hz."""
+"""Time (s) after which the device's states show the effect of a file's reason. States come at 1 Hz."""
 
 
 class HeardDevices(ObservedGraph[Device]):
-    """All devices heard, or only those of this `name`.
+    """All devices heard, or only the devices with this `name`.
 
-    `session`: the one whose last ride's story is kept, even if others ride later. `senders`: the nodes
-    that publish each topic, of a live graph on which FLEET_STATES are heard too; None if not known.
+    `session`: the session whose last ride stays in the story, even if others ride later. `senders`: the
+    nodes that publish each topic on a live graph where FLEET_STATES is heard too; None if unknown.
     """
 
     makes: ClassVar = {
@@ -62,8 +62,11 @@ class HeardDevices(ObservedGraph[Device]):
         most_lines: int = MOST_LINES,
         graph: Sequence[str] = (),
     ) -> None:
-        """`most_lines`: story lines remembered of each device. `graph`: the options that name
-        this graph, for commands."""
+        """Make an empty collection.
+
+        `most_lines`: maximum number of story lines for each device. `graph`: options that name this
+        graph, for the commands in sentences.
+        """
         super().__init__()
         self._most_lines = most_lines
         self._graph = graph
@@ -91,8 +94,8 @@ class HeardDevices(ObservedGraph[Device]):
             self._refusal(self.now, heard.message)
 
     def retained(self, heard: Heard) -> None:
-        """Take a request that a fleet adapter has retained. It counts for a lift without states, where
-        no adapter repeats itself."""
+        """Take a request that a fleet adapter sent earlier. It matters for a lift without states,
+        because no adapter repeats its request there."""
         if isinstance(heard.message, d.LiftRequest):
             found = self.device("lift", heard.message.lift_name, self.now)
             if isinstance(found, LiftFacts) and found.state is None:
@@ -100,12 +103,12 @@ class HeardDevices(ObservedGraph[Device]):
                 found.retain(heard.message, self.now)
 
     def at_its_end(self) -> None:
-        """Explain the recording's end, not the moment for which our recorder kept it."""
+        """Explain the recording's end instead of the moment for which our recorder kept the file."""
         self._reason.clear()
         self._then.clear()
 
     def story_from(self, at: float) -> None:
-        """Leave everything before this time (s) out of the stories."""
+        """Leave all events before this time (s) out of the stories."""
         self._story_from = at
 
     def devices(self) -> list[Key]:
@@ -121,14 +124,15 @@ class HeardDevices(ObservedGraph[Device]):
     def explain(
         self, kind: Kind, name: str, zone: tzinfo | None, remedies: Remedies | None = None
     ) -> Explanation:
-        """Explain the device at the last message. `zone`: of the times; None: this machine's."""
+        """Explain the device at the last message. `zone`: time zone of the texts; None: this machine's
+        zone."""
         began = self.began or self.now
         last = self.known.get((kind, name)) or self.make(kind, name)
         at_end = self.now, last, self.spoke
         now, device, spoke = self._then.get((kind, name), at_end)
         reason = self._reason.get(name) or self._reason.get("")
         if reason and reason.fault in first_causes.OFFLINE and len(last.flaps(self.now)) >= FLAPS:
-            now, device, spoke = at_end  # only time shows that the device comes and goes
+            now, device, spoke = at_end  # only later messages show that the device comes and goes
         clock = TimePhrases(now, zone)
         around = self._around(spoke, reason, remedies or {})
         answer = self._answer(device, clock, around)
@@ -193,7 +197,7 @@ class HeardDevices(ObservedGraph[Device]):
         raise AssertionError(device)
 
     def _story(self, device: Device, answer: Answer) -> tuple[StoryLine, ...]:
-        """Return the remembered story of the ride in question."""
+        """Return the remembered story of the ride that the answer explains."""
         if isinstance(device, LiftFacts) and device.kept and not answer.asks:
             return device.kept
         return device.lines_since(max(answer.since, self._story_from))
@@ -201,7 +205,7 @@ class HeardDevices(ObservedGraph[Device]):
     # ---- messages to devices
 
     def make(self, kind: Kind, name: str) -> Device:
-        """Make a device without messages yet."""
+        """Make a device that has heard no messages."""
         made = super().make(kind, name)
         made.focus = self._session
         made.lines = deque(maxlen=self._most_lines)
@@ -210,7 +214,7 @@ class HeardDevices(ObservedGraph[Device]):
     def device(
         self, kind: Kind, name: str, moment: Moment, *, stated: bool = False
     ) -> Device | None:
-        """Return the device of this name, if we explain it."""
+        """Return the device of this name; None if this collection does not explain the device."""
         if self._name in ("", name):
             return super().device(kind, name, moment, stated=stated)
         if stated and name and len(self._others[kind]) < MOST_DEVICES:
@@ -236,7 +240,7 @@ class HeardDevices(ObservedGraph[Device]):
                 self.known[kind, note.subject].note(moment, note)
 
     def _keep(self, name: str) -> None:
-        """Keep the devices of this name ("": all) as they are now."""
+        """Keep a copy of the present state of the devices with this name; "" means all devices."""
         for key, device in self.known.items():
             if name in ("", device.id) and key not in self._then:
                 self._then[key] = self.now, deepcopy(device), {**self.spoke}
@@ -255,7 +259,7 @@ class HeardDevices(ObservedGraph[Device]):
 
 
 def _act_on(answer: Answer, reason: FileReason, remedies: Remedies) -> None:
-    """Propose a step for the file's reason where the device's state alone shows nothing to do."""
+    """Propose a step for the file's reason, if the device's state itself shows nothing to do."""
     if any(step.who != "nobody" for step in answer.next):
         return
     do = remedies[reason.fault][1] if reason.fault in remedies else ""

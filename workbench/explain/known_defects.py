@@ -1,7 +1,7 @@
-"""Known defects of RMF, each with its thread, where what was heard leaves no doubt.
+"""Known defects of RMF, each with its issue. A note appears only where the messages leave no doubt.
 
-Messages of lifts and doors do not prove #389 (a robot enters without a session), PR#490 (mutex groups)
-and Jazzy's RequestLift that accepts a match without arrival: these are not named.
+Messages of lifts and doors cannot prove three other defects, so no note names them. #389: a robot
+enters without a session. PR#490: mutex groups. Jazzy's RequestLift accepts a match without arrival.
 """
 
 from collections.abc import Callable, Iterator
@@ -13,7 +13,8 @@ from bridges.observe.requesters import Moment
 from workbench.explain.device import Device
 
 SPAM: Final = 10
-"""A fleet adapter ends a session with one END, or with a few while states are late."""
+"""Number of END requests that shows a defect. Normally an adapter sends one END, or a few until a state
+comes."""
 
 
 def _calls_back(lift: ObservedLift, now: Moment) -> str:
@@ -51,7 +52,7 @@ PATTERNS: Final[tuple[tuple[Callable[[ObservedLift, Moment], str], str], ...]] =
         " fleet adapters (rmf_ros2#382, #415).",
     ),
 )
-"""A pattern, which returns its requester or "", and its sentence."""
+"""Defects: a function, which returns the affected requester or "", and the sentence."""
 
 
 def notes(device: Device, now: Moment) -> Iterator[str]:

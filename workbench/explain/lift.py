@@ -1,8 +1,8 @@
 """Explain why a robot waits for a lift, in sentences from its messages.
 
-RMF's RequestLift looks at four fields of LiftState and at nothing else: the lift's name, its session,
-its floor and its door (rmf_ros2, RequestLift.cpp:322-326). The answer names the missing ones,
-the reason, and the party that has to act next.
+RMF's RequestLift checks only four fields of LiftState: the lift's name, its session, its floor and its
+door (rmf_ros2, RequestLift.cpp:322-326). The answer names the fields that do not match, the reason, and
+the party that has to act next.
 """
 
 from typing import Final
@@ -20,16 +20,17 @@ from workbench.explain.phrases import TimePhrases
 from workbench.explain.rows import label
 
 STANDS_S: Final = 5.0
-"""A fleet adapter that knows the recall floor asks for it within this time (s)."""
+"""Maximum time (s) in which a fleet adapter that knows the recall floor requests this floor."""
 FLOOR_S: Final = 20.0
-"""A car that moves reaches the next floor within this time (s)."""
+"""Maximum normal time (s) of a moving car between two floors."""
 ALARMS: Final = {"FIRE": "fire alarm", "EMERGENCY": "emergency (stop, code blue, earthquake)"}
 
 
 def answer(
     lift: LiftFacts, clock: TimePhrases, around: common.OthersHeard, focus: str = ""
 ) -> Answer:
-    """Explain the lift at the last message. `focus`: the session in question; "" for a waiting one."""
+    """Explain the lift at the last message. `focus`: the session to explain; "" for a session that
+    waits."""
     if lift.last_state is None:
         return _with_askers(common.unheard(lift, around), lift, clock)
     stopped = common.stopped(lift, around, clock)
@@ -64,7 +65,7 @@ def _why(
     clock: TimePhrases,
     around: common.OthersHeard,
 ) -> None:
-    """Find the cause: the lift itself first, then the way of the requests, then the holder."""
+    """Find the cause: first the lift itself, then the path of the requests, then the holder."""
     silent = lift.not_passed_on(clock.now)
     if first_causes.two_nodes(found, lift, clock, around, "lift_states"):
         return
@@ -93,7 +94,8 @@ def _why(
 
 
 def _in_question(lift: LiftFacts, clock: TimePhrases, focus: str) -> DeviceRequester | None:
-    """Return the claim in question: that of `focus`, else the longest waiting, else the holder's."""
+    """Return the claim to explain: of `focus`, else of the longest waiting requester, else of the
+    holder."""
     if focus:
         return lift.requesters.get(focus)
     waiting = [one for one in lift.asking(clock.now) if not lift.matches(one)]
@@ -103,7 +105,8 @@ def _in_question(lift: LiftFacts, clock: TimePhrases, focus: str) -> DeviceReque
 
 
 def _begins(lift: LiftFacts, claim: DeviceRequester | None) -> float:
-    """Return the story's beginning (s): the waiting one's request, or the holder's grant."""
+    """Return when the story begins (s): at the waiting requester's request, or at the holder's
+    grant."""
     holder = lift.requesters.get(lift.session.value)
     starts = [claim.first.at] if claim else []
     if holder is not None:
@@ -126,7 +129,8 @@ def _with_askers(found: Answer, lift: LiftFacts, clock: TimePhrases) -> Answer:
 
 
 def _hold(found: Answer, lift: LiftFacts, clock: TimePhrases, *, then: bool = False) -> None:
-    """Name the holder and the car's place. `then`: in the past tense, as of the last state."""
+    """Name the holder and the car's place. `then` selects the past tense, for the last state before
+    silence."""
     holder = "nobody" if lift.session.value == NOBODY else lift.session.value
     motion = "" if lift.motion.value == "unknown" else f", {_motion(lift.motion.value)}"
     car = f"at {lift.floor.value}, door {lift.door.value}{motion}, mode {lift.mode.value}"
@@ -144,7 +148,8 @@ def _motion(motion: str) -> str:
 def _fields(
     lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases
 ) -> tuple[CheckedField, ...]:
-    """Return RequestLift's fields, as this requester's fleet adapter sees them; the name as heard."""
+    """Return RequestLift's fields, as this requester's fleet adapter sees them. The lift's name counts
+    as matching."""
     since = (lift.session.since, lift.floor.since, lift.door.since)
     return tuple(
         CheckedField(*check, clock.since(moment))
@@ -166,7 +171,7 @@ def _others_wait(
         found.say(f"{'Others wait' if claim else 'These wait'}: {'; '.join(texts)}{more}.")
 
 
-# ---- why it waits
+# ---- why the requester waits
 
 
 def _alarm(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
@@ -202,7 +207,7 @@ def _alarm(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
 
 
 def _held(found: Answer, lift: LiftFacts, clock: TimePhrases, around: common.OthersHeard) -> None:
-    """Explain what the holder waits for, or why it keeps the lift."""
+    """Explain the holder's wait, or why the holder keeps the lift."""
     holder = lift.session.value
     theirs = lift.requesters.get(holder)
     if theirs is not None and theirs.ended is not None:
@@ -220,7 +225,7 @@ def _held(found: Answer, lift: LiftFacts, clock: TimePhrases, around: common.Oth
 
 
 def _missing(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
-    """Explain a granted session whose mode, floor or door is still missing."""
+    """Explain which of mode, floor and door a granted session still lacks."""
     on = common.relays(lift, clock)
     if lift.floor.value == NO_FLOOR and lift.door.value == "open":
         found.say(
@@ -267,7 +272,7 @@ def _rides(lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> bool:
 
 
 def _human(found: Answer, lift: LiftFacts, clock: TimePhrases, on: str) -> None:
-    """Explain a session in HUMAN mode: is the controller asked for AGV mode at all?"""
+    """Explain a session in HUMAN mode: does the daemon ask the controller for AGV mode at all?"""
     human = (
         f"{lift.session.value} has the session, but the lift has been in HUMAN mode"
         f" {clock.since(lift.mode.since)}"

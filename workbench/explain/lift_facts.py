@@ -1,4 +1,4 @@
-"""One lift's facts from its messages, and the story of each ride."""
+"""Facts about one lift from its messages, and the story of each ride."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -14,12 +14,13 @@ from workbench.explain.phrases import lasted
 from workbench.explain.rows import label
 
 DIRECT: Final = "the supervisor, or a person with `send --direct`,"
-"""The sender on `lift_requests` of a request that no fleet adapter was heard to make."""
+"""Sender of a request on `lift_requests`, if no fleet adapter was heard to send the same request."""
 
 
 @dataclass(slots=True)
 class Rides:
-    """Totals of all rides: number ended, longest wait for the car, beginning of the last."""
+    """Totals of all rides: the number ended, the longest wait for the car, and the beginning of the
+    last ride."""
 
     ended: int = 0
     longest_s: float = 0.0
@@ -29,7 +30,7 @@ class Rides:
 
 
 class LiftFacts(Device, ObservedLift):
-    """`kept`: the story of the last ride of `focus`."""
+    """A lift with its story. `kept`: the story of the last ride of session `focus`."""
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
@@ -38,12 +39,12 @@ class LiftFacts(Device, ObservedLift):
 
     @property
     def floors(self) -> tuple[str, ...]:
-        """Return the floors that it serves."""
+        """Return the floors that the lift serves."""
         served = self.state.available_floors[:200] if self.state else ()
         return tuple(map(label, served))
 
     def sender(self, who: str) -> str:
-        """Name the sender for this session on `lift_requests`, as far as known."""
+        """Name the sender of this session's requests on `lift_requests`, as far as known."""
         one = self.requesters.get(who)
         return "the supervisor" if one is not None and one.own else DIRECT
 
@@ -57,12 +58,14 @@ class LiftFacts(Device, ObservedLift):
         return f"Whether {who} is in the car is not known."
 
     def keeps(self, now: Moment) -> str:
-        """Say that the holder keeps the session in a hazard, and whether it may be in the car."""
+        """Say that the holder keeps the session during a hazard, and whether the holder may be in the
+        car."""
         who = self.session.value
         return f"{who} keeps the session meanwhile: only its END ends one. {self.in_car(who, now)}"
 
     def retain(self, request: d.LiftRequest, now: Moment) -> None:
-        """Take a request that its fleet adapter sent before we listened. Its stamp tells when."""
+        """Take a request that the fleet adapter sent before we listened. The request's stamp tells
+        when."""
         wall, who = in_seconds(request.request_time), self.text(request.session_id)
         if request.request_type == END:
             self.requesters.drop(who)
@@ -72,10 +75,10 @@ class LiftFacts(Device, ObservedLift):
         one, _ = self.requesters.ask(who, wants, asked, stands=True)
         one.own = True
         if one.times > 1 and one.given_up:
-            one.boarded = asked  # a robot asks for another floor from within the car
+            one.boarded = asked  # a robot that asks for another floor is in the car
 
     def says(self, one: News) -> str:
-        """Return a line of the story; "" for none."""
+        """Return a line of the story; "" if the event is not told."""
         who, by = one.who, one.requester
         match one.what:
             case "asks" if by:
@@ -145,7 +148,7 @@ class LiftFacts(Device, ObservedLift):
 
 
 def moves(before: str, door: str) -> str:
-    """`opens`, `closes`, `is open`, `is closed`."""
+    """Return the door's change in words: `opens`, `closes`, `is open` or `is closed`."""
     if door != "moving":
         return f"is {door}"
     return {"closed": "opens", "open": "closes"}.get(before, "moves")

@@ -1,4 +1,4 @@
-"""Explain what the holder of a lift does: it is silent, has sent END, or has all that it waits for."""
+"""Explain a lift's holder: the holder is silent, has sent END, or sees all conditions met."""
 
 from shlex import quote
 from typing import Final
@@ -14,7 +14,7 @@ from workbench.explain.phrases import TimePhrases, lasted, listed
 from workbench.explain.rows import label
 
 LONG_S: Final = 60.0
-"""A robot drives within this time (s) of getting all it waits for."""
+"""Maximum normal time (s) until a robot drives after all its conditions are met."""
 
 
 def release(lift: LiftFacts) -> str:
@@ -23,7 +23,7 @@ def release(lift: LiftFacts) -> str:
 
 
 def without_word(found: Answer, lift: LiftFacts, clock: TimePhrases, around: OthersHeard) -> None:
-    """Explain a holder that neither asks nor sends END."""
+    """Explain a holder that sends neither requests nor END."""
     holder, theirs = lift.session.value, lift.requesters.get(lift.session.value)
     heard_s = clock.now.at - max(lift.began.at, lift.session.since.at)
     if theirs is None and heard_s < common.LISTENS_S:
@@ -75,7 +75,8 @@ def _of_fleet(
     clock: TimePhrases,
     around: OthersHeard,
 ) -> tuple[list[str], list[str]]:
-    """Return for whom the holder's adapter speaks now, and who fell silent when the holder did."""
+    """Return the robots for which the holder's adapter speaks now, and the robots that fell silent with
+    the holder."""
     ended = theirs.last.at if theirs else float("-inf")
     speaks: list[str] = []
     together: list[str] = []
@@ -91,7 +92,7 @@ def _of_fleet(
 
 
 def _robots(found: list[str], fleet: str) -> list[str]:
-    """Name the robots, or the fleet where only the adapter's words for the fleet were heard."""
+    """Name the robots. Name the fleet if the adapter spoke only for the whole fleet."""
     robots = sorted(who for who in found if who not in (fleet, f"{fleet}/"))
     return robots[:4] or ([f"the rest of {fleet}"] if found else [])
 
@@ -99,7 +100,7 @@ def _robots(found: list[str], fleet: str) -> list[str]:
 def end_not_obeyed(
     found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases
 ) -> None:
-    """Explain an END after which the lift still shows the session."""
+    """Explain why the lift still shows a session after the holder's END."""
     assert claim.ended is not None
     at = clock.time(claim.ended.wall)
     if clock.now.at - claim.ended.at < SETTLES_S:
@@ -123,7 +124,7 @@ def end_not_obeyed(
 
 
 def drives(found: Answer, claim: DeviceRequester, clock: TimePhrases) -> None:
-    """Explain a robot that has all it waited for."""
+    """Explain a robot whose conditions are all met."""
     met = claim.met or claim.since
     found.say(
         f"{claim.who} has all that it waits for: its lift at {claim.wants} with the door open"
@@ -145,7 +146,7 @@ def drives(found: Answer, claim: DeviceRequester, clock: TimePhrases) -> None:
 
 
 def forgotten(found: Answer, lift: LiftFacts, holder: str, clock: TimePhrases) -> None:
-    """Explain that the supervisor requests for another session than the holder's."""
+    """Explain that the supervisor sends requests for another session than the holder's session."""
     asks = lift.supervisor
     if asks is None or asks.value in ("", holder, NOBODY):
         return

@@ -1,4 +1,5 @@
-"""Explain why a robot's request does not reach a lift, or is not granted by a free lift."""
+"""Explain why a robot's request does not reach a lift, or why a free lift does not grant the
+request."""
 
 from typing import Final
 
@@ -10,11 +11,11 @@ from workbench.explain.lift_facts import LiftFacts
 from workbench.explain.phrases import TimePhrases, lasted
 
 SETTLES_S: Final = 2.0
-"""Normal time (s) from a request to its grant, or to a supervisor's change of holder."""
+"""Normal time (s) from a request to its grant, or to a change of holder by the supervisor."""
 
 
 def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
-    """Explain why the free lift is not given to the requester."""
+    """Explain why the free lift grants the requester no session."""
     if lift.floors and claim.wants not in lift.floors:
         found.say(
             f"{lift.name} serves {', '.join(lift.floors[:12])}, not {claim.wants or 'an empty name'}:"
@@ -47,7 +48,7 @@ def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: T
 def _asks_for_another(
     found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases
 ) -> bool:
-    """Does the supervisor pass on other requests than this one?"""
+    """Explain that the supervisor does not forward this request. True if it forwards other requests."""
     passed = claim.passed_on
     if not claim.own or (passed is not None and clock.now.at - passed.at < 5.0):
         return False
@@ -66,7 +67,8 @@ def _asks_for_another(
 def not_passed_on(
     found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases, around: OthersHeard
 ) -> None:
-    """Explain that nothing comes on `lift_requests` while this robot asks or repeats END."""
+    """Explain that nothing comes on `lift_requests`, although this robot sends requests or repeats
+    END."""
     if common.clock_off(claim) and claim.ended is None:
         _clock(found, lift, claim)
         return
@@ -100,7 +102,7 @@ def not_passed_on(
 
 
 def _clock(found: Answer, lift: LiftFacts, claim: DeviceRequester) -> None:
-    """Explain requests that are dropped because of their stamps."""
+    """Explain that the supervisor drops requests because of their stamps."""
     whose = f"the machine with the fleet adapter of {claim.who.rpartition('/')[0] or claim.who}"
     if abs(lift.stamp_age_s) >= CLOCKS_DIFFER_S:
         whose += ", or of this machine (the states' stamps do not fit either)"

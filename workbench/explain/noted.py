@@ -1,8 +1,8 @@
-"""The notes of our daemons about their own devices: inputs, outputs, faults, bus errors and refusals;
-and our recorder's notes of the reason for a file.
+"""Notes in a recording. Our daemons note inputs, outputs, faults, bus errors and refusals of their own
+devices. Our recorder notes why it kept a file.
 
-In an incident file the texts are JSON under `/rmf_bridge/` (`bridges/blackbox/incident.py`,
-`readable`). A file may come from anywhere, so a text of another shape is ignored.
+In an incident file the notes are JSON texts under `/rmf_bridge/` (`bridges/blackbox/incident.py`,
+`readable`). A file may come from anywhere, so the reader ignores texts of another shape.
 """
 
 from collections.abc import Iterator, Mapping
@@ -15,14 +15,16 @@ from workbench.explain.timeline import Level
 
 TOPICS: Final = ("samples", "outputs", "faults", "decisions", "bus_errors", "notes")
 MOST: Final = 40
-"""At most this many inputs, outputs or faults of one device are read."""
+"""Maximum number of inputs, outputs or faults that are read from one note."""
 
 
 @dataclass(frozen=True, slots=True)
 class Noted:
-    """One note about `subject`. `inputs`, `outputs`, `faults`: all of them, as name -> value ("": off),
-    or None if the note is about something else. `refused`: why a request was refused. `bus_error`: why
-    the bus failed. `kept_for`: the reason for the file, as a fixed name and a text.
+    """One note about `subject`.
+
+    `inputs`, `outputs` and `faults` are complete: name -> value, where "" means off. Each is None if
+    the note is about something else. `refused`: why the daemon refused a request. `bus_error`: why the
+    bus failed. `kept_for`: the reason for the file, as a fixed name and a text.
     """
 
     subject: str
@@ -35,7 +37,8 @@ class Noted:
 
 
 def noted(topic: str, text: str) -> Noted | None:
-    """Return the note in a text of this topic (its last part); None for other texts."""
+    """Return the note in this text; None if the text is no note. `topic` is the last part of the
+    topic's name."""
     try:
         told = msgspec.json.decode(text)
     except (msgspec.MsgspecError, RecursionError):
@@ -61,7 +64,7 @@ def noted(topic: str, text: str) -> Noted | None:
 
 
 def levels(at: float, note: Noted, on: dict[tuple[str, str], str]) -> Iterator[Level]:
-    """Yield the changes by this note. `on`: name -> value before; updated here."""
+    """Yield the changes that this note makes. `on`, name -> value before the note, is updated here."""
     lanes = (("inputs", note.inputs), ("relays", note.outputs), ("faults", note.faults))
     for lane, found in lanes:
         if found is None:
@@ -74,7 +77,8 @@ def levels(at: float, note: Noted, on: dict[tuple[str, str], str]) -> Iterator[L
 
 
 def _fields(struct: object) -> Iterator[tuple[str, str]]:
-    """Return the fields of a sample or of outputs with on, off or a word; no measurements."""
+    """Yield the fields of a sample or of outputs: each is on, off or a word. Measurements are left
+    out."""
     if not isinstance(struct, dict):
         return
     for name, value in [*struct.items()][:MOST]:

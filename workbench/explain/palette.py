@@ -1,7 +1,8 @@
-"""The look of each tone, by day and by night: colours safe for the colour-blind, and patterns.
+"""The look of each tone, in the light and the dark theme: colours safe for the colour-blind, and
+patterns.
 
-The colours are Okabe's and Ito's (https://jfly.uni-koeln.de/color/). Tones never differ by
-colour alone: each has a label, and wrong, unknown and requested ones also have a pattern.
+The colours are from Okabe and Ito (https://jfly.uni-koeln.de/color/). Colour alone never tells two
+tones apart: each span has a label, and the wrong, unknown and requested tones also have a pattern.
 """
 
 from dataclasses import dataclass
@@ -24,7 +25,8 @@ MEANING: Final[dict[Tone, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class ToneStyle:
-    """A tone in one theme. `text`: on the fill. `pattern`: lines over it; "" for none."""
+    """A tone in one theme. `text`: colour of text on the fill. `pattern`: lines over the fill; "" for
+    none."""
 
     fill: str
     text: str
@@ -54,13 +56,13 @@ PAPER: Final[dict[Theme, tuple[str, str, str, str]]] = {
     "light": ("#ffffff", "#1b1d21", "#5b616b", "#d3d7dd"),
     "dark": ("#17191d", "#eceff3", "#a7adb8", "#363b44"),
 }
-"""Background, text, weaker text, grid."""
+"""Colours of the background, the text, the weaker text and the grid."""
 STEP: Final[dict[Theme, str]] = {"light": "#b54a12", "dark": "#e8854a"}
-"""The line of a clock's step, or of a file's reason."""
+"""Colour of the line that marks a clock's step, or the moment of a file's reason."""
 
 
 def css(theme: Theme) -> str:
-    """Return the rules of one theme."""
+    """Return the CSS rules of one theme."""
     back, text, weak, grid = PAPER[theme]
     rules = [
         f".paper{{fill:{back}}}",
@@ -79,7 +81,7 @@ def css(theme: Theme) -> str:
 
 
 def style(theme: Theme | None) -> str:
-    """Return the style sheet: of one theme, or of both, chosen by the reader's screen."""
+    """Return the style sheet of one theme. None returns both themes; the reader's screen chooses."""
     if theme is not None:
         return css(theme)
     return f"{css('light')}@media (prefers-color-scheme: dark){{{css('dark')}}}"

@@ -12,11 +12,11 @@ from bridges.observe.requesters import Moment
 JOINS: Final = re.compile(
     r"`(rmf-bridge (doctor|explain|exporter|judge|mqtt-out|notify|page|release|send|watch)\b[^`]*)`"
 )
-"""A command in a sentence that joins RMF's graph."""
+"""Pattern of a command in a sentence, if the command joins RMF's graph."""
 
 
 def lasted(seconds: float) -> str:
-    """`0.4 s`, `12 s`, `2 min 39 s`, `3 h 5 min`, `2 d 4 h`."""
+    """Return a duration in words, such as `0.4 s`, `12 s`, `2 min 39 s`, `3 h 5 min`, `2 d 4 h`."""
     if seconds < 9.95:
         return f"{max(0.0, seconds):.1f} s"
     whole = round(seconds)
@@ -30,18 +30,18 @@ def lasted(seconds: float) -> str:
 
 
 def listed(names: Sequence[str], word: str = "and") -> str:
-    """`a`, `a and b`, `a, b and c`."""
+    """Join names to `a`, `a and b`, or `a, b and c`."""
     *first, last = names
     return f"{', '.join(first)} {word} {last}" if first else last
 
 
 def on_graph(text: str, options: Sequence[str]) -> str:
-    """Add the graph's options to every command in the text that joins it."""
+    """Add the graph's options to every command in the text that joins the graph."""
 
     def joined(found: re.Match[str]) -> str:
         command, name = found.groups()
         words = [*options]
-        if name == "doctor" and "--config" in words:  # it names the file already
+        if name == "doctor" and "--config" in words:  # the file names the graph
             at = words.index("--config")
             del words[at : at + 2]
         return f"`{command} {shlex.join(words)}`" if words else found[0]
@@ -51,23 +51,23 @@ def on_graph(text: str, options: Sequence[str]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class TimePhrases:
-    """Says times by one time zone (None: this machine's), as seen from `now`."""
+    """Puts times into words, in one time zone (None: this machine's zone), as seen from `now`."""
 
     now: Moment
     zone: tzinfo | None
 
     def time(self, wall: float, *, tenths: bool = False) -> str:
-        """`14:03:07`; with the date where it is not today's."""
+        """Return `14:03:07`. A day other than today adds the date."""
         at = self._local(wall)
         text = f"{at:%H:%M:%S}" + (f".{at.microsecond // 100000}" if tenths else "")
         return text if at.date() == self._local(self.now.wall).date() else f"{at:%Y-%m-%d} {text}"
 
     def date(self, wall: float) -> str:
-        """`2026-11-22 14:03:07`."""
+        """Return `2026-11-22 14:03:07`."""
         return f"{self._local(wall):%Y-%m-%d %H:%M:%S}"
 
     def since(self, moment: Moment) -> str:
-        """`since 14:03:07 (12 s)`."""
+        """Return `since 14:03:07 (12 s)`."""
         for_s = lasted(self.now.at - moment.at)
         if moment.seen:
             return f"since {self.time(moment.wall)} ({for_s})"
@@ -76,5 +76,9 @@ class TimePhrases:
     def _local(self, wall: float) -> datetime:
         try:
             return datetime.fromtimestamp(wall, self.zone)
-        except (OverflowError, ValueError, OSError):  # a recording may hold any number
+        except (
+            OverflowError,
+            ValueError,
+            OSError,
+        ):  # a recording may hold a time outside the calendar
             return datetime.fromtimestamp(0, self.zone)

@@ -1,7 +1,8 @@
-"""A timeline as SVG: lanes from left to right, a label in each span, and details under the pointer.
+"""Draw a timeline as SVG: lanes from left to right, a label in each span, and details under the
+pointer.
 
-Every text becomes a text node of an XML tree, so no name from the network can be markup. The picture
-needs no script, font or network.
+Every text becomes a text node of an XML tree, so a name from the network cannot become markup. The
+picture needs no script, font or network.
 """
 
 import re
@@ -25,10 +26,10 @@ RIGHT: Final = 16.0
 CHAR: Final = 6.6
 """Width (pixels) of a character of the 12-pixel font, rounded up."""
 NARROW: Final = 1.2
-"""Spans narrower than this (pixels) are drawn as one with their neighbours."""
+"""Width (pixels) below which a span is drawn together with its neighbours."""
 TICKS: Final = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200)
 ROBOT: Final = re.compile(r"(?:^|(?<= for ))[^\s/]+/(?=[^\s/]+(?: \(request \S*\))?$)")
-"""The fleet before a robot's name."""
+"""Pattern of the fleet in front of a robot's name."""
 FONT: Final = "font-family:system-ui,'Noto Sans','DejaVu Sans',sans-serif"
 TEXT: Final = ".txt{font-size:12px}.small{font-size:11px}.title{font-size:16px;font-weight:600}"
 
@@ -39,7 +40,8 @@ def svg(
     zone: tzinfo | None = None,
     theme: Theme | None = None,
 ) -> str:
-    """Draw the picture. `zone`: of its times; None: this machine's. `theme`: None: the reader's."""
+    """Draw the picture. `zone`: time zone of the axis; None: this machine's zone. `theme`: None lets
+    the reader's screen choose."""
     return tostring(Picture(timeline, max(LEAST_WIDE, width), zone, theme).root, "unicode")
 
 
@@ -79,7 +81,7 @@ class Picture:
         self._steps()
         self._legend()
 
-    # ---- places
+    # ---- positions
 
     def _wall(self, at: float) -> float:
         return self._timeline.wall + at - self._timeline.from_s
@@ -114,7 +116,8 @@ class Picture:
         return SubElement(self.root, "line", place)
 
     def _patterns(self) -> None:
-        """Add hatches for wrong, dots for unknown, lines for requested spans."""
+        """Define the patterns: hatches for wrong spans, dots for unknown spans, lines for requested
+        spans."""
         defs = SubElement(self.root, "defs")
         for tone, size, path, wide in (
             ("wrong", 8, "M-1,9 L9,-1", "1.4"),
@@ -188,7 +191,7 @@ class Picture:
         self._marks(lane, y, what)
 
     def _marks(self, lane: Lane, y: float, what: str) -> None:
-        """Draw a pointer at each mark, with its label if there is room before the next."""
+        """Draw a pointer at each mark. Add the label if there is room before the next mark."""
         busy = [(self._x(span.from_s), self._x(span.to_s)) for span in lane.spans]
         places = [self._x(mark.at_s) for mark in lane.marks]
         for number, (mark, x) in enumerate(zip(lane.marks, places, strict=True)):
@@ -214,7 +217,7 @@ class Picture:
         SubElement(element, "title").text = text
 
     def _steps(self) -> None:
-        """Mark the steps of the listener's clock."""
+        """Draw a line at each step of the listener's clock."""
         for mark in self._timeline.steps:
             line = self._line(self._x(mark.at_s), TOP - 8, self._foot + 4, "step")
             self._hint(line, mark.label)
@@ -245,13 +248,13 @@ def _gutter(lanes: Iterable[Lane], width: int) -> float:
 
 
 def _wide(text: str) -> float:
-    """Return a text's rough width (pixels); 走 takes two places."""
+    """Return a text's approximate width (pixels); a wide character such as 走 counts twice."""
     return CHAR * sum(1.7 if unicodedata.east_asian_width(c) in "WF" else 1.0 for c in text)
 
 
 def _fitted(text: str, room: float) -> str:
-    """Cut the text to fit; "" if almost nothing fits. Of a robot the fleet is cut, never the name, so
-    that no two robots of a fleet read alike."""
+    """Cut the text to fit; return "" if almost nothing fits. A robot's text loses its fleet, never its
+    name. Thus two robots of a fleet never look the same."""
     if _wide(text) <= room:
         return text
     if (robot := ROBOT.sub("", text)) != text:
@@ -265,7 +268,7 @@ def _fitted(text: str, room: float) -> str:
 
 
 def _round_times(begin: float, end: float, step: int, zone: tzinfo | None) -> Iterator[float]:
-    """Yield the round times between two times, by the zone's local clock."""
+    """Yield the round times between `begin` and `end`, on the zone's local clock."""
     try:
         offset = datetime.fromtimestamp(begin, zone).astimezone(zone).utcoffset()
     except (OverflowError, ValueError, OSError):
@@ -284,7 +287,7 @@ WORST: Final[dict[Tone, int]] = {"wrong": 2, "unknown": 1}
 def _drawable(
     spans: Iterable[LaneSpan], x: Callable[[float], float]
 ) -> Iterator[tuple[LaneSpan, int]]:
-    """Return the spans, the invisibly narrow ones joined, each with its number of original spans."""
+    """Yield each span with its number of original spans. Spans too narrow to see are joined."""
     joined: list[LaneSpan] = []
     for span in spans:
         gap = joined and x(span.from_s) - x(joined[-1].to_s) > NARROW
@@ -301,7 +304,7 @@ def _drawable(
 
 
 def _one(spans: list[LaneSpan]) -> LaneSpan:
-    """Join narrow spans to one, with the worst tone among them."""
+    """Join narrow spans into one span, which has the worst tone among them."""
     tone = max(spans, key=lambda span: (WORST.get(span.tone, 0), span.to_s - span.from_s)).tone
     label = spans[0].label if len(spans) == 1 else ""
     return LaneSpan(spans[0].from_s, spans[-1].to_s, label, tone)

@@ -15,7 +15,7 @@ MOST_WIDE: Final = 100
 SCREEN_LINES: Final = 40
 LEAST_STORY: Final = 6
 FIRST: Final = 2
-"""Number of lines always shown of a story's beginning."""
+"""Number of lines that always show the beginning of a story."""
 MOST_FAULTS: Final = 4
 
 
@@ -25,7 +25,7 @@ def lines(
     width: int = MOST_WIDE,
     height: int = SCREEN_LINES,
 ) -> list[str]:
-    """Return a screen of lines, no wider than `width` where words allow."""
+    """Return a screen of lines. A line is wider than `width` only if one word is."""
     found = [*_answer(explanation, min(width, MOST_WIDE))]
     room = max(LEAST_STORY, height - len(found) - 1)
     return [*found, *_story(explanation, zone, room)]
@@ -57,7 +57,7 @@ def _answer(one: Explanation, width: int) -> Iterator[str]:
 
 
 def _story(one: Explanation, zone: tzinfo | None, room: int) -> Iterator[str]:
-    """Return the story's beginning, and as much of its end as fits."""
+    """Yield the story's beginning, and as much of the story's end as fits."""
     shown = one.story
     if not shown:
         return
@@ -75,7 +75,7 @@ def _story(one: Explanation, zone: tzinfo | None, room: int) -> Iterator[str]:
 
 
 def _table(fields: tuple[CheckedField, ...]) -> Iterator[str]:
-    """Return a row for each field: its value, and the wanted value if different."""
+    """Yield a row for each field: its value, and the wanted value if it differs."""
     widths = [
         max(len(text) for text in column) for column in zip(*map(_cells, fields), strict=True)
     ]

@@ -1,7 +1,7 @@
-"""A timeline as values, for `plot`, the web page, and JSON by `dataclasses.asdict`.
+"""A timeline as values, for `plot`, the web page, and JSON through `dataclasses.asdict`.
 
-Times are s on `Heard.at`'s clock. Every text is printable and not too long, and may come from the
-network: it is text, never markup.
+Times are seconds on `Heard.at`'s clock. Every text is printable and has a limited length. A text may
+come from the network, so treat it as text, never as markup.
 """
 
 from dataclasses import dataclass
@@ -23,11 +23,18 @@ LANES: Final[tuple[LaneName, ...]] = (
     "requests",
     "faults",
 )
-"""In the order in which they are drawn."""
+"""Lanes in the order of drawing."""
 Tone = Literal["calm", "works", "open", "held", "asks", "wrong", "unknown"]
-"""The look of a span, besides its label. calm: at rest. works: moves, charges, is on. open: a robot may
-pass. held: somebody's session. asks: somebody requests something. wrong: a fault or hazard.
-unknown: not heard."""
+"""The look of a span, besides its label.
+
+- calm: the device rests.
+- works: the device moves, charges or is on.
+- open: a robot may pass.
+- held: somebody has a session.
+- asks: somebody requests something.
+- wrong: a fault or hazard.
+- unknown: nothing was heard.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +58,10 @@ class Mark:
 
 @dataclass(frozen=True, slots=True)
 class Lane:
-    """One row of a lane; its spans never overlap. `row`: a relay, input, requester or fault; "" in a
-    lane of one row. `left_out`: the oldest spans and marks, dropped because there were too many.
+    """One row of a lane; its spans never overlap.
+
+    `row`: name of a relay, input, requester or fault; "" if the lane has only one row. `left_out`:
+    number of the oldest spans and marks that the row dropped because there were too many.
     """
 
     name: LaneName
@@ -66,9 +75,8 @@ class Lane:
 class Timeline:
     """One device between two times.
 
-    `wall`: s since the epoch at `from_s`, by the listener's clock. `steps`: the steps of that
-    clock. `lanes`: in the order of LANES, only those with messages. `left_out`:
-    rows that were dropped.
+    `wall`: seconds since the epoch at `from_s`, on the listener's clock. `steps`: the steps of that
+    clock. `lanes`: lanes with messages, in the order of LANES. `left_out`: number of dropped rows.
     """
 
     kind: Kind
@@ -83,9 +91,10 @@ class Timeline:
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """A note of our daemon about its device: from `at` on, `name` is `value` ("": off, or over).
+    """A note of our daemon about its device: from `at` on, `name` has the value `value`; "" means off,
+    or over.
 
-    `lane`: relays (an output and its value), inputs, or faults (a code and its detail).
+    `lane` is relays (an output and its value), inputs, or faults (a code and its detail).
     """
 
     at: float

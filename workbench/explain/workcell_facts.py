@@ -1,4 +1,4 @@
-"""One dispenser's or ingestor's facts from its messages, and its story."""
+"""Facts about one dispenser or ingestor from its messages, and its story."""
 
 from bridges.observe.news import News
 from bridges.observe.workcell import ObservedDispenser, ObservedIngestor, ObservedWorkcell
@@ -6,10 +6,10 @@ from workbench.explain.device import Device
 
 
 class WorkcellFacts(Device, ObservedWorkcell):
-    """What both kinds of workcell tell."""
+    """A workcell with its story."""
 
     def says(self, one: News) -> str:
-        """Return a line of the story; "" for none."""
+        """Return a line of the story; "" if the event is not told."""
         match one.what:
             case "asks" if one.requester:
                 return f"{self.name} is asked for {one.requester.wants} (request {one.who})"
@@ -22,8 +22,8 @@ class WorkcellFacts(Device, ObservedWorkcell):
 
 
 class DispenserFacts(WorkcellFacts, ObservedDispenser):
-    """A dispenser's."""
+    """Facts about a dispenser."""
 
 
 class IngestorFacts(WorkcellFacts, ObservedIngestor):
-    """An ingestor's."""
+    """Facts about an ingestor."""
