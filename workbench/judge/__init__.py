@@ -1,1 +1,1 @@
-"""RMF's contract as laws; judge whether a lift, door or charger node on the graph keeps them."""
+"""RMF's contract as laws, and a judge: does a lift, door or charger node on the graph keep the laws?"""

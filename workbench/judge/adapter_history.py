@@ -1,4 +1,5 @@
-"""The history of a fleet's adapter: what its robots asked of lifts and doors, and what these showed."""
+"""The history of a fleet adapter: the requests of its robots to lifts and doors, and the states of
+these devices."""
 
 from collections import deque
 from copy import copy
@@ -17,22 +18,31 @@ from bridges.observe.requesters import DeviceRequester, Moment
 from workbench.judge.history import NOT_YET, REMEMBERED, AnyHistory, keep
 
 IGNORED: Final = 5
-"""So many states without a word are no loss of the network's, if the fleet was heard meanwhile."""
+"""Number of states that an adapter must leave unanswered, while its fleet is heard, before network loss
+is ruled out."""
 ALARMS_S: Final = 60.0
-"""For this long (s) after an alarm's news robots may change their way."""
+"""Time (s) after an alarm's start or end in which robots may change their way."""
 BACK_S: Final = 0.5
 ADAPTERS: Final = (topics.ADAPTER_LIFT_REQUESTS.name, topics.ADAPTER_DOOR_REQUESTS.name)
 
 
 @dataclass(slots=True)
 class Wish(DeviceRequester):
-    """One robot's visit to one device. `met`: since its latest wish, the device has once shown all that
-    RMF's phase waits for. `whole`: heard from its beginning. `inside`: it has asked for another floor
-    after a wish was met, so the robot is in the car. `came_from`: the floor before. `held_at`: when a
-    state last showed its session. `ignored`: states in a row without its word, while its fleet was
-    heard, from `ignored_since`; `lapsed`: a first request was left alone for so long. `spare`: ENDs
-    since a state last showed its session. `passed`: a later passage has begun without its CLOSE.
-    `visits`: the kind of device, and the visitor."""
+    """One robot's visit to one device.
+
+    - `met`: the device has shown all that RMF's phase waits for, at least once after the latest
+      request.
+    - `whole`: the visit was heard from its beginning.
+    - `inside`: the robot requested another floor after a wish was met, so the robot is in the car.
+    - `came_from`: the floor before.
+    - `held_at`: the time of the last state that showed the visit's session.
+    - `ignored`: number of states in a row without a request by the robot, although its fleet was heard.
+    - `ignored_since`: the time of the first of these states.
+    - `lapsed`: the adapter did not repeat the first request for IGNORED states.
+    - `spare`: number of ENDs after the last state that showed the visit's session.
+    - `passed`: a later passage began before the robot sent CLOSE for this passage.
+    - `visits`: the kind of device, and the visitor.
+    """
 
     whole: bool = False
     inside: bool = False
@@ -47,16 +57,21 @@ class Wish(DeviceRequester):
     visits: str = ""
 
     def ignored_s(self, now: float) -> float:
-        """Return for how long (s) states have been ignored; 0 before IGNORED of them."""
+        """Return for how long (s) the robot has ignored states; 0 for fewer than IGNORED states."""
         return now - self.ignored_since if self.ignored >= IGNORED else 0.0
 
 
 class AdapterHistory(AnyHistory):
-    """`name`: a fleet, or fleet/robot. `device`, `wish`, `was`: of the latest request, with the visit
-    before it. `stated`: the visits to the device of the latest state. `listed`: the robots in the
-    fleet's states, of which `lists` were heard. `back`: steps back of the stamps, by robot and topic.
-    `lapses`: in a row, by `Wish.visits`: waits with one request. `unclosed`: by robot: passages
-    without CLOSE."""
+    """The history of one fleet adapter.
+
+    - `name`: a fleet, or fleet/robot.
+    - `device`, `wish`, `was`: of the latest request; `was` is the visit before `wish`.
+    - `stated`: the visits to the device of the latest state.
+    - `listed`: the robots in the fleet's states. `lists`: number of fleet states heard.
+    - `back`: number of times that stamps stepped back, by robot and topic.
+    - `lapses`: number of waits in a row with only one request, by `Wish.visits`.
+    - `unclosed`: number of passages without CLOSE, by robot.
+    """
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
@@ -115,14 +130,16 @@ class AdapterHistory(AnyHistory):
         return who == self.name or who.startswith(f"{self.name}/")
 
     def excused(self, wish: Wish) -> bool:
-        """May the robot change its way: a hazard or an alarm, or another task since its wish?"""
+        """May the robot change its way? A hazard, an alarm, or a new task after its request is an
+        excuse."""
         state = self.device.state if self.device else None
         hazard = isinstance(state, d.LiftState) and state.current_mode in HAZARDS
         task_at = self._tasks.get(wish.who, ("", NOT_YET))[1]
         return hazard or self.now - self._alarm_at < ALARMS_S or task_at >= wish.since.at
 
     def _forget(self, now: float) -> None:
-        """Begin anew after a silence of everybody: anything may have been missed."""
+        """Forget the visits after a silence of the whole network, because messages may have been
+        missed."""
         self._began = now
         self._wishes.clear()
 
@@ -140,7 +157,7 @@ class AdapterHistory(AnyHistory):
     # ---- requests
 
     def _is_replayed(self, message: d.LiftRequest | d.DoorRequest) -> bool:
-        """Note the stamp. Is this an old message, retained for a late listener?"""
+        """Note the stamp. Is this an old message, which its publisher retained for late listeners?"""
         who = message.session_id if isinstance(message, d.LiftRequest) else message.requester_id
         key, at = f"{words.kind(message)} {who}", in_seconds(message.request_time)
         newest, recent = self._stamps.get(key, (0.0, deque(maxlen=100)))
@@ -194,7 +211,7 @@ class AdapterHistory(AnyHistory):
         return True
 
     def _say(self, wish: Wish, wants: str, now: Moment) -> None:
-        """Take its word; `wants` is empty for END and CLOSE."""
+        """Note the visitor's request. `wants` is empty for END and CLOSE."""
         if not wants:
             wish.ended = wish.ended or now
             wish.spare += 1
@@ -216,7 +233,7 @@ class AdapterHistory(AnyHistory):
         return silent_s > GIVEN_UP_S and not _holds(device, wish.who)
 
     def _begin_passage(self, begun: Wish, device: AnyDevice) -> None:
-        """Count the robot's earlier passages of doors that lack a CLOSE."""
+        """Count the robot's earlier passages of doors for which no CLOSE was heard."""
         if not isinstance(device, ObservedDoor) or begun.wants != "open":
             return
         for key, wish in self._wishes.items():
@@ -243,12 +260,12 @@ class AdapterHistory(AnyHistory):
             if _holds(device, wish.who):
                 wish.held_at, wish.spare = self.now, 0
             elif wish.held_at > NOT_YET and self.now - wish.last.at > REQUESTER_SILENT_S:
-                wish.ended = wish.ended or now  # its END was not heard
+                wish.ended = wish.ended or now  # the listener missed the END
         self._meet(device, now)
         return bool(self.stated)
 
     def _count(self, wish: Wish, before: float) -> None:
-        """Count the state, if the wish was not spoken of since the state before."""
+        """Count the state as ignored, if the robot sent no request after the state before."""
         if wish.last.at >= before:
             wish.ignored = 0
         elif self._alive_at > before:

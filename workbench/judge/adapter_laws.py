@@ -1,7 +1,7 @@
-"""The laws of a fleet's adapter, beside any lift and door.
+"""The laws of a fleet adapter, for all lifts and doors that it uses.
 
-The place of the robot is not on the graph: a request for another floor stands for its entry, and END
-for its exit. The states that were shown tell what its adapter could know.
+The robot's place is not on the graph. A request for another floor counts as its entry, and END counts
+as its exit. The published states show how much its adapter could know.
 """
 
 from collections.abc import Callable
@@ -18,14 +18,14 @@ CONTEXT: Final = "rmf_ros2 agv/RobotContext.cpp:1700-1735"
 REQUEST_LIFT: Final = "rmf_ros2 phases/RequestLift.cpp:322-326"
 DOOR_OPEN: Final = "rmf_ros2 phases/DoorOpen.cpp"
 NEVER_ENDS_S: Final = 60.0
-"""No robot takes longer to drive out, in silence."""
+"""Time (s) after which a silent robot can no longer be driving out of a car."""
 FOR_EVER_S: Final = 60.0
 AGAIN: Final = 2
-"""A restart explains one breach, not two in a row."""
+"""Number of breaches in a row that a restart of the adapter cannot explain."""
 SPAM: Final = 5
 LISTS: Final = 5
 TASKS_S: Final = 3.0
-"""A fleet's state tells of a new task this much later, at most."""
+"""Maximum delay (s) of a fleet state that tells of a new task."""
 GOES: Final = (d.LiftRequestType.REQUEST_END_SESSION, d.LiftRequestType.REQUEST_AGV_MODE)
 
 
@@ -71,7 +71,7 @@ def _floors(history: AdapterHistory) -> Finding:
 
 
 def _repeats(kind: str) -> Callable[[AdapterHistory], Finding]:
-    """Check the requests of a wait, for a lift or for a door."""
+    """Return a check that the adapter repeats its requests in a wait, for a lift or for a door."""
 
     def check(history: AdapterHistory) -> Finding:
         wish, was = history.wish, history.was
@@ -93,7 +93,7 @@ STATES: Final = {"lift": d.LiftState, "door": d.DoorState}
 
 
 def _changes(history: AdapterHistory) -> Wish | None:
-    """Return the visit before this request, if the request is for another floor."""
+    """Return the visit before this request, if the request is for another floor; else None."""
     wish, was = history.wish, history.was
     if wish is None or was is None or wish.ended or not isinstance(history.device, ObservedLift):
         return None
@@ -102,7 +102,8 @@ def _changes(history: AdapterHistory) -> Wish | None:
 
 
 def _explained(history: AdapterHistory, was: Wish, text: str) -> Finding:
-    """Return a breach, unless the state that allows it, an alarm or a new task is heard late."""
+    """Return a breach. It is withdrawn if a late message excuses it: a state, an alarm or a new
+    task."""
     lift = history.device
     assert lift is not None
     return Doubt(text, lambda: lift.matches(was) or history.excused(was), TASKS_S)
@@ -159,7 +160,7 @@ def _ends_again(history: AdapterHistory) -> Finding:
 
 
 def _holders(history: AdapterHistory) -> list[Wish]:
-    """List the visit whose session the latest message shows."""
+    """Return the visit whose session the latest message shows, in a list; [] if there is none."""
     news = history.news
     holder = news.session_id if isinstance(news, d.LiftState) else None
     return [one for one in history.stated if one.who == holder]

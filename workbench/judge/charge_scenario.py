@@ -1,4 +1,4 @@
-"""The play for a charger: two requests and their ends."""
+"""The play for a charger: two requests, and the end of each."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -14,16 +14,19 @@ from workbench.rmf_model import Said
 SERVED: Final = (d.ChargerStateValue.CHARGER_ASSIGNED, d.ChargerStateValue.CHARGER_CHARGING)
 START_TIMEOUT_S: Final = 10.0
 LATEST_S: Final = START_TIMEOUT_S + 15.0
-"""After this time the first request is cancelled, if its start_timeout has not ended it."""
+"""Time (s) after which the play cancels the first request, if start_timeout has not ended the
+request."""
 REPEATS: Final = 6
 
 
 class ChargeScenario(Scenario):
-    """Request a station for a robot that does not come; when start_timeout has ended that request, make
-    another and cancel it. Meanwhile there is an occasion to break each law of requests: one for another
-    station, a second one for this station, a cancel of another request, and repeats.
+    """Request a station for a robot that does not come.
 
-    `robot`: FLEET/ROBOT. If it does come, its charge is cancelled.
+    When start_timeout has ended this request, make a second request and cancel it. Other messages give
+    a wrong node an occasion to break each law of requests: a request for another station, a second
+    request for this station, a cancel of another request, and repeats.
+
+    `robot`: FLEET/ROBOT. If the robot does come, the play cancels its charge.
     """
 
     def __init__(self, charger: str, robot: str, request_id: str, patience_s: float) -> None:
@@ -42,11 +45,11 @@ class ChargeScenario(Scenario):
 
     @property
     def over(self) -> bool:
-        """Are both requests over, or was the first one never granted?"""
+        """Are both requests over, or did the station never grant the first request?"""
         return bool(self.failed) or self._over
 
     def begin(self, now: float) -> list[Said]:
-        """Ask."""
+        """Send the first request."""
         return self.tick(now)
 
     def _play(self) -> Iterator[list[Said]]:
@@ -73,7 +76,7 @@ class ChargeScenario(Scenario):
             yield [self._ask(request_id)] if free else []
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
-        """Take its states, and a refusal."""
+        """Note the charger's states and refusals."""
         if isinstance(message, d.DiagnosticStatus) and message.hardware_id == self.charger:
             if any((v.key, v.value) == ("request_id", self._ids[0]) for v in message.values):
                 self.failed = f"refused: {shown(message.message)}"
@@ -82,7 +85,7 @@ class ChargeScenario(Scenario):
         return []
 
     def tick(self, now: float) -> list[Said]:
-        """Take the next step, if it is due."""
+        """Do the next step, if its time has come."""
         if now < self._wake_at or self.over:
             return []
         self._now, self._wake_at = now, now + REPEAT_S
@@ -95,7 +98,7 @@ class ChargeScenario(Scenario):
         return self._wake_at
 
     def leave(self, now: float) -> list[Said]:
-        """Cancel."""
+        """Cancel our requests."""
         self._leaving = True
         return [self._cancel(one) for one in (*self._ids, f"{self._ids[0]}-rival")]
 
@@ -105,7 +108,7 @@ class ChargeScenario(Scenario):
         return self._leaving and not self._shows(self._ids[0])
 
     def _shows(self, request_id: str) -> bool:
-        """Does the station serve this request, or another with an id that begins so?"""
+        """Does the station serve this request, or a request whose id begins with this id?"""
         state = self._state
         if state is None or state.state not in SERVED:
             return False

@@ -13,17 +13,24 @@ CHARGING: Final = d.ChargerStateValue.CHARGER_CHARGING
 RELEASED: Final = d.ChargerStateValue.CHARGER_RELEASED
 ERROR: Final = d.ChargerStateValue.CHARGER_ERROR
 LOST: Final = float("inf")
-"""Time of a cancel that the station may not have received."""
+"""Time noted for a cancel that the station may not have received."""
 UNREQUESTED: Final = "unrequested/"
-"""Prefix of ids of unrequested charges. A station's next charge may have the same id."""
+"""Prefix of the ids of charges that nobody requested. A station may use the same id for its next
+charge."""
 
 
 class ChargerHistory(History[d.ChargerState]):
-    """`requests`: by id, the latest; `first_asked`: id -> time of the first. `elsewhere`: ids of other
-    stations' requests. `second_at`: the last request with another id than the served request's.
-    `cancels`: id -> time of the first; the cancel of a charge that nobody requested is forgotten with
-    that charge. `foreign_at`: the last cancel of an id that the station does not show. `same_since`:
-    the beginning of the present state and request; `same_before`: that of those before."""
+    """The history of one charger.
+
+    - `requests`: id -> the latest request. `first_asked`: id -> time of the first request.
+    - `elsewhere`: ids of requests to other stations.
+    - `second_at`: time of the last request with another id than the served request.
+    - `cancels`: id -> time of the first cancel. When a charge that nobody requested ends, its cancel is
+      forgotten.
+    - `foreign_at`: time of the last cancel of an id that the station does not show.
+    - `same_since`: when the present state and request began. `same_before`: when the state and request
+      before began.
+    """
 
     seen: ObservedCharger
     observes = ObservedCharger
@@ -38,11 +45,11 @@ class ChargerHistory(History[d.ChargerState]):
 
     @staticmethod
     def claims(state: d.ChargerState) -> bool:
-        """Is it any state but ERROR?"""
+        """Is the state anything but ERROR?"""
         return state.state != ERROR
 
     def take_other(self, heard: Heard) -> bool:
-        """Take requests to this charger, and cancels."""
+        """Take requests and cancels for this charger."""
         match heard.message:
             case d.ChargerRequest(charger_name=self.name):
                 self.asked()
@@ -63,12 +70,12 @@ class ChargerHistory(History[d.ChargerState]):
         return True
 
     def forget(self) -> None:
-        """Forget what a silence may have ended."""
+        """Forget the requests that may have ended during a silence."""
         self.cancels.pop(UNREQUESTED + self.name, None)
         self.cancels = dict.fromkeys(self.cancels, LOST)
 
     def settle(self, state: d.ChargerState) -> None:
-        """Note since when it is so; forget the cancels of finished charges."""
+        """Note when the state began; forget the cancels of finished charges."""
         if self.before is None or _served(self.before) != _served(state):
             self.same_before, self.same_since = self.same_since, self.now
         if state.state in (IDLE, RELEASED):
@@ -83,7 +90,7 @@ class ChargerHistory(History[d.ChargerState]):
 
 
 def unrequested(request_id: str) -> bool:
-    """Is this id without a request?"""
+    """Is this the id of a charge that nobody requested?"""
     return request_id.startswith(UNREQUESTED)
 
 

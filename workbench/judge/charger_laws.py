@@ -1,5 +1,8 @@
-"""The laws of a charger's node. No part of RMF sends ChargerRequest: these rest on the messages' own
-texts and on what robots and coordinators need."""
+"""The laws of a charger's node.
+
+No part of RMF sends ChargerRequest. These laws follow from the comments in the message files, and from
+the needs of robots and coordinators.
+"""
 
 from typing import Final
 
@@ -21,9 +24,10 @@ from workbench.judge.shared_laws import ANSWERED, ONE, RATE, STAMP, fresh, named
 
 LATE_S: Final = 10.0
 SEEN_S: Final = 1.0
-"""An ASSIGNED state may be heard this long (s) after its beginning."""
+"""Time (s) after its beginning in which an ASSIGNED state may be heard late."""
 ENDS_WITHIN_S: Final[dict[int, float]] = {int(ASSIGNED): 5.0, int(CHARGING): 120.0}
-"""How long (s) a station may serve a cancelled request in these states: at 120 s it has ramped down."""
+"""Maximum time (s) for which a station may serve a cancelled request, by state. A charger needs up to
+120 s to ramp down."""
 FOREIGN_S: Final = 2.0
 UNREACHED_S: Final = 15.0
 
@@ -36,7 +40,7 @@ def _numbers(history: ChargerHistory) -> Finding:
 
 
 def _known(history: ChargerHistory) -> d.ChargerState | None:
-    """Return the state, if it is one of RMF's."""
+    """Return the new state, if its number is a state of RMF."""
     state = history.new
     return state if state is not None and state.state in list(d.ChargerStateValue) else None
 
@@ -77,8 +81,11 @@ def _same_robot(history: ChargerHistory) -> Finding:
 
 
 def _keeps(history: ChargerHistory) -> Finding:
-    """A station belongs to one request. An unrequested charge is taken over by its own robot's
-    request when that comes, and a restarted node may know of no request."""
+    """Check that a station belongs to one request until that request ends.
+
+    Two changes are allowed. The request of the robot on the pad may take over an unrequested charge. A
+    restarted node may have forgotten its request.
+    """
     state, before = history.new, history.before
     if state is None or before is None or not {state.state, before.state} <= ENDS_WITHIN_S.keys():
         return None
@@ -92,7 +99,7 @@ def _keeps(history: ChargerHistory) -> Finding:
 
 
 def _is_over(history: ChargerHistory, before: d.ChargerState) -> bool:
-    """May this promise have ended between two states, by a cancel or its start_timeout?"""
+    """May a cancel or the start_timeout have ended this promise between the two states?"""
     if before.state != ASSIGNED or unrequested(before.request_id):
         return False
     known = before.request_id in history.requests and before.request_id not in history.cancels
@@ -102,7 +109,8 @@ def _is_over(history: ChargerHistory, before: d.ChargerState) -> bool:
 
 
 def _overdue_s(history: ChargerHistory, state: d.ChargerState, since: float) -> float:
-    """Return how long its start_timeout has been over, if it began then; negative before."""
+    """Return how long (s) the start_timeout has been over, if it began at `since`; negative before its
+    end."""
     asked = history.requests.get(state.request_id)
     limit_s = in_seconds(asked.start_timeout) if asked else 0.0
     return history.now - since - limit_s if limit_s > 0.0 else NOT_YET
@@ -148,7 +156,7 @@ def _foreign_cancel(history: ChargerHistory) -> Finding:
     if state is None or before is None or before.state != ASSIGNED or not before.request_id:
         return None
     if unrequested(before.request_id):
-        return None  # it ends when its robot leaves, unannounced
+        return None  # an unrequested charge ends when its robot leaves, which no message announces
     if history.now - history.foreign_at > FOREIGN_S:
         return None
     if state.state not in (IDLE, RELEASED):

@@ -15,22 +15,28 @@ BLIND: Final = (d.DoorModeValue.MODE_OFFLINE, d.DoorModeValue.MODE_UNKNOWN)
 REOPENS_WITHIN_S: Final = 1.0
 AT_ONCE_S: Final = 0.3
 CROSSES_S: Final = 0.5
-"""A state may be heard this long (s) after the CLOSE that it has caused."""
+"""Time (s) by which a state may be heard later than its cause, a CLOSE."""
 DWELLS_S: Final = 0.5
-"""No operator releases a door that people have opened sooner than this."""
+"""Minimum time (s) for which a door operator keeps a door open that people have opened."""
 OPENING_S: Final = 1.0
-"""No operator reverses an opening door sooner than this."""
+"""Minimum time (s) before a door operator reverses an opening door."""
 
 
 class DoorHistory(History[d.DoorState]):
-    """`latched`: the last request was OPEN; `was_closed`: the door was closed then. `asked_at`: the
-    first OPEN of this latch; `openings`: OPENs since the door was last seen other than closed, at
-    `not_closed_at`. `closed_at`: the last CLOSE on door_requests; `adapter_closed_at`: that of a fleet
-    adapter to the supervisor, in this latch. `was_open`: the door has been open in this latch.
-    `reopened`: when it reopened at once, in this latch. `instant`: how many times in a row it was OPEN
-    as soon as that was requested; `opened`: the latest state is the first OPEN of this latch. `shut`:
-    how many times in a row a door that people had opened closed at RMF's CLOSE; `left`: the latest
-    state ends such an opening."""
+    """The history of one door. A latch lasts from an OPEN request to the next CLOSE request.
+
+    - `latched`: the last request was OPEN. `was_closed`: the door was closed at that request.
+    - `asked_at`: time of the first OPEN of this latch.
+    - `openings`: number of OPENs after `not_closed_at`, when the door was last seen not closed.
+    - `closed_at`: time of the last CLOSE on door_requests.
+    - `adapter_closed_at`: time of a fleet adapter's last CLOSE to the supervisor in this latch.
+    - `was_open`: the door has been open in this latch.
+    - `reopened`: times at which the door reopened immediately, in this latch.
+    - `instant`: how many times in a row the door showed OPEN immediately after the request.
+    - `opened`: the latest state is the first OPEN state of this latch.
+    - `shut`: how many times in a row RMF's CLOSE closed a door that people had opened.
+    - `left`: the latest state ends such an opening.
+    """
 
     observes = ObservedDoor
 
@@ -47,12 +53,12 @@ class DoorHistory(History[d.DoorState]):
 
     @property
     def mode(self) -> int:
-        """The door's mode now."""
+        """Present mode of the door."""
         return self.state.current_mode.value if self.state else -1
 
     @property
     def mode_before(self) -> int:
-        """The mode in the state before; -1 for none."""
+        """Mode in the state before; -1 without such a state."""
         return self.before.current_mode.value if self.before else -1
 
     @staticmethod
@@ -77,7 +83,7 @@ class DoorHistory(History[d.DoorState]):
         return True
 
     def forget(self) -> None:
-        """Forget requests from before a silence: the node may have restarted."""
+        """Forget the requests from before a silence, because the node may have restarted."""
         self.latched = self.was_open = False
         self._people_at = NOT_YET
         self.not_closed_at = self.now

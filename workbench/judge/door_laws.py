@@ -9,13 +9,13 @@ from workbench.judge.shared_laws import ANSWERED, ONE, RATE, STAMP, fresh, named
 
 OPENS_WITHIN_S: Final = 30.0
 SILENCE_S: Final = 10.0
-"""Nodes that close a door in RMF's silence wait no longer (lci-rmf-adapter)."""
+"""Maximum time (s) after which faulty nodes close a door because RMF is silent (lci-rmf-adapter)."""
 ASKED: Final = 5
 INSTANT: Final = 2
 SHUT: Final = 3
 BYPASS_S: Final = 5.0
 FLICKERS_S: Final = 0.9
-"""Time (s) in which no door can close and open again."""
+"""Time (s) too short for a real door to close and open again."""
 LATE_S: Final = FLICKERS_S + 1.0
 
 
@@ -39,7 +39,7 @@ def _opens(history: DoorHistory) -> Finding:
 
 
 def _left_open(history: DoorHistory) -> bool:
-    """Was it open for a requester, and has this just ended?"""
+    """Was the door open for a requester until the state before, and is it no longer open?"""
     moves = history.mode in (CLOSED, d.DoorModeValue.MODE_MOVING)
     return history.latched and history.was_open and moves and history.mode_before == OPEN
 
@@ -49,7 +49,7 @@ def _bypass(history: DoorHistory) -> bool:
 
 
 def _stays(history: DoorHistory) -> Finding:
-    """Silence must not close the door."""
+    """Check that the door does not close because RMF is silent."""
     if history.new is None or not history.latched or not history.was_open:
         return None
     if not _left_open(history) or _bypass(history):
@@ -59,8 +59,10 @@ def _stays(history: DoorHistory) -> Finding:
 
 
 def _left(text: str, history: DoorHistory) -> Doubt:
-    """Excused if a CLOSE was on its way, or if the contact only flickered: another law judges that.
-    By the stamps too, because a busy network delivers the next state late."""
+    """Return a doubt. A CLOSE on its way is an excuse, and so is a contact that flickers (another law).
+
+    Stamps count too, because a busy network may deliver the next state late.
+    """
     left_at, read_at = history.now, history.seen.stamped_at
 
     def excused() -> bool:
@@ -71,7 +73,8 @@ def _left(text: str, history: DoorHistory) -> Doubt:
 
 
 def _bypassed(history: DoorHistory) -> Finding:
-    """A fleet adapter's CLOSE is for the supervisor."""
+    """Check that a fleet adapter's CLOSE, which is meant for the supervisor, does not close the
+    door."""
     if history.new is None or not history.latched or not _bypass(history):
         return None
     if not _left_open(history):

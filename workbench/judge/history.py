@@ -1,7 +1,7 @@
-"""The history of one device, from its messages; bounded, however many come.
+"""The history of one device, from its messages. Its memory has a limit.
 
-A history takes messages and decides nothing; laws read it. This file has the part common to all three
-kinds: messages, the pace and stamps of states, and the answers to requests.
+A history takes messages and decides nothing; laws read the history. This file has the part that all
+kinds share: messages, the pace and stamps of states, and the answers to requests.
 """
 
 from abc import ABC, abstractmethod
@@ -19,24 +19,24 @@ from bridges.observe.limits import SLOWEST_S
 from bridges.observe.requesters import Moment
 
 REMEMBERED: Final = 200
-"""Limit of requesters remembered by a history; a site has some dozens."""
+"""Maximum number of requesters that a history remembers; a site has some dozens."""
 BURST: Final = 20
 FROZEN_S: Final = 0.05
 ANSWERS_WITHIN_S: Final = 0.1
 OFTEN_S: Final = 30.0
 EARLY_S: Final = 0.15
-"""Least earliness (s) of a state that a timer's jitter cannot explain."""
+"""Time (s) by which a state must come early before a timer's jitter cannot explain it."""
 PAUSE_S: Final = 2.0
 PAUSE: Final = 1.4
-"""A pause of so many usual gaps, and of PAUSE_S, may be a restart."""
+"""A pause may be a restart if it lasts this many usual gaps, and at least PAUSE_S."""
 KNOWN: Final = 3
 RHYTHM: Final = 10
 TURNS: Final = 4
-"""Two publishers that take so many turns in OFTEN_S are no restarted node."""
+"""Number of turns between two publishers in OFTEN_S that a restart of one node cannot explain."""
 STEADY_S: Final = 0.05
 UNEVEN_S: Final = 0.1
 CROSSED_S: Final = 1.0
-"""After this time (s) a state shows the effect of a request, if the request has any."""
+"""Time (s) after which a state shows the effect of a request. A request may have no effect."""
 TESTED_S: Final = 5.0
 SILENCES: Final = 5
 
@@ -47,7 +47,7 @@ V = TypeVar("V")
 
 
 def keep(known: dict[str, V], key: str, value: V, most: int = REMEMBERED) -> None:
-    """Put an entry last; forget the oldest if there are too many."""
+    """Put an entry last; forget the oldest entry if there are more than `most`."""
     known.pop(key, None)
     known[key] = value
     if len(known) > most:
@@ -55,14 +55,16 @@ def keep(known: dict[str, V], key: str, value: V, most: int = REMEMBERED) -> Non
 
 
 class AnyHistory(ABC):
-    """The common part of all histories. Times are those of the messages (s).
+    """The part that all histories share. Times are the messages' times (s).
 
-    `news`: the message taken last, None when only time has passed; `own`: the judge sent it. `states`:
-    the number of states, or of an adapter's requests. `senders`: the publishers on their topic; none in
-    a recording. `others`: others of the kind. `network_s`: the part of the time since the state before
-    in which the network was silent: nobody was heard, though other devices had been. `silences`: the
-    beginnings (wall clock) and lengths (s) of the first SILENCES of these.
-    `burst_s`: time taken by the latest BURST unchanged states.
+    - `news`: the latest message; None when only time has passed. `own`: the judge sent it.
+    - `states`: number of states, or of an adapter's requests.
+    - `senders`: the publishers on the topic of the states; empty for a recording.
+    - `others`: names of other devices of the kind.
+    - `network_s`: how long (s) the whole network was silent after the state before. Silence counts only
+      after another device was heard.
+    - `silences`: the first SILENCES such silences, each with its beginning (wall clock) and length (s).
+    - `burst_s`: duration of the latest BURST unchanged states.
     """
 
     def __init__(self, name: str) -> None:
@@ -80,11 +82,11 @@ class AnyHistory(ABC):
 
     @abstractmethod
     def take(self, heard: Heard, own: bool = False) -> bool:
-        """Take a message; `own`: the judge's. False if no law need be checked."""
+        """Take a message; `own`: the judge sent it. Return False if no law needs a check."""
 
     @property
     def state(self) -> words.Stated | None:
-        """The latest state, if a device is judged."""
+        """Latest state, if the history is of a device."""
         return None
 
     @abstractmethod
@@ -105,21 +107,25 @@ class AnyHistory(ABC):
             self._any_at = heard.at
 
     def _end_silence(self, now: float, wall: float) -> None:
-        """Note a silence of the network: nothing came, though other devices had been heard too."""
+        """Note a silence of the network: no device was heard, although other devices had been heard
+        before."""
         silent_s = now - self._any_at
         if silent_s > PAUSE_S and self._any_at - self._other_at <= SLOWEST_S:
-            self.network_s += silent_s - PAUSE_S  # the slowest node may be silent for so long
+            self.network_s += silent_s - PAUSE_S  # the slowest node may be silent for PAUSE_S
             if silent_s > SLOWEST_S:
                 self.silences = [*self.silences, (wall - silent_s, silent_s)][:SILENCES]
 
 
 class History(AnyHistory, Generic[T]):
-    """One device.
+    """The history of one device.
 
-    `seen`: the device's observations. `before`: the state before the latest, None at the first one, and
-    after a pause, because the node may have restarted; `since`: time of that. `frozen_s`: time for
-    which the states have shown the same stamp; `claimed_s`: time for which each `claims` what a robot
-    acts on. `asked_last`: the latest request. `turns`: times at which two publishers took turns.
+    - `seen`: the device's observations.
+    - `before`: the state before the latest. None at the first state and after a pause, because the node
+      may have restarted. `since`: the time when `before` was last None.
+    - `frozen_s`: how long (s) the states have shown the same stamp.
+    - `claimed_s`: how long (s) every state has said something on which a robot acts (see `claims`).
+    - `asked_last`: the latest request.
+    - `turns`: times at which two publishers took turns.
     """
 
     observes: ClassVar[type[AnyDevice]]
@@ -141,8 +147,8 @@ class History(AnyHistory, Generic[T]):
         self.turns: deque[float] = deque(maxlen=TURNS)
 
     def take(self, heard: Heard, own: bool = False) -> bool:
-        """Take a message; `own`: the judge's. False if no law need be checked, because it is not about
-        this device."""
+        """Take a message; `own`: the judge sent it. Return False for a message about other devices,
+        which needs no check."""
         self._begin(heard, own)
         message = heard.message
         if not isinstance(message, words.Stated | words.Requested):
@@ -161,7 +167,7 @@ class History(AnyHistory, Generic[T]):
         return self.take_other(heard)
 
     def _published_by(self, heard: Heard) -> None:
-        """Note the state's publisher, and each time when two publishers have taken turns."""
+        """Note the state's publisher, and the time if two publishers have taken turns."""
         moment, before = Moment(heard.at, heard.wall), self._sender
         self.seen.published_by(heard.sender, moment)
         self._sender = heard.sender
@@ -174,7 +180,7 @@ class History(AnyHistory, Generic[T]):
 
     @abstractmethod
     def settle(self, state: T) -> None:
-        """Note the new state's meaning; `before` and `state` are set."""
+        """Note the meaning of the new state; `before` and `state` are already set."""
 
     @staticmethod
     @abstractmethod
@@ -182,10 +188,10 @@ class History(AnyHistory, Generic[T]):
         """Would a robot act on this state?"""
 
     def forget(self) -> None:
-        """Forget what a silence may have ended."""
+        """Forget the requests that may have ended during a silence."""
 
     def often(self, times: deque[float]) -> bool:
-        """Are there as many times as are kept, all within OFTEN_S?"""
+        """Is `times` full, and are all its times within OFTEN_S?"""
         return len(times) == times.maxlen and self.now - times[0] < OFTEN_S
 
     def asked(self) -> None:
@@ -194,34 +200,36 @@ class History(AnyHistory, Generic[T]):
 
     @property
     def state(self) -> T | None:
-        """The latest state."""
+        """Latest state."""
         return self.seen.state
 
     @property
     def heard_at(self) -> float:
-        """The time of the latest state."""
+        """Time of the latest state."""
         return self.seen.last_state.at if self.seen.last_state else NOT_YET
 
     @property
     def new(self) -> T | None:
-        """The state, if it is the latest message."""
+        """Latest state if it is the latest message, else None."""
         return self.state if self.news is self.state else None
 
     @property
     def tested(self) -> int:
-        """Count the latest requests, up to 8, whose next state was unchanged."""
+        """Number of the latest 8 requests that were followed by an unchanged state."""
         return len(self._answers)
 
     @property
     def answers(self) -> int:
-        """Count those of the latest 8 requests answered by a state that was not due. Load bunches
-        messages but adds no state: at the usual pace none was an answer."""
+        """Number of the latest 8 requests that were answered by a state that was not due.
+
+        Load bunches messages but adds no state: at the usual pace no state counts as an answer.
+        """
         pace_s = sum(gap_s for _, gap_s in self._answers) / max(1, self.tested)
         return sum(early for early, _ in self._answers) if pace_s < self._early_s else 0
 
     @property
     def has_rhythm(self) -> bool:
-        """Have states come for long enough to know their rhythm, and their publishers?"""
+        """Have states come for long enough to show their rhythm and their publishers?"""
         return len(self._gaps) == RHYTHM
 
     @property
@@ -233,7 +241,7 @@ class History(AnyHistory, Generic[T]):
         return self.has_rhythm and steady and uneven
 
     def was_tested(self, at: float) -> bool:
-        """Has a state had the time to show the effect of a request that came then?"""
+        """Has any later state had the time to show the effect of a request at `at`?"""
         return CROSSED_S < self.now - at < TESTED_S
 
     @property
@@ -241,7 +249,7 @@ class History(AnyHistory, Generic[T]):
         return self._usual_s - EARLY_S
 
     def _take_state(self, state: T, earlier: float) -> bool:
-        """Take the new state. `earlier`: time of the one before."""
+        """Take the new state. `earlier`: time of the state before."""
         self.states += 1
         self.before = self.seen.before
         if self.before is None or self._paused(words.stamped_at(self.before)):
@@ -254,13 +262,15 @@ class History(AnyHistory, Generic[T]):
         return True
 
     def checked(self) -> None:
-        """Begin the next gap, after the laws have read this one."""
+        """Begin the next gap. The laws have read the present gap."""
         if self.new is not None:
             self.network_s = 0.0
 
     def _paused(self, stamped_before: float) -> bool:
-        """Was there a pause, long enough for a restart, or is this one of the states that a network
-        delivers together after a pause?"""
+        """Was there a pause that is long enough for a restart?
+
+        After a pause a network may deliver several states together. They count to the same pause.
+        """
         gap_s, step_s = self.seen.gap_s, self.seen.stamped_at - stamped_before
         known = len(self._quiet) >= KNOWN
         if gap_s > (max(PAUSE_S, PAUSE * self._usual_s) if known else SLOWEST_S):
@@ -280,8 +290,8 @@ class History(AnyHistory, Generic[T]):
         self.claimed_s = self.now - self._claims_since
 
     def _look_at_pace(self, state: T, earlier: float) -> None:
-        """Note the pace of unchanged states: they are due at the node's own rate, never at a
-        request."""
+        """Note the pace of unchanged states. Such states are due at the node's own rate, never in
+        answer to a request."""
         self._gaps.append(self.seen.gap_s)
         quiet_since, self._quiet_since = self._quiet_since, earlier
         if self.before is None or _content(state) != _content(self.before):
@@ -299,7 +309,7 @@ class History(AnyHistory, Generic[T]):
 
 
 def _content(state: words.Stated) -> words.Stated:
-    """Return all but the stamp."""
+    """Return the state without its stamp."""
     kind = words.kind(state)
     stamp = "time" if kind in ("dispenser", "ingestor") else f"{kind}_time"
     return replace(state, **{stamp: d.Time()})

@@ -1,4 +1,4 @@
-"""Check the messages of one device, or of one fleet's adapter, against the laws of its kind."""
+"""Check the messages of one device, or of one fleet adapter, against the laws of its kind."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -39,14 +39,15 @@ SCENES: Final[Mapping[JudgedKind, Callable[[str], AnyHistory]]] = MappingProxyTy
     }
 )
 MUTE_S: Final = 10.0
-"""A publisher that sends no state in this time (s) would not send one to RMF."""
+"""Time (s) without a state after which a publisher counts as mute, for RMF too."""
 SHOWN: Final = 3
-"""Limit of evidence stored for one law."""
+"""Maximum number of breaches that a law keeps as evidence."""
 
 
 @dataclass
 class _Tally:
-    """The score of one law. `doubt`: a possible breach that may still be excused, and its evidence."""
+    """The score of one law. `doubt`: a possible breach that a later message may still excuse, with its
+    evidence."""
 
     law: Law[Any]
     kept: int = 0
@@ -68,9 +69,10 @@ class _Tally:
 
 
 class Judge:
-    """Judges one device, by RMF's name for it, in bounded memory.
+    """Judges one device, by the device's name in RMF, in limited memory.
 
-    `only`: the ids of the laws to judge by; all of the kind without it. `broken`: is any of them?
+    `only`: the ids of the laws to check; empty means all laws of the kind. `broken`: is one of these
+    laws broken?
     """
 
     def __init__(self, kind: JudgedKind, name: str, only: Iterable[str] | None = None) -> None:
@@ -84,7 +86,7 @@ class Judge:
         self._tallies = [_Tally(law) for law in LAWS[kind] if law.id in ids]
 
     def hear(self, heard: Heard, own: bool = False) -> None:
-        """Take the next message, of any device, in order of arrival. `own`: published by the judge."""
+        """Take the next message of any device, in order of arrival. `own`: the judge published it."""
         self.first = self.first or heard
         if self.history.take(heard, own):
             for tally in self._tallies:
@@ -95,11 +97,13 @@ class Judge:
     def fire_ends(
         self, publishers: int, retaining: int, supervisors: int, at: float, wall: float
     ) -> None:
-        """Take the number of the fire topic's publishers, of retaining ones, and of supervisors; only
-        if one lift is on the graph, because the topic does not name the alarm's lift.
-        Jazzy's lift supervisor has a volatile publisher, and never uses it (rmf_ros2 7eef65a,
-        lift_supervisor/Node.cpp:52). Only a repeated finding counts, because publishers are
-        discovered one by one."""
+        """Take the number of the fire topic's publishers, of retaining publishers, and of supervisors.
+
+        These numbers count only if one lift is on the graph, because the topic does not name the
+        alarm's lift. Jazzy's lift supervisor has a volatile publisher, and never uses it (rmf_ros2
+        7eef65a, lift_supervisor/Node.cpp:52). Only a repeated finding counts, because publishers are
+        discovered one by one.
+        """
         if isinstance(self.history, LiftHistory) and publishers and not self.history.others:
             volatile = publishers - retaining
             found = None if 0 < volatile <= supervisors else volatile > 0
@@ -110,7 +114,7 @@ class Judge:
                     self._check(tally, at, wall)
 
     def end(self, at: float, wall: float, heard_s: float = 0.0) -> tuple[JudgedLaw, ...]:
-        """End the hearing after `heard_s`. Return each law with its verdict, in the laws' order."""
+        """End the judgement after `heard_s`. Return each law with its verdict, in the laws' order."""
         self.history.pass_time(at, wall)
         mute = heard_s > MUTE_S and len(self.history.senders) > len(self.history.others)
         if self.history.states or mute:

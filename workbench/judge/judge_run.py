@@ -1,7 +1,7 @@
-"""Run a judgement: listen, play if asked and allowed, release, give the verdict.
+"""Run a judgement: listen, perform a play if asked and allowed, release the device, give the verdict.
 
-Without I/O and clock, so that it is the same on a wire and in virtual time. The shell hands over
-its messages, publishes those returned, and calls `turn` at `wake_at`.
+This module has no I/O and no clock, so a judgement is the same on a wire and in virtual time. The
+caller passes its messages in, publishes the returned messages, and calls `turn` at `wake_at`.
 """
 
 from collections.abc import Callable
@@ -15,15 +15,15 @@ from workbench.judge.shared_laws import BURST_WITHIN_S
 from workbench.rmf_model import NEVER, Said
 
 LISTENS_S: Final = 4.0
-"""Wait (s) before a play, for the device's state and other nodes."""
+"""Time (s) before a play in which the judge listens for the device's state and for other nodes."""
 APPEARS_S: Final = 15.0
-"""Longest wait (s) for the device's first state: nodes must find each other."""
+"""Maximum wait (s) for the device's first state, because nodes must first discover each other."""
 SETTLES_S: Final = 4.0
-"""Listening time (s) after a play, in which breaches may still show."""
+"""Time (s) after a play in which the judge listens for late breaches."""
 
 
 class Act(Enum):
-    """The present act."""
+    """Part of a judgement that runs now."""
 
     LISTEN = auto()
     PLAY = auto()
@@ -33,9 +33,10 @@ class Act(Enum):
 
 
 class JudgeRun:
-    """`for_s`: listening time without a play; inf: until `stop`. `strangers()`: other publishers
-    on the play's topics, "" for none. `note`: why a play was not performed, or not to its
-    end.
+    """One judgement.
+
+    `for_s`: listening time without a play; inf: until `stop`. `strangers()`: names of other publishers
+    on the play's topics; "" for none. `note`: why a play was not performed, or did not reach its end.
     """
 
     def __init__(
@@ -64,13 +65,13 @@ class JudgeRun:
         return self.act is Act.DONE
 
     def begin(self, at: float, wall: float) -> None:
-        """Listen from now on. `at`: monotonic s. `wall`: s since the epoch."""
+        """Listen from now on. `at`: monotonic time (s). `wall`: seconds since the epoch."""
         self.began_at, self._until = at, at + self._for_s
         self._epoch = wall - at
         self._last = (at, wall)
 
     def hear(self, heard: Heard) -> list[Said]:
-        """Take a message of the graph, except our own."""
+        """Take a message of the graph that another node sent. Return messages to publish."""
         self._last = (heard.at, heard.wall)
         self.judge.hear(heard)
         if self._scenario is None or self.act not in (Act.PLAY, Act.LEAVE):
@@ -86,7 +87,7 @@ class JudgeRun:
         return self._told(said)
 
     def turn(self, at: float, wall: float) -> list[Said]:
-        """Do what is due now."""
+        """Do everything whose time has come. Return messages to publish."""
         self._last = (at, wall)
         match self.act:
             case Act.LISTEN if at >= self._until:
@@ -106,7 +107,7 @@ class JudgeRun:
         return NEVER if self.act is Act.DONE else self._until
 
     def stop(self) -> list[Said]:
-        """End early, after the device is released if we have it. May be called again."""
+        """End early. If we have the device, release it first. May be called again."""
         if self.act is Act.PLAY:
             self.note, self._in_haste = "interrupted", True
             return self._begin_leaving()
@@ -117,8 +118,8 @@ class JudgeRun:
 
     @property
     def _now(self) -> float:
-        """Return RMF's clock: the wall clock at the beginning plus the time since, unaffected by clock
-        steps."""
+        """Return RMF's clock: the wall clock at the beginning plus the time since then. Clock steps do
+        not change it."""
         return self._epoch + self._last[0]
 
     def _begin_play(self) -> list[Said]:
@@ -169,7 +170,7 @@ class JudgeRun:
         self._until = self._last[0] + SETTLES_S
 
     def _told(self, said: list[Said]) -> list[Said]:
-        """Judge what we publish like everybody's messages."""
+        """Judge our own messages like the messages of other nodes, and return them."""
         at, wall = self._last
         for topic, message in said:
             self.judge.hear(Heard(at, wall, topic.name, message), own=True)

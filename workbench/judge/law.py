@@ -10,9 +10,9 @@ from bridges.messages import words
 S_contra = TypeVar("S_contra", contravariant=True)
 
 LEEWAY_S: Final = 1.0
-"""Greatest difference (s) in the arrival of two topics."""
+"""Maximum difference (s) between the arrival times of two topics."""
 LONGEST: Final = 60
-"""Limit of a network name's length when shown."""
+"""Maximum length (characters) of a network name in a text."""
 
 
 class Verdict(StrEnum):
@@ -25,10 +25,10 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Doubt:
-    """A law looks broken, unless a message still on its way explains it.
+    """A law looks broken, but a message that is still on its way may explain the breach.
 
-    Topics have no common order on a wire: a lift's state may be heard before the END that caused it.
-    `excused()` is called again at each message, for `leeway_s`.
+    Topics have no common order on a wire: a lift's state may be heard before the END that caused the
+    state. The judge calls `excused()` at each message, for `leeway_s`.
     """
 
     text: str
@@ -37,17 +37,18 @@ class Doubt:
 
 
 Finding = str | Doubt | None
-"""A law's finding in the latest message: the breach, KEPT, or None without an occasion to break it."""
+"""A law's finding in the latest message: a breach as text, a doubt, KEPT, or None. None means that the
+message gave no occasion to break the law."""
 KEPT: Final = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Law(Generic[S_contra]):
-    """One sentence of RMF's contract, and its check after each message.
+    """One sentence of RMF's contract, and a check after each message.
 
-    `occasion`: the event in which a wrong node would break it; without that event it is not seen.
-    `source`: its reference. `check(history)`: a pure function of the messages heard.
-    `sensed`: a stuck or noisy wire below a correct node can break it too.
+    `occasion`: the event at which a wrong node would break the law; without such an event the law is
+    not seen. `source`: the reference. `check(history)`: a pure function of the messages heard.
+    `sensed`: a stuck or noisy wire at a correct node can break the law too.
     """
 
     id: str
@@ -61,7 +62,7 @@ class Law(Generic[S_contra]):
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """Evidence of a breach. `at`: s on the messages' clock; `wall`: s since the epoch."""
+    """Evidence of a breach. `at`: seconds on the messages' clock. `wall`: seconds since the epoch."""
 
     at: float
     wall: float
@@ -70,7 +71,8 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True)
 class JudgedLaw:
-    """A law and its verdict. `times`: how often it was kept or broken; `evidence`: the first few."""
+    """A law and its verdict. `times`: how often the law was kept or broken. `evidence`: the first few
+    breaches."""
 
     law: Law[object]
     verdict: Verdict
@@ -79,6 +81,6 @@ class JudgedLaw:
 
 
 def shown(name: str) -> str:
-    """A name from the network: on one line, quoted, and never longer than a line."""
+    """Return a name from the network, quoted, on one line, and cut to LONGEST characters."""
     text = words.printable(name[: LONGEST + 1])
     return f"'{text}'" if len(text) <= LONGEST else f"'{text[:LONGEST]}…'"

@@ -10,18 +10,20 @@ from workbench.judge.law import KEPT, Doubt, Finding, shown
 from workbench.judge.lift_history import ASKED_S, GRACE_S, LATE_S, LiftHistory, moves
 
 ENDS_WITHIN_S: Final = 3.0
-"""A state period of 2 s, and one scan."""
+"""Maximum time (s) until an END takes effect: a state period of 2 s, and one scan."""
 GRANTS_WITHIN_S: Final = 30.0
 GRANT_ASKED: Final = 10
 JUMPS_WITHIN_S: Final = 1.5
 REFUSED: Final = 3
 FOREIGN_S: Final = 2.0
 SUPERVISED_S: Final = 10.0
-"""Without a request on lift_requests for so long (s), the supervisor may be dead, or not recorded."""
+"""Time (s) without a request on lift_requests after which the supervisor may be dead, or not
+recorded."""
 SETTLED_S: Final = 3.0
-"""Time (s) after a node's first state in which it may still obey requests that we have not heard."""
+"""Time (s) after a node's first state in which the node may still obey requests that we have not
+heard."""
 ALARMS_END_S: Final = 3.0
-"""Nodes that end one alarm together publish their `false` within this time (s)."""
+"""Maximum time (s) between the `false` messages of nodes that end one alarm together."""
 
 
 def _is_open(history: LiftHistory) -> d.LiftState | None:
@@ -47,7 +49,7 @@ def numbers(history: LiftHistory) -> Finding:
 
 
 def other_lift(history: LiftHistory) -> Finding:
-    """The lift is not given to a session that only asked for another lift."""
+    """Check that the lift is not given to a session that only requested another lift."""
     session = history.session
     if history.new is None or history.before is None:
         return None
@@ -63,7 +65,7 @@ def other_lift(history: LiftHistory) -> Finding:
 
 
 def own_name(history: LiftHistory) -> Finding:
-    """The lift is not given to a session that did not ask."""
+    """Check that the lift is not given to a session that sent no request."""
     session = history.session
     if history.new is None or history.before is None or not session:
         return None
@@ -79,7 +81,7 @@ def own_name(history: LiftHistory) -> Finding:
 
 
 def grants(history: LiftHistory) -> Finding:
-    """The first request on a free lift in service is granted.
+    """Check that a free lift in service grants the first request.
 
     After a ride the node may keep the lift for GRACE_S, because the robot may still be in the car.
     """
@@ -102,7 +104,7 @@ def grants(history: LiftHistory) -> Finding:
 
 
 def bypassed(history: LiftHistory) -> Finding:
-    """Requests of fleet adapters to the supervisor grant nothing."""
+    """Check that requests from fleet adapters to the supervisor grant nothing."""
     session = history.session
     supervised = history.now - history.direct_at <= SUPERVISED_S
     if history.new is None or history.before is None or not supervised:
@@ -127,7 +129,7 @@ def bypassed(history: LiftHistory) -> Finding:
 
 
 def ended_unasked(history: LiftHistory) -> Finding:
-    """A session ends only by its own END."""
+    """Check that a session ends only at its own END."""
     old, new, since = history.session_before, history.session, history.held_since
     if history.new is None or history.before is None or not old:
         return None
@@ -137,7 +139,7 @@ def ended_unasked(history: LiftHistory) -> Finding:
         return KEPT if tested else None
     ask = history.asks.get(old)
     if ask is None and since > history.since + SETTLED_S:
-        return None  # given to nobody who asked: that breaks L4.own
+        return None  # the session sent no request, which breaks L4.own
     if history.has_ended(old, since) or (ask and ask.human) or _foreign_end(history, old, since):
         return None
     what = f"session {shown(old)} became {shown(new)}" if new else f"session {shown(old)} ended"
@@ -149,7 +151,7 @@ def ended_unasked(history: LiftHistory) -> Finding:
 
 
 def _foreign_end(history: LiftHistory, session: str, since: float) -> str:
-    """Return the session whose END has just come, while this session lasted; "" for none."""
+    """Return the other session whose END has just come during this session; "" for none."""
     if history.has_ended(session, since):
         return ""
     others = ((who, at) for who, at in history.ended.items() if who not in ("", session))
@@ -158,7 +160,7 @@ def _foreign_end(history: LiftHistory, session: str, since: float) -> str:
 
 
 def ended_by_another(history: LiftHistory) -> Finding:
-    """The END of a session that does not have the lift changes nothing."""
+    """Check that nothing changes at the END of a session that does not have the lift."""
     old = history.session_before
     if history.new is None or history.before is None or not old:
         return None
@@ -173,7 +175,7 @@ def ended_by_another(history: LiftHistory) -> Finding:
 
 
 def ends(history: LiftHistory) -> Finding:
-    """The holder's END ends the session, whatever floor and door it names."""
+    """Check that the holder's END ends the session, with any floor and door in the request."""
     if history.new is None:
         return None
     if history.bare_refused >= REFUSED:
@@ -215,7 +217,7 @@ def no_jump(history: LiftHistory) -> Finding:
 
 
 def in_agv(history: LiftHistory) -> Finding:
-    """A robot is let in only while the car is not open to the public."""
+    """Check that the door opens for a boarding robot only while the car is closed to the public."""
     state = history.new
     if state is None or not (history.offers and history.offered):
         return None
@@ -225,7 +227,7 @@ def in_agv(history: LiftHistory) -> Finding:
 
 
 def holds(history: LiftHistory) -> Finding:
-    """The door stays open for the robot."""
+    """Check that the door stays open for the robot."""
     state = _is_open(history)
     if state is None or not state.session_id or not history.was_asked_to(state.current_floor):
         return None
@@ -245,19 +247,19 @@ def floors(history: LiftHistory) -> Finding:
 
 
 def destination(history: LiftHistory) -> Finding:
-    """The car goes to its holder's requested floor."""
+    """Check that the car goes to the floor that its holder requested."""
     state = history.new
     if state is None or not state.session_id or not state.destination_floor:
         return None
     if state.current_mode in HAZARDS:
-        return None  # it goes to its recall floor
+        return None  # the car goes to its recall floor
     floor, before = state.destination_floor, history.before
     changed = before is None or floor != before.destination_floor
     within_s = ASKED_S if changed else float("inf")
     if history.was_asked_to(floor, within_s):
         return KEPT
     if not history.known or state.session_id not in history.asks:
-        return None  # asked before we listened, or another law says so
+        return None  # requested before we listened, or another law reports the breach
     return Doubt(
         f"destination {shown(floor)}, which {shown(state.session_id)} did not ask for",
         lambda: history.was_asked_to(floor, within_s) or history.session != state.session_id,
@@ -274,7 +276,7 @@ def unserved(history: LiftHistory) -> Finding:
 
 
 def lets_nobody_in(history: LiftHistory) -> Finding:
-    """Under a hazard no robot is let in."""
+    """Check that no robot is let in during a hazard."""
     state = history.new
     if state is None or state.current_mode not in HAZARDS or not state.session_id:
         return None
@@ -284,7 +286,7 @@ def lets_nobody_in(history: LiftHistory) -> Finding:
 
 
 def grants_nothing(history: LiftHistory) -> Finding:
-    """Under a hazard no new session gets the lift."""
+    """Check that no new session gets the lift during a hazard."""
     state, before = history.new, history.before
     if state is None or before is None or state.current_mode not in HAZARDS:
         return None
@@ -303,7 +305,7 @@ def grants_nothing(history: LiftHistory) -> Finding:
 
 
 def no_false(history: LiftHistory) -> Finding:
-    """Only an operator calls an alarm off. With several lifts the publisher is unknown."""
+    """Check that `false` comes only after an alarm. With several lifts the publisher is unknown."""
     if not isinstance(history.news, d.Bool) or history.others:
         return None
     if history.often(history.false_alarms):
@@ -312,7 +314,8 @@ def no_false(history: LiftHistory) -> Finding:
 
 
 def others_alarms(history: LiftHistory) -> Finding:
-    """A `false` waits for the alarms of all other nodes. Several nodes may end one alarm together."""
+    """Check that no node sends `false` during another node's alarm. Several nodes may end one alarm
+    together."""
     if not isinstance(history.news, d.Bool) or history.ended_by is None:
         return None
     by, others = history.ended_by, [s for s in history.alarming if s is not history.ended_by]
@@ -324,7 +327,7 @@ def others_alarms(history: LiftHistory) -> Finding:
 
 
 def retained(history: LiftHistory) -> Finding:
-    """Fleets can hear the alarm."""
+    """Check that fleet adapters can hear the alarm."""
     if history.volatile is None:
         return None
     return "its publisher is volatile: fleet adapters do not match it" if history.volatile else KEPT

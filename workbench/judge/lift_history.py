@@ -12,25 +12,28 @@ from bridges.observe.limits import SLOWEST_S
 from workbench.judge.history import NOT_YET, REMEMBERED, History, keep
 
 GRACE_S: Final = 65.0
-"""Time (s) in which a session may resume: its robot may still be in the car."""
+"""Time (s) in which a session may resume, because its robot may still be in the car."""
 LATE_S: Final = 5.0
-"""Greatest time (s) from an END to the state that first shows its session."""
+"""Maximum time (s) from an END to a late state that shows the session for the first time."""
 FLOORS: Final = 8
 OURS_S: Final = 2.0
-"""An END that we send so soon (s) after a session's end did not cause that end."""
+"""Time (s) after a session's end. An END that we send in this time did not cause the end."""
 ASKED_S: Final = 10.0
-"""A request repeats itself at each state: a floor not asked for so long (s) was given up."""
+"""Time (s) after which a floor counts as given up. An adapter repeats a request at each state."""
 AT_ONCE_S: Final = 0.3
-"""Longer than a scan, and than the crossing of a state and a request on the wire."""
+"""Time (s) longer than a scan, and longer than a state and a request need to cross on the wire."""
 REOPENS_WITHIN_S: Final = 1.0
 END: Final = d.LiftRequestType.REQUEST_END_SESSION
 
 
 @dataclass
 class Ask:
-    """The requests of one session since `first_at`. `floors`: the last request for each. `direct`:
-    was it heard on lift_requests? `direct_at`: the latest there; `since`: the beginning of the present
-    gapless row of `times` there. `human`: did it ask for HUMAN mode?"""
+    """The requests of one session after `first_at`.
+
+    `floors`: floor -> time of the last request. `direct`: a request was heard on lift_requests.
+    `direct_at`: time of the latest such request. `since`: the time when the present gapless row of
+    `times` such requests began. `human`: the session requested HUMAN mode.
+    """
 
     first_at: float
     since: float
@@ -42,15 +45,18 @@ class Ask:
 
     @property
     def floor(self) -> str:
-        """The floor of the latest request."""
+        """Floor of the latest request."""
         return next(reversed(self.floors), "")
 
 
 @dataclass
 class Ending:
-    """The ENDs of the present session on lift_requests: `at`: the first; `bare_at`: the first without a
-    floor; `floor_at`: the first with one. RMF's supervisor sends one with a floor if the session is
-    still shown after one without."""
+    """Times of the ENDs of the present session on lift_requests.
+
+    `at`: the first END. `bare_at`: the first END without a floor. `floor_at`: the first END with a
+    floor. RMF's supervisor sends an END with a floor if the lift still shows the session after an END
+    without a floor.
+    """
 
     at: float = NOT_YET
     bare_at: float = NOT_YET
@@ -58,21 +64,33 @@ class Ending:
 
 
 class LiftHistory(History[d.LiftState]):
-    """`asks`, `elsewhere`: requests for this lift, and for others. `ended`: session -> its last END.
-    `granted_at`: since when the present session has been shown; `held_since`: the same of the session
-    before. `known`: was the beginning of the present one seen? `last`: the session before, until
-    `last_at`. `offered`: OPEN has been shown at its destination; `offers`: OPEN is shown while that
-    is not so. `ending`: the ENDs of the present session. `bare_refused`: how many sessions in a row
-    outlived an END without a floor and ended at one with a floor. `reopened`: when the door
-    reopened at once, in one stop. `open_seen`: floor and time of the last OPEN at another floor.
-    `direct_at`: when lift_requests last carried a request of another session, for any lift; `rival_at`:
-    for this lift; `foreign_end_at`: an END of another session. `unserved_at`: the last request, by the
-    holder or for a free lift, for a floor that is not served. `travelled`: the car has moved in this
-    session. `bare_end`: the session before ended at an END without a floor. `free_since`: beginning of
-    the present time without session and hazard.
-    `false_alarms`: times of a needless false on the fire topic; `called_off`: its latest message ended
-    an alarm. `alarming`: sender -> its last word on the fire topic; `ended_by`: the sender of the
-    latest `false`. `volatile`: does its publisher retain nothing? None if unknown.
+    """The history of one lift. "Present" means the session that the latest state shows.
+
+    - `asks`, `elsewhere`: requests for this lift, and for other lifts. `ended`: session -> its last
+      END.
+    - `granted_at`: when the present session was first shown. `held_since`: the same for the session
+      before.
+    - `known`: the beginning of the present session was seen.
+    - `last`: the session before. `last_at`: the end of that session.
+    - `offered`: the present session has been shown OPEN at its destination. `offers`: OPEN is shown,
+      and `offered` is not yet true.
+    - `ending`: the ENDs of the present session.
+    - `bare_refused`: how many sessions in a row outlived an END without a floor and ended at an END
+      with a floor.
+    - `reopened`: times at which the door reopened immediately, in one stop.
+    - `open_seen`: floor and time of the last OPEN at another floor.
+    - `direct_at`: time of the last request on lift_requests by another session, for any lift.
+      `rival_at`: the same for this lift.
+    - `foreign_end_at`: time of the last END of another session.
+    - `unserved_at`: time of the last request for an unserved floor, by the holder or for a free lift.
+    - `travelled`: the car has moved in this session.
+    - `bare_end`: the session before ended at an END without a floor.
+    - `free_since`: when the present time without session and hazard began.
+    - `false_alarms`: times of needless `false` messages on the fire topic.
+    - `called_off`: the latest message on the fire topic ended an alarm.
+    - `alarming`: sender -> its last message on the fire topic. `ended_by`: sender of the latest
+      `false`.
+    - `volatile`: the fire topic's publisher retains nothing; None if unknown.
     """
 
     seen: ObservedLift
@@ -104,27 +122,27 @@ class LiftHistory(History[d.LiftState]):
 
     @property
     def session(self) -> str:
-        """The present session."""
+        """Present session."""
         return self.state.session_id if self.state else ""
 
     @property
     def session_before(self) -> str:
-        """The session in the state before."""
+        """Session in the state before."""
         return self.before.session_id if self.before else ""
 
     def has_ended(self, session: str, since: float) -> bool:
-        """Has an END for this session come since then?"""
+        """Has an END for this session come after `since`?"""
         return self.ended.get(session, NOT_YET) > since - LATE_S
 
     def was_asked_to(self, floor: str, within_s: float = float("inf")) -> bool:
-        """Has the present session asked for this floor, as its last one or not long ago?"""
+        """Has the present session requested this floor, in its last request or within `within_s`?"""
         ask = self.asks.get(self.session)
         if ask is None or floor not in ask.floors:
             return False
         return floor == ask.floor or self.now - ask.floors[floor] < within_s
 
     def take_other(self, heard: Heard) -> bool:
-        """Take requests of this lift and of others, and the fire alarm."""
+        """Take requests for this lift and other lifts, and the fire alarm."""
         message = heard.message
         if isinstance(message, d.Bool) and heard.topic == topics.FIRE_ALARM_TRIGGER.name:
             return self._alarm(message.data, heard.sender)
@@ -145,7 +163,7 @@ class LiftHistory(History[d.LiftState]):
         return True
 
     def forget(self) -> None:
-        """Forget what a silence may have ended."""
+        """Forget the requests and sessions that may have ended during a silence."""
         self.known = False
         if self.seen.before is not None and self.seen.before.session_id:
             self.last = self.seen.before.session_id
@@ -155,7 +173,7 @@ class LiftHistory(History[d.LiftState]):
         self.open_seen = self._open = ("", NOT_YET)
 
     def settle(self, state: d.LiftState) -> None:
-        """Note the session, whether OPEN is shown to it, and the door."""
+        """Note the session, the door, and whether the session was shown OPEN."""
         if self.before is not None and self.session != self.session_before:
             self._changed_hands(state)
         if self.session or state.current_mode in HAZARDS:
@@ -191,7 +209,7 @@ class LiftHistory(History[d.LiftState]):
         self.reopened.clear()
 
     def _count_bare(self, before: str) -> None:
-        """Did this session end at an END without a floor, or only at one with a floor?"""
+        """Count whether the session ended at an END without a floor, or only at an END with a floor."""
         ending = self.ending
         if not before or ending.bare_at == NOT_YET:
             return
@@ -247,7 +265,7 @@ class LiftHistory(History[d.LiftState]):
             self.reopened.clear()
 
     def _hear_direct(self, request: d.LiftRequest) -> None:
-        """Note what a request on lift_requests must not do."""
+        """Note requests on lift_requests that must not change the session."""
         here, holds = request.lift_name == self.name, request.session_id == self.session
         served = self.state.available_floors if self.state else ()
         if not holds:
@@ -269,5 +287,5 @@ class LiftHistory(History[d.LiftState]):
 
 
 def moves(state: d.LiftState) -> bool:
-    """Does it say that the car moves?"""
+    """Does the state say that the car moves?"""
     return state.motion_state in (d.LiftMotion.MOTION_UP, d.LiftMotion.MOTION_DOWN)

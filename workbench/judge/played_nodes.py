@@ -1,8 +1,8 @@
-"""RMF's nodes, played towards one device: fleet adapters with their robots, and their supervisor.
+"""RMF's nodes, played for one device: fleet adapters with their robots, and the supervisor.
 
-By RMF's rules (`workbench/rmf_model/`), without I/O and clock. The played supervisor does not get the
-states of other devices, because it would end their sessions. If a supervisor is on the graph already,
-only fleet adapters are played, and their requests go through it.
+The nodes follow RMF's rules (`workbench/rmf_model/`), without I/O and clock. The played supervisor does
+not get the states of other devices, because it would end their sessions. If the graph already has a
+supervisor, only fleet adapters are played, and their requests go through that supervisor.
 """
 
 from collections import deque
@@ -15,17 +15,20 @@ from workbench.rmf_model import NEVER, Party, Said
 from workbench.rmf_model.robot import Phase, RobotContext
 
 DEAF_S: Final = 6.0
-"""The played supervisor is silent for this long after an END without a floor. RMF's would send one with
-a floor at once, and so hide the refusal of the first."""
+"""Time (s) for which the played supervisor is silent after an END without a floor.
+
+RMF's supervisor would immediately send an END with a floor. This would hide that the lift refused the
+first END.
+"""
 RETAINED: Final = topics.ADAPTER_LIFT_REQUESTS.publish.depth
 
 Step = Phase | float
 Script = Callable[[RobotContext], Iterator[Step]]
-"""A robot's steps: phases, and seconds of driving."""
+"""A robot's steps: each is a phase, or seconds of driving."""
 
 
 class Traveller:
-    """A robot with its fleet adapter. `waits_since`: beginning of its phase; inf while it drives."""
+    """A robot with its fleet adapter. `waits_since`: when its phase began; inf while it drives."""
 
     def __init__(self, requester_id: str, script: Script) -> None:
         self.robot = RobotContext(requester_id)
@@ -41,7 +44,7 @@ class Traveller:
         return type(phase).__name__ if phase is not None and not phase.done else ""
 
     def go_on(self, now: float) -> list[Said]:
-        """Begin the next step, if the last one is over."""
+        """Begin the next step, if the present step is over."""
         if self.done or not self.robot.done or now < self._drives_until:
             return []
         step = next(self._steps, None)
@@ -56,7 +59,7 @@ class Traveller:
         return []
 
     def wake_at(self) -> float:
-        """Time of its next timer, or of the end of its drive."""
+        """Time of the robot's next timer, or of the end of its drive."""
         drives = self._drives_until if self.robot.done and not self.done else NEVER
         return min(self.robot.wake_at(), drives)
 
@@ -64,8 +67,9 @@ class Traveller:
 class PlayedNodes:
     """One scenario for one device. `now` is RMF's clock (s since the epoch).
 
-    `supervisor`: makes a new one; None if one is on the graph. `over`: every step was done, or `failed`
-    gives the reason. Methods return the messages to be published and judged.
+    `supervisor`: a function that makes a new supervisor; None if the graph has one. `over`: every step
+    is done, or `failed` gives the reason. Methods return messages, which the caller publishes and
+    judges.
     """
 
     def __init__(
@@ -91,7 +95,7 @@ class PlayedNodes:
 
     @property
     def names(self) -> set[str]:
-        """Our own sessions."""
+        """Names of our own sessions."""
         return {traveller.robot.requester_id for traveller in self.travellers}
 
     def begin(self, now: float) -> list[Said]:
@@ -99,14 +103,14 @@ class PlayedNodes:
         return self._go_on(now)
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
-        """Take a message of the graph, except our own. `topic`: its name."""
+        """Take a message of the graph that another node sent. `topic`: the topic's name."""
         if isinstance(message, words.Stated) and words.device(message) != self.device:
             return []
         said = self._spread(topic, message, now)
         return said + self._go_on(now)
 
     def tick(self, now: float) -> list[Said]:
-        """Fire due timers."""
+        """Fire the timers whose time has come."""
         said = []
         for traveller in self.travellers:
             if now >= traveller.robot.wake_at():
@@ -120,8 +124,8 @@ class PlayedNodes:
         return min([*(t.wake_at() for t in self.travellers), *waits])
 
     def restart_supervisor(self, now: float) -> list[Said]:
-        """Replace the played supervisor; the new one hears fleet adapters' retained messages, one
-        adapter's after the other's."""
+        """Replace the played supervisor. The new supervisor hears the messages that each fleet adapter
+        retained, one adapter after another."""
         if self._makes is None:
             return []
         self._supervisor = self._makes()
@@ -131,7 +135,8 @@ class PlayedNodes:
         return said
 
     def deafen(self, until: float) -> None:
-        """Let the played supervisor hear no states until then: it would repair a wrong node's doing."""
+        """Pass no states to the played supervisor before `until`, because it would repair a wrong
+        node's error."""
         self._deaf_until = until
 
     def _go_on(self, now: float) -> list[Said]:

@@ -18,10 +18,10 @@ NARROWEST: Final = 60
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """One judgement. `wall`: its beginning (s since the epoch). `heard_s`: time of listening.
-    `states`: number heard; of an adapter, requests. `others`: others of its kind. `notes`: the
-    listener's remarks.
-    `silences` of the whole network: beginning (s since the epoch) and length (s)."""
+    """One judgement. `wall`: its beginning (s since the epoch). `heard_s`: time of listening (s).
+    `states`: number of states heard, or of an adapter's requests. `others`: names of other devices
+    of the kind. `notes`: the listener's remarks. `silences` of the whole network: beginning (s since
+    the epoch) and length (s)."""
 
     kind: JudgedKind
     name: str
@@ -39,7 +39,7 @@ class Judgement:
 
 
 def report(judge: Judge, judged: tuple[JudgedLaw, ...], heard_s: float, *notes: str) -> Judgement:
-    """Report a judge's findings."""
+    """Collect a judge's findings."""
     wall, history = judge.first.wall if judge.first else 0.0, judge.history
     others = tuple(sorted(history.others))
     about = (judge.kind, judge.name, wall, heard_s, history.states, others, judged)
@@ -47,7 +47,7 @@ def report(judge: Judge, judged: tuple[JudgedLaw, ...], heard_s: float, *notes: 
 
 
 def text(report: Judgement, width: int) -> str:
-    """Format one screen: broken laws first, with their evidence; a line for each other one."""
+    """Format one screen: first the broken laws with their evidence, then a line for each other law."""
     name = words.printable(report.name)
     if not report.states and not report.of(Verdict.BROKEN):
         heard = f"no {_counted(report)} heard in {report.heard_s:.0f} s"
@@ -91,7 +91,8 @@ def _cut(sentence: str, room: int) -> str:
 
 
 def _time(wall: float) -> str:
-    """Format the local time of day, to the millisecond; a time beyond the calendar as a number."""
+    """Format the local time of day, to the millisecond. Format a time outside the calendar as a
+    number."""
     try:
         return f"{datetime.fromtimestamp(wall):%H:%M:%S}.{int(wall * 1000) % 1000:03d}"
     except (OverflowError, ValueError, OSError):
@@ -110,7 +111,7 @@ def _others(report: Judgement) -> str:
 
 
 def verdict(report: Judgement) -> Verdict:
-    """The verdict on all laws together."""
+    """Return the verdict on all laws together."""
     return next((v for v in ORDER if report.of(v)), Verdict.NOT_SEEN)
 
 
@@ -128,7 +129,8 @@ def as_json(report: Judgement) -> str:
 
 
 def junit(report: Judgement) -> str:
-    """Return JUnit's XML: each law a test case, broken: failure, not seen: skipped."""
+    """Return JUnit's XML. Each law is a test case; a broken law is a failure, and an unseen law is
+    skipped."""
     suite = ElementTree.Element(
         "testsuite",
         name=words.printable(f"rmf-bridge judge {report.kind} {report.name}"),
@@ -160,7 +162,8 @@ def _case(suite: ElementTree.Element, report: Judgement, judged: JudgedLaw) -> N
 
 
 def markdown(kind: JudgedKind) -> str:
-    """Return a kind's laws as a table for docs/reference/laws.md; *: a wire can break it too."""
+    """Return a kind's laws as a table for docs/reference/laws.md. `*` marks a law that a faulty wire
+    can break too."""
     rows = [
         f"| `{law.id}`{'*' if law.sensed else ''} | {law.sentence} | {law.occasion} | {law.reason}"
         f" | {law.source} |"

@@ -1,4 +1,4 @@
-"""Plays for a lift and a door: their conditions, their course, and the device's release."""
+"""Plays for a lift and a door: each has conditions, a course, and the release of the device."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
@@ -19,13 +19,13 @@ from workbench.rmf_model.supervisors import DoorSupervisor, LiftSupervisor
 FLEET: Final = "rmf_bridge_judge"
 DRIVES_S: Final = 6.0
 DOORWAY_S: Final = 12.0
-"""Longer than the wait of any node that closes a door in silence."""
+"""Time (s) longer than any node waits before it closes a door because of silence."""
 SHOWS_S: Final = 4.0
-"""In this time (s) a node shows the effect of a message that must have none."""
+"""Time (s) in which a wrong node would show the effect of a message that must have no effect."""
 STRANGER: Final = f"{FLEET}/nobody"
 BYPASSER: Final = f"{FLEET}/robot_without_supervisor"
 NOWHERE: Final = f"{FLEET} nowhere"
-"""The name of no device and no floor."""
+"""A name that no device and no floor has."""
 AGV: Final = d.LiftRequestType.REQUEST_AGV_MODE
 END: Final = d.LiftRequestType.REQUEST_END_SESSION
 LEAVES_S: Final = 10.0
@@ -34,7 +34,7 @@ MOST_FLOORS: Final = 20
 
 
 def busy(state: words.Stated) -> str:
-    """Return why nothing may be played for this device now; "" if it is idle."""
+    """Return why the device must not be moved now; "" if it is idle."""
     match state:
         case d.LiftState():
             idle = not state.session_id and state.current_mode not in HAZARDS
@@ -48,9 +48,12 @@ def busy(state: words.Stated) -> str:
 
 
 class Scenario(ABC):
-    """A play, its topics, and its end. `speaks`: the topics that we publish; `sole`: those without
-    any other publisher, because two supervisors would spoil the test. However the play ends,
-    `leave` is then called every REPEAT_S until `left`."""
+    """A play, its topics, and its end.
+
+    `speaks`: the topics that we publish. `sole`: topics that must have no other publisher, because two
+    supervisors would spoil the test. After every end of a play, the caller calls `leave` each REPEAT_S
+    until `left`.
+    """
 
     speaks: tuple[AnyTopic, ...]
     hears: tuple[AnyTopic, ...]
@@ -65,11 +68,11 @@ class Scenario(ABC):
 
     @property
     def why(self) -> str:
-        """Why the play did not reach its end; "" if it did."""
+        """Reason why the play did not reach its end; "" if it did."""
         return self.failed or self.play.failed
 
     def unfit(self, state: words.Stated) -> str:
-        """Return why it may not be played now; "" if allowed."""
+        """Return why the play may not begin now; "" if allowed."""
         return busy(state)
 
     def begin(self, now: float) -> list[Said]:
@@ -81,12 +84,12 @@ class Scenario(ABC):
         return self.play.hear(topic, message, now)
 
     def _disturb(self, now: float) -> list[Said]:
-        """Send what was to come between two states."""
+        """Send the disturbing messages that were to come between two states."""
         disturbs, self._disturbs = self._disturbs, None
         return disturbs(now) if disturbs else []
 
     def tick(self, now: float) -> list[Said]:
-        """Fire due timers."""
+        """Fire the timers whose time has come."""
         return self.play.tick(now)
 
     def wake_at(self) -> float:
@@ -104,13 +107,13 @@ class Scenario(ABC):
 
 
 class RideScenario(Scenario):
-    """Robots ride from one floor to another, every second one back.
+    """Robots ride from one floor to another, and every second robot rides back.
 
-    `through`: a supervisor is on the graph. `restarts`: the played supervisor restarts with a robot
-    in the car. Without `through` each law of sessions has its occasion. Before the ride: a request for
-    another lift, and a request that no supervisor passes on. While the first robot has the lift: an END
-    of another session, as rmf-web sends it, a request of that session, and a request for an unknown
-    floor.
+    `through`: a supervisor is on the graph. `restarts`: the played supervisor restarts with a robot in
+    the car. Without `through`, further messages give each law of sessions an occasion. Before the ride
+    come a request for another lift, and a request that no supervisor forwards. During the first robot's
+    session come an END of another session, in rmf-web's form, a request of that session, and a request
+    for an unknown floor.
     """
 
     def __init__(
@@ -163,7 +166,8 @@ class RideScenario(Scenario):
         yield EndLiftSession(self.lift)
 
     def _ask_aside(self, floor: str, first: bool) -> Iterator[Step]:
-        """Ask for another lift, then for this one around the supervisor; other robots wait."""
+        """Request another lift, then request this lift without the supervisor. The other robots wait
+        meanwhile."""
         if first:
             self._disturbs = lambda now: [self._send(STRANGER, floor, now, lift=NOWHERE)]
         yield SHOWS_S
@@ -181,7 +185,7 @@ class RideScenario(Scenario):
         return f"{', '.join(missing)}: it serves {', '.join(map(shown, served[:MOST_FLOORS]))}"
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
-        """Take states, until another session has the lift."""
+        """Take states. The play fails when another session has the lift."""
         stated = isinstance(message, d.LiftState) and message.lift_name == self.lift
         if isinstance(message, d.LiftState) and stated:
             self._state = message
@@ -196,7 +200,8 @@ class RideScenario(Scenario):
         return {*self.play.names, STRANGER, BYPASSER}
 
     def leave(self, now: float) -> list[Said]:
-        """Send END for each of us, as fleet adapters do; with a floor if that has no effect."""
+        """Send END for each of our sessions, as fleet adapters do. If END has no effect, send END with
+        a floor."""
         self._leaving += 1
         floor = self._state.current_floor if self._state and self._leaving > 3 else ""
         shown_now = {self._state.session_id} & self._names if self._state else set()
@@ -214,14 +219,14 @@ class RideScenario(Scenario):
 
     @property
     def left(self) -> bool:
-        """Was END sent, and does the lift show none of our sessions?"""
+        """Was END sent, and does the lift show no session of ours?"""
         free = self._state is None or self._state.session_id not in self._names
         return self._leaving > 0 and free
 
 
 class PassageScenario(Scenario):
-    """A robot goes through a door, so many times. While it stands in the doorway, another door and an
-    unknown fleet adapter are told to close."""
+    """A robot passes a door, several times. While the robot stands in the doorway, two CLOSE messages
+    come that must not close this door: for another door, and from an unknown fleet adapter."""
 
     def __init__(
         self,
@@ -257,14 +262,15 @@ class PassageScenario(Scenario):
             yield from self._until_closed()
 
     def _until_closed(self) -> Iterator[Step]:
-        """Wait until closed, so the next passage begins at a closed door; RMF would not wait."""
+        """Wait until the door is closed, so that the next passage begins at a closed door. RMF would
+        not wait."""
         for _ in range(30):
             if self._mode == d.DoorModeValue.MODE_CLOSED:
                 return
             yield 1.0
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
-        """Take states and heartbeats. A disturbance comes with the next state."""
+        """Take states and heartbeats. A disturbing message follows the next state."""
         stated = isinstance(message, d.DoorState) and message.door_name == self.door
         if isinstance(message, d.DoorState) and stated:
             self._mode = message.current_mode.value
@@ -278,7 +284,7 @@ class PassageScenario(Scenario):
         return [] if direct and self._through else [_closes(door, now, who)]
 
     def leave(self, now: float) -> list[Said]:
-        """Send CLOSE, to the supervisor or in its name."""
+        """Send CLOSE to the supervisor, or in the supervisor's name."""
         self._leaving += 1
         [name] = self.play.names
         said = [_closes(self.door, now, name)]

@@ -12,12 +12,17 @@ from workbench.judge.history import NOT_YET, History, keep
 
 
 class WorkcellHistory(History[d.DispenserState]):
-    """`listed`: guid -> time of the first state that listed it. `results`: guid -> the last status.
-    `acknowledged`: guid -> stamp of its result ACKNOWLEDGED, before any state has listed it. `left`:
-    the guids that the latest state lists no longer. `unexplained`: guids that have left without SUCCESS
-    -> the time. `asked_since`: guid -> the times of the requests after its last result. `result`: the
-    latest message, if it is a result of this workcell; `result_before`: the status of the result before
-    that for the same guid."""
+    """The history of one workcell.
+
+    - `listed`: guid -> time of the first state that listed the guid.
+    - `results`: guid -> the last status.
+    - `acknowledged`: guid -> stamp of its result ACKNOWLEDGED, until a state lists the guid.
+    - `left`: the guids that the latest state no longer lists.
+    - `unexplained`: guid -> the time when the guid left without SUCCESS.
+    - `asked_since`: guid -> the times of the requests after its last result.
+    - `result`: the latest message, if it is a result of this workcell.
+    - `result_before`: the status of the result before `result`, for the same guid.
+    """
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
@@ -32,16 +37,16 @@ class WorkcellHistory(History[d.DispenserState]):
 
     @staticmethod
     def claims(state: Any) -> bool:
-        """Is it any state but OFFLINE?"""
+        """Is the state anything but OFFLINE?"""
         return bool(state.mode != d.WorkcellMode.OFFLINE)
 
     def take(self, heard: Heard, own: bool = False) -> bool:
-        """Take a message; an own result is no state and no request."""
+        """Take a message. A result of this workcell is neither a state nor a request."""
         self.result, self.left = None, ()
         return super().take(heard, own)
 
     def take_other(self, heard: Heard) -> bool:
-        """Take requests to this workcell, and its results."""
+        """Take requests to this workcell, and results of this workcell."""
         message = heard.message
         if not isinstance(message, words.WorkcellRequested | words.WorkcellResulted):
             return False
@@ -64,7 +69,7 @@ class WorkcellHistory(History[d.DispenserState]):
         return True
 
     def settle(self, state: d.DispenserState) -> None:
-        """Note which requests the state lists, and which it lists no longer."""
+        """Note the requests that the state lists, and the requests that it no longer lists."""
         queue = set(state.request_guid_queue)
         before = set(self.before.request_guid_queue) if self.before else set(self.listed)
         self.left = tuple(sorted(before - queue))
@@ -77,7 +82,7 @@ class WorkcellHistory(History[d.DispenserState]):
                 keep(self.unexplained, guid, self.now)
 
     def waited_s(self, guid: str) -> float:
-        """Return for how long RMF has repeated this request without a result (s)."""
+        """Return for how long (s) RMF has repeated this request without a result."""
         times = self.asked_since.get(guid) or [self.now]
         return self.now - times[0] if len(times) > 2 else NOT_YET
 

@@ -1,4 +1,5 @@
-"""The laws of a dispenser's or ingestor's node: RMF completes a request by its states and results."""
+"""The laws of a dispenser's or ingestor's node. RMF completes a request according to states and
+results."""
 
 from functools import partial
 from typing import Final
@@ -25,8 +26,11 @@ def _numbers(history: WorkcellHistory) -> Finding:
 
 
 def _lists_first(history: WorkcellHistory) -> Finding:
-    """RMF compares stamps: it ignores a state older than the acknowledgement, and the state that lists
-    the request may have been lost."""
+    """Check that a state newer than an acknowledgement lists the acknowledged request.
+
+    RMF compares stamps and ignores an older state. The first state that lists the request may have been
+    lost.
+    """
     result, state = history.result, history.new
     if result is not None:
         acknowledged = result.status == ACKNOWLEDGED and result.request_guid in history.listed
@@ -43,8 +47,11 @@ def _excused(history: WorkcellHistory, guid: str) -> bool:
 
 
 def _leaves_done(history: WorkcellHistory) -> Finding:
-    """One SUCCESS may be lost, and RMF, which goes on, asks for no repeat. So a request that leaves
-    without a result is a breach the second time, or if the node has restarted in between."""
+    """Check that a listed request leaves only after SUCCESS.
+
+    A SUCCESS may get lost. RMF then continues and asks for no repeat. For this reason one request
+    without a result is no breach; the second is, and the first after a restart of the node is too.
+    """
     for guid in history.left:
         result = history.results.get(guid)
         if result == SUCCESS:
