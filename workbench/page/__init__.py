@@ -1,1 +1,1 @@
-"""The page: a graphical view of RMF's graph, in its own process."""
+"""A web page that draws RMF's graph, in a separate process."""

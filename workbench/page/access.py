@@ -1,7 +1,7 @@
 """Access to the page's actions: passwords, sessions, and a limit of failed logins.
 
-A password file has a line `user:scrypt$N$r$p$salt$hash` for each user, as `rmf-bridge page --add-user`
-writes it: scrypt with a salt of its own (RFC 7914, from Python's hashlib).
+A password file has a line `user:scrypt$N$r$p$salt$hash` for each user. `rmf-bridge page --add-user`
+writes the line, with a new salt for each password (scrypt, RFC 7914, from Python's hashlib).
 """
 
 import base64
@@ -20,10 +20,10 @@ from bridges.system.files import replace
 from bridges.system.user_files import OTHERS, read
 
 COST: Final = (2**14, 8, 1)
-"""N, r and p: 16 MB and about 50 ms for one try."""
+"""Parameters N, r and p of scrypt: 16 MB and about 50 ms for each try."""
 MOST_COST: Final = 2**17
 SESSION_S: Final = 12 * 3600.0
-"""A login ends after a shift."""
+"""Duration (s) of a login: one shift."""
 IDLE_S: Final = 3600.0
 MOST_SESSIONS: Final = 100
 TRIES: Final = 5
@@ -35,11 +35,11 @@ USER: Final = re.compile(r"[A-Za-z0-9._@-]{1,64}")
 
 
 class PasswordError(Exception):
-    """A password file that cannot be used, or a user or password that cannot be added."""
+    """Error: a password file is unusable, or a user or password cannot be added."""
 
 
 def hashed(password: str) -> str:
-    """Return the password's hash with its salt, as a line of the file has them."""
+    """Return the password's hash with its salt, in the form of a password file."""
     salt = os.urandom(16)
     n, r, p = COST
     parts = (base64.b64encode(part).decode() for part in (salt, _scrypt(password, salt, n, r, p)))
@@ -47,13 +47,14 @@ def hashed(password: str) -> str:
 
 
 def matches(password: str, stored: str) -> bool:
-    """Does the password match? Raises PasswordError if `stored` is not one of our hashes."""
+    """Does the password match? Raises PasswordError if `stored` does not have the form that `hashed`
+    returns."""
     cost, salt, wanted = _parts(stored)
     return hmac.compare_digest(_scrypt(password, salt, *cost), wanted)
 
 
 def _parts(stored: str) -> tuple[tuple[int, int, int], bytes, bytes]:
-    """Return N, r and p, the salt and the hash. Raises PasswordError."""
+    """Return N, r and p, then the salt, then the hash. Raises PasswordError."""
     try:
         name, n, r, p, salt, expected = stored.split("$")
         cost = (int(n), int(r), int(p))
@@ -70,7 +71,7 @@ def _scrypt(password: str, salt: bytes, n: int, r: int, p: int) -> bytes:
 
 
 def users(file: Path) -> dict[str, str]:
-    """Return the hash of each user. Raises PasswordError, with the file and line."""
+    """Return user -> hash. Raises PasswordError, with the file and line."""
     try:
         content, mode = read(file, LONGEST_FILE)
     except OSError as error:
@@ -115,7 +116,7 @@ def add_user(file: Path, user: str, password: str) -> None:
 
 
 class Tries:
-    """Failed logins by address. Of too many addresses the oldest are forgotten."""
+    """Failed logins by address. If there are too many addresses, the oldest are forgotten."""
 
     def __init__(self) -> None:
         self._failed_at: OrderedDict[str, list[float]] = OrderedDict()
@@ -135,7 +136,7 @@ class Tries:
 
 @dataclass(slots=True)
 class LoginSession:
-    """A logged-in user. `proof`: the token that a form must send back (CSRF)."""
+    """A login of a user. `proof`: the token that a form must send back, against forged forms (CSRF)."""
 
     user: str
     began_at: float
@@ -144,7 +145,7 @@ class LoginSession:
 
 
 class LoginSessions:
-    """Logged-in users, by their cookies' secrets."""
+    """Logins, by the secret in each cookie."""
 
     def __init__(self) -> None:
         self._by_secret: OrderedDict[str, LoginSession] = OrderedDict()
@@ -158,7 +159,7 @@ class LoginSessions:
         return secret
 
     def find(self, secret: str | None, now: float) -> LoginSession | None:
-        """Return this cookie's session; None if unknown or over."""
+        """Return the session of this cookie; None if the session is unknown or over."""
         session = self._by_secret.get(secret or "")
         if session is None or secret is None:
             return None
@@ -174,7 +175,7 @@ class LoginSessions:
 
 
 class PasswordCheck:
-    """Lets users in with a password, with a limit of tries for each address."""
+    """Check of a user's password, with a limit of tries for each address."""
 
     def __init__(self, known: Mapping[str, str]) -> None:
         self._known = known
@@ -182,7 +183,8 @@ class PasswordCheck:
         self._nobody = hashed(secrets.token_urlsafe(16))
 
     def refuses(self, user: str, password: str, address: str, now: float) -> str:
-        """Return why this user is refused; "" if let in. A check takes as long for an unknown user."""
+        """Return why the login is refused; "" if accepted. The check takes the same time for an unknown
+        user."""
         if not self._tries.allowed(address, now):
             return "too many wrong passwords; wait a minute"
         right = matches(password[:1024], self._known.get(user, self._nobody))

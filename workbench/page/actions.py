@@ -1,8 +1,9 @@
 """The actions of a logged-in user, and their commands.
 
-The page has no rights and no topics of its own: each action is a command of this program, run as the
-page's user, as it would be in this machine's shell. Each is logged with its user. Names come
-from the network and may look like options: options have their value after `=`, names stand after `--`.
+The page has no rights and no topics of its own. Each action is a command of this program. It runs as
+the page's user, as if this user had typed it in a shell on this machine. A log records each action with
+its user. Names come from the network and may look like options. For this reason an option's value
+follows `=`, and names follow `--`.
 """
 
 import asyncio
@@ -33,16 +34,16 @@ MOST_KEPT: Final = 100
 LONGEST_FILE: Final = 1_000_000
 RESET: Final = "The daemon clears each latched fault whose cause is gone."
 REPORTS: Final = re.compile(r"^rmf-bridge \S+: ", re.M)
-"""The name of the command at the beginning of its complaint."""
+"""Pattern of the command's name at the beginning of an error message."""
 PROGRESS: Final = re.compile(r"^[\d.]+ s  \S+ +\S.*?  ")
-"""The time, the step and the device at the beginning of a line of `send`."""
+"""Pattern of the time, the step and the device at the beginning of a line of `send`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """A button: its text, the question that confirms it, and the command's words.
+    """A button: its text, the question that asks for confirmation, and the command's words.
 
-    `done`: the sentence that reports its success; "": the command's last line does.
+    `done`: the sentence that reports success; "" uses the command's last line.
     """
 
     text: str
@@ -53,9 +54,9 @@ class Action:
 
 @dataclass(frozen=True, slots=True)
 class Local:
-    """A daemon on this machine that serves the device: its YAML, and its simulation's actions.
+    """A daemon on this machine that serves the device: its YAML, and the actions of its simulation.
 
-    `presses`, `fails`: the signals and parts of its plant; none if it is not a simulation.
+    `presses`, `fails`: signals and parts of the simulated plant; empty without a simulation.
     """
 
     file: str
@@ -66,7 +67,7 @@ class Local:
 
 @dataclass(frozen=True, slots=True)
 class PastAction:
-    """One past action. `code`: the command's exit code; None if it took too long. `done`: see
+    """One past action. `code`: the command's exit code; None if the command took too long. `done`: see
     Action."""
 
     wall: float
@@ -140,7 +141,7 @@ def queue(name: str, robot: str, graph: Sequence[str]) -> Action:
 
 
 def press(local: Local, device: str, signal: str, on: bool) -> Action:
-    """Return the action that presses a signal of a simulation, or lets go of it."""
+    """Return the action that presses or releases a signal of a simulation."""
     how = "on" if on else "off"
     words = ("press", f"--device={device}", *_runtime(local), "--", local.file, signal, how)
     did = f"In the simulation {signal} of {printable(device)} is {how}."
@@ -149,7 +150,8 @@ def press(local: Local, device: str, signal: str, on: bool) -> Action:
 
 
 def fail(local: Local, device: str, part: str, how: str) -> Action:
-    """Return the action that lets a part of a simulation fail, or mends it (`how`: ok)."""
+    """Return the action that makes a part of a simulation fail. `how` is the mode; ok mends the
+    part."""
     words = ("fail", f"--device={device}", *_runtime(local), "--", local.file, part, how)
     did = f"In the simulation {part} of {printable(device)} is {how}."
     act = f"Mend {part}" if how == "ok" else f"Let {part} fail"
@@ -161,15 +163,15 @@ def _runtime(local: Local) -> tuple[str, ...]:
 
 
 class Deeds:
-    """Carries out actions, and remembers them with their users."""
+    """Runs actions, and remembers each with its user."""
 
     def __init__(self, folder: Path | None) -> None:
-        """`folder`: where `actions.jsonl` is written, if anywhere."""
+        """`folder`: the folder for `actions.jsonl`; None writes no file."""
         self._file = folder / "actions.jsonl" if folder else None
         self.latest: deque[PastAction] = deque(maxlen=MOST_KEPT)
 
     async def do(self, action: Action, user: str) -> PastAction:
-        """Run the action's command. Never raises: `said` of the result has the error."""
+        """Run the action's command. Never raises: `said` of the result holds the error."""
         code, said = await _run(action.words)
         done = PastAction(time.time(), user, action.text, code, said, action.done)
         self.latest.appendleft(done)
@@ -190,7 +192,8 @@ class Deeds:
 
 
 async def _run(words: Sequence[str]) -> tuple[int | None, str]:
-    """Run a command. Return its exit code, None after the time limit, and the output's beginning."""
+    """Run a command. Return its exit code (None after the time limit), and the beginning of its
+    output."""
     try:
         child = await asyncio.create_subprocess_exec(
             sys.executable,

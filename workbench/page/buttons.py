@@ -1,5 +1,5 @@
-"""The buttons of a device, for a logged-in user. Each button asks for confirmation before its
-command is run."""
+"""The buttons of a device, for a logged-in user. Each button asks for confirmation before its command
+runs."""
 
 import itertools
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ NO: Final = "No, change nothing"
 
 
 class Buttons:
-    """Shows the buttons, and carries their actions out."""
+    """Shows the buttons, and runs their actions."""
 
     def __init__(
         self, cards: Cards, here: LocalDaemons, login: Login, deeds: Deeds, graph: Sequence[str]
@@ -129,7 +129,7 @@ class Buttons:
         ui.button(action.text, on_click=lambda: self._ask(action, request))
 
     async def _ask(self, action: Action, request: Request) -> None:
-        """Ask the user for confirmation, carry the action out, and show the outcome."""
+        """Ask the user for confirmation, run the action, and show the outcome."""
         with ui.dialog() as dialog, ui.card():
             dialog.props('aria-label="Are you sure?"')
             ui.label(action.question)

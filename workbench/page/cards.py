@@ -1,7 +1,7 @@
-"""The site in browsers: a card that changes is drawn once for all browsers.
+"""The site in browsers: each changed card is drawn once for all browsers.
 
-The changes of a turn go to each browser as one script, made once: with an update for each card, a
-browser could not keep up with 300 of them in a second.
+Each browser gets all changes of a turn as one script, and all browsers get the same script. With an
+update for each card, a browser could not keep up with 300 changes in a second.
 """
 
 import json
@@ -17,9 +17,9 @@ from workbench.page.listener import Listener
 from workbench.page.live_site import DeviceView, LiveSite
 
 AGES_S: Final = 1.0
-"""Seconds between drawings of ages and silences, which change by themselves."""
+"""Time (s) between drawings of ages and silences, which change without messages."""
 Key = tuple[str, str]
-"""A device's kind, and its name as it is shown."""
+"""A device's kind, and its name in printable form."""
 
 
 STATUS: Final = "status"
@@ -41,17 +41,20 @@ class Wall(Protocol):
     """One browser's live view."""
 
     def change(self, script: str) -> None:
-        """Show a change of the site, by this script."""
+        """Run this script, which shows a change of the site."""
 
     def rebuild(self) -> None:
         """Draw all cards again, because cards were added or removed."""
 
     def answer(self, wrong: int) -> None:
-        """Tell the browser that everything heard before its last question has been sent."""
+        """Answer that all messages from before the browser's last question have been sent.
+
+        `wrong`: number of devices that need attention.
+        """
 
 
 class Cards:
-    """The cards, and the walls that show them."""
+    """All cards, and the browsers' walls that show the cards."""
 
     def __init__(
         self, site: LiveSite, listener: Listener, clock: Callable[[], float] = time.monotonic
@@ -95,16 +98,16 @@ class Cards:
         return {place: html for place, html in self._parts.items() if before.get(place) != html}
 
     def parts(self) -> dict[str, str]:
-        """Draw all but the cards, by place."""
+        """Draw everything except the cards: place -> content."""
         return {STATUS: self.status(), WRONG: self.attention(), ROBOTS: self.robots()}
 
     def attention(self) -> str:
-        """List the devices that need attention, each with what is wrong and what to do."""
+        """List the devices that need attention, each with its trouble and the remedy."""
         wrong = [self.shown[key] for key in sorted(self.shown) if self.shown[key].row.wrong]
         return drawing.attention(wrong, self._remedies)
 
     def status(self) -> str:
-        """Return one line: how many devices were heard, and how many of them need attention."""
+        """Return one line: the number of devices heard, and the number that needs attention."""
         told = " · ".join(self._told())
         return f'<p class="status" role="status">{told}</p>'
 
@@ -131,7 +134,7 @@ class Cards:
             yield f"{self._listener.cut} messages were too long and are shown in part"
 
     def _draw(self, every: Iterable[DeviceView]) -> dict[str, str]:
-        """Draw the changed cards; return them by place."""
+        """Draw the changed cards: place -> content."""
         changed, added = {}, False
         for shown in every:
             key = (shown.row.kind, shown.row.name)

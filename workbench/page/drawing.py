@@ -1,7 +1,7 @@
-"""The site's devices as HTML and SVG: a shaft, a door, a charger, a robot. Pure.
+"""Draw the site's devices as HTML and SVG: a shaft, a door, a charger, a robot. All functions are pure.
 
-Every text goes through `html.escape`: names come from the network. Nothing is shown only by colour;
-each drawing has its meaning in words.
+Names come from the network, so every text goes through `html.escape`. Colour alone never carries a
+meaning: each drawing also tells its meaning in words.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,7 +17,7 @@ from workbench.page.live_site import DeviceView, RobotShown, Stands
 
 OLD: Final = ' class="old"'
 NOW: Final = '<span class="now">now</span><span class="was">was</span>'
-"""The browser shows the second word when the page's server is silent."""
+"""Word for a fresh state. The browser shows `was` instead when the page's server is silent."""
 WAS: Final = "was"
 NO_FLOOR: Final = "at no known floor"
 SILENT_DO: Final = (
@@ -27,22 +27,22 @@ STALE_DO: Final = "look at the device, its bus, and the clock of its daemon's ma
 MOST_TOLD: Final = 10
 ROBOT_SILENT_S: Final = 10.0
 HALF: Final[Mapping[int, float]] = {d.LiftMotion.MOTION_UP: -0.5, d.LiftMotion.MOTION_DOWN: 0.5}
-"""Half a floor, in the direction of each motion."""
+"""Offset of half a floor, in the direction of each motion."""
 LONGEST: Final = 160
-"""Limit of characters of a text on a card; the list of what is wrong has LONGEST_FAULT."""
+"""Maximum length (characters) of a text on a card. The list of troubles has LONGEST_FAULT instead."""
 LONGEST_FAULT: Final = 400
 MOST_FLOORS: Final = 40
-"""Limit of landings of a drawn shaft; beyond it, words alone give the car's place."""
+"""Maximum number of landings of a drawn shaft. With more landings, only words tell the car's place."""
 FLOOR_PX, SHAFT_PX, LABEL_PX = 22, 44, 46
 ARROWS: Final = {d.LiftMotion.MOTION_UP: "▲", d.LiftMotion.MOTION_DOWN: "▼"}
 LEAVES: Final = {"open": 0.12, "moving": 0.3, "closed": 0.5}
-"""The share of the doorway that each leaf covers."""
+"""Share of the doorway that each door leaf covers."""
 
 
 def card(view: DeviceView, left: float | None = None) -> str:
     """Draw one device as a box: name, state and faults.
 
-    `left`: the place of a lift's car in the last drawing.
+    `left`: where the last drawing showed a lift's car.
     """
     row = view.row
     name = f"<h3>{_told(row.name)}</h3>"
@@ -64,7 +64,7 @@ def path_of(kind: str, name: str) -> str:
 
 
 def attention(wrong: Sequence[DeviceView], remedies: Remedies) -> str:
-    """List what is wrong with the first of these devices, and what to do."""
+    """List the troubles of the first devices in `wrong`, each with its remedy."""
     items = "".join(_trouble(view, remedies) for view in wrong[:MOST_TOLD])
     more = len(wrong) - MOST_TOLD
     items += f"<li>{more} more: see “Only what needs attention”.</li>" if more > 0 else ""
@@ -99,7 +99,7 @@ def _old(view: DeviceView) -> str:
 
 
 def when(wall: float) -> str:
-    """Return the HTML of a time (s since the epoch), which the browser shows in its own zone."""
+    """Return the HTML of a time (s since the epoch). The browser shows the time in its zone."""
     return f'<time data-at="{wall:.3f}"></time>'
 
 
@@ -135,7 +135,8 @@ def _facts(view: DeviceView, left: float | None) -> Iterable[str]:
 
 
 def had(stands: Stands) -> str:
-    """Format the time in minutes, so that a card does not change every second: `at least 12 min`."""
+    """Format the time in minutes, so that a card does not change every second, such as `at least 12
+    min`."""
     minutes = int(stands.for_s // 60)
     if stands.at_least:
         return f"at least {minutes} min" if minutes else "since before this page heard of it"
@@ -147,7 +148,7 @@ def _fact(name: str, value: str) -> str:
 
 
 def _told(text: str, longest: int = LONGEST) -> str:
-    """Format a text as HTML; a long text is cut."""
+    """Format a text as HTML. Cut the text after `longest` characters."""
     return escape(text if len(text) <= longest else f"{text[:longest]}…")
 
 
@@ -165,9 +166,10 @@ def _picture(view: DeviceView, left: float | None) -> str:
 
 
 def car_place(state: Stated | None, left: float | None) -> float | None:
-    """Return a lift car's place, counted from the highest floor; between two floors a half.
+    """Return the place of a lift's car: 0 is the highest floor, 0.5 is between the two highest floors.
+    None: unknown.
 
-    Between floors the car is half a floor from its last place, in its direction. None: not known.
+    A car between floors is half a floor away from its last place, in the direction of its motion.
     """
     if not isinstance(state, d.LiftState):
         return None
@@ -183,7 +185,7 @@ def car_place(state: Stated | None, left: float | None) -> float | None:
 
 
 def _placed(told: str, state: d.LiftState, left: float | None) -> str:
-    """Put the place of a car at no known floor into the description of its state (`told`)."""
+    """Add the place of a car at no known floor to the description of its state (`told`)."""
     place = car_place(state, left)
     if state.current_floor or (place is None and state.motion_state not in HALF):
         return told
@@ -194,9 +196,9 @@ def _placed(told: str, state: d.LiftState, left: float | None) -> str:
 
 
 def shaft(state: d.LiftState, left: float | None = None, *, old: bool = False) -> str:
-    """Draw a lift's shaft: floors, highest at the top, the car at or between them, door and direction.
+    """Draw a lift's shaft: floors with the highest at the top, the car, its door and its direction.
 
-    `left`: the car's place in the last drawing.
+    `left`: where the last drawing showed the car.
     """
     floors = floors_of(state)
     if not floors:
@@ -231,8 +233,8 @@ def _car(state: d.LiftState, place: float, left: float | None) -> str:
 
 
 def floors_of(state: d.LiftState) -> list[str]:
-    """Return the landings from the top down (RMF lists them from the bottom up); empty if too
-    many."""
+    """Return the landings from the top down; [] if there are too many. RMF lists the landings from the
+    bottom up."""
     floors = list(dict.fromkeys(state.available_floors))
     return floors[::-1] if len(floors) <= MOST_FLOORS else []
 
@@ -246,7 +248,8 @@ def _short(text: str) -> str:
 
 
 def _leaves(x: float, y: float, width: float, height: float, door: str) -> str:
-    """Draw a car or doorway with two leaves: apart, together, or between; hatched if unknown."""
+    """Draw a car or doorway with two leaves: apart, together, or halfway. Hatch the leaves if
+    unknown."""
     share = LEAVES.get(door)
     frame = _rect("car", x, y, width, height)
     if share is None:

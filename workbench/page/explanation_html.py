@@ -11,14 +11,14 @@ from workbench.page.tables import table
 
 
 def explanation(found: Explanation) -> str:
-    """Format the sentences, RMF's conditions, the party to act next, and the faults with remedies."""
+    """Format the sentences, RMF's conditions, the next steps, and the faults with remedies."""
     return "".join(_parts(found))
 
 
 def timeline(svg: str, opens_at: float = 1.0) -> str:
-    """Format a timeline's picture; on a narrow screen it scrolls, by keyboard too.
+    """Format a timeline's picture. On a narrow screen the picture scrolls, with the keyboard too.
 
-    `opens_at`: the place shown first, as a share of the length.
+    `opens_at`: the place shown first, as a share of the picture's width.
     """
     where = f'tabindex="0" role="region" aria-label="Timeline" data-open="{opens_at:.4f}"'
     return f'<div class="timeline" {where}>{svg}</div>'
@@ -53,7 +53,7 @@ def _fault(one: FaultTold) -> str:
 
 
 def story(found: Explanation, zone: tzinfo | None = None) -> str:
-    """Format the events, each as a line. `zone`: of their times."""
+    """Format the events, one line each. `zone`: time zone of the events."""
     if not found.story:
         return "<p>Nothing was heard of it.</p>"
     last = found.story[-1]

@@ -1,9 +1,10 @@
-"""Guard the page: before anything else, check each request's Host, Origin and login, and that it is
-whole, in bounded time and size.
+"""Guard the page: check each request before the page sees it.
 
-A page on 127.0.0.1 can be reached by any web site that the same browser has open: by a name
-made to resolve to 127.0.0.1 (DNS rebinding), or by a socket or form of another origin. So only the
-page's configured names are answered, and only its own origin may open its socket or post.
+The guard checks the Host, the Origin and the login. It also limits a request's time and size.
+
+Any web site that the same browser has open can reach a page on 127.0.0.1. The site may use a name that
+resolves to 127.0.0.1 (DNS rebinding), or a socket or form of its own origin. For this reason the guard
+accepts only the page's configured names, and only the page's own origin may open the socket or post.
 """
 
 import asyncio
@@ -18,9 +19,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 MOST_BODY: Final = 64 * 1024
 BODY_S: Final = 5.0
-"""A request must arrive within this time (s)."""
+"""Maximum time (s) for a request to arrive."""
 ANSWER_S: Final = 120.0
-"""An answer must be sent within this time (s), which is enough for 15 MB at 1 Mbit/s."""
+"""Maximum time (s) to send an answer, which is enough for 15 MB at 1 Mbit/s."""
 HEADERS: Final = {
     "content-security-policy": "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval';"
     " style-src 'self' 'unsafe-inline'; img-src 'self' data:; font-src 'self' data:;"
@@ -29,12 +30,13 @@ HEADERS: Final = {
     "x-frame-options": "DENY",
     "referrer-policy": "same-origin",
 }
-"""NiceGUI's own scripts are inline and evaluated; everything comes from this address."""
+"""Security headers of every answer. NiceGUI needs inline and evaluated scripts. Everything comes from
+this address."""
 
 
 @dataclass(frozen=True, slots=True)
 class HttpRefusal:
-    """Why a request is not answered. `to`: the address it is redirected to, if any."""
+    """Reason why the page does not answer a request. `to`: the address of a redirection, if any."""
 
     status: int
     why: str
@@ -42,9 +44,10 @@ class HttpRefusal:
 
 
 def refused(scope: Scope, hosts: Collection[str]) -> str:
-    """Return why this request is refused; "" if answered. `hosts`: names, with or without a port.
+    """Return why this request is refused; "" if accepted. `hosts`: names, with or without a port.
 
-    A host that is an address is answered: only a name can be made to resolve to another machine.
+    A host that is an IP address is accepted, because only a name can be made to resolve to another
+    machine.
     """
     headers = Headers(scope=scope)
     host = headers.get("host", "").lower()
@@ -62,7 +65,7 @@ def refused(scope: Scope, hosts: Collection[str]) -> str:
 
 
 def host_of(netloc: str) -> str:
-    """Return the host without its port: `[::1]` for `[::1]:8080`."""
+    """Return the host without its port, such as `[::1]` for `[::1]:8080`."""
     name, colon, port = netloc.rpartition(":")
     return name if colon and port.isdecimal() else netloc
 
@@ -76,9 +79,9 @@ def _is_address(host: str) -> bool:
 
 
 class RequestGuard:
-    """The outermost layer of the page.
+    """Outermost layer of the page.
 
-    `gate`: the further check of requests with the right Host and Origin.
+    `gate`: a further check of each request whose Host and Origin are right.
     """
 
     def __init__(
@@ -113,11 +116,11 @@ class RequestGuard:
             async with asyncio.timeout(ANSWER_S if scope["type"] == "http" else None):
                 await self._app(scope, receive, sending)
         except TimeoutError:
-            return  # the server ends a connection whose answer is incomplete
+            return  # the server closes a connection whose answer is incomplete
 
 
 async def _whole(receive: Receive) -> tuple[Receive, HttpRefusal | None]:
-    """Return the request with its body read, or why it is refused."""
+    """Read the whole body. Return a `receive` that yields the body, or why the request is refused."""
     body, more = b"", True
     try:
         async with asyncio.timeout(BODY_S):

@@ -1,4 +1,4 @@
-"""The head of every view: its title, links to the others, and the user."""
+"""The head of every view: a title, links to the other views, and the user."""
 
 from html import escape
 from typing import Final
@@ -10,11 +10,11 @@ from bridges.messages.words import printable
 from workbench.page.login import Login
 
 BLUE: Final = "#005a93"
-"""The colour of buttons: white text is readable on it in both themes."""
+"""Colour of buttons. White text is readable on it in both themes."""
 GREEN: Final = "#00674c"
-"""The colour of success; on the library's own, white text is unreadable."""
+"""Colour of success. White text is unreadable on the library's own green."""
 RED: Final = "#b02a00"
-"""The colour of failure, and of the button that acts."""
+"""Colour of failure, and of the button that confirms an action."""
 
 
 def head(title: str, login: Login, request: Request) -> None:
@@ -31,10 +31,10 @@ def head(title: str, login: Login, request: Request) -> None:
 
 
 def main(style: str = "") -> ui.element:
-    """Make the content of a view; the library puts it into its `main`."""
+    """Make the content of a view. The library places the content inside its `main` element."""
     return ui.element("div").props("id=main").classes(style)
 
 
 def part(html: str = "", style: str = "") -> ui.html:
-    """Make a part whose content is replaced later. `html`: our own markup with every text escaped."""
+    """Make a part of a view that is replaced later. `html`: our own markup, with every text escaped."""
     return ui.html(html, sanitize=False).classes(style)

@@ -1,4 +1,5 @@
-"""The views of recordings: the folder's list, and one recording explained and drawn."""
+"""The views of recordings: a list of the folder, and one recording with its explanation and
+timeline."""
 
 import asyncio
 from collections.abc import Iterator
@@ -23,7 +24,7 @@ from workbench.page.zone import LONGEST as LONGEST_ZONE
 from workbench.page.zone import zone_of
 
 ANSWERS_S: Final = 10.0
-"""Time limit (s) for a browser to name its zone."""
+"""Maximum time (s) for a browser to name its time zone."""
 FILTER: Final = (
     '<div class="filters"><label>Find a device, reason or day'
     ' <input id="find" type="search"></label></div>'
@@ -31,7 +32,7 @@ FILTER: Final = (
 
 
 class IncidentViews:
-    """The recordings of one folder, or one `recording` alone."""
+    """The recordings of one folder, or a single `recording`."""
 
     def __init__(self, folder: Path, recording: Path | None, login: Login) -> None:
         self._folder = folder
@@ -48,7 +49,7 @@ class IncidentViews:
         app.get("/incidents/{name}/file")(self.download)
 
     def all(self, request: Request) -> None:
-        """Show the list."""
+        """Show the list of recordings."""
         head("Incidents", self._login, request)
         with main():
             part(self._list())
@@ -65,13 +66,13 @@ class IncidentViews:
         return None
 
     async def alone(self, request: Request, client: Client) -> None:
-        """Show the only recording, given at the page's start."""
+        """Show the single recording that the command line named."""
         assert self._recording is not None
         head(self._recording.name, self._login, request)
         await self._view(self._recording, client)
 
     def download(self, name: str) -> Response:
-        """Send the file."""
+        """Send the recording's file."""
         if self._file(name) is None:
             return Response("there is no incident of that name", status_code=404)
         path = self._folder / name
@@ -95,7 +96,8 @@ class IncidentViews:
         return f'{FILTER}<ul class="incidents">{items}</ul>'
 
     async def _view(self, path: Path, client: Client, link: str = "") -> None:
-        """Show an empty view at once, and fill it when the recording is read, which may take long."""
+        """Show an empty view immediately, and fill it after the recording is read, which may take
+        long."""
         with main():
             box = part('<p role="status">The recording is being read …</p>')
         await client.connected()
@@ -129,7 +131,7 @@ def _file_of(one: incidents.File) -> str:
 
 
 def _about(one: incidents.File) -> str:
-    """Tell the time and the file of an incident."""
+    """Return the HTML of an incident's time and file."""
     return f'<p class="about">{when(one.wall)} {_file_of(one)}</p>'
 
 

@@ -1,7 +1,7 @@
-"""List the folder of recordings, and explain one of them. No other folder is ever read.
+"""List the folder of recordings, and explain one of them. The page never reads another folder.
 
-A recording may come from elsewhere and be hostile, so it is read in a process of its own
-(`python -m workbench.page.incidents FILE`) with limited memory and time.
+A recording may come from elsewhere and be hostile, so a separate process reads it (`python -m
+workbench.page.incidents FILE`) with limited memory and time.
 """
 
 import asyncio
@@ -33,21 +33,23 @@ from workbench.replay.sources import BagError, Notes
 MOST_LISTED: Final = 500
 MOST_REASONS: Final = 20
 MOST_DEVICES: Final = 50
-"""Limit of devices shown of one recording; the others are counted."""
+"""Maximum number of devices shown from one recording. The page tells how many more there are."""
 LONGEST_S: Final = 20.0
-"""A recording is read for this long (s) at most; the page says that the rest is left out."""
+"""Maximum time (s) for reading a recording. The page says that the rest is left out."""
 
 ENDED_S: Final = 60.0
-"""The reading process is ended after this time (s): only messages of others than RMF take so long."""
+"""Time (s) after which the page kills the reading process. Only a recording of messages outside RMF
+takes so long."""
 MOST_MEMORY: Final = 128 << 20
-"""Limit of the reading process's memory (bytes). The process and the page share the unit's 256 MB."""
+"""Maximum memory (bytes) of the reading process. The process and the page share the unit's 256 MB."""
 
 
 @dataclass(frozen=True, slots=True)
 class File:
-    """A recording in the folder. `wall`: the time in its name, else of its last write (epoch s).
+    """A recording in the folder. `wall`: the time in its name, else the time of its last write (s since
+    the epoch).
 
-    `device`, `reason`: from the name of a file of our recorder; "" for other files.
+    `device` and `reason` come from the name that our recorder gives a file; "" for other files.
     """
 
     name: str
@@ -58,7 +60,7 @@ class File:
 
     @property
     def title(self) -> str:
-        """Return device and reason; the file's name if a person has named the file."""
+        """Device and reason. A file that a person has named returns the file's name."""
         return f"{self.device}: {self.reason.replace('-', ' ')}" if self.device else self.name
 
 
@@ -66,7 +68,7 @@ class File:
 class ExplainedRecording:
     """An explained recording: each device's explanation and timeline, and the unreadable parts.
 
-    `reasons`: the recorder's notes: the time (s) and the text.
+    `reasons`: notes of the recorder, each with its time (s) and text.
     """
 
     devices: tuple[tuple[Explanation, Timeline], ...]
@@ -74,14 +76,15 @@ class ExplainedRecording:
     reasons: tuple[tuple[float, str], ...] = ()
 
     def opens_at(self, timeline: Timeline) -> float:
-        """Return the reason's place in this timeline, as a share of its length; 1 without a reason."""
+        """Return where the timeline shows the file's reason, as a share of the timeline's length; 1
+        without a reason."""
         length = timeline.to_s - timeline.from_s
         at = max((at for at, _ in self.reasons), default=timeline.to_s)
         return min(1.0, max(0.0, (at - timeline.from_s) / length)) if length else 1.0
 
 
 def listed(folder: Path) -> list[File]:
-    """List recordings, newest first. Raises OSError."""
+    """Return the recordings of the folder, newest first. Raises OSError."""
     found = sorted(_files(folder), key=lambda one: one.wall, reverse=True)
     return found[:MOST_LISTED]
 
@@ -94,12 +97,12 @@ def _files(folder: Path) -> Iterator[File]:
 
 
 def file_in(folder: Path, name: str) -> File | None:
-    """Find the recording of this name; None if the folder has no such recording. Raises OSError."""
+    """Return the recording of this name; None if the folder has no such recording. Raises OSError."""
     return next((one for one in _files(folder) if one.name == name), None)
 
 
 async def read_apart(path: Path, zone: str = "") -> ExplainedRecording:
-    """Run `read` in a process of its own. `zone`: the name of the browser's zone. Raises BagError."""
+    """Run `read` in a separate process. `zone`: name of the browser's time zone. Raises BagError."""
     child = await asyncio.create_subprocess_exec(
         sys.executable,
         "-P",
@@ -123,7 +126,7 @@ async def read_apart(path: Path, zone: str = "") -> ExplainedRecording:
 
 
 def main(path: Path, zone: str) -> int:
-    """Read a recording, and write its explanation, or why it cannot be read, to standard output."""
+    """Read a recording. Write its explanation to standard output, or why it cannot be read."""
     resource.setrlimit(resource.RLIMIT_DATA, (MOST_MEMORY, MOST_MEMORY))
     try:
         code, told = 0, msgspec.msgpack.encode(read(path, faults.for_explain(), zone_of(zone)))
@@ -136,7 +139,8 @@ def main(path: Path, zone: str) -> int:
 
 
 def read(path: Path, remedies: Remedies, zone: tzinfo | None = None) -> ExplainedRecording:
-    """Read the recording in bounded time. `zone`: of the times shown. Raises BagError if it is none."""
+    """Read the recording in limited time. `zone`: time zone of the texts. Raises BagError if the file
+    is no recording."""
     notes, story = Notes(), heard_devices.HeardDevices()
     cut = not _all_of(path, notes, story.take)
     devices = story.devices()
@@ -160,7 +164,7 @@ def read(path: Path, remedies: Remedies, zone: tzinfo | None = None) -> Explaine
 
 
 def _reason(own: Own) -> Iterator[tuple[float, str]]:
-    """Yield the time and text of a note of our recorder; nothing for its other texts."""
+    """Yield the time and text of the recorder's note about its reason; nothing for other notes."""
     note = noted(own.topic.rpartition("/")[2], own.text)
     if note is not None and note.kept_for is not None:
         code, text = note.kept_for
@@ -168,13 +172,13 @@ def _reason(own: Own) -> Iterator[tuple[float, str]]:
 
 
 def _marked(timeline: Timeline, reasons: Sequence[tuple[float, str]]) -> Timeline:
-    """Mark each reason for the file in the timeline."""
+    """Return the timeline with a mark at each reason for the file."""
     marks = [Mark(at, text, "wrong") for at, text in reasons]
     return replace(timeline, steps=(*timeline.steps, *marks))
 
 
 def _all_of(path: Path, notes: Notes, take: Callable[[Heard | Own], None]) -> bool:
-    """Take the messages of a recording. Return whether the time was enough for all."""
+    """Take the messages of a recording. Return whether the time sufficed for all of them."""
     until = time.monotonic() + LONGEST_S
     for heard in all_in(path, notes):
         take(heard)

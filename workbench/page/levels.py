@@ -1,6 +1,7 @@
-"""The present inputs and outputs of a daemon on this machine, from its ring.
+"""The present inputs and outputs of a daemon on this machine, from the daemon's ring.
 
-The ring has the driver's decoding of the contacts and the core's decisions; no voltages.
+The ring is the file of its latest decisions. It has the contacts as the driver decodes them, and the
+core's decisions, but no voltages.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -12,11 +13,12 @@ from bridges.blackbox.ring import NAME, RingError, Tail
 from bridges.blackbox.value_codec import HOLDS, TYPE, Tree
 
 Rows = Mapping[str, str]
-"""A name and its present value."""
+"""Present values by name."""
 
 
 class Levels:
-    """Follows the ring of one daemon. `sensed`, `driven`: device's name -> its inputs, its outputs."""
+    """Follows the ring of one daemon. `sensed`, `driven`: device's name -> its inputs, and its
+    outputs."""
 
     def __init__(self, folder: Path) -> None:
         self.sensed: dict[str, Rows] = {}
@@ -26,7 +28,7 @@ class Levels:
         self._inode = 0
 
     def look(self) -> None:
-        """Read new entries; without a readable ring nothing is known."""
+        """Read the new entries. If the ring is unreadable, forget all values."""
         try:
             inode = self._path.stat().st_ino
             if self._tail is None or inode != self._inode:

@@ -1,4 +1,4 @@
-"""The page's node on the graph: it listens, never speaks, and joins again when the graph is lost."""
+"""The page's node on the graph. It only listens, and it joins again after the graph is lost."""
 
 import logging
 import threading
@@ -18,14 +18,14 @@ from workbench.page.live_site import HEARD, LiveSite
 log = logging.getLogger(__name__)
 
 WAITING: Final = 20_000
-"""Limit of waiting messages. More come only in a flood, and are dropped and counted."""
+"""Maximum number of waiting messages. Only a flood brings more; these are dropped and counted."""
 LONGEST_TURN_S: Final = 0.05
-"""A turn ends after this time (s): a flood must not keep the browsers waiting."""
+"""Maximum time (s) of a turn, because a flood must not keep the browsers waiting."""
 AGAIN_S: Final = 3.0
 
 
 class Listener:
-    """Fills a site from the graph, on a thread of its own."""
+    """Fills a site from the graph, on a separate thread."""
 
     def __init__(self, site: LiveSite, join: Callable[[], Transport]) -> None:
         self._site = site
@@ -38,7 +38,7 @@ class Listener:
         self.trouble = "has not joined RMF's graph yet"
 
     def start(self) -> None:
-        """Join, in the background."""
+        """Join the graph in the background."""
         self._thread.start()
 
     def end(self) -> None:
@@ -54,7 +54,7 @@ class Listener:
             self.lost += 1
 
     def turn(self) -> bool:
-        """Take the waiting messages, on the caller's thread. Return whether there were any."""
+        """Take the waiting messages, on the caller's thread. Return whether any were waiting."""
         any_heard = False
         until = time.monotonic() + LONGEST_TURN_S
         while time.monotonic() < until:

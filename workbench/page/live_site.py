@@ -1,7 +1,7 @@
 """The page's memory of RMF's graph: each device's latest state, and its last ten minutes.
 
-Pure: time comes with each message. Anybody on the network may make names up, so everything
-has a bound, and known devices are never displaced by later ones.
+All functions are pure: time comes with each message. Anybody on the network may invent names, so
+everything has a limit, and later devices never displace known devices.
 """
 
 import dataclasses
@@ -32,12 +32,12 @@ from workbench.explain.timeline import Timeline
 from workbench.graph.board import Board, BoardRow
 
 KEPT_S: Final = 600.0
-"""The past that a device's page shows."""
+"""Time (s) for which a device's page shows the past."""
 STEP_S: Final = 10.0
-"""The timeline moves on in steps of this length (s)."""
+"""Time (s) by which the timeline moves in each step."""
 MOST_LINES: Final = 100
-"""Limit of story lines of one device. Its view shows forty. With six hundred each a large site takes
-150 MB."""
+"""Maximum number of story lines of one device. Its view shows forty. With six hundred lines for each
+device, a large site takes 150 MB."""
 MOST_ROBOTS: Final = 500
 
 HEARD: Final[tuple[AnyTopic, ...]] = (
@@ -62,7 +62,7 @@ HEARD: Final[tuple[AnyTopic, ...]] = (
 
 @dataclass(frozen=True, slots=True)
 class RobotShown:
-    """A robot as its fleet reports it."""
+    """A robot according to its fleet's states."""
 
     fleet: str
     state: d.RobotState
@@ -71,7 +71,8 @@ class RobotShown:
 
 @dataclass(frozen=True, slots=True)
 class Stands:
-    """Time (s) since a robot got its charger. `at_least`: the page began to listen later."""
+    """Time (s) for which a robot has had its charger. `at_least`: the robot got it before the page
+    listened."""
 
     for_s: float
     at_least: bool
@@ -79,10 +80,10 @@ class Stands:
 
 @dataclass(frozen=True, slots=True)
 class DeviceView:
-    """A device as the page draws it: its row from `watch`, and its last state, if any.
+    """A device ready to be drawn: its row from `watch`, and its last state, if any.
 
-    `stands`: its robot's time at the charger. `heard_wall`: the arrival of its last state. `read_wall`:
-    the stamp of that state (both s since the epoch; 0: never).
+    `stands`: how long its robot has had the charger. `heard_wall`: when its last state arrived.
+    `read_wall`: the stamp of that state. Both are seconds since the epoch; 0 means never.
     """
 
     row: BoardRow
@@ -93,7 +94,7 @@ class DeviceView:
 
 
 class LiveSite:
-    """Everything heard so far, within bounds."""
+    """Everything heard so far, within limits."""
 
     def __init__(self, graph: Sequence[str] = ()) -> None:
         """`graph`: the options that name the page's graph, for commands."""
@@ -106,7 +107,7 @@ class LiveSite:
 
     @property
     def crowded(self) -> set[Kind]:
-        """The kinds with devices dropped for lack of room."""
+        """Kinds that have dropped devices for lack of room."""
         return self._story.crowded
 
     def take(self, heard: Heard) -> None:
@@ -130,7 +131,10 @@ class LiveSite:
             self._board.note(heard)
 
     def devices(self, now: float, wall: float) -> list[DeviceView]:
-        """Return devices, coordinators and scheduled robots. `now`: steady s; `wall`: stamps' clock."""
+        """Return devices, coordinators and scheduled robots.
+
+        `now`: steady clock (s). `wall`: the clock of the stamps (s since the epoch).
+        """
         every, rows = self._story.stated(), self._board.rows(now, wall)
         shown = {f"{one.kind} {words.printable(one.id)}": one for one in every}
         return [_view(row, shown.get(f"{row.kind} {row.name}")) for row in rows]
@@ -151,7 +155,8 @@ class LiveSite:
         remedies: Remedies,
         zone: tzinfo | None = None,
     ) -> Explanation | None:
-        """Explain why somebody waits for this device, or its activity. `zone`: of its times."""
+        """Explain why somebody waits for this device, or what the device does. `zone`: time zone of the
+        texts."""
         device = self._found(kind, name)
         if device is None:
             return None
@@ -159,9 +164,10 @@ class LiveSite:
         return self._story.explain(device.kind, device.id, zone, remedies)
 
     def timeline(self, kind: str, name: str, now: float) -> Timeline | None:
-        """Return the last ten minutes of a device; `name`: as shown.
+        """Return the last ten minutes of a device; `name` is its printable name.
 
-        The timeline ends up to STEP_S later: so the parts already drawn move only once in that time.
+        The timeline ends up to STEP_S after `now`, so that the parts already drawn move only once in
+        STEP_S.
         """
         device = self._found(kind, name)
         drawing = self._drawings.get((device.kind, device.id)) if device else None
@@ -171,7 +177,7 @@ class LiveSite:
         return dataclasses.replace(found, to_s=(found.to_s // STEP_S + 1) * STEP_S)
 
     def _found(self, kind: str, name: str) -> Device | None:
-        """Return the device of this shown name."""
+        """Return the device with this printable name."""
         for known in (one for one in KINDS if one == kind):
             every = (one for one in self._story.stated(known) if words.printable(one.id) == name)
             return self._device((known, name)) or next(every, None)
@@ -183,12 +189,12 @@ class LiveSite:
         return found if found is not None and found.state is not None else None
 
     def robots(self) -> list[RobotShown]:
-        """Return the robots that fleets report, by fleet and name."""
+        """Return the robots in fleet states, sorted by fleet and name."""
         return [robot for _, robot in sorted(self._robots.items())]
 
     def _about(self, key: Key, heard: Heard) -> None:
-        """Take a request, a cancel or a refusal. Drop a message for an unknown device: anybody
-        can request anything."""
+        """Take a request, a cancel or a refusal. Drop a message for an unknown device, because anybody
+        can send requests with any name."""
         if self._device(key):
             self._story.take(heard)
             self._remember(key, heard)
@@ -228,7 +234,7 @@ class LiveSite:
 
     def _fleet(self, message: d.FleetState, now: Moment) -> None:
         """Take a fleet's robots. In a full table a new robot replaces the robot that was silent for the
-        longest, at least FORGOTTEN_S."""
+        longest time, if that silence lasted at least FORGOTTEN_S."""
         for state in message.robots:
             key = (message.name, state.name)
             if self._robots.pop(key, None) is None and len(self._robots) >= MOST_ROBOTS:
@@ -240,7 +246,7 @@ class LiveSite:
 
 
 def _view(row: BoardRow, device: Device | None) -> DeviceView:
-    """Return the view to draw. A robot's time at its charger runs until the last state seen."""
+    """Return the view to draw. A robot's time at its charger ends at the last state heard."""
     stands = None
     if isinstance(device, ObservedCharger) and device.last_state and device.robot.value != NOBODY:
         since = device.robot.since

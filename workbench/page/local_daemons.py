@@ -1,7 +1,7 @@
 """The daemons on this machine that the page's user may see, and the YAML that serves each device.
 
-The page reads what `rmf-bridge status` reads. It asks a simulation for the names of its signals and
-parts.
+The page reads the same files as `rmf-bridge status`. It asks a simulation for the names of its signals
+and parts.
 """
 
 import json
@@ -22,7 +22,7 @@ from workbench.page.levels import Levels, Rows
 
 @dataclass(frozen=True, slots=True)
 class ServedDevice:
-    """A device served by a daemon here: its YAML, present inputs and outputs.
+    """A device that a daemon on this machine serves: its YAML, present inputs and outputs.
 
     `contacts`: known signal -> is it asserted?
     """
@@ -34,16 +34,16 @@ class ServedDevice:
 
 
 class LocalDaemons:
-    """This machine's daemons at the last look. `served`: (kind, name) -> the device."""
+    """This machine's daemons when the page last looked. `served`: (kind, name) -> the device."""
 
     def __init__(self, base: Path | None) -> None:
-        """`base`: the folder of runtime directories, if not where `run` and systemd make them."""
+        """`base`: the folder of runtime directories; None means the folders of `run` and systemd."""
         self.served: Mapping[tuple[str, str], ServedDevice] = {}
         self._base = base
         self._levels: dict[Path, Levels] = {}
 
     def look(self) -> None:
-        """Find the daemons that serve now. Raises OSError."""
+        """Find the daemons that run now. Raises OSError."""
         base = self._base
         folders = sorted(p for p in base.iterdir() if p.is_dir()) if base else list(runtimes())
         found: dict[tuple[str, str], ServedDevice] = {}

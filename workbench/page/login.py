@@ -1,8 +1,8 @@
-"""Identify the user of a request: by a login's cookie, or by a trusted proxy's header.
+"""Identify the user of a request, by the cookie of a login or by the header of a trusted proxy.
 
-A session's cookie is HttpOnly and SameSite=Strict, and Secure where the
-form came over TLS; a form carries a proof beside it. The header of a
-reverse proxy is believed only from the proxy's address.
+A session's cookie is HttpOnly and SameSite=Strict. It is also Secure if the form came over TLS. Each
+form carries a proof besides the cookie. The header of a reverse proxy counts only if the request comes
+from the proxy's address.
 """
 
 import asyncio
@@ -34,10 +34,10 @@ FORM: Final = """<!doctype html><html lang="en"><head><meta charset="utf-8">
 
 
 class Login:
-    """Identifies users. Without a password file and a proxy nobody can log in, and nobody may act."""
+    """Identifies users. Without a password file and without a proxy, nobody can log in or act."""
 
     def __init__(self, door: PasswordCheck | None, *, proxy: str = "", header: str = "") -> None:
-        """`proxy`: the address whose `header` names the user."""
+        """`proxy`: address of the proxy. `header`: the proxy's header that names the user."""
         self._door = door
         self._proxy = proxy
         self._header = header
@@ -52,7 +52,7 @@ class Login:
         return session.user if session else ""
 
     def form(self, request: Request, user: str) -> str:
-        """Return HTML for the head of a page: the user, or the link to the login."""
+        """Return the HTML for a page's head: the user, or a link to the login."""
         session = self._sessions.find(request.cookies.get(COOKIE), time.monotonic())
         if user and session:
             return (
@@ -83,7 +83,7 @@ class Login:
         address = request.client.host if request.client else ""
         if self._door is None:
             return self._page(request, status=403)
-        async with self._one_at_a_time:  # scrypt takes 16 MB and 50 ms
+        async with self._one_at_a_time:  # each check takes 16 MB and 50 ms
             why = await asyncio.to_thread(
                 self._door.refuses, user, password, address, time.monotonic()
             )
@@ -101,7 +101,7 @@ class Login:
         return answer
 
     async def log_out(self, request: Request) -> Response:
-        """End the session, if the form carries its proof."""
+        """End the session, if the form carries the session's proof."""
         secret = request.cookies.get(COOKIE)
         session = self._sessions.find(secret, time.monotonic())
         fields = await _fields(request)
@@ -114,7 +114,7 @@ class Login:
 
 
 async def _fields(request: Request) -> dict[str, str]:
-    """Return a form's fields; a form with too many fields has none."""
+    """Return a form's fields; {} for a form with too many fields."""
     try:
         found = parse_qs((await request.body()).decode(errors="replace"), max_num_fields=10)
     except ValueError:
@@ -123,7 +123,7 @@ async def _fields(request: Request) -> dict[str, str]:
 
 
 def _next(request: Request) -> str:
-    """Return the next address: only a path of this page."""
+    """Return the address to show next. It must be a path of this page."""
     path = request.query_params.get("next", "/")
     plain = path.startswith("/") and not path.startswith(("//", "/\\")) and path.isprintable()
     return path if plain else "/"

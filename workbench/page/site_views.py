@@ -1,4 +1,5 @@
-"""The views of a live site: all of it, and one device with its timeline, its why and its wiring."""
+"""The views of a live site: the whole site, and one device with its timeline, explanation and
+wiring."""
 
 import json
 import time
@@ -39,9 +40,9 @@ SECTIONS: Final = (
 )
 WIDE: Final = "panel wide-part"
 FEW: Final = 8
-"""A section of more devices than this takes the whole width."""
+"""Maximum number of devices in a section of half width. A larger section takes the whole width."""
 LOST: Final = '<p id="lost" role="alert"></p>'
-"""The browser says here that the page's server is silent."""
+"""Place where the browser tells that the page's server is silent."""
 FILTERS: Final = (
     '<div class="filters"><label>Find a device <input id="find" type="search"></label>'
     '<label><input id="only" type="checkbox"> Only what needs attention</label></div>'
@@ -53,8 +54,8 @@ NOT_HERE: Final = (
 
 
 class SiteWall(Tab):
-    """One browser's view of the site. It has few elements of the library, because a browser goes
-    through all of them at each update."""
+    """One browser's view of the site. It has few elements of the library, because a browser visits all
+    of them at each update."""
 
     def __init__(self, cards: Cards, client: Client) -> None:
         super().__init__(client)
@@ -68,7 +69,7 @@ class SiteWall(Tab):
         self.rebuild()
 
     def change(self, script: str) -> None:
-        """Send a change. For a browser that is away all cards are drawn again at its return."""
+        """Send a change. A browser that is away gets all cards when it returns."""
         if not self.is_here:
             self._missed = True
         elif self._missed:
@@ -79,7 +80,7 @@ class SiteWall(Tab):
     def rebuild(self) -> None:
         """Draw all cards, by kind and name."""
         self._missed = not self.is_here
-        self._built += 1  # makes the content differ: equal content would not be sent
+        self._built += 1  # makes the content differ, because equal content is not sent
         html = "".join(self._section(*section) for section in SECTIONS)
         none = "<p>No device is shown.</p>"
         self._box.set_content(
@@ -94,7 +95,8 @@ class SiteWall(Tab):
         return f"<section{many}><h2>{title}</h2>{cards}</section>" if keys else ""
 
     def _slot(self, key: Key) -> str:
-        """Make a card's slot. Its link is not in the redrawn part, so it keeps the keyboard's focus."""
+        """Make a card's slot. The link stays outside the redrawn part, so the link keeps the keyboard's
+        focus."""
         card = f'<div id="{place_of(key)}">{self._cards.cards[key]}</div>'
         name, path = escape(key[1]), path_of(*key)
         link = f'<a class="cover" href="{path}" aria-label="{name}"></a>' if key[0] in KINDS else ""
@@ -102,7 +104,7 @@ class SiteWall(Tab):
 
 
 class SiteViews:
-    """The site and its devices."""
+    """Views of the site and of its devices."""
 
     def __init__(
         self,
@@ -127,7 +129,7 @@ class SiteViews:
             ui.page(f"/{kind}/{{name:path}}", title="Device")(partial(self.device, kind))
 
     def site(self, request: Request, client: Client) -> None:
-        """Show everything, as a wall of cards."""
+        """Show the whole site as a wall of cards."""
         head("Site", self._login, request)
         with main():
             self._join(SiteWall(self._cards, client), client)
@@ -154,7 +156,7 @@ class SiteViews:
         return client.build_response(request, 404)
 
     def _parts(self, key: Key, request: Request, client: Client) -> None:
-        """Fill the view of a device that was heard."""
+        """Fill the view of a device. At least one message of the device was heard."""
         tab = Tab(client)
         self._join(tab, client)
         drawn: dict[str, Callable[[], str]] = {}

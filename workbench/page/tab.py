@@ -1,4 +1,5 @@
-"""One browser's tab: its time zone, its question for the newest, and the changes of its view."""
+"""One browser's tab: its time zone, its question for the latest changes, and the changes of its
+view."""
 
 import json
 import math
@@ -14,22 +15,23 @@ from nicegui.events import GenericEventArguments
 from workbench.page.zone import zone_of
 
 PIECE: Final = re.compile(r"(?=<(?:rect|text|line|path|tr|p|li)\b)|(?<=\n)")
-"""A part of a view is cut into pieces at these places. A small change concerns few pieces."""
+"""Pattern of the places where a part of a view is cut into pieces. A small change concerns few
+pieces."""
 WHOLE: Final = 1_000_000
-"""More pieces than any part has."""
+"""A number larger than the pieces of any part."""
 
 Edit = tuple[int, int, Sequence[str]]
-"""The number of the first replaced piece, that of the first kept piece after it, the new pieces."""
+"""Number of the first replaced piece, number of the first piece kept after it, and the new pieces."""
 
 
 def edits(before: Sequence[str], after: Sequence[str]) -> list[Edit]:
-    """Return the edits that make `after` of `before`, the last edit first."""
+    """Return the edits that turn `before` into `after`, the last edit first."""
     found = SequenceMatcher(None, before, after, autojunk=False).get_opcodes()
     return [(i, j, after[m:n]) for what, i, j, m, n in reversed(found) if what != "equal"]
 
 
 class Tab:
-    """The tab of a client. `zone`: the browser's; None until the browser has named it."""
+    """The tab of a client. `zone`: the browser's time zone; None until the browser has named it."""
 
     def __init__(self, client: Client) -> None:
         self.zone: tzinfo | None = None
@@ -60,21 +62,22 @@ class Tab:
             self.run(f"patch({json.dumps(place)}, {json.dumps(changed)})")
 
     def change(self, script: str) -> None:
-        """Ignore a change of the site: a device's view draws itself."""
+        """Ignore a change of the site, because a device's view draws itself."""
 
     def rebuild(self) -> None:
         """Ignore that cards were added or removed."""
 
     def answer(self, wrong: int) -> None:
-        """Answer the browser's question: everything heard before the question has been sent.
+        """Answer that all messages from before the browser's question have been sent.
 
-        `wrong`: the number of devices that need attention."""
+        `wrong`: number of devices that need attention.
+        """
         asked, self._asked = self._asked, None
         if asked is not None and self.is_here:
             self.run(f"fresh({asked}, {wrong})")
 
     def _ask(self, event: GenericEventArguments) -> None:
-        """Take the question: the browser's steady clock, and its zone."""
+        """Take the question, which carries the browser's steady clock and time zone."""
         match event.args:
             case [int() | float() as asked, str() as zone] if math.isfinite(asked):
                 self._asked, self.zone = float(asked), zone_of(zone)

@@ -13,7 +13,7 @@ NO_RING = "Its daemon keeps no ring, or the page's user may not read it: no live
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str) -> str:
-    """Return a table; every cell is text."""
+    """Return an HTML table. Every cell is escaped text."""
     heads = "".join(f'<th scope="col">{escape(text)}</th>' for text in headings)
     body = "".join(
         f"<tr>{''.join(_cell(*pair) for pair in zip(headings, row, strict=True))}</tr>"
@@ -26,15 +26,16 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str) 
 
 
 def _cell(heading: str, cell: str) -> str:
-    """Format a cell with its heading, for narrow screens; an empty one is left out there."""
+    """Format a cell with its heading, for narrow screens. A narrow screen hides empty cells."""
     none = ' class="none"' if cell in ("-", "") and heading != "now" else ""
     return f'<td data-head="{escape(heading)}"{none}>{escape(cell)}</td>'
 
 
 def wiring(file: str, device: str, contacts: Mapping[str, bool]) -> str:
-    """Return the tables of the device's YAML, wires and limits, as `rmf-bridge check` prints them.
+    """Return the tables of wires and limits from the device's YAML, like the output of `rmf-bridge
+    check`.
 
-    `contacts`: known signal -> is it asserted? Shown as a column of the wires.
+    `contacts`: known signal -> is it asserted? The table of wires shows this in a column.
     """
     found = _tables(file, _changed_at(file), device)
     if isinstance(found, str):
@@ -44,7 +45,7 @@ def wiring(file: str, device: str, contacts: Mapping[str, bool]) -> str:
 
 
 def _folded(one: Table) -> str:
-    """Format a table; settings at their defaults are folded away."""
+    """Format a table. Settings at their defaults are hidden until the reader unfolds them."""
     if one.headings != SETTINGS:
         return table(one.headings, one.rows, one.title)
     set_, rest = ([row for row in one.rows if bool(row[2]) == own] for own in (True, False))
@@ -87,7 +88,7 @@ def _changed_at(file: str) -> float:
 
 @lru_cache(maxsize=64)
 def _tables(file: str, changed_at: float, device: str) -> list[Table] | str:
-    """Return the tables, or why there are none. `changed_at`: a changed file is read again."""
+    """Return the tables, or why there are none. A new `changed_at` reads the file again."""
     try:
         config = load(Path(file))
     except SettingsError as error:

@@ -1,6 +1,6 @@
 """The page's application: the views' addresses, admission, and the serving process.
 
-NiceGUI is imported here and in the views alone. A browser's actions reach the graph only by a
+Only this module and the views import NiceGUI. A browser's actions reach the graph only through a
 command (`actions.py`).
 """
 
@@ -45,34 +45,38 @@ log = logging.getLogger(__name__)
 PUMP_S: Final = 0.1
 HERE_S: Final = 1.0
 RECONNECT_S: Final = 30.0
-"""A browser that is away for longer (s) reloads its view."""
+"""Time (s) after which a browser that was away reloads its view."""
 MOST_HISTORY: Final = 100
-"""Limit of missed updates sent to a returning browser; after more it reloads its view."""
+"""Maximum number of missed updates that a returning browser gets. After more updates the browser
+reloads its view."""
 MOST_CONNECTIONS: Final = 200
 MOST_BYTES: Final = 64 * 1024
-"""Limit of a message from a browser (bytes); the library's messages have a hundredth of this size."""
+"""Maximum size (bytes) of a message from a browser. The library's messages have a hundredth of this
+size."""
 MOST_BROWSERS: Final = 50
-"""Limit of open views; each takes up to a megabyte. An unused view is dropped within a minute."""
+"""Maximum number of open views. Each view takes up to a megabyte. An unused view is dropped within a
+minute."""
 OF_EVERYBODY: Final = ("/login", "/favicon.ico")
 LIBRARY: Final = "/_nicegui/"
-"""The library's own scripts and styles."""
+"""Path of the library's own scripts and styles."""
 SOCKET: Final = "/_nicegui_ws/"
 LOOK_S: Final = 1.0
 QUIET_S: Final = 60.0
-"""Least time (s) between log lines about browsers that do not read."""
+"""Minimum time (s) between log lines about browsers that do not read."""
 MOST_WAITING: Final = 50
-"""Limit of a browser's unread packets: those of about five seconds. A browser that reads has a few."""
+"""Maximum number of a browser's unread packets, which come in about five seconds. A browser that reads
+has few unread packets."""
 
 
 class Gate:
-    """Admission of up to MOST_BROWSERS browsers. `closed`: only of logged-in users."""
+    """Admission of up to MOST_BROWSERS browsers. `closed`: admit only logged-in users."""
 
     def __init__(self, login: Login, *, closed: bool) -> None:
         self._login = login
         self._closed = closed
 
     def __call__(self, scope: Scope) -> HttpRefusal | None:
-        """Return why a request is refused; None if it is answered."""
+        """Return why a request is refused; None if accepted."""
         path = str(scope["path"])
         if path in OF_EVERYBODY or path.startswith(LIBRARY):
             return None
@@ -90,8 +94,11 @@ def serve(
     join: Callable[[], Transport],
     graph: Sequence[str],
 ) -> None:
-    """Serve until a signal ends it. `opened`: listens at `args.listen`. `known`: users and their
-    hashes. `graph`: the options that name the page's graph, for its commands."""
+    """Serve until a signal ends the process.
+
+    `opened`: a socket that listens at `args.listen`. `known`: users and their hashes. `graph`: the
+    options that name the page's graph, for its commands.
+    """
     address, _ = args.listen
     shown = f"[{address}]" if ":" in address else address
     netloc = f"{shown}:{opened.getsockname()[1]}"
@@ -100,7 +107,7 @@ def serve(
     )
     ui.add_css(STYLE, shared=True)
     ui.add_head_html(f"<script>{SCRIPT}</script>", shared=True)
-    # Quasar draws a progress bar that has no name over the page during each request of a script.
+    # Quasar draws a nameless progress bar over the page during each request of a script.
     app.config.quasar_config["loadingBar"]["skipHijack"] = True
     app.get("/login")(login.show)
     app.post("/login")(login.log_in)
@@ -113,7 +120,7 @@ def serve(
     gate = Gate(login, closed=not ipaddress.ip_address(address).is_loopback)
     app.add_middleware(RequestGuard, hosts=_hosts(address, netloc, args.host), gate=gate)
     for name in ("engineio.server", "socketio.server"):
-        logging.getLogger(name).handlers.clear()  # strange frames would fill the log
+        logging.getLogger(name).handlers.clear()  # malformed frames would fill the log
     app.on_startup(lambda: _end_useless())
     app.on_startup(lambda: _say(f"the page is at http://{netloc}/ (Ctrl-C ends it)"))
     try:
@@ -131,7 +138,7 @@ def serve(
                 message_history_length=MOST_HISTORY,
                 limit_concurrency=MOST_CONNECTIONS,
                 ws_max_size=MOST_BYTES,
-                log_config=None,  # its lines go the way of ours
+                log_config=None,  # our log formats the server's lines
                 language="en-GB",
             )
     finally:
@@ -175,7 +182,7 @@ async def _look(here: LocalDaemons) -> None:
 
 
 async def _end_useless() -> None:
-    """Endlessly end connections of browsers that do not read or send no request."""
+    """Close connections of browsers that do not read or send no request. Runs until the page ends."""
     silent = Silent()
     ended: set[object] = set()
     told_at = AGES_AGO
@@ -188,7 +195,7 @@ async def _end_useless() -> None:
 
 
 def _unasked(connections: Iterable[Any]) -> Iterator[tuple[Hashable, Any]]:
-    """Yield the connections on which no request is being answered, each with its last request."""
+    """Yield the connections on which no request waits for its answer, each with its last request."""
     for one in connections:
         last = getattr(one, "cycle", one)
         if last is None or getattr(last, "response_complete", False):
@@ -196,13 +203,14 @@ def _unasked(connections: Iterable[Any]) -> Iterator[tuple[Hashable, Any]]:
 
 
 async def _end_deaf(ended: set[object], told_at: float) -> float:
-    """End browsers that do not read. `ended`: those already being ended. Return the last log time."""
+    """Disconnect browsers that do not read. `ended`: browsers that are already being disconnected.
+    Return the last log time."""
     sockets = core.sio.eio.sockets.copy()
     ended &= sockets.keys()
     deaf = [one for one in sockets.keys() - ended if sockets[one].queue.qsize() > MOST_WAITING]
     for one in deaf:
         ended.add(one)
-        with suppress(Exception):  # it may be closing already
+        with suppress(Exception):  # the socket may be closing already
             await sockets[one].close(wait=False)
     now = time.monotonic()
     if not deaf or now < told_at + QUIET_S:
