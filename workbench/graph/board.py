@@ -1,4 +1,4 @@
-"""The rows of `watch`, made from messages and a time. Pure.
+"""The rows of `watch`, made from messages and a time. All functions are pure.
 
 RMF's states have no field for faults, queues and simulations. Our daemons publish this information on
 `/diagnostics`.
@@ -25,22 +25,22 @@ from bridges.system.columns import aligned, clipped, hanging, width
 from bridges.system.paint import repainted
 
 SETTLES_S: Final = 1.5
-"""A daemon's diagnostics come at 1 Hz."""
+"""Time (s) after which a daemon's diagnostics must have come. They come at 1 Hz."""
 HEADINGS: Final = ("kind", "name", "state", "held by", "waiting", "age", "", "faults")
 MOST_PLACES: Final = 500
-"""The most robots to remember: anybody can make names up, and the page listens for months."""
+"""Maximum number of robots to remember. Anybody can invent names, and the page listens for months."""
 SECONDS: Final = re.compile(r"\d+(\.\d+)? (s|min)\b")
 
 Device = tuple[str, str]
-"""A device's kind and its name, as shown."""
+"""A device's kind and printable name."""
 
 
 class BoardRow(Struct, frozen=True):
     """One device, an alarm, the charger coordinator, or a robot with its assigned place.
 
-    `waiting`: the waiting robots, or what the holder waits for. `age`: the reading's age. `mark`: why
-    the row may be wrong. `simulated`: is the device without hardware? `faults`: the faults that its
-    daemons report.
+    `waiting`: the waiting robots, or what the holder waits for. `age`: the reading's age, in words.
+    `mark`: why the row may be wrong. `simulated`: is the device without hardware? `faults`: the faults
+    that its daemons report.
     """
 
     kind: str
@@ -67,7 +67,7 @@ class BoardRow(Struct, frozen=True):
         return (*state, self.waiting, self.age, marks, self.faults)
 
     def news(self) -> tuple[object, ...]:
-        """Return the parts whose changes are printed, without running seconds."""
+        """Values whose change is worth a new line, without running seconds."""
         told = (self.state, self.held_by, self.waiting, self.mark, self.faults)
         return (self.simulated, *(SECONDS.sub("", text) for text in told))
 
@@ -86,7 +86,7 @@ class Board:
         self.note(heard)
 
     def note(self, heard: Heard) -> None:
-        """Take the charging assignments of a message; the device memory takes all other messages."""
+        """Take the charging assignments of a message. `ObservedGraph` takes all other messages."""
         if not isinstance(heard.message, d.ChargingAssignments):
             return
         for one in heard.message.assignments:
@@ -96,7 +96,8 @@ class Board:
                 self._places[who] = place
 
     def unsettled(self, now: float) -> set[Device]:
-        """Return kind and name of devices just heard, whose daemons may still report a simulation."""
+        """Return kind and name of the devices whose daemons may still report a simulation, because they
+        were just heard."""
         return {
             (one.kind, words.printable(one.id))
             for one in self._graph.stated()
@@ -187,7 +188,7 @@ class Board:
         daemon = self._daemon(diagnosis, now)
         simulated = (
             daemon.value("simulated") == "yes" if daemon else False
-        )  # a fault hides the word
+        )  # a fault replaces the message
         return daemon is not None and (simulated or SIMULATED in daemon.message)
 
 
@@ -197,12 +198,12 @@ def _said(device: AnyDevice, now: float) -> list[Diagnosis]:
 
 
 def _waiting(said: Diagnosis) -> str:
-    """Name the waiting robots and the reason: `fleet/b (12 s): for END of fleet/a`."""
+    """Return the waiting robots and the reason, such as `fleet/b (12 s): for END of fleet/a`."""
     return ": ".join(filter(None, (said.value("waiting"), said.value("waits"))))
 
 
 def _coordinates(diagnosis: Diagnosis) -> str:
-    """Describe the coordinator's work and schedule."""
+    """Describe the coordinator's present task and schedule."""
     silent = diagnosis.value("assigns").startswith("no:")
     does = "requests chargers that another node assigns" if silent else "assigns chargers"
     schedule = diagnosis.value("schedule")
@@ -239,7 +240,8 @@ def _mark(device: AnyDevice, now: float) -> str:
 
 
 def table(rows: Iterable[BoardRow]) -> list[str]:
-    """Format the rows in columns under headings; queues, marks and faults only if needed."""
+    """Format the rows in columns under headings. Columns for queues, marks and faults appear only if
+    needed."""
     shown = [row.cells() for row in rows]
     if not shown:
         return ["nothing heard yet"]
@@ -276,8 +278,9 @@ def json_line(row: BoardRow, wall: float) -> str:
 def repaint(
     rows: list[BoardRow], lines_before: int, columns: int, lines: int, *, coloured: bool = True
 ) -> tuple[str, int]:
-    """Return the text that redraws a terminal showing `lines_before` lines of the table, and the new
-    number of lines. No line wraps and nothing scrolls away.
+    """Return the text that redraws the table on a terminal, and the new number of lines.
+
+    The terminal shows `lines_before` lines of the table now. No line wraps and nothing scrolls away.
     """
     shown = list(fitting(rows, columns - 1))
     if len(shown) >= lines:
@@ -290,8 +293,8 @@ def repaint(
 
 
 def fitting(rows: list[BoardRow], columns: int) -> Iterator[tuple[str, bool]]:
-    """Return each line of the table, and whether it needs attention. If a line is too long for the
-    terminal, marks and faults follow on lines of their own."""
+    """Yield each line of the table, and whether the line needs attention. If a line is too long for the
+    terminal, its marks and faults follow on separate lines."""
     heading, *lines = table(rows)
     wide = any(width(line) > columns for line in (heading, *lines))
     if wide and rows:

@@ -1,8 +1,8 @@
 """Decide when `send` publishes, when it ends, and what it prints if the request has no effect.
 
-Pure: `step(request, seen, now)`. A request is repeated at 1 Hz until its effect is seen, as in RMF.
-Only a state heard after the first request counts, because an earlier state may show the same for
-another reason. `requests/` has each request's message and the condition that fulfils it.
+`step(request, seen, now)` is pure. `send` repeats a request at 1 Hz until its effect is seen, as RMF
+does. Only a state heard after the first request counts, because an earlier state may show the same for
+another reason. `requests/` has each request's message and the condition that fulfils the request.
 """
 
 from collections.abc import Iterable
@@ -15,15 +15,18 @@ from workbench.graph.requests import Failed, Fulfilled, Obstacle, Request, Reque
 
 REPEAT_S: Final = 1.0
 PATIENCE_S: Final = 2.0
-"""States come at 1 Hz. After two seconds of silence a request is sent nevertheless."""
+"""Silence (s) of the device after which a request is sent nevertheless. States come at 1 Hz."""
 HINT_AFTER_S: Final = 3.0
-"""A starting node needs a second or two to find other nodes. Then `send` prints what is missing."""
+"""Time (s) after which `send` prints what is missing. A starting node needs a second or two to find
+other nodes."""
 
 
 @dataclass(frozen=True, slots=True)
 class SendStep:
-    """The next step: a request to send now, a hint to print once, or the outcome. `direct`: the request
-    goes to the device's own daemon."""
+    """The next step: a request to send now, a hint to print once, or the outcome.
+
+    `direct`: the request goes to the device's own daemon instead of the supervisor.
+    """
 
     send: words.Requested | None = None
     hint: str = ""
@@ -82,14 +85,14 @@ def _reason(request: Request, seen: RequestProgress, now: float) -> str:
 
 
 def _missed(request: Request, seen: RequestProgress) -> Obstacle | None:
-    """Name the party missing on the graph: the request's receiver, or the device."""
+    """Return who is missing on the graph: the request's receiver, or the device."""
     if seen.first_sent_at is None and seen.listeners == 0:
         return request.nobody(seen)
     return None if seen.states else request.unheard(seen)
 
 
 def _given_up(more: str, seen: RequestProgress) -> str:
-    """End a wait; its reason was printed when it began."""
+    """Return the text of a timeout. The hint before has already given the reason."""
     return f"gave up after {seen.timeout_s:g} s{more}"
 
 

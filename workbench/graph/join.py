@@ -1,4 +1,4 @@
-"""The common part of the commands on a graph: options, joining, durations, ending."""
+"""The part that all commands on a graph share: options, joining, durations, ending."""
 
 import argparse
 import ipaddress
@@ -49,7 +49,7 @@ def _domain(text: str) -> int:
 
 
 def seconds(least: float, most: float) -> Callable[[str], float]:
-    """Return an argparse reader for an option in seconds."""
+    """Return a function that parses an option in seconds, from `least` to `most`."""
 
     def read(text: str) -> float:
         with suppress(ValueError):
@@ -84,7 +84,7 @@ def open_graph(args: argparse.Namespace, node_name: str) -> Transport:
 
 
 class Renamed:
-    """A transport with the site's topic names (`rmf.topics` of a YAML).
+    """A transport that uses the site's topic names (`rmf.topics` of a YAML).
 
     `names`: RMF's topic name -> the site's.
     """
@@ -98,18 +98,18 @@ class Renamed:
         self._names = names
 
     def publisher(self, topic: Topic[M]) -> Publisher[M]:
-        """Declare a publisher under the site's name."""
+        """Declare a publisher under the site's topic name."""
         return self._transport.publisher(self._named(topic))
 
     def subscribe(
         self, topic: Topic[M], received: Callable[[M], None], *, others_only: bool = False
     ) -> Subscription:
-        """Declare a subscription under the site's name."""
+        """Declare a subscription under the site's topic name."""
         return self._transport.subscribe(self._named(topic), received, others_only=others_only)
 
     @property
     def release(self) -> Release:
-        """Return the release of RMF's messages in use."""
+        """Release of RMF's messages in use."""
         return self._transport.release
 
     def faults(self) -> list[tuple[str, str]]:
@@ -118,7 +118,7 @@ class Renamed:
 
     @property
     def lives(self) -> bool:
-        """Does the transport's thread run?"""
+        """Is the transport's thread alive?"""
         return self._transport.lives
 
     def _named(self, topic: Topic[M]) -> Topic[M]:
@@ -126,7 +126,7 @@ class Renamed:
 
 
 def graph_of(args: argparse.Namespace, speaks: str) -> str:
-    """Describe the joined graph: `dds in domain 7, on this machine alone`."""
+    """Describe the joined graph, such as `dds in domain 7, on this machine alone`."""
     from bridges.transports.choose import domain_id, stays_on_loopback
 
     rmf = overridden(_configured(args.config), args)
@@ -173,7 +173,7 @@ def complain(command: str, text: object) -> None:
 
 @dataclass(frozen=True, slots=True)
 class CommandLine:
-    """The command line as typed: a proposed command repeats its options, so it can be copied.
+    """The command line as typed. Proposed commands repeat its options, so that a user can copy them.
 
     `typed`: every word after `rmf-bridge`. `options`: the options for another command on the same
     graph.
@@ -187,7 +187,7 @@ class CommandLine:
         return shlex.join(("rmf-bridge", *self.typed, option))
 
     def other(self, *command: str) -> str:
-        """Return another command, on the same graph. Only `send` knows `--direct`."""
+        """Return another command for the same graph. Only `send` accepts `--direct`."""
         options = [one for one in self.options if one != "--direct" or command[0] == "send"]
         return shlex.join(("rmf-bridge", *command, *options))
 

@@ -1,4 +1,4 @@
-"""A live graph as a stream of `Heard`, as recordings give it."""
+"""A live graph as a stream of `Heard`, the form in which recordings are read too."""
 
 import time
 from collections.abc import Iterable
@@ -34,12 +34,13 @@ OF_DEVICES: Final[tuple[AnyTopic, ...]] = (
     topics.INGESTOR_RESULTS,
     topics.DIAGNOSTICS,
 )
-"""The topics about devices. Volatile, so that no retained request passes for a new request."""
+"""Topics about devices. The subscriptions are volatile, so that no retained request looks like a new
+request."""
 
 
 class Ear:
-    """Hears these topics from now on. `others_only`: without this transport's own messages.
-    `ends`: the subscriptions by topic. A ROS machine without the packages of workcells hears none.
+    """Hears these topics from now on. `others_only`: without the messages of this transport itself.
+    `ends`: topic -> subscription. A ROS machine without the packages of workcells hears no workcells.
     """
 
     def __init__(

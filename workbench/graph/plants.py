@@ -1,4 +1,5 @@
-"""Talk to the plants of a running simulation by their control sockets (`hal_fakes/control.py`)."""
+"""Talk to the simulated plants of a running simulation through their control sockets
+(`hal_fakes/control.py`)."""
 
 import argparse
 import json
@@ -26,7 +27,8 @@ def add_simulation(parser: argparse.ArgumentParser) -> None:
 
 
 def names(verb: str) -> Completer:
-    """Complete the names for `press` or `fail` from the running simulation, if there is any."""
+    """Return a completer of the names for `press` or `fail`. The running simulation, if any, lists the
+    names."""
 
     def complete(prefix: str, parsed_args: argparse.Namespace, **_: object) -> list[str]:
         found = set[str]()
@@ -51,7 +53,8 @@ def _folder(args: argparse.Namespace) -> Path:
 
 
 def tell(args: argparse.Namespace, verb: str) -> int:
-    """Print each device's names for `press` or `fail`. Return 0; 69 if no simulation runs."""
+    """Print the names that each device offers to `press` or `fail`. Return 0; 69 if no simulation
+    runs."""
     try:
         answers = [json.loads(ask(path, ["names"])) for path in _sockets(args)]
     except (OSError, ValueError) as error:
@@ -68,7 +71,7 @@ def tell(args: argparse.Namespace, verb: str) -> int:
 def obey(args: argparse.Namespace, verb: str, *words: str) -> int:
     """Send one command and print its effect.
 
-    Return 0; 1 if the plant refuses; 69 without a simulation; 64 for no such device; 78 for a wrong
+    Return 0; 1 if the plant refuses; 64 for an unknown device; 69 without a simulation; 78 for a wrong
     YAML.
     """
     from bridges.settings.load import SettingsError, load

@@ -25,13 +25,14 @@ from workbench.graph.board import BoardRow
 
 RENEWED_S: Final = 60.0
 EXPIRES_S: Final = 180
-"""Three renewals: a device that nobody renews is then gone from the broker too."""
+"""Time (s) until a message expires: three renewals. The broker then drops a device that nobody
+renews."""
 TEXT_MAX: Final = 255
-"""The longest state of an entity in Home Assistant (characters)."""
+"""Maximum length (characters) of an entity's state in Home Assistant."""
 
 
 class Retained(NamedTuple):
-    """One message. `news`: its content without times, whose change is published at once."""
+    """One message. `news`: its content without times. A change of `news` is published immediately."""
 
     topic: str
     payload: str
@@ -39,14 +40,14 @@ class Retained(NamedTuple):
 
 
 class ShownDevice(NamedTuple):
-    """A device with its row."""
+    """A device with its row of `watch`."""
 
     device: AnyDevice
     row: BoardRow
 
 
 class Retainer:
-    """The messages that the broker should hold, and those that it was given.
+    """The messages that the broker should hold, and the messages that the broker already got.
 
     `discovery`: Home Assistant's prefix; None without discovery.
     """
@@ -58,11 +59,11 @@ class Retainer:
 
     @property
     def status(self) -> str:
-        """Return the topic that says whether this publisher lives."""
+        """Topic that says whether this publisher lives."""
         return f"{self._prefix}/status"
 
     def forget(self) -> None:
-        """Publish everything again, because the broker may have lost it."""
+        """Publish everything again, because the broker may have lost the messages."""
         self._held.clear()
 
     def due(self, shown: Iterable[ShownDevice], now: float, wall: float) -> Iterator[Retained]:
@@ -77,7 +78,7 @@ class Retainer:
                 yield message
 
     def given(self, message: Retained, now: float) -> None:
-        """Note that the broker gets this message."""
+        """Note that the broker got this message."""
         if message.payload:
             self._held[message.topic] = message.news, now
         else:
@@ -151,7 +152,7 @@ def _is_lift(device: AnyDevice) -> bool:
 
 
 def _content(state: object) -> dict[str, object]:
-    """Return a state's own fields, in RMF's words."""
+    """Return the fields that only this kind of state has, in RMF's words."""
     match state:
         case d.LiftState():
             return {
@@ -170,7 +171,8 @@ def _content(state: object) -> dict[str, object]:
 
 
 def _identifier(name: str) -> str:
-    """Return a name in the characters of topics and of discovery; no two names become one."""
+    """Return a name in the characters that topics and discovery allow. Different names stay
+    different."""
     return re.sub(
         r"[^A-Za-z0-9-]",
         lambda found: "".join(f"_{byte:02X}" for byte in found[0].encode("utf-8", "surrogatepass")),

@@ -1,8 +1,8 @@
 """Every request that `send` can make: its message, its fulfilment, and its obstacles.
 
-Messages and the conditions that fulfil them are those of RMF's fleet adapters (rmf_ros2 9dedd0f).
-There is one file for each kind of device; this file has the common part. A request's `obstacles` are a
-table, most specific first; the last obstacle always applies.
+The messages and conditions are the same as in RMF's fleet adapters (rmf_ros2 9dedd0f). Each kind of
+device has a file; this file has the common part. A request's `obstacles` are a table, most specific
+first; the last obstacle always applies.
 """
 
 from abc import ABC, abstractmethod
@@ -27,14 +27,17 @@ NEVER_AT: Final = float("-inf")
 
 
 class RequestProgress(Struct, frozen=True):
-    """The events since the command began; times are monotonic s.
+    """The events after the command began. Times are monotonic (s).
 
-    `listeners`: matched subscriptions of the request's topic. `states`: the states that concern the
-    request, in order, the last at `stated_at`. `there`: kind and name of every device heard.
-    `graph`: where we listen, for people. `hinted`: the hints printed. `heartbeat`: the door
-    supervisor's latest, at `heartbeat_at`. `boarded`: is a robot inside, by the lift's diagnostics?
-    "yes" or "no"; "" if not heard. `refusals`: the chargers' refusals after our first request;
-    `results`: the workcells' results.
+    - `listeners`: number of matched subscriptions of the request's topic.
+    - `states`: the states that concern the request, in order. The last came at `stated_at`.
+    - `there`: kind and name of every device heard.
+    - `graph`: where we listen, in words for people.
+    - `hinted`: the hints printed.
+    - `heartbeat`: the door supervisor's latest heartbeat, which came at `heartbeat_at`.
+    - `boarded`: "yes" or "no" from the lift's diagnostics: is a robot inside? "" if not heard.
+    - `refusals`: the chargers' refusals after our first request.
+    - `results`: the workcells' results.
     """
 
     began_at: float
@@ -91,7 +94,8 @@ class RequestProgress(Struct, frozen=True):
         return self.states_of(kind)[-1]
 
     def requesters(self, door: str) -> list[str] | None:
-        """Return the door's holders by a heartbeat after our first request; None before that."""
+        """Return the door's holders from a heartbeat after our first request; None before such a
+        heartbeat."""
         sent_at = self.first_sent_at
         if self.heartbeat is None or sent_at is None or self.heartbeat_at < sent_at:
             return None
@@ -126,7 +130,8 @@ class Obstacle(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Request(ABC):
-    """A request about the device of this `name`, to its daemon if `direct`, else to the supervisor.
+    """A request about the device `name`. It goes to the device's daemon if `direct`, else to the
+    supervisor.
 
     `answers`: topics to hear besides the states.
     """
@@ -144,12 +149,12 @@ class Request(ABC):
 
     @property
     def topic(self) -> AnyTopic:
-        """Return the daemon's own topic, or the fleet adapters' topic."""
+        """Topic of the request: the daemon's own topic if `direct`, else the fleet adapters' topic."""
         return self.own if self.direct or self.adapter is None else self.adapter
 
     @property
     def watched_s(self) -> float:
-        """Return how long the device is watched after the outcome (s)."""
+        """Time (s) to watch the device after the outcome."""
         return 0.0
 
     @abstractmethod
@@ -158,7 +163,7 @@ class Request(ABC):
 
     @abstractmethod
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Return the outcome, if the states show an outcome."""
+        """Return the outcome; None while the states show no outcome."""
 
     @abstractmethod
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
@@ -166,15 +171,15 @@ class Request(ABC):
 
     @property
     def supervisor(self) -> AnyTopic | None:
-        """Return the topic that only a supervisor publishes; None where that is not needed."""
+        """Topic that only a supervisor publishes; None if the request needs no supervisor."""
         return None
 
     def goes_direct(self, seen: RequestProgress, now: float) -> bool:
-        """Is it time to ask the device's own daemon, in place of an idle supervisor?"""
+        """Has the time come to ask the device's own daemon, because the supervisor does nothing?"""
         return False
 
     def about(self, state: words.Stated) -> bool:
-        """Is the state of this device?"""
+        """Does the state come from this device?"""
         return (words.kind(state), words.device(state)) == (self.kind, self.name)
 
     def ready(self, seen: RequestProgress) -> bool:
@@ -214,7 +219,7 @@ class Request(ABC):
         return Obstacle(True, f"no '{self.name}' on {topic}; {self._hears(seen)}")
 
     def _hears(self, seen: RequestProgress) -> str:
-        """Name the heard devices of the kind, else all heard devices, else the graph."""
+        """Name the heard devices of this kind, else all heard devices, else the graph."""
         if names := seen.names(self.kind):
             near = "" if self.name in names else nearest(self.name, names)
             return f"{self.kind}s heard: {', '.join(names)}{near}"
@@ -236,7 +241,7 @@ class Request(ABC):
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """Return `; did you mean 'Lift1'?`, or "" when no name is similar."""
+    """Return a text such as `; did you mean 'Lift1'?`; "" when no name is similar."""
     folded = {n.lower(): n for n in names}
     near = get_close_matches(name.lower(), folded, n=1, cutoff=0.6)
     return f"; did you mean '{folded[near[0]]}'?" if near else ""

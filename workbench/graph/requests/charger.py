@@ -1,4 +1,5 @@
-"""Assign a charger to a robot, and cancel: by the charger's daemon, or by the coordinator's queue."""
+"""Assign a charger to a robot, or cancel the assignment, through the charger's daemon or the
+coordinator's queue."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -27,7 +28,7 @@ class _Charger(Request):
 
 @dataclass(frozen=True, slots=True)
 class RobotCharge(_Charger):
-    """Assign the charger to a robot under our request id."""
+    """Assign the charger to a robot, under a request id of our own."""
 
     fleet: str
     robot: str
@@ -38,15 +39,14 @@ class RobotCharge(_Charger):
     answers: ClassVar[tuple[AnyTopic, ...]] = (topics.CHARGER_REFUSALS,)
 
     def message(self, seen: RequestProgress) -> d.ChargerRequest:
-        """Return the request, always with the same id: a repeat is no new request."""
+        """Return the request. The id is always the same, so a repeat is no new request."""
         charger = "" if self.name == ANY else self.name
         limit = duration(self.start_timeout_s)
         return d.ChargerRequest(charger, self.fleet, self.robot, limit, self.request_id)
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Return Fulfilled once a state with our id shows that the charger serves the robot; Failed
-        after a refusal.
-        """
+        """Return Fulfilled after a state with our id shows that the charger serves the robot; Failed
+        after a refusal."""
         answer = seen.answer(d.ChargerState)
         if answer is None or answer.state not in SERVING or answer.request_id != self.request_id:
             return self._refused(seen)
@@ -96,9 +96,8 @@ class ChargeCancel(_Charger):
         return d.ChargerCancel(self.name, self.request_id)
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Return Fulfilled once the charger is free or shows another id; Failed if it never showed
-        ours.
-        """
+        """Return Fulfilled after the charger shows no id or another id; Failed if the charger never
+        showed our id."""
         answer = seen.answer(d.ChargerState)
         if answer is None or self._holds(answer):
             return None
@@ -122,14 +121,15 @@ COORDINATOR: Final = "charger coordinator"
 
 @dataclass(frozen=True, slots=True)
 class QueuedCharge(RobotCharge):
-    """Request the charger of this `name`, or any charger (ANY), for this robot from the coordinator."""
+    """Request a charger for this robot from the coordinator: the charger `name`, or any charger
+    (ANY)."""
 
     own = topics.ADAPTER_CHARGER_REQUESTS
     listener = COORDINATOR
 
     @property
     def who(self) -> str:
-        """Return the robot as FLEET/ROBOT."""
+        """The robot as FLEET/ROBOT."""
         return f"{self.fleet}/{self.robot}"
 
     def about(self, state: words.Stated) -> bool:
@@ -143,7 +143,7 @@ class QueuedCharge(RobotCharge):
         return bool(seen.names(self.kind))
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Return Fulfilled once a charger serves the robot; Failed if the coordinator refuses."""
+        """Return Fulfilled after a charger serves the robot; Failed if the coordinator refuses."""
         answer = seen.answer(d.ChargerState)
         if answer is None or answer.state not in SERVING:
             return self._refused(seen)
@@ -151,7 +151,8 @@ class QueuedCharge(RobotCharge):
         return Fulfilled(f"{answer.charger_name} is {state} for {self.who}")
 
     def unheard(self, seen: RequestProgress) -> Obstacle:
-        """Explain why no charger shows the robot yet: it waits in the queue, or was refused."""
+        """Explain why no charger shows the robot yet: the robot waits in the queue, or the request was
+        refused."""
         if not seen.names(self.kind):
             return super(QueuedCharge, self).unheard(seen)
         cancel = ("send", "charger", ANY, "--queue", "--cancel", self.request_id)
@@ -181,7 +182,7 @@ class QueuedCancel(ChargeCancel):
         return d.ChargerCancel("", self.request_id)
 
     def about(self, state: words.Stated) -> bool:
-        """Is the state about this request? Never: no state shows a queued request."""
+        """Is the state about this request? Always no, because no state shows a queued request."""
         return False
 
     def ready(self, seen: RequestProgress) -> bool:
@@ -189,7 +190,7 @@ class QueuedCancel(ChargeCancel):
         return bool(seen.names(self.kind))
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | None:
-        """Return Fulfilled once the cancel has been sent."""
+        """Return Fulfilled after the cancel has been sent."""
         if seen.first_sent_at is None:
             return None
         return Fulfilled(f"the {COORDINATOR} was told that request {self.request_id} is withdrawn")

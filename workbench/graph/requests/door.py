@@ -12,8 +12,8 @@ from workbench.graph.requests import Fulfilled, Obstacle, Request, RequestProgre
 class DoorMove(Request):
     """Open or close the door.
 
-    On the adapter topic it also waits for the supervisor's heartbeat, as a fleet adapter does. The
-    heartbeat must list us while we hold the door, and must no longer list us after the release.
+    On the adapter topic the request also waits for the supervisor's heartbeat, as a fleet adapter does.
+    The heartbeat must list us while we hold the door, and must no longer list us after the release.
     """
 
     opened: bool
@@ -26,7 +26,7 @@ class DoorMove(Request):
 
     @property
     def mode(self) -> d.DoorModeValue:
-        """Return the requested mode."""
+        """The requested mode."""
         return d.DoorModeValue.MODE_OPEN if self.opened else d.DoorModeValue.MODE_CLOSED
 
     def message(self, seen: RequestProgress) -> d.DoorRequest:
@@ -38,9 +38,8 @@ class DoorMove(Request):
         )
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | None:
-        """Return Fulfilled once the door has the mode, and the heartbeat (on the adapter topic)
-        agrees.
-        """
+        """Return Fulfilled after the door shows the mode. On the adapter topic the heartbeat must agree
+        too."""
         answer = seen.answer(d.DoorState)
         if answer is None or answer.current_mode.value != self.mode:
             return None
@@ -53,7 +52,7 @@ class DoorMove(Request):
         return requesters is not None and (self.requester in requesters) == self.opened
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the obstacles, judged by the door's mode."""
+        """Return the obstacles that the door's mode shows."""
         mode, name = seen.states_of(d.DoorState)[-1].current_mode.value, self.name
         others = ", ".join(r for r in seen.requesters(name) or [] if r != self.requester)
         return (

@@ -12,9 +12,9 @@ from bridges.observe.lift import HAZARDS, request_lift
 from workbench.graph.requests import Failed, Fulfilled, Obstacle, Request, RequestProgress, nearest
 
 OBEYS_WITHIN_S: Final = 5.0
-"""Time limit (s) for a supervisor's end of a session; it needs a few states."""
+"""Maximum time (s) for a supervisor to end a session, which takes a few states."""
 MOVES_WITHIN_S: Final = 5.0
-"""After an operator's release the lift is watched for this long (s): a person may stand at the car."""
+"""Time (s) to watch the lift after an operator's release, because a person may stand at the car."""
 
 
 class _Lift(Request):
@@ -25,7 +25,7 @@ class _Lift(Request):
 
     @property
     def supervisor(self) -> AnyTopic | None:
-        """Return the lift's topic, on which only supervisors publish."""
+        """The lift's topic, on which only supervisors publish."""
         return None if self.direct else self.own
 
     @property
@@ -52,7 +52,7 @@ class LiftRide(_Lift):
         )
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Return Fulfilled once RequestLift's four fields match; Failed for an unserved floor."""
+        """Return Fulfilled after RequestLift's four fields match; Failed for an unserved floor."""
         states = seen.states_of(d.LiftState)
         served = states[-1].available_floors if states else ()
         if served and self.floor not in served:
@@ -79,7 +79,8 @@ class LiftRide(_Lift):
         return self.granted_only or all(check.met for check in checks)
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the obstacles: session, mode, or a floor or door state not reached."""
+        """Return the obstacles: another session, a mode, or a floor or door state that was not
+        reached."""
         state = seen.states_of(d.LiftState)[-1]
         name, session, mode = self.name, state.session_id, state.current_mode
         word = words.word(d.LiftMode, mode)
@@ -108,8 +109,8 @@ class LiftRide(_Lift):
 class LiftEnd(_Lift):
     """End `session`; "": the session of the first LiftState heard.
 
-    `falls_back`: if the supervisor does not obey within OBEYS_WITHIN_S, the lift's own daemon is asked.
-    If a robot may be inside, the operator must first confirm that the car is empty (`car_empty`).
+    `falls_back`: if the supervisor does not obey within OBEYS_WITHIN_S, ask the lift's own daemon. If a
+    robot may be inside, the operator must first confirm that the car is empty (`car_empty`).
     """
 
     session: str = ""
@@ -121,8 +122,10 @@ class LiftEnd(_Lift):
         return self.session or next(first, "")
 
     def message(self, seen: RequestProgress) -> d.LiftRequest | None:
-        """Return END_SESSION without a floor, as fleets send it. DOOR_OPEN tells our lifts that a
-        person ends the session, which outranks a robot that goes on requesting.
+        """Return END_SESSION without a floor, as fleets send it.
+
+        DOOR_OPEN tells our lifts that a person ends the session. A person outranks a robot that still
+        sends requests.
         """
         session = self._ending(seen)
         if not session:
@@ -135,7 +138,7 @@ class LiftEnd(_Lift):
         )
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | None:
-        """Return Fulfilled once the state shows another session, or no session."""
+        """Return Fulfilled after the state shows another session, or no session."""
         session = self._ending(seen)
         if seen.states and not session:
             return Fulfilled(f"{self.name} has no session: nothing to end")
@@ -150,17 +153,18 @@ class LiftEnd(_Lift):
 
     @property
     def watched_s(self) -> float:
-        """Return how long the lift is watched after the session's end (s)."""
+        """Time (s) to watch the lift after the session's end."""
         return MOVES_WITHIN_S if self.falls_back else 0.0
 
     def goes_direct(self, seen: RequestProgress, now: float) -> bool:
-        """Has the supervisor, if any, had OBEYS_WITHIN_S, and is the car empty?"""
+        """Has the supervisor, if any, had OBEYS_WITHIN_S, and is the car known or confirmed to be
+        empty?"""
         asked_at = seen.began_at if seen.first_sent_at is None else seen.first_sent_at
         late = now >= asked_at + OBEYS_WITHIN_S
         return self.falls_back and not self.direct and late and self._outside(seen)
 
     def nobody(self, seen: RequestProgress) -> Obstacle:
-        """Explain the refusal: even without a supervisor, a robot may be in the car."""
+        """Explain why the request is refused even without a supervisor: a robot may be in the car."""
         found = super(LiftEnd, self).nobody(seen)
         if self.direct or not self.falls_back or not seen.states:
             return found
@@ -172,7 +176,7 @@ class LiftEnd(_Lift):
         return self.car_empty or seen.boarded == "no"
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the obstacles: the session is still shown."""
+        """Return the obstacles: the lift still shows the session."""
         if self.falls_back and not self._outside(seen):
             text = (
                 f"{self.name} still shows the session, and a robot may be in the car: look inside"

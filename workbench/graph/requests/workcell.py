@@ -1,4 +1,4 @@
-"""Ask a dispenser or ingestor for one cycle, as DispenseItem.cpp and IngestItem.cpp do."""
+"""Request one cycle of a dispenser or ingestor, as DispenseItem.cpp and IngestItem.cpp do."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -14,7 +14,8 @@ DECIDE = "its daemon's machine: rmf-bridge status, then rmf-bridge workcell done
 
 @dataclass(frozen=True, slots=True)
 class Dispensing(Request):
-    """Ask for `quantity` items of `type_guid`, "" for no items, until there is a result."""
+    """Request `quantity` items of `type_guid` until a result comes; `type_guid` "" requests no
+    items."""
 
     guid: str
     type_guid: str = ""
@@ -30,13 +31,13 @@ class Dispensing(Request):
     part: ClassVar[type[d.DispenserRequestItem | d.IngestorRequestItem]] = d.DispenserRequestItem
 
     def message(self, seen: RequestProgress) -> words.WorkcellRequested:
-        """Return the request, always with the same guid: a repeat is no new request."""
+        """Return the request. The guid is always the same, so a repeat is no new request."""
         one = self.part(self.type_guid, self.quantity, self.compartment)
         items = (one,) if self.type_guid else ()
         return self.made(d.Time(), self.guid, self.name, self.transporter, items)  # type: ignore[arg-type]
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Return the outcome that a result gives. (RMF also takes an unlisted request for done.)"""
+        """Return the outcome that a result gives. RMF would also count an unlisted request as done."""
         for one in seen.results:
             if (one.source_guid, one.request_guid) == (self.name, self.guid):
                 if one.status == d.WorkcellStatus.SUCCESS:
@@ -46,7 +47,7 @@ class Dispensing(Request):
         return None
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the obstacles, judged by its last state."""
+        """Return the obstacles that the workcell's last state shows."""
         state = seen.states[-1]
         assert isinstance(state, words.WorkcellStated)
         listed = self.guid in state.request_guid_queue
@@ -63,7 +64,7 @@ class Dispensing(Request):
 
 @dataclass(frozen=True, slots=True)
 class Ingesting(Dispensing):
-    """The same for an ingestor."""
+    """Ask an ingestor to take items, by the rules of `Dispensing`."""
 
     kind: ClassVar[str] = "ingestor"
     states: ClassVar[AnyTopic] = topics.INGESTOR_STATES
