@@ -1,5 +1,5 @@
-"""Examples for the keys of the reference: from a shipped file, else the default, else a value of the
-type.
+"""Examples for the keys of the reference. An example comes from a shipped file, else from the default,
+else it is some value of the type.
 
 Shipped files are tested, so these examples stay valid.
 """
@@ -53,7 +53,8 @@ WRITTEN: dict[str, object] = {
     "maps": {"L1": "ground floor"},
     "paths": {"battery": "/robots/$robot/battery"},
 }
-"""Examples for keys missing in shipped files. Each key has the same meaning in every section."""
+"""Examples for keys that shipped files lack. Each of these keys has the same meaning in every
+section."""
 
 Found = dict[tuple[type, str], str]
 
@@ -72,13 +73,15 @@ def example(struct: type, field: mi.Field) -> str:
 
 
 def device_yamls() -> list[Path]:
-    """Return the shipped device YAMLs; `fleet_*.yaml` are configurations of RMF's fleet adapters."""
+    """Return the shipped device YAMLs. Files named `fleet_*.yaml` are left out, because they configure
+    RMF's fleet adapters."""
     return sorted(f for f in CONFIG.glob("*.yaml") if not f.name.startswith("fleet_"))
 
 
 @functools.cache
 def _shipped() -> Found:
-    """Return each field's shortest value in the shipped files other than its default."""
+    """Return the shortest value of each field in the shipped files. Values equal to the default are
+    left out."""
     found: Found = {}
     for file in device_yamls():
         config = load(file)
@@ -136,7 +139,7 @@ def flow(value: object) -> str:
 
 
 def _is_numbered(info: mi.Type) -> bool:
-    """Is this a mapping with numbers as keys?"""
+    """Are the mapping's keys numbers?"""
     if isinstance(info, mi.Metadata):
         return _is_numbered(info.type)
     key = info.key_type if isinstance(info, mi.DictType) else None

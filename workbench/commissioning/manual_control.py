@@ -1,6 +1,5 @@
-"""Controls one device by hand (`walk`, the kill test): its lock, its record, its guard, and outputs
-off.
-"""
+"""Control one device by hand (`walk`, the kill test): take its lock, write its record, start its guard,
+and switch its outputs off."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -71,7 +70,10 @@ class _OtherInputs:
 
 
 def not_off(driver: Driver[Any, Any], insist: Callable[[], None]) -> str:
-    """Switch every output off. Return "", or why that is unverified. `insist`: end the bus's pauses."""
+    """Switch every output off. Return "", or the reason why an output is not verified off.
+
+    `insist`: function that ends the bus's pauses.
+    """
     insist()
     try:
         driver.make_safe()

@@ -1,6 +1,6 @@
-"""Generates the configuration reference from the structs of the YAML, as JSON Schema and as a page.
+"""Generate the configuration reference from the structs of the YAML, as JSON Schema and as a page.
 
-Keys, types, bounds, units, defaults and meanings come from the structs' fields, purposes from the
+Keys, types, bounds, units, defaults and meanings come from the structs' fields. Purposes come from the
 structs' docstrings.
 """
 
@@ -34,7 +34,7 @@ FILE: dict[str, str] = {
     "buses": "name -> a bus, by its `type`.",
     "type": "the sort of a bus, which decides its other keys.",
 }
-"""Meanings of the keys outside the structs."""
+"""Meanings of the keys that no struct has."""
 
 
 class Shape(msgspec.Struct, frozen=True):
@@ -99,8 +99,11 @@ def schema() -> Schema:
 
 
 def _for_editors(component: dict[str, Any]) -> None:
-    """Remove titles, which are class names, and give each nullable key its own description: an
-    editor would show both titles and the struct's description."""
+    """Remove titles, and give each nullable key its own description.
+
+    An editor would show the titles, which are class names. It would also show the struct's description
+    at such a key.
+    """
     component.pop("title")
     for told in component.get("properties", {}).values():
         for part in told.get("anyOf", ()):
@@ -109,14 +112,14 @@ def _for_editors(component: dict[str, Any]) -> None:
 
 
 def _allow_type(components: dict[str, dict[str, dict[str, Schema]]], ref: Schema) -> None:
-    """Add `type:` to a bus: this key is read before the struct and is not a field."""
+    """Add `type:` to a bus. The program reads this key before the struct, so the key is not a field."""
     component = components[str(ref["$ref"]).rsplit("/", 1)[1]]
     component["properties"].setdefault("type", {"type": "string"})
     component["properties"]["type"]["description"] = FILE["type"]
 
 
 def _key(name: str, schema: Schema) -> Schema:
-    """Return the schema of a key outside the structs."""
+    """Return the schema of a key that no struct has."""
     return {name: {"description": FILE[name], **schema}}
 
 
@@ -158,7 +161,7 @@ def _file(shape: Shape, buses: dict[str, type], by_type: dict[type, Schema]) -> 
 
 
 def _named_by_device(driver: Shape, of_file: Shape) -> Schema:
-    """Require each device to name its driver, unless the file's driver serves."""
+    """Require each device to name its driver, except a device that uses the file's driver."""
     required = [] if driver == of_file else ["driver"]
     return {"required": required, "properties": _key("driver", {"const": driver.driver})}
 
@@ -178,7 +181,7 @@ def _graph_file(kind: AnyGraphKind, by_type: dict[type, Schema]) -> Schema:
 
 
 def page() -> str:
-    """Return docs/reference/configuration.md, with structs of several sections at the end."""
+    """Return docs/reference/configuration.md. Structs that several sections share come at the end."""
     rows = [f"| `{key}` | {told} |" for key, told in FILE.items()]
     sections = [
         "# Configuration reference",
@@ -215,7 +218,7 @@ def _keys_of(same: list[Shape]) -> str:
 
 
 def _tops() -> Headings:
-    """Return a file's sections and their headings; structs common to several come first."""
+    """Return a file's sections and their headings. Structs that several sections share come first."""
     found: Headings = {Rmf: "## `rmf`", RecordingSettings: "## `recording`"}
     for name in named.bus_types():
         found[named.bus_called(name).settings] = f"## Bus of `type: {name}`"
@@ -252,7 +255,7 @@ def _headings(tops: Headings) -> Headings:
     everywhere = [struct for top in tops for struct, _ in _inside(top, ())]
     heirs = Counter(base for struct in {*tops, *everywhere} for base in _bases(struct))
     shared = (base for base, many in heirs.items() if many > 1 and len(_fields(base)) > 1)
-    printed = {*tops, *everywhere, *shared}  # heirs print the only key of a base
+    printed = {*tops, *everywhere, *shared}  # a base with a single key is printed by its heirs
     inside = {top: list(_inside(top, printed)) for top in tops}
     tops_of = Counter(struct for found in inside.values() for struct in {s for s, _ in found})
     ordered: Headings = {}
@@ -266,7 +269,8 @@ def _headings(tops: Headings) -> Headings:
 
 
 def _inside(top: type, printed: Container[type]) -> Iterator[tuple[type, str]]:
-    """Return the structs inside a struct and their relative paths, without those of printed bases."""
+    """Yield the structs inside a struct, each with its relative path. Structs of printed bases are left
+    out."""
     todo, seen = [(top, "")], {top}
     while todo:
         struct, path = todo.pop(0)
@@ -290,7 +294,7 @@ def _fields(struct: type) -> tuple[mi.Field, ...]:
 
 
 def _own(struct: type, printed: Container[type]) -> list[mi.Field]:
-    """Return the fields that are new or differ from the nearest printed base."""
+    """Return the fields that the nearest printed base lacks or defines otherwise."""
     base = _printed_base(struct, printed)
     known = _fields(base) if base else ()
     return [field for field in _fields(struct) if field not in known]

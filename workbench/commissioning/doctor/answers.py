@@ -1,8 +1,8 @@
-"""Find devices on a file's buses: read each device of the file once, then scan a bounded range for
+"""Find devices on a file's buses: read each device of the file once, then scan a limited range for
 other devices.
 
 Nothing is written. Drivers are read but never opened, because opening claims outputs and may switch
-them off. The modules' watchdogs are removed from the settings, so no driver arms one.
+them off. The doctor removes the modules' watchdogs from the settings, so no driver arms a watchdog.
 """
 
 import re
@@ -21,12 +21,12 @@ from workbench.commissioning.doctor.finding import Finding, note, ok, warning, w
 
 TRIES: Final = 3
 HEARD_S: Final = 1.5
-"""Slow broadcasts come once a second."""
+"""Time (s) to listen on CAN and MQTT. Slow stations send once a second."""
 ANSWERS_S: Final = 0.5
-"""Devices on MQTT take so long to answer a question."""
+"""Maximum time (s) for a device on MQTT to answer a question."""
 TOPICS_SHOWN: Final = 40
 UNITS_MOST: Final = {"modbus": 247, "can": 127}
-"""Modbus over Serial Line V1.02, 2.2; CiA 301."""
+"""Highest unit or node number (Modbus over Serial Line V1.02, 2.2; CiA 301)."""
 SOME: Final = 16
 LOOK_AT: Final = {
     "modbus": 'supply and cable; docs/how-to/wire.md, "RS-485"',
@@ -36,9 +36,10 @@ LOOK_AT: Final = {
 }
 TEXTS: Final = "docs/how-to/troubleshoot.md"
 NO_PATH: Final = (10, 11)
-"""Exceptions of a gateway whose unit is silent (Modbus Application Protocol V1.1b3, section 7)."""
+"""Exception codes of a gateway whose unit is silent (Modbus Application Protocol V1.1b3, section 7)."""
 DEVICE_TYPE: Final = (0x1000, 0, 4)
-"""The object that every CANopen node has: its device type (CiA 301, 7.5.2.1)."""
+"""Index, subindex and size (bytes) of the device type, which every CANopen node has (CiA 301,
+7.5.2.1)."""
 
 
 def answers(config: Config, bus_name: str, whole: bool) -> Iterator[Finding]:
@@ -61,7 +62,7 @@ def _opened(config: Config, bus_name: str) -> Bus:
 
 
 def unarmed(settings: msgspec.Struct) -> msgspec.Struct:
-    """Return a bus's settings without the modules' watchdogs, which a reading would arm."""
+    """Return a bus's settings without the modules' watchdogs, because a reading would arm them."""
     if getattr(settings, "module_watchdog", None) is None:
         return settings
     return msgspec.structs.replace(settings, module_watchdog=None)
@@ -95,7 +96,7 @@ def _reading(config: Config, bus_name: str, name: str, bus: Any) -> Callable[[],
 
 
 def _read(read: Callable[[], Any], bus: Bus) -> Any:
-    """Read; if a sleeping line answers late, read several times. Raises DriverError."""
+    """Read. Try several times, because a sleeping line answers late. Raises DriverError."""
     for _ in range(TRIES - 1):
         bus.insist()
         try:
@@ -107,7 +108,7 @@ def _read(read: Callable[[], Any], bus: Bus) -> Any:
 
 
 def _listened(bus: Any, listen_s: float = HEARD_S) -> None:
-    """On CAN and MQTT, receive for a while. Faults of the bus show in the readings."""
+    """Receive for `listen_s` (s) on CAN and MQTT. The readings show faults of the bus."""
     if not hasattr(bus, "wait"):
         return
     try:
@@ -139,7 +140,7 @@ def _modbus(config: Config, bus_name: str, bus: Any, whole: bool) -> Iterator[Fi
 
 
 def _can(config: Config, bus_name: str, bus: Any, whole: bool) -> Iterator[Finding]:
-    """Ask CANopen nodes for their device type; listen to other stations."""
+    """Ask CANopen nodes for their device type, and listen to other stations."""
     from drivers.hal.can.canopen import Aborted, CanOpenNode
     from drivers.hal.can.frames import named
 
@@ -164,7 +165,8 @@ def _can(config: Config, bus_name: str, bus: Any, whole: bool) -> Iterator[Findi
 
 
 def _mqtt(config: Config, bus_name: str, bus: Any, whole: bool) -> Iterator[Finding]:
-    """List the topics that there are, for `--scan` only: our user may not be allowed to read them."""
+    """List the topics of the broker, only with `--scan`, because our user may not be allowed to read
+    them."""
     if not whole:
         return
     subject, ours = f"bus {bus_name}", set(bus.topics())
@@ -229,7 +231,7 @@ def numbers(config: Config, bus_name: str, what: str) -> Iterator[int]:
 
 
 def ranges(numbers: Iterable[int]) -> str:
-    """Format numbers as `1, 3 to 16`."""
+    """Format numbers as ranges, such as `1, 3 to 16`."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and runs[-1][-1] == number - 1:

@@ -1,4 +1,5 @@
-"""The kernel's CAN interfaces (SocketCAN): present, up, at the right bitrate, and able to recover."""
+"""Examine the kernel's CAN interfaces (SocketCAN): present, up, at the right bitrate, and able to
+recover."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -10,14 +11,14 @@ from workbench.commissioning.doctor.machine import Machine
 
 CAN: Final = "can"
 ARPHRD_CAN: Final = "280"
-"""linux/if_arp.h."""
+"""Number of a CAN interface's type (linux/if_arp.h)."""
 IFF_UP: Final = 1
 DEAF: Final = "no station on this bus is heard"
 HOW: Final = 'docs/how-to/wire.md, "CAN": sudo ip link set {} up type can bitrate {} restart-ms 100'
 
 
 def interface(machine: Machine, name: str, bitrate: int | None) -> Iterator[Finding]:
-    """Examine `can`. `bitrate`: the stations' bit/s; None if each site chooses a bitrate."""
+    """Examine `can`. `bitrate`: bit/s of the stations; None if each site chooses its bitrate."""
     rate = str(bitrate or "250000")
     folder = f"/sys/class/net/{name}"
     if not machine.at(folder).is_dir():
@@ -52,7 +53,7 @@ class _Timing(msgspec.Struct, frozen=True):
 
 
 class Controller(msgspec.Struct, frozen=True):
-    """A controller as `ip -details` reports it."""
+    """State of a CAN controller, from `ip -details`."""
 
     state: str = "?"
     bittiming: _Timing = _Timing()

@@ -9,18 +9,18 @@ from typing import Final
 from workbench.commissioning.doctor.machine import Machine
 
 CHIP_INFO: Final = 0x8044B401
-"""GPIO_GET_CHIPINFO_IOCTL: name, label and number of lines."""
+"""Request GPIO_GET_CHIPINFO_IOCTL: name, label and number of lines."""
 CHIP: Final = struct.Struct("=32s32sI")
 LINE_INFO: Final = 0xC100B405
-"""GPIO_V2_GET_LINEINFO_IOCTL: name, consumer, offset, attributes, flags."""
+"""Request GPIO_V2_GET_LINEINFO_IOCTL: name, consumer, offset, attributes, flags."""
 LINE: Final = struct.Struct("=32s32sIIQ176x")
 USED, OUTPUT = 1, 8
-"""GPIO_V2_LINE_FLAG_USED and _OUTPUT."""
+"""Flags GPIO_V2_LINE_FLAG_USED and GPIO_V2_LINE_FLAG_OUTPUT."""
 
 
 @dataclass(frozen=True, slots=True)
 class Chip:
-    """One chip: its device, its label, and how many lines it has."""
+    """One chip: its device, its label, and its number of lines."""
 
     device: Path
     label: str
@@ -28,13 +28,13 @@ class Chip:
 
     @property
     def number(self) -> int:
-        """The N in gpiochipN."""
+        """Number N in gpiochipN."""
         return int(self.device.name.removeprefix("gpiochip"))
 
 
 @dataclass(frozen=True, slots=True)
 class LineNow:
-    """The present state of a line. `consumer`: its holder as the kernel names it; "" if free."""
+    """Present state of a line. `consumer`: the holder's name in the kernel; "" if the line is free."""
 
     consumer: str
     output: bool
@@ -47,7 +47,7 @@ def devices(machine: Machine) -> list[Path]:
 
 
 def chips(machine: Machine) -> Iterator[Chip]:
-    """Return the chips that this process may open."""
+    """Yield the chips that this process may open."""
     for device in devices(machine):
         try:
             answer = machine.ioctl(device, CHIP_INFO, bytes(CHIP.size))

@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from bridges.settings.building_map import BuildingMap
 
 XNERGY_BITRATE: Final = 250_000
-"""The maker's default for receivers on CANopen, in bit/s (`drivers/charger/canopen.py`)."""
+"""Default bitrate (bit/s) of the maker's receivers on CANopen (`drivers/charger/canopen.py`)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """The command line's choices. `kill_test`: device and output; None without the test.
+    """Choices of the command line. `kill_test`: device and output; None without the test.
 
-    `whole_scan`: every unit or node of a bus. `listen_s`: how long to listen to RMF's graph; 0: not
-    at all. `line`: the command line, with the options of that graph.
+    `whole_scan`: scan every unit or node of a bus. `listen_s`: time (s) to listen to RMF's graph; 0: do
+    not join. `line`: the command line, with the options of that graph.
     """
 
     runtime_dir: str | None = None
@@ -77,7 +77,7 @@ def examined(
 
 
 def _file(config: Config, building: "BuildingMap | None") -> Iterator[Finding]:
-    """Examine `file`: the result of `check`, in short."""
+    """Examine `file`: report the result of `check`, in short."""
     yield ok("file", f"{config.path} is a valid file of a {config.kind}")
     for problem in config.warnings:
         yield note("file", str(problem), "legal, and worth a look", "rmf-bridge check FILE")
@@ -124,7 +124,7 @@ def _gpio(
 def _answering(
     config: Config, places: Directories, now: ServingDaemon, options: Options
 ) -> Iterator[Finding]:
-    """Read the devices while no other process can open the buses."""
+    """Read the devices, if no other process uses the buses."""
     names = [name for name, kind in config.bus_types.items() if kind != "gpio"]
     if now.busy or not names:
         return
@@ -157,15 +157,15 @@ def _killed(
     assert options.kill_test is not None
     device, output = options.kill_test
     step = step_called(config, device, output)
-    assert step is not None  # without a step the command has ended
+    assert step is not None  # the command has already refused an unknown step
 
     def still_driven() -> bool | None:
-        """On GPIO: is one of the device's lines still an output?"""
+        """Is one of the device's GPIO lines still an output?"""
         bus = config.bus_of(device)
         if config.bus_types[bus] != "gpio":
             return None
         chip = gpio.header(machine, config.buses[bus].chip)
-        assert chip is not None  # without a chip no output was switched on
+        assert chip is not None  # without a chip no output could have been switched on
         outputs = [wire for wire in config.wires(device) if wire.direction == "out"]
         return any(line(machine, chip, _bcm(wire.point)).output for wire in outputs)
 

@@ -6,7 +6,8 @@ from typing import Final, Literal
 import msgspec
 
 Level = Literal["ok", "note", "unknown", "warning", "wrong"]
-"""`note`: worth knowing; needs no action. `unknown`: the fact cannot be seen from here."""
+"""Severity of a finding. `note`: worth knowing, without a need to act. `unknown`: this machine cannot
+show the fact."""
 WELL, WARNINGS, WRONG = 0, 1, 2
 EXIT_CODE: Final = {
     "ok": WELL,
@@ -38,7 +39,7 @@ def note(subject: str, found: str, means: str = "", do: str = "") -> Finding:
 
 
 def unknown(subject: str, found: str, means: str = "", do: str = "") -> Finding:
-    """Make a finding about a fact that cannot be seen from here."""
+    """Make a finding about a fact that this machine cannot show."""
     return Finding(subject, "unknown", found, means, do)
 
 

@@ -1,6 +1,5 @@
-"""The form for an afternoon with real hardware (docs/how-to/hardware.md): machine and findings are
-filled in; a person fills in the other cells.
-"""
+"""The form for an afternoon with real hardware (docs/how-to/hardware.md). `doctor` fills in the machine
+and the findings; a person fills in the other cells."""
 
 import platform
 import time
@@ -19,7 +18,8 @@ ALL: Final = frozenset({"gpio", "modbus", "http", "can"})
 
 
 class FormStep(msgspec.Struct, frozen=True):
-    """One step of docs/how-to/hardware.md. `buses`: the buses concerned. `seen`: the expected sight."""
+    """One step of docs/how-to/hardware.md. `buses`: the buses that need the step. `seen`: the result
+    that a person should see."""
 
     number: str
     buses: frozenset[str]

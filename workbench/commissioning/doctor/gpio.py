@@ -1,4 +1,5 @@
-"""The 40-pin header: its chip, its lines' holders, its outputs at boot and after the daemon dies."""
+"""Examine the 40-pin header: its chip, the holders of its lines, and its outputs at boot and after a
+daemon's death."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -21,7 +22,7 @@ BOARDS: Final = {
     "pinctrl-bcm2711": "a Raspberry Pi 4",
     "pinctrl-rp1": "a Raspberry Pi 5",
 }
-"""Labels of the header's chip in Raspberry Pi's kernels."""
+"""Labels that Raspberry Pi's kernels give to the header's chip."""
 HEADER_LABEL: Final = "pinctrl-"
 CONFIGS: Final = ("/boot/firmware/config.txt", "/boot/config.txt")
 PERSIST: Final = (
@@ -58,7 +59,7 @@ def gpio(machine: Machine, chip: int | None, who: User) -> Iterator[Finding]:
 
 
 def header(machine: Machine, chip: int | None) -> Chip | None:
-    """Return the daemon's chip: the chip of the YAML, or else the chip with the header's label."""
+    """Return the daemon's chip: the chip that the YAML names, else the chip with the header's label."""
     for one in chips(machine):
         if one.number == chip or (chip is None and one.label.startswith(HEADER_LABEL)):
             return one
@@ -90,7 +91,7 @@ def _permission(machine: Machine, chip: Chip, who: User) -> Finding:
 
 
 def lines(machine: Machine, chip: Chip, wires: Iterable[Wire]) -> Iterator[Finding]:
-    """Find other programs that hold these pins, while no daemon runs."""
+    """Find other programs that hold these pins. Call only while no daemon runs."""
     free = True
     for wire in wires:
         try:
@@ -112,7 +113,7 @@ def lines(machine: Machine, chip: Chip, wires: Iterable[Wire]) -> Iterator[Findi
 
 
 def boot(machine: Machine, wires: Iterable[Wire], accepted: Mapping[str, str]) -> Iterator[Finding]:
-    """Examine `gpio at boot`: find relays that are on from power-on until the daemon starts."""
+    """Examine `gpio at boot`: find relays that are on between power-on and the daemon's start."""
     firmware, off = _firmware(machine), list[str]()
     for wire in (wire for wire in wires if wire.direction == "out"):
         level = firmware.get(_offset(wire))
@@ -136,7 +137,8 @@ def _safe_line(wire: Wire) -> str:
 
 
 def _firmware(machine: Machine) -> dict[int, bool]:
-    """Return BCM number -> level driven by `gpio=18=op,dl` in config.txt; True is high."""
+    """Return BCM number -> level that config.txt drives with lines such as `gpio=18=op,dl`; True is
+    high."""
     levels: dict[int, bool] = {}
     for text in filter(None, map(machine.text, CONFIGS)):
         for pins, options in re.findall(r"^\s*gpio=([0-9,-]+)=(\S+)", text, re.MULTILINE):
@@ -157,7 +159,7 @@ def _pins(text: str) -> Iterator[int]:
 
 
 def death(machine: Machine) -> Iterator[Finding]:
-    """Examine `gpio after a death`: does the kernel still drive an output after its holder's death?"""
+    """Examine `gpio after a death`: does the kernel still drive an output after its holder died?"""
     said = next(filter(None, map(machine.text, PERSIST)), "")
     strict = any(
         re.search(r"^\s*dtparam=.*\bstrict_gpiod\b", machine.text(path) or "", re.MULTILINE)

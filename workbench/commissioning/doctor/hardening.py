@@ -1,6 +1,7 @@
-"""The points of docs/how-to/harden.md, judged by the facts that this machine shows; reads only.
+"""Judge the points of docs/how-to/harden.md by the facts that this machine shows. The doctor only
+reads.
 
-Each subject is a heading of that page. A fact that cannot be seen from here is a finding `unknown`,
+Each subject is a heading of that page. A fact that this machine cannot show is a finding `unknown`,
 neither good nor bad.
 """
 
@@ -30,9 +31,9 @@ OTHERS_READ: Final = stat.S_IRWXG | stat.S_IRWXO
 SECRETS: Final = ("private_key", "password_file", "token_file")
 READABLE: Final = ("ca", "certificate", "ca_file")
 LISTENS: Final = {"tcp": "0A", "udp": "07"}
-"""Protocol -> the state of an open socket without peer, in /proc/net (include/net/tcp_states.h)."""
+"""Protocol -> number in /proc/net of an open socket without peer (include/net/tcp_states.h)."""
 LOOPBACK: Final = re.compile("(0{16}FFFF0000)?[0-9A-F]{6}7F|0{24}01000000")
-"""127.x.x.x and ::1, as x86 and arm write them in /proc/net: the last byte of a word first."""
+"""Pattern of 127.x.x.x and ::1 in /proc/net on x86 and arm: each word begins with its last byte."""
 
 
 def hardening(config: Config, machine: Machine) -> Iterator[Finding]:
@@ -74,7 +75,7 @@ def _graph(rmf: Rmf, machine: Machine, service: dict[str, str] | None) -> Iterat
 
 
 def _speaks(rmf: Rmf, machine: Machine) -> str:
-    """Return the transport; for `auto`, the first that seems to be installed."""
+    """Return the transport. For `auto`, return the first transport that seems to be installed."""
     if rmf.transport != "auto":
         return rmf.transport
     if machine.installed("rclpy") or (rmf.ros_setup and machine.at(rmf.ros_setup).exists()):

@@ -1,4 +1,4 @@
-"""The machine itself: its clock, its watchdog, its disks and the daemon's directories."""
+"""Examine the machine itself: its clock, its watchdog, its disks and the daemon's directories."""
 
 import os
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from workbench.commissioning.doctor.machine import Machine
 from workbench.commissioning.doctor.users import User
 
 FREE_LEAST: Final = 50 << 20
-"""Least free space (bytes); with less, a growing log soon fills the disk."""
+"""Minimum free space (bytes). With less space, a growing log soon fills the disk."""
 
 
 def clock(machine: Machine) -> Iterator[Finding]:
@@ -31,7 +31,7 @@ def clock(machine: Machine) -> Iterator[Finding]:
 
 
 def watchdog(machine: Machine) -> Iterator[Finding]:
-    """Examine `watchdog`: is this machine restarted when its kernel or systemd hangs?"""
+    """Examine `watchdog`: does a watchdog restart this machine when its kernel or systemd hangs?"""
     subject = "watchdog"
     means = "when the kernel hangs, relays stay as they are until somebody cuts the supply"
     if not machine.folder("/dev", "watchdog*"):
@@ -70,7 +70,7 @@ def directories(machine: Machine, places: Directories, who: User) -> Iterator[Fi
 
 
 def disk(what: str, found: os.statvfs_result) -> Finding:
-    """Examine the free space. A disk in memory may be small."""
+    """Examine the free space. A disk in memory may be small without a warning."""
     means = "the device is served nevertheless, but status, log and the record of outputs get lost"
     if found.f_flag & os.ST_RDONLY:
         do = "an overlay or tmpfs for this directory; after errors of an SD card: replace it"
@@ -95,7 +95,7 @@ def existing(folder: Path) -> Path:
 def _is_there(folder: Path) -> bool:
     try:
         return folder.is_dir()
-    except PermissionError:  # this user may not search a parent directory
+    except PermissionError:  # this user may not enter a parent directory
         return False
 
 

@@ -1,9 +1,9 @@
-"""The kill test: does an output go off when the process that holds it on is killed?
+"""The kill test: does an output go off when its holding process is killed?
 
 Another process (`victim.py`) switches one output on as the daemon would, with the daemon's lock, record
-and guard, and is killed with -9. Then the guard must switch the output off and verify it, as systemd's
-ExecStopPost does after a service dies. On GPIO the test also looks, before the guard, whether the line
-is still an output.
+and guard. The test kills this process with -9. Then the guard must switch the output off and verify it,
+as systemd's ExecStopPost does after a service dies. On GPIO the test first looks whether the line is
+still an output; only then does the guard act.
 """
 
 import os
@@ -24,14 +24,14 @@ from workbench.commissioning.walk.core import WalkStep
 KILL_TEST: Final = "kill test"
 STARTS_S: Final = 15.0
 SEEN_S: Final = 1.0
-"""Seconds for which a relay is on before the kill, long enough to be seen."""
+"""Time (s) for which a relay is on before the kill, long enough for a person to see."""
 OFF_WITHIN_S: Final = 15.0
-"""`outputs-off` has 5 s, and may be tried twice."""
+"""Maximum time (s) until the output is off. `outputs-off` takes up to 5 s, and may run twice."""
 LOOK_S: Final = 0.02
 CUT: Final = "cut the relays' supply; then rmf-bridge outputs-off FILE"
 
 StillDriven = Callable[[], bool | None]
-"""Tells whether the kernel still drives the line; None where unknown."""
+"""Function that tells whether the kernel still drives the line; None if unknown."""
 
 
 def kill_test(
@@ -103,7 +103,8 @@ def _started(
 
 
 def _line(victim: "subprocess.Popen[bytes]", within_s: float) -> str:
-    """Return the victim's next line; "" if no line comes in time, or the victim has ended."""
+    """Return the victim's next line; "" if no line comes within `within_s` (s), or the victim has
+    ended."""
     assert victim.stdout
     if not select.select([victim.stdout], [], [], within_s)[0]:
         return ""
@@ -115,7 +116,8 @@ def _ended_early(victim: "subprocess.Popen[bytes]") -> str:
 
 
 def _ended(victim: "subprocess.Popen[bytes]") -> None:
-    """Wait until the victim has ended. A living victim switches off when its input ends."""
+    """Close the victim's input, and wait until the victim has ended. A living victim then switches
+    off."""
     assert victim.stdin
     assert victim.stdout
     victim.stdin.close()
@@ -124,7 +126,8 @@ def _ended(victim: "subprocess.Popen[bytes]") -> None:
 
 
 def _off_after(places: Directories, file: Path, died_at: float) -> float | None:
-    """Return the seconds until `outputs-off` has removed the record, once all is verified off."""
+    """Return the time (s) until `outputs-off` removed the record; None if it did not. It removes the
+    record after it has verified that all is off."""
     pause = threading.Event()
     while (after_s := time.monotonic() - died_at) < OFF_WITHIN_S:
         if not Records(places, file).unreleased():

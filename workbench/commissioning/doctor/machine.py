@@ -1,7 +1,7 @@
 """This machine as the doctor sees it: its files, its commands' output, its devices' answers.
 
 The doctor reaches the machine only through this module. In tests `root` is the directory of a made-up
-machine: scripts in its `usr/bin` are the commands, and `ioctl` answers for its devices.
+machine: scripts in its `usr/bin` are the commands, and `ioctl` answers in place of its devices.
 """
 
 import fcntl
@@ -18,7 +18,8 @@ COMMAND_S: Final = 3.0
 PLACES: Final = ("usr/sbin", "usr/bin", "sbin", "bin")
 TEXT_MAX: Final = 1 << 20
 TIMEX_MAX: Final = 512
-"""Longer than any kernel's struct timex. Zeroes only read the clock's state."""
+"""Size (bytes) greater than any kernel's struct timex. A struct of zeroes only reads the clock's
+state."""
 TIME_ERROR: Final = 5
 
 
@@ -35,7 +36,7 @@ def _installed(package: str) -> bool:
 
 
 def _synchronised() -> bool | None:
-    """Is the kernel's clock synchronised, by adjtimex(2)?"""
+    """Return whether the kernel's clock is synchronised, from adjtimex(2); None if unknown."""
     import ctypes
 
     state: int = ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(TIMEX_MAX))
@@ -44,10 +45,11 @@ def _synchronised() -> bool | None:
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """The doctor's access. `ioctl(device, request, argument)`: the kernel's reply, or OSError.
+    """The doctor's access to the machine.
 
+    `ioctl(device, request, argument)` returns the kernel's reply, or raises OSError.
     `installed(package)`: can this Python import the package? `synchronised()`: is the clock
-    synchronised? None if unknown. `uid`, `gids`: of this process.
+    synchronised? None if unknown. `uid` and `gids` belong to this process.
     """
 
     root: Path = Path("/")
@@ -58,11 +60,11 @@ class Machine:
     gids: frozenset[int] = field(default_factory=lambda: frozenset({os.getegid(), *os.getgroups()}))
 
     def at(self, path: str | Path) -> Path:
-        """Return an absolute path's place below `root`."""
+        """Return where an absolute path lies below `root`."""
         return self.root / str(path).lstrip("/")
 
     def named(self, found: Path) -> str:
-        """Return the absolute path of a place below `root`."""
+        """Return the absolute path that the machine's own programs use for a place below `root`."""
         return f"/{found.relative_to(self.root)}"
 
     def text(self, path: str | Path) -> str | None:

@@ -1,4 +1,4 @@
-"""RMF's graph as this machine sees it: interface, domain, nodes, and message versions.
+"""Examine RMF's graph from this machine: interface, domain, nodes, and message versions.
 
 The doctor joins the graph as `watch` does, for some seconds, and only listens.
 """
@@ -35,14 +35,16 @@ SENDERS: Final = {
     "adapter_door_requests": "RMF's fleet adapters",
     "fleet_states": "RMF's fleet adapters",
 }
-"""Requests need these topics. Other topics may be silent."""
+"""Topics on which requests depend, with their publishers. Other topics may be silent."""
 LIBRARIES: Final = {"dds": "cyclonedds", "zenoh": "eclipse-zenoh"}
 
 
 @dataclass(frozen=True, slots=True)
 class GraphLook:
-    """Settings for examining the graph. `listen_s`: how long to listen. `serving`: is our own daemon on
-    the graph? None if unknown. `watch`: the command that shows this graph.
+    """Settings for examining the graph.
+
+    `listen_s`: time (s) to listen. `serving`: is our own daemon on the graph? None if unknown. `watch`:
+    the command that shows this graph.
     """
 
     localhost: bool
@@ -53,7 +55,7 @@ class GraphLook:
 
     @property
     def alone(self) -> str:
-        """Return the remedy for a silent graph."""
+        """Remedy for a silent graph."""
         return (
             f"docs/how-to/ros.md: domain, multicast, interfaces; {self.watch} shows what is heard"
         )
@@ -118,7 +120,7 @@ def _heard(config: Config, transport: Transport, look: GraphLook) -> Iterator[Fi
 
 
 def _listened(ear: Ear, listen_s: float) -> list[Any]:
-    """Collect every message for this time (s)."""
+    """Return every message that arrives within `listen_s` (s)."""
     until, messages = time.monotonic() + listen_s, list[Any]()
     while (left_s := until - time.monotonic()) > 0:
         messages += [heard.message for heard in ear.listen(left_s)]
@@ -194,7 +196,7 @@ def _installed() -> Iterator[Finding]:
 
 @contextmanager
 def overheard() -> Iterator[list[str]]:
-    """Collect the transports' warnings and errors during the block."""
+    """Yield a list that collects the transports' warnings and errors during the block."""
     said: list[str] = []
     ears = logging.Handler(logging.WARNING)
     ears.emit = lambda record: said.append(record.getMessage())  # type: ignore[method-assign]
@@ -212,4 +214,4 @@ def overheard() -> Iterator[list[str]]:
 
 
 def _ignore(message: object) -> None:
-    """Discard a message: only senders are counted."""
+    """Discard a message, because only senders are counted."""

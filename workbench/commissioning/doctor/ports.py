@@ -1,4 +1,4 @@
-"""Serial ports, of RS-485 lines and of CAN adapters that speak slcan."""
+"""Examine serial ports, which lead to RS-485 lines or to CAN adapters that speak slcan."""
 
 import re
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ DEAF: Final = "nobody on this line is heard"
 
 
 def port(machine: Machine, path: str, who: User, *, served: bool) -> Iterator[Finding]:
-    """Examine `serial port`. `served`: a running daemon of this file has it open."""
+    """Examine `serial port`. `served`: a running daemon of this file has the port open."""
     if not machine.at(path).exists():
         seen = ", ".join(machine.named(one) for one in machine.folder(BY_ID))
         do = (
@@ -52,7 +52,7 @@ def _permission(machine: Machine, path: str, device: str, who: User) -> Finding:
 
 
 def _stable(machine: Machine, path: str, device: str) -> Iterator[Finding]:
-    """Warn of a path that the next boot may give to another adapter."""
+    """Warn of a path that may mean another adapter after the next boot."""
     if not re.match(r"/dev/tty(USB|ACM)", path):
         return
     same = [machine.named(one) for one in machine.folder(BY_ID)]

@@ -1,6 +1,6 @@
-"""A running daemon of this file, and its status, read instead of opening its buses.
+"""Find a running daemon of this file. Read its status instead of opening its buses.
 
-A gateway may take one client only, and two masters on one line spoil each other's frames.
+A gateway may accept only one client, and two masters on one line spoil each other's frames.
 """
 
 from collections.abc import Iterator
@@ -22,10 +22,10 @@ NOT_ASKED: Final = "its buses are not read here, because a controller has only o
 
 @dataclass(frozen=True, slots=True)
 class ServingDaemon:
-    """The daemon's state. `busy`: why its buses must not be opened; "" if they may be opened.
+    """State of the daemon. `busy`: why the doctor must not open its buses; "" if allowed.
 
-    `serving`: does a daemon serve this file? None if unknown. `simulated`: on fake hardware,
-    and on loopback.
+    `serving`: does a daemon serve this file? None if unknown. `simulated`: the daemon runs on fake
+    hardware and on the loopback interface.
     """
 
     findings: list[Finding] = field(default_factory=list)
@@ -35,7 +35,8 @@ class ServingDaemon:
 
 
 def served(places: Directories, file: Path, wall: float) -> ServingDaemon:
-    """Examine `daemon`. `wall`: now (s since the epoch), for the age of the daemon's status."""
+    """Examine `daemon`. `wall`: present time (s since the epoch), for the age of the daemon's
+    status."""
     try:
         held_by = holder.look(places)
     except PermissionError as error:
@@ -97,7 +98,7 @@ def _told(one: DaemonStatus) -> Iterator[Finding]:
 
 
 def _listeners(status: Status) -> Iterator[Finding]:
-    """Check for listeners to the states. Other topics often have no listener."""
+    """Check that some node listens to the states. Other topics often have no listener."""
     for topic, nodes in status.get("heard_by", {}).items():
         if nodes:
             yield ok(DAEMON, f"{topic}: heard by {nodes} node{'s' if nodes > 1 else ''}")

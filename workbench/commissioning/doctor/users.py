@@ -1,7 +1,7 @@
-"""The daemon's user, and that user's access to devices.
+"""Find the daemon's user, and this user's access to devices.
 
-With the unit installed: the service's user, with the groups of its drop-ins; else the present user.
-Users and groups are read from /etc/passwd and /etc/group.
+If the unit is installed, the user is the service's user, with the groups of the service's drop-ins.
+Otherwise it is the present user. Users and groups are read from /etc/passwd and /etc/group.
 """
 
 import os
@@ -28,7 +28,8 @@ class User:
     service: bool
 
     def may(self, found: os.stat_result) -> bool:
-        """May this user read and write there, by the file's mode? Access lists are ignored."""
+        """May this user read and write the file, according to the file's mode? Access lists are
+        ignored."""
         if self.uid == 0:
             return True
         if found.st_uid == self.uid:
@@ -58,7 +59,7 @@ def user(machine: Machine) -> User:
 
 
 def users(machine: Machine) -> Iterator[Finding]:
-    """Examine `user`: does the unit's user exist, with its groups?"""
+    """Examine `user`: do the unit's user and that user's groups exist?"""
     subject = "user"
     if not has_unit(machine):
         name = _name(machine, machine.uid)
@@ -90,7 +91,7 @@ def users(machine: Machine) -> Iterator[Finding]:
 
 
 def join(who: User, group: str) -> str:
-    """Return the remedy that puts this user in a group."""
+    """Return the remedy that adds this user to a group."""
     if who.service:
         return f"sudo rmf-bridge enable FILE: its drop-in gives the service the group {group}"
     return f"sudo usermod -aG {group} {who.name}, then log in again"

@@ -1,7 +1,7 @@
-"""The process that the kill test kills: it switches one output on as the daemon would, and prints `on`.
+"""The process that the kill test kills. It switches one output on as the daemon would, and prints `on`.
 
-`python -m workbench.commissioning.doctor.victim FILE DEVICE STEP RUNTIME_DIR`. The process switches off
-and ends when its input ends or after ON_S, because its parent may have died.
+The command is `python -m workbench.commissioning.doctor.victim FILE DEVICE STEP RUNTIME_DIR`. If the
+parent dies, the process's input ends. The process then switches off and ends, at the latest after ON_S.
 """
 
 import select
@@ -22,7 +22,7 @@ ON_S: Final = 5.0
 
 
 def main(file: Path, device: str, step: str, runtime_dir: str | None) -> int:
-    """Return 0 if the output is verified off."""
+    """Run the victim. Return 0 if the output is verified off."""
     signals.End()
     try:
         config = load(file)
@@ -62,7 +62,8 @@ def step_called(config: Config, device: str, name: str | None) -> WalkStep | Non
 
 
 def _on_for_a_while(driver: Driver[Any, Any], bus: Bus, step: WalkStep | None) -> bool:
-    """Switch on for ON_S, and off again if not killed. True if verified off."""
+    """Switch on for ON_S; then switch off, if the process still lives. Return whether the output is
+    verified off."""
     assert step is not None  # without a step there is no kill test
     try:
         driver.open()

@@ -1,6 +1,6 @@
-"""Draft a commented YAML for `rmf-bridge init`. Pure: answers in, text out.
+"""Draft a commented YAML for `rmf-bridge init`. All functions are pure: answers in, text out.
 
-`points.py` gives each signal a pin or an address of its own.
+`points.py` gives each signal a pin or an address.
 """
 
 import re
@@ -18,7 +18,7 @@ from workbench.commissioning.init.points import FreePoints, points_for
 from workbench.commissioning.reference import meaning
 
 DRIVERS: Final = {"http": "http", "can": "canopen", "gateway": "register"}
-"""The driver for each wiring; `dry_contact` for wirings not listed."""
+"""Wiring -> driver. A wiring that is not listed uses `dry_contact`."""
 WIRINGS: Final = {
     "lift": ("gpio", "modbus", "rs485", "gateway"),
     "door": ("modbus", "rs485", "gpio", "http", "gateway"),
@@ -39,7 +39,7 @@ ADDRESSES: Final = {
     "can": "can0",
     "gateway": "192.168.1.60",
 }
-"""The address offered for each wiring; a GPIO header has no address."""
+"""Wiring -> default address. A GPIO header has no address."""
 HAZARDS: Final = LIFT_INPUTS[:7]
 DOOR_ENDS: Final = {"door_opened": "open", "door_closed": "closed"}
 BOOLEANS: Final = ("y", "n", "yes", "no", "on", "off", "true", "false", "null")
@@ -98,14 +98,15 @@ def draft(answers: DraftAnswers) -> str:
 
 
 def _bus(wiring: str, address: str) -> str:
-    """Return the key in BUSES; a gateway is on a serial line if its address is a device file."""
+    """Return the bus as a key of BUSES. A gateway whose address is a device file is on a serial
+    line."""
     if wiring != "gateway":
         return wiring
     return "rs485" if address.startswith("/") else "modbus"
 
 
 def _lift(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
-    """Return the lines below the name of a lift, on contacts or on a gateway."""
+    """Yield the lines below the name of a lift, on contacts or on a gateway."""
     floors = [quoted(floor) for floor in answers.floors]
     if len(floors) < 2 or len(set(floors)) < len(floors):
         raise Impossible(f"a lift has at least two floors, each name once, not {', '.join(floors)}")
@@ -158,7 +159,7 @@ def _floor_code(answers: DraftAnswers, floors: list[str], points: FreePoints) ->
 
 
 def _door(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
-    """Return the lines below the name of a door, on contacts, an HTTP relay or registers."""
+    """Yield the lines below the name of a door, on contacts, an HTTP relay or registers."""
     if answers.wiring == "http":
         yield from SHELLY.splitlines()
         return
@@ -173,7 +174,7 @@ def _door(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
 
 
 def _charger(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
-    """Return the lines below the name of a charger, on HTTP, CANopen or contacts."""
+    """Yield the lines below the name of a charger, on HTTP, CANopen or contacts."""
     if answers.wiring in ("http", "can"):
         yield from (CHARGER_HTTP if answers.wiring == "http" else CHARGER_CANOPEN).splitlines()
         return
@@ -186,7 +187,7 @@ def _charger(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
 
 
 def _said(struct: type, key: str) -> str:
-    """Return the comment for a key: the beginning of the key's description."""
+    """Return the comment for a key: the first clause of the key's description."""
     return f"# {re.split('[;:.]', meaning(struct, key))[0]}"
 
 

@@ -1,4 +1,4 @@
-"""The answers from which a draft is made."""
+"""The answers for a draft."""
 
 from collections.abc import Mapping
 from typing import Final, Literal
@@ -14,21 +14,24 @@ LIFT_INPUTS: Final = (
     *("fire_alarm", "code_blue", "earthquake", "emergency", "out_of_service", "manual_mode"),
     *("overload", "agv_mode", "door_opened", "door_closed", "stopped"),
 )
-"""The possible inputs of a lift."""
+"""Possible inputs of a lift."""
 OFFERED: Final = ("fire_alarm", "agv_mode", "door_opened", "door_closed", "stopped")
 
 
 class Impossible(Exception):
-    """Contradictory answers. The text gives reason and remedy."""
+    """Error: the answers contradict each other. The text gives reason and remedy."""
 
 
 class DraftAnswers(msgspec.Struct, frozen=True, kw_only=True):
     """The device to be connected, as the integrator describes it.
 
-    `address`: host, serial port or CAN interface; "" for the usual address. `floors`: RMF's names, from
-    below. `signals`: a lift's inputs. `contacts`: the level of a closed contact on the header: high
-    if wired to 3.3 V, low if wired to ground. `relays`: the level that switches relays on. `places`: a
-    gateway's answers, by the names in `gateway.py`.
+    - `address`: host, serial port or CAN interface; "" for the usual address.
+    - `floors`: RMF's names, from the lowest floor up.
+    - `signals`: a lift's inputs.
+    - `contacts`: the level of a closed contact on the header: high if wired to 3.3 V, low if wired to
+      ground.
+    - `relays`: the level that switches relays on.
+    - `places`: a gateway's answers, with the names in `gateway.py`.
     """
 
     kind: Kind

@@ -1,4 +1,5 @@
-"""Draft the map of a lift's gateway or a door's operator, from the answers about its register table."""
+"""Draft the `map:` of a lift's gateway or a door's operator from answers about the device's
+registers."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final
@@ -6,7 +7,7 @@ from typing import Final
 from workbench.commissioning.init.answers import DraftAnswers, Impossible
 
 ABSENT: Final = "none"
-"""The answer for a part that the register table does not have."""
+"""Answer for a value that the device's registers do not have."""
 PLACES: Final = {
     "floor_at": ("the floor number", "input register 0"),
     "door_at": ("the door's number", "input register 1"),
@@ -17,7 +18,7 @@ PLACES: Final = {
     "hold_at": ("the command that holds the door open", "holding register 1"),
     "call_at": ("the number of the called floor", "holding register 2"),
 }
-"""Answer -> the part of the register table, and the place offered."""
+"""Answer -> a value of the device, and the register that is offered by default."""
 DOOR_PLACES: Final = ("door_at", "hold_at")
 OPTIONAL: Final = ("motion_at", "agv_mode_at", "fire_alarm_at", "request_at")
 NUMBERS: Final = {
@@ -25,7 +26,7 @@ NUMBERS: Final = {
     "door_numbers": "closed, moving, open",
     "motion_numbers": "stopped, up, down",
 }
-"""Answer -> the meanings, in the order of the answer's numbers."""
+"""Answer -> the meanings of its numbers, in order."""
 
 
 def questions() -> dict[str, str]:
@@ -40,7 +41,7 @@ def questions() -> dict[str, str]:
 
 
 def lift(answers: DraftAnswers, floors: Sequence[str]) -> Iterator[str]:
-    """Return the lines below the name of a lift on a gateway."""
+    """Yield the lines below the name of a lift on a gateway."""
     codes = _codes(answers, "floor_numbers", floors)
     at = answers.places
     yield f"    unit: {answers.unit}"
@@ -67,7 +68,7 @@ def lift(answers: DraftAnswers, floors: Sequence[str]) -> Iterator[str]:
 
 
 def door(answers: DraftAnswers) -> Iterator[str]:
-    """Return the lines below the name of a door on an operator's registers."""
+    """Yield the lines below the name of a door on an operator's registers."""
     at = answers.places
     closed, moving, opened = _numbers(answers, "door_numbers", 3)
     yield f"    unit: {answers.unit}"
@@ -85,7 +86,8 @@ def _codes(answers: DraftAnswers, name: str, meanings: Sequence[str]) -> str:
 
 
 def _numbers(answers: DraftAnswers, name: str, many: int | None = None) -> list[int]:
-    """Return the answer's numbers. Raises Impossible for other text, or for too few or too many."""
+    """Return the answer's numbers. Raises Impossible for other text, or for too few or too many
+    numbers."""
     told = [part.strip() for part in answers.places[name].split(",")]
     distinct = {int(part) for part in told if part.isascii() and part.isdigit()}
     if len(distinct) < len(told) or (many is not None and len(told) != many):

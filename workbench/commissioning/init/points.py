@@ -1,4 +1,5 @@
-"""Give each signal of a draft the next free pin of the header or address of the module."""
+"""Give each signal of a draft the next free pin of the header, or the next free address of the
+module."""
 
 from collections.abc import Iterator
 from itertools import count
@@ -8,22 +9,25 @@ from workbench.commissioning.init.answers import DraftAnswers, Impossible, Level
 
 REST_LOW: Final = (11, 13, 15, 16, 18, 22, 32, 33, 35, 36, 37, 38, 40, 12)
 REST_HIGH: Final = (7, 29, 31, 26, 24)
-"""Positions on J8 by the level to which the Pi pulls them from power-on until the daemon starts: a
-relay belongs on a pin whose level keeps it off. Source: BCM2835 ARM Peripherals, table 6-31 (BCM0
-to 8 high)."""
+"""Positions on J8 that the Pi pulls high, or low, from power-on until the daemon starts.
+
+A relay belongs on a pin whose level keeps the relay off. Source: BCM2835 ARM Peripherals, table 6-31
+(BCM0 to 8 high).
+"""
 
 
 class FreePoints(Protocol):
-    """The next free points; each method returns the inside of a YAML mapping."""
+    """The next free points. Each method returns the text inside a YAML mapping."""
 
     def contact(self) -> str:
-        """Place a contact that is closed while its signal is on; a cut wire reads off."""
+        """Take a point for a contact that is closed while its signal is on. A cut wire reads off."""
 
     def loop(self) -> str:
-        """Place a contact that is open while its signal is on (an alarm loop); a cut wire reads on."""
+        """Take a point for a contact that is open while its signal is on (an alarm loop). A cut wire
+        reads on."""
 
     def relay(self) -> str:
-        """Place a relay that acts while energised."""
+        """Take a point for a relay that acts while energised."""
 
 
 class PinHeader:
@@ -41,12 +45,12 @@ class PinHeader:
         return f'point: "J8:{self._input()}", active: {self._closed}, pull: {self._pull}'
 
     def loop(self) -> str:
-        """Take the next input pin, on while the contact is open."""
+        """Take the next input pin. The signal is on while the contact is open."""
         opened = "low" if self._closed == "high" else "high"
         return f'point: "J8:{self._input()}", active: {opened}, pull: {self._pull}'
 
     def relay(self) -> str:
-        """Take the next pin whose relay stays off from power-on."""
+        """Take the next pin that keeps its relay off from power-on."""
         return f'point: "J8:{_first(self._outputs)}", active: {self._relays}'
 
     def _input(self) -> int:
@@ -75,7 +79,7 @@ class Module:
         return f'point: "unit {self._unit} discrete input {next(self._inputs)}", active: high'
 
     def loop(self) -> str:
-        """Take the next discrete input, on while it reads 0."""
+        """Take the next discrete input. The signal is on while the input reads 0."""
         return f'point: "unit {self._unit} discrete input {next(self._inputs)}", active: low'
 
     def relay(self) -> str:

@@ -1,6 +1,5 @@
-"""Scan one device for a walk on a thread, so that a slow or dead terminal never delays switching
-off.
-"""
+"""Scan one device for a walk on a separate thread, so that a slow or dead terminal never delays
+switching off."""
 
 import threading
 import time
@@ -41,14 +40,15 @@ class ContactReading:
 
     @property
     def asserted(self) -> bool | None:
-        """Return the level's meaning; None before the first reading."""
+        """Is the signal on? None before the first reading."""
         return None if self.level is None else self.wire.asserted(self.level)
 
 
 class Bench:
-    """A device under test on its tapped bus. `off`: the outputs, all off.
+    """A device under test on its tapped bus. `off`: the value that switches all outputs off.
 
-    Use as a context: at its end every output is switched off. `verified_off`: was that read back?
+    Use the bench as a context manager: at the end it switches every output off. `verified_off`: did a
+    reading confirm that?
     """
 
     def __init__(
@@ -80,12 +80,12 @@ class Bench:
         self._thread.join()
 
     def put(self, event: Event) -> None:
-        """Queue the person's action; from any thread."""
+        """Queue the person's action. May be called from any thread."""
         self._events.append(event)
 
     @property
     def decoded(self) -> str:
-        """Return the driver's decoding of the inputs, in words."""
+        """Return the inputs in words, as the driver decodes them."""
         return "" if self.memory.sample is None else plain(self.memory.sample)
 
     def _run(self) -> None:
@@ -129,7 +129,8 @@ class Bench:
         return InputsRead(sample)
 
     def _make_safe(self) -> bool:
-        """Switch all outputs off. Without outputs to try do nothing, so a charge goes on."""
+        """Switch all outputs off. If there are no outputs to try, do nothing, so that a charge
+        continues."""
         if not self.steps:
             return True
         if why := not_off(self._driver, self._bus.insist):

@@ -1,8 +1,9 @@
-"""Decide when an output of a walk is on and when its effect counts as seen. Pure: time is an argument.
+"""Decide when an output of a walk is on and when its effect counts as seen. All functions are pure:
+time is an argument.
 
-One output is on at a time, for ON_S at most. It goes off at once if a reading fails, grows old, or
-shows that the output must not be on. Feedback may follow late, because a car needs time to move. Inputs
-that were on before the output do not count as feedback.
+Only one output is on at a time, for ON_S at most. The output goes off immediately if a reading fails,
+grows old, or shows that the output must not be on. Feedback may follow late, because a car needs time
+to move. Inputs that were on before the output do not count as feedback.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -12,16 +13,16 @@ from typing import Any, Final
 ON_S: Final = 5.0
 FEEDBACK_S: Final = 120.0
 STALE_S: Final = 1.0
-"""The greatest age (s) of the readings while an output is switched on or stays on."""
+"""Maximum age (s) of the readings while an output is switched on or stays on."""
 
 
 @dataclass(frozen=True, slots=True)
 class WalkStep:
-    """One output to try. `outputs`: the driver's outputs, with this output on. `expects`: the effect to
-    see.
+    """One output to try. `outputs`: the driver's outputs, with this output on. `expects`: the effect
+    that should be seen.
 
-    `seen(sample)`: is the effect there? None if no input shows it. `hindrance(sample)`: why the
-    output must not be on now, "" if it may.
+    `seen(sample)`: is the effect there? None if no input shows it. `hindrance(sample)`: why the output
+    must not be on now; "" if allowed.
     """
 
     name: str
@@ -34,10 +35,13 @@ class WalkStep:
 
 @dataclass(frozen=True, slots=True)
 class WalkMemory:
-    """The memory of a walk. `on`: the step whose output is on. `off_at`: when the output goes off (s).
+    """The memory of a walk.
 
-    `waits`: the step whose feedback may still come, until `waits_until`. `results`: step -> the effect
-    seen. `says`: why the last key had no effect, or why an output went off.
+    - `on`: the step whose output is on.
+    - `off_at`: when the output goes off (s).
+    - `waits`: the step whose feedback may still come, until `waits_until`.
+    - `results`: step -> the effect seen.
+    - `says`: why the last key had no effect, or why an output went off.
     """
 
     sample: Any = None

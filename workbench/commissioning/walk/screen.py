@@ -1,4 +1,4 @@
-"""A walk on a terminal, even a phone's: tables redrawn in place, and keys."""
+"""A walk on a terminal, even on a phone: tables redrawn in place, and keys."""
 
 import os
 import re
@@ -19,7 +19,7 @@ from workbench.commissioning.walk.signed import NOT_TRIED
 
 HELP: Final = "ENTER on/off   n next   p back   y seen   x not seen   q end"
 WIDE: Final = 60
-"""Least number of columns for showing the wires too; a phone has about 40."""
+"""Minimum number of columns for showing the wires too. A phone has about 40 columns."""
 HEADINGS: Final = 2
 BOLD, DIM, ALARM, ON = "1", "2", "1;31", "1;33"
 HIDE_CURSOR, SHOW_CURSOR = "\x1b[?25l", "\x1b[?25h"
@@ -31,7 +31,7 @@ Lines = list[tuple[str, str]]
 
 
 class Screen:
-    """Display and keys. `cursor`: the output that ENTER switches."""
+    """The display and the keys of a walk. `cursor`: the output that ENTER switches."""
 
     def __init__(self, device: str, bench: Bench) -> None:
         self._device = device
@@ -48,7 +48,7 @@ class Screen:
         sys.stdout.flush()
 
     def draw(self, now: float) -> None:
-        """Show everything as it is now (monotonic s)."""
+        """Draw the present state. `now`: monotonic time (s)."""
         plain = not coloured(sys.stdout)
         page = self.page(now, *shutil.get_terminal_size())
         *above, (last, _) = [(text, "" if plain else style) for text, style in page]
@@ -74,7 +74,7 @@ class Screen:
         return True
 
     def page(self, now: float, columns: int, rows: int) -> Lines:
-        """Return the present display, as far as there is room."""
+        """Return the lines of the display, as many as there is room for."""
         memory = self._bench.memory
         age = "not read yet" if memory.read_at is None else f"read {now - memory.read_at:.1f} s ago"
         texts = (
@@ -94,7 +94,7 @@ class Screen:
         return [*title, *inputs, *decoded, *outputs, *(line for part in below for line in part)]
 
     def _selected(self) -> str:
-        """Describe the output at the cursor and its effect seen so far."""
+        """Describe the output at the cursor, and the effect that was seen so far."""
         if not self._bench.steps:
             return "no output can be tried here"
         step = self._bench.steps[self._cursor]
@@ -102,7 +102,7 @@ class Screen:
         return f"{step.name} {step.does}; should be seen: {step.expects}. So far: {seen}"
 
     def _inputs(self, now: float, most: int, columns: int) -> Lines:
-        """List every input; without enough room, the inputs that changed last."""
+        """List every input. If there is too little room, list the inputs that changed last."""
         known = self._bench.inputs
         if not known:
             nothing = "no contacts: registers or messages, decoded"
@@ -120,7 +120,7 @@ class Screen:
         ]
 
     def _outputs(self, now: float, most: int, columns: int) -> Lines:
-        """List every output; without enough room, the outputs around the cursor."""
+        """List every output. If there is too little room, list the outputs around the cursor."""
         memory, steps = self._bench.memory, self._bench.steps
         rows, styles = [("", "output", "is", "seen")], [DIM]
         first = max(0, min(self._cursor - most // 2, len(steps) - most))
@@ -134,18 +134,18 @@ class Screen:
 
 
 class Room(NamedTuple):
-    """The number of rows for inputs and for outputs."""
+    """Number of rows for inputs and for outputs."""
 
     inputs: int
     outputs: int
 
 
 def room(rows: int, inputs: int, outputs: int) -> Room:
-    """Share out the rows: at least three for outputs, then inputs, then more outputs."""
+    """Divide the rows: first at least three for outputs, then the inputs, then more outputs."""
     least = min(outputs, 3)
     if inputs + least <= rows:
         return Room(inputs, min(outputs, rows - inputs))
-    for_inputs = max(1, rows - least - 1)  # one row counts the hidden inputs
+    for_inputs = max(1, rows - least - 1)  # the last row tells how many inputs are hidden
     return Room(for_inputs, least)
 
 
@@ -156,7 +156,7 @@ def _short(result: str) -> str:
 
 
 def _fitted(rows: Sequence[tuple[str, ...]], names: int, columns: int) -> list[str]:
-    """Format the rows as lines; cut the names in this column if lines are too long."""
+    """Format the rows as lines. If lines are too long, cut the names in column `names`."""
     lines = aligned(rows)
     if (over := max(map(width, lines)) - columns) > 0:
         longest = max(width(row[names]) for row in rows)
@@ -181,7 +181,8 @@ def _row(one: ContactReading, now: float) -> tuple[str, ...]:
 
 @contextmanager
 def keyboard() -> Iterator[int]:
-    """Switch the terminal to single keys; restore it at the end."""
+    """Set the terminal to single keys, yield its file descriptor, and restore the terminal at the
+    end."""
     terminal = sys.stdin.fileno()
     before = termios.tcgetattr(terminal)
     tty.setcbreak(terminal)
@@ -192,7 +193,8 @@ def keyboard() -> Iterator[int]:
 
 
 def keys(terminal: int, wait_s: float) -> list[str]:
-    """Return the pressed keys; [] without a key in `wait_s`, "q" if the terminal is gone."""
+    """Return the pressed keys; [] if no key comes within `wait_s` (s); ["q"] if the terminal is
+    gone."""
     if not select.select([terminal], [], [], wait_s)[0]:
         return []
     try:

@@ -1,4 +1,4 @@
-"""The record of a walk: file, tests, results and signature. Markdown and JSON."""
+"""The record of a walk, as Markdown and JSON: file, tests, results and signature."""
 
 import hashlib
 import json
@@ -27,7 +27,8 @@ def record(
     end: str,
     simulated: bool,
 ) -> dict[str, Any]:
-    """Return the record. `at`: start of the walk. `end`: how the walk ended, or that it goes on."""
+    """Return the record. `at`: start of the walk. `end`: how the walk ended, or that the walk
+    continues."""
     return {
         "file": str(file),
         "sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
@@ -58,7 +59,7 @@ def _seen(one: ContactReading) -> str:
 
 
 def markdown(record: dict[str, Any]) -> str:
-    """Format the record for people, with room for the signature below."""
+    """Format the record for people, with room for a signature at the end."""
     practice = " on fake hardware: practice, no commissioning" if record["simulated"] else ""
     lines = [
         f"# Walk of {record['device']}{practice}",

@@ -1,4 +1,5 @@
-"""The outputs that a walk tries for each kind, and the feedback expected on the inputs."""
+"""The outputs that a walk tries for each kind of device, and the feedback that the inputs should
+show."""
 
 from collections.abc import Callable, Collection, Iterator
 from typing import Any, Final
@@ -87,7 +88,7 @@ def _door(settings: object, wired: Wired) -> Iterator[WalkStep]:
 
 def _charger(settings: object, wired: Wired) -> Iterator[WalkStep]:
     if wired is None:
-        return  # without contacts a charge is a request: `rmf-bridge send charger`
+        return  # a charger without contacts is tried with `rmf-bridge send charger`
 
     def at_fault(sample: ChargerSample) -> str:
         return f"the station shows an error {sample.error_text}".rstrip() if _fault(sample) else ""
@@ -126,7 +127,7 @@ KINDS: Final[dict[str, Callable[[Any, Wired], Iterator[WalkStep]]]] = {
     "lift": _lift,
     "door": _door,
     "charger": _charger,
-    "alarm": lambda settings, wired: iter(()),  # a panel is only read
+    "alarm": lambda settings, wired: iter(()),  # an alarm panel has no outputs
     "dispenser": _workcell,
     "ingestor": _workcell,
 }

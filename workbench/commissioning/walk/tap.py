@@ -1,4 +1,5 @@
-"""A bus with a tap: the driver works as usual, and a person can see the levels that it reads."""
+"""A bus with a tap: the driver works as usual, and a person can see the levels that the driver
+reads."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -38,11 +39,11 @@ class Tap:
         self.close = bus.close
 
     def __getattr__(self, name: str) -> Any:
-        """Pass on everything else to the bus."""
+        """Pass all other attributes on to the bus."""
         return getattr(self._bus, name)
 
     def lines(
         self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool], *of_modbus: Any
     ) -> TappedLines:
-        """Return one device's points, whose readings are remembered here."""
+        """Return the lines of one device. The tap remembers their readings."""
         return TappedLines(self._bus.lines(inputs, outputs, *of_modbus), self.levels)
