@@ -1,1 +1,1 @@
-"""Read recordings of every kind, and replay their decisions."""
+"""Read recordings of every format, and replay the decisions in them."""

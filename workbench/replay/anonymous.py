@@ -48,7 +48,7 @@ from workbench.replay.replayed import of_head
 from workbench.replay.sources import TOPICS
 
 SAID: Final = FREE_TEXTS | {"code", "detail", "reason", "code_fault", "errors", "lost", "io_fault"}
-"""Fields whose words are a core's own."""
+"""Fields whose words come from a core itself."""
 NAME: Final = re.compile(r"(?!\d+$)[\w./-]{1,128}")
 ADDRESS: Final = "192.0.2.1"
 HOSTS: Final = ("host", "api_base", "url")
@@ -72,7 +72,7 @@ def anonymous(incident: Incident) -> Incident:
 
 
 def _swap(names: list[str]) -> Swap:
-    """Replace names, whole or inside a text, longest first."""
+    """Return a function that replaces names, whole or inside a text, longest first."""
     if not names:
         return lambda text: text
     width = len(str(len(names)))
@@ -136,7 +136,7 @@ def _subjects(incident: Incident) -> Iterator[str]:
 
 
 def _own_names(config: Config, content: dict[str, Any]) -> Iterator[str]:
-    """Return the YAML's devices and places, or for a kind without hardware every word of the site."""
+    """Yield the YAML's devices and places. For a kind without hardware yield every word of the site."""
     kind = kind_called(config.kind)
     yield from content.get("rmf", {}).get("topics", {}).values()
     if isinstance(kind, GraphKind):
@@ -160,7 +160,7 @@ def _words(value: object) -> Iterator[str]:
 
 @cache
 def our_words() -> frozenset[str]:
-    """Return every key and word that is part of the program, in a YAML or a core."""
+    """Return every key and word of the program itself, in a YAML or in a core."""
     found = {"site", *TOPICS}
     _schema_words(schema(), found)
     for kind in kind_names():
@@ -182,7 +182,7 @@ def _schema_words(part: object, found: set[str]) -> None:
 
 
 def _module_words(module: ModuleType) -> Iterator[str]:
-    """Return the words in a module's types: literals and values of enumerations."""
+    """Yield the words in a module's types: literals and values of enumerations."""
     for kind in vars(module).values():
         if inspect.isclass(kind) and issubclass(kind, enum.Enum):
             yield from (str(member.value) for member in kind)
@@ -258,7 +258,7 @@ def _message(value: Any, swap: Swap) -> Any:
 
 
 def _tree(told: Tree, swap: Swap) -> Tree:
-    """Swap texts, but not the names of types, fields and members."""
+    """Return the tree with its texts replaced, except the names of types, fields and members."""
     if isinstance(told, str):
         return swap(told)
     if isinstance(told, list):

@@ -1,11 +1,11 @@
-"""Read RMF's messages from a recording: ours, rosbag2's of any release (MCAP or sqlite3), or a daemon's
-ring itself.
+"""Read RMF's messages from a recording: our own, rosbag2's of any release (MCAP or sqlite3), or a
+daemon's ring itself.
 
-A recording is read as a stream, in bounded memory. Topics and types that are not RMF's are skipped and
+A recording is read as a stream, in limited memory. Topics and types that are not RMF's are skipped and
 counted. The readable part of a damaged recording is yielded, then the damage is noted.
 
-In our own files `log_time` is by a clock that never steps, and `publish_time` by the wall clock. Other
-recordings have one clock; if that clock steps back, `at` goes on from its last value.
+In our own files `log_time` is from a clock that never steps, and `publish_time` is from the wall clock.
+Other recordings have one clock. If that clock steps back, `at` continues from its last value.
 """
 
 import logging
@@ -30,16 +30,17 @@ log = logging.getLogger(__name__)
 
 NS: Final = 1e-9
 STEPPED_NS: Final = 10**9
-"""The least step back (s) of a clock that was set back; a smaller step is disorder in the recording."""
+"""Minimum step back (ns) that counts as a clock set back. A smaller step is disorder in the
+recording."""
 LONGEST_MESSAGE: Final = 8 << 20
 
 
 Keep = Callable[[str, bytes, float], bool]
-"""Is a sample of this topic, recorded at this time (s), worth decoding?"""
+"""Function that tells whether to decode a sample: topic, sample, and the time of recording (s)."""
 
 
 def heard_in(path: Path, notes: Notes | None = None, keep: Keep | None = None) -> Iterator[Heard]:
-    """Yield all messages of RMF in a recording, as `all_in` does."""
+    """Yield all messages of RMF in a recording; the arguments are those of `all_in`."""
     return (one for one in all_in(path, notes, keep) if isinstance(one, Heard))
 
 
@@ -48,9 +49,9 @@ def all_in(
 ) -> Iterator[Heard | Own]:
     """Yield RMF's messages and our recorder's texts, in the order of recording.
 
-    `path`: an MCAP file, a `.db3` file, a directory of rosbag2, or a ring. Skipped messages
-    and damage go to `notes`; without `notes`, damage is logged. Samples that `keep` refuses stay
-    undecoded, which saves nine tenths of the time. Raises BagError if `path` is no recording.
+    `path`: an MCAP file, a `.db3` file, a directory of rosbag2, or a ring. Skipped messages and damage
+    go to `notes`; without `notes`, damage is logged. Samples that `keep` refuses stay undecoded, which
+    saves nine tenths of the time. Raises BagError if `path` is no recording.
     """
     noted = Notes() if notes is None else notes
     clock = _Clock()
@@ -72,7 +73,7 @@ def all_in(
 
 
 class _Clock:
-    """Time that never runs backwards (ns)."""
+    """Clock that never runs backwards (ns)."""
 
     def __init__(self) -> None:
         self._shift = 0
@@ -92,7 +93,8 @@ def _raw(path: Path, noted: Notes) -> Iterator[Raw]:
 
 
 def _parts(path: Path) -> list[Path]:
-    """Return the files of a recording in order, or the directory itself if it is read as a whole."""
+    """Return the files of a recording in order; or the directory itself, if a library reads it as a
+    whole."""
     try:
         if not path.is_dir():
             return [path]
@@ -110,12 +112,13 @@ def _parts(path: Path) -> list[Path]:
 
 
 def continuous(files: list[Path]) -> list[Path]:
-    """Return our recorder's files that continue each other without overlap, else all files."""
+    """Return our recorder's files that follow each other without overlap; if there are none, return all
+    files."""
     return [file for file in files if f"_{CONTINUOUS}_" in file.name] or files
 
 
 def _number(path: Path) -> tuple[int, str]:
-    """Return the number that rosbag2 gives a file: name_2 comes before name_10."""
+    """Return the number that rosbag2 gives a file, so that name_2 comes before name_10."""
     number = path.stem.rpartition("_")[2]
     return int(number) if number.isdecimal() and len(number) < 7 else 0, path.name
 

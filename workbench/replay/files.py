@@ -12,8 +12,11 @@ from workbench.replay.sources import BagError, Notes
 
 
 def opened(path: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
-    """Return a daemon's run and its entries. In a directory: the first run, and its entries from
-    all files, in the order of file names. Raises BagError."""
+    """Return a daemon's run, and the entries of this run.
+
+    For a directory, return the first run. Its entries come from all files, in the order of file names.
+    Raises BagError.
+    """
     if path.is_dir():
         return _of_all(sorted(path.glob("*.mcap")), path, notes)
     try:
@@ -34,7 +37,8 @@ def opened(path: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
 
 
 def _of_all(files: list[Path], folder: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
-    """Yield the entries of the first file's daemon, only from its continuous files if there are any."""
+    """Return the run of the first file's daemon, and its entries. Continuous files are preferred, if
+    there are any."""
     if not files:
         raise BagError(f"{folder} holds no recording: it has no .mcap file")
     files = continuous(files)

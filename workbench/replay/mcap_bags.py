@@ -1,4 +1,4 @@
-"""Read RMF's messages from an MCAP file, ours or rosbag2's."""
+"""Read RMF's messages from an MCAP file of our recorder or of rosbag2."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,7 +17,8 @@ NO_CHANNEL: Final = Source("", None, "of no channel")
 
 
 def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
-    """Yield a file's RMF messages, undecoded. Damage that ends the messages is noted."""
+    """Yield a file's RMF messages, undecoded. If damage ends the messages, the damage goes to
+    `notes`."""
     declared = _Declared()
     try:
         for record in records(path):
@@ -36,8 +37,8 @@ def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
 
 
 class _Declared:
-    """A file's declarations so far. `ours`: is it our recorder's? `sources`, `senders`: channel ->
-    source, publisher."""
+    """The declarations of a file so far. `ours`: did our recorder write the file? `sources`: channel ->
+    source. `senders`: channel -> publisher."""
 
     def __init__(self) -> None:
         self.ours = False
@@ -46,7 +47,7 @@ class _Declared:
         self._types: dict[int, tuple[str, list[Release]]] = {}
 
     def is_ours(self, found: Source) -> bool:
-        """Is this topic our recorder's own?"""
+        """Is this a topic for our recorder's own texts?"""
         return self.ours and found.topic.startswith(OWN_TOPICS)
 
     def take(self, record: McapRecord) -> None:

@@ -1,8 +1,7 @@
-"""Read the records of any writer's MCAP file, in bounded memory, and in time bounded by the file's
-size.
+"""Read the records of any writer's MCAP file, in limited memory. The file's size limits the time.
 
 Everything in the file is checked before it is used: a length may be false, a chunk may unpack to
-gigabytes, the end may be missing. The index is never used, so it may be missing. Format:
+gigabytes, the end may be missing. The reader ignores the index, so the index may be missing. Format:
 https://mcap.dev/spec (version 0).
 """
 
@@ -21,19 +20,20 @@ from mcap.records import Channel, Chunk, Header, McapRecord, Message, Metadata, 
 
 MAGIC: Final = b"\x89MCAP0\r\n"
 LONGEST_RECORD: Final = 64 << 20
-"""Limit of a record and of an unpacked chunk (bytes). rosbag2 and Foxglove write chunks
-of 1 to 8 MB."""
+"""Maximum size (bytes) of a record and of an unpacked chunk. rosbag2 and Foxglove write chunks of 1 to
+8 MB."""
 MOST_UNPACKED: Final = 200
 FIRST_UNPACKED: Final = 2 << 20
-"""Limits of an unpacked file: this multiple of the file's size, plus this number of bytes."""
+"""Limits of the unpacked size (bytes) of a file: MOST_UNPACKED times the file's size, plus
+FIRST_UNPACKED."""
 MOST_DECLARED: Final = 10_000
-"""Limit of schemas and channels in a file."""
+"""Maximum number of schemas and channels in a file."""
 FRAME: Final = 9
-"""Each record begins with its opcode (1 byte) and its length (8 bytes)."""
+"""Size (bytes) of a record's head: its opcode (1 byte) and its length (8 bytes)."""
 
 MESSAGE: Final = struct.Struct("<HIQQ")
-"""A message begins with channel, sequence, log time and publish time (ns). It is decoded here,
-faster than by the library, because messages are the most frequent records."""
+"""Head of a message: channel, sequence, log time and publish time (ns). This code decodes it, faster
+than the library, because messages are the most frequent records."""
 READ: Final[dict[int, Callable[[ReadDataStream], McapRecord]]] = {
     Opcode.HEADER: Header.read,
     Opcode.SCHEMA: Schema.read,
@@ -48,12 +48,12 @@ INVALID: Final = (
     zstandard.ZstdError,
     RuntimeError,
 )
-"""Exceptions raised by parsing arbitrary bytes as a record."""
+"""Exceptions that parsing arbitrary bytes as a record may raise."""
 LAST: Final = (Opcode.DATA_END, Opcode.FOOTER)
 
 
 class Damaged(ValueError):
-    """The file cannot be read further; the text gives the reason."""
+    """Error: the file cannot be read further. The text gives the reason."""
 
 
 def records(path: Path) -> Iterator[McapRecord]:
@@ -69,14 +69,14 @@ def records(path: Path) -> Iterator[McapRecord]:
 
 
 class _Allowances:
-    """Remaining bytes to unpack and channels to declare in a file."""
+    """Number of bytes that a file may still unpack, and of channels that it may still declare."""
 
     def __init__(self, size: int) -> None:
         self._unpacked = FIRST_UNPACKED + MOST_UNPACKED * size
         self._declared = MOST_DECLARED
 
     def records(self, source: IO[bytes], size: int) -> Iterator[McapRecord]:
-        """Yield the records from here to the end of the data."""
+        """Yield the records from the present position to the end of the data."""
         while True:
             at = source.tell()
             opcode, body = _body(source, at, size)

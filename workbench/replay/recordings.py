@@ -1,4 +1,4 @@
-"""Common parts of the commands that read a recording: the span to read, refusals, thinning out."""
+"""The part that all commands on a recording share: the span to read, refusals, and thinning out."""
 
 import argparse
 import os
@@ -19,9 +19,11 @@ from workbench.replay.sources import BagError, Notes
 
 CLOCK = re.compile(r"(?:(\d{4}-\d\d-\d\d)[ T])?(\d\d?):(\d\d)(?::(\d\d(?:\.\d+)?))?")
 SAME_S = 2.4
-"""Shorter than the 3 s after which a daemon counts as silent."""
+"""Time (s) between samples that differ only in numbers. It is shorter than the 3 s after which a daemon
+counts as silent."""
 STAMPED = 12
-"""Bytes before a DiagnosticArray's status: CDR's head, the stamp (OMG DDSI-RTPS 10.2; Header)."""
+"""Number of bytes before a DiagnosticArray's status: CDR's head and the stamp (OMG DDSI-RTPS 10.2;
+Header)."""
 MOST_TOLD = 512
 FIRST_OF_OTHERS = 300
 COORDINATOR = b"charger_coordinator"
@@ -29,14 +31,16 @@ COORDINATOR = b"charger_coordinator"
 
 @dataclass(frozen=True, slots=True)
 class TypedTime:
-    """A time as typed: s from the beginning, or a local time of a day (None: the recording's first)."""
+    """A time as typed: seconds from the beginning, or a local time of a day. Day None is the
+    recording's first day."""
 
     after_s: float | None = None
     day: str | None = None
     of_day_s: float = 0.0
 
     def wall(self, began: float) -> float:
-        """Return the time (s since the epoch), in a recording with this beginning."""
+        """Return the time (s since the epoch). `began`: the recording's beginning (s since the
+        epoch)."""
         if self.after_s is not None:
             return began + self.after_s
         day = datetime.fromisoformat(self.day) if self.day else datetime.fromtimestamp(began)
@@ -46,7 +50,8 @@ class TypedTime:
 
 @dataclass(slots=True)
 class RecordingSpan:
-    """The part of a recording to read. `begins_at`: when the recording began, by `Heard.at`."""
+    """The part of a recording to read. `begins_at`: when the recording began, on `Heard.at`'s clock
+    (s)."""
 
     from_: TypedTime | None
     to: TypedTime | None
@@ -94,11 +99,11 @@ def _plus(text: str) -> float:
 
 
 class Sieve:
-    """Choose the samples worth decoding, for one device or (name "") for all.
+    """Choose the samples to decode, for one device or for all devices (name "").
 
-    Diagnostics come each second and seldom change: if only numbers (ages, counts) differ from the
-    node's last sample, one sample is taken every SAME_S. The first samples of other devices are taken
-    too, for the devices' names.
+    Diagnostics come each second and seldom change. If only numbers (ages, counts) differ from the
+    node's last sample, the sieve takes one sample every SAME_S. It also takes the first samples of
+    other devices, because explanations list the other devices' names.
     """
 
     def __init__(self, name: str) -> None:
@@ -116,7 +121,8 @@ class Sieve:
         return topic != topics.DIAGNOSTICS.name or self._is_news(sample, at)
 
     def _is_common(self, topic: str, sample: bytes) -> bool:
-        """Does the topic concern all devices? A heartbeat without a door means that nobody holds it."""
+        """Does the topic concern all devices? A heartbeat that does not list a door means that nobody
+        holds the door."""
         return topic == topics.DOOR_SUPERVISOR_HEARTBEAT.name or COORDINATOR in sample
 
     def _is_news(self, sample: bytes, at: float) -> bool:
@@ -133,7 +139,7 @@ class Sieve:
 def told_between(
     path: Path, span: RecordingSpan, command: str, device: str
 ) -> Iterator[Heard | Own]:
-    """Yield messages and our recorder's texts about the device ("": all), as `between` does.
+    """Yield messages and our recorder's texts about the device ("": all devices), as `between` does.
 
     Messages that differ little from second to second are thinned out (`Sieve`).
     """
@@ -143,8 +149,8 @@ def told_between(
 def between(
     path: Path, span: RecordingSpan, command: str, keep: Keep | None = None
 ) -> Iterator[Heard | Own]:
-    """Yield a recording from its beginning to the end of the span: earlier states are still valid
-    there.
+    """Yield a recording from its beginning to the end of the span. Earlier states are included, because
+    they still hold in the span.
 
     Damage is printed on standard error. Raises BagError.
     """

@@ -1,8 +1,9 @@
-"""Replay a recording: today's core decides on the recorded events, and each decision is compared.
+"""Replay a recording: today's core decides on the recorded events, and each decision is compared with
+the recorded decision.
 
 A core is a pure function of its memory, an event, the time and its limits. A recording has the initial
-memory and every event. So the decisions are the same, to the bit, unless the core or its limits have
-changed.
+memory and every event. For this reason a decision differs, even by a bit, only if the core or its
+limits have changed.
 """
 
 import struct
@@ -37,16 +38,17 @@ AnyDecision = Decision[Any, Any, Any]
 Parts = tuple[str, Tree, Tree]
 """A part of a decision that differs: the part's name, its recorded value, and today's value."""
 CONTEXT: Final = 6
-"""The number of events reported before a difference."""
+"""Number of events that are reported before a difference."""
 PARTS: Final = ("outputs", "news", "refused")
-"""The parts visible from outside; only these are compared when other limits are tried."""
+"""Parts of a decision that are visible from outside. If other limits are tried, only these parts are
+compared."""
 LASTING: Final = ("outputs", "news", "faults")
-"""The parts that stay until a decision changes them."""
+"""Parts of a decision that stay until a later decision changes them."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReplayedCore:
-    """A kind's core as a replay needs it, with one subject's limits. `types`: `typed.types_of`."""
+    """The core of one subject, with the subject's limits. `types`: the result of `typed.types_of`."""
 
     decide: Callable[[Any, Any, float], Any]
     published: Callable[[Any, Any], Any]
@@ -55,7 +57,7 @@ class ReplayedCore:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A differing decision. `wall`: its time (s since the epoch). `what`: the differing part.
+    """A decision that differs. `wall`: its time (s since the epoch). `what`: the part that differs.
 
     `before`: the last events up to this decision, each with its time, in words.
     """
@@ -70,9 +72,13 @@ class Difference:
 
 @dataclass(slots=True)
 class Course:
-    """Progress of a replay. `decisions`: number compared. `unusable`: entries of subjects that cannot
-    be replayed. `subjects`: replayable ones; `others`: those that the settings lack. `began`, `ended`:
-    s since the epoch."""
+    """Progress of a replay.
+
+    - `decisions`: number of decisions compared.
+    - `unusable`: number of entries of subjects that cannot be replayed.
+    - `subjects`: the subjects that can be replayed. `others`: the subjects that the settings lack.
+    - `began`, `ended`: times (s since the epoch).
+    """
 
     decisions: int = 0
     unusable: int = 0
@@ -97,7 +103,7 @@ def of_head(head: Head) -> Config:
 
 
 class ReplayedCores:
-    """The cores of a daemon, from its settings."""
+    """The cores of a daemon, made from the daemon's settings."""
 
     def __init__(self, config: Config) -> None:
         self._config = config
@@ -131,7 +137,7 @@ def _with(decide: Callable[..., Any], limits: Any) -> Callable[[Any, Any, float]
 
 
 class _Subject:
-    """One subject; its decisions are repeated, beginning with its recorded memory."""
+    """One subject. Its decisions are repeated, beginning with its recorded memory."""
 
     def __init__(self, core: ReplayedCore, known: Known) -> None:
         self._core = core
@@ -146,11 +152,12 @@ class _Subject:
 
     @property
     def has_decided(self) -> bool:
-        """Is there a reading to repeat, and a report to publish?"""
+        """Has the subject made a decision, whose reading can be repeated and whose report can be
+        published?"""
         return self._report is not None
 
     def memory(self) -> Tree:
-        """Return the present memory."""
+        """Present memory, as recordings store it."""
         return tree(self._memory)
 
     def published(self) -> None:
@@ -158,7 +165,7 @@ class _Subject:
         self._memory = self._core.published(self._memory, self._report)
 
     def step(self, step: Decided) -> list[Parts]:
-        """Decide on an event; return the differences."""
+        """Decide on a recorded event. Return the parts that differ."""
         event = typed(step.event, self._core.types["event"])
         if type(event) in (Sampled, IoFailed):
             self._reading = event
@@ -171,7 +178,8 @@ class _Subject:
         return self._compared(told, decision)
 
     def again(self, at: float) -> list[Parts]:
-        """Repeat the last reading, which changed nothing when recorded."""
+        """Repeat the last reading, which changed nothing in the recording. Return the parts that
+        differ."""
         outputs, news, report = self._outputs, self._news, self._report
         decision = self._decide(self._reading, at)
         if (
@@ -242,8 +250,11 @@ class Replay:
                     break
 
     def changes(self) -> Iterator[Difference]:
-        """Yield the effects of other limits: each time that outputs, state or refusal begin to
-        differ, differ in another way, or (None today) match the recording again."""
+        """Yield the effects of other limits.
+
+        An effect is a time at which outputs, state or refusal begin to differ, or differ in a new way.
+        If they match the recording again, today's value is None.
+        """
         shown: dict[tuple[str, str], tuple[Tree, Tree]] = {}
         for entry in self._entries:
             self.course.reach(entry)
@@ -263,7 +274,8 @@ class Replay:
         return Difference(_name(entry), at + offset_s, *found, words)
 
     def _played(self, entry: AnyEntry, *, strict: bool) -> Iterator[tuple[float, list[Parts]]]:
-        """Yield time and differences of each decision in an entry. `strict`: compare memories too."""
+        """Yield the time and the differences of each decision in an entry. `strict`: compare memories
+        too."""
         if isinstance(entry, Known):
             yield from self._known(entry, strict=strict)
         elif isinstance(entry, SubjectForgotten):
@@ -289,7 +301,7 @@ class Replay:
                 yield at, subject.again(at)
 
     def _known(self, entry: Known, *, strict: bool) -> Iterator[tuple[float, list[Parts]]]:
-        """Begin a subject's replay, or compare its memory with the recorded one."""
+        """Begin the replay of a subject, or compare its memory with the recorded memory."""
         name = entry.subject
         if entry.anew or name not in self._subjects:
             core = self._cores.of(name)
@@ -303,7 +315,7 @@ class Replay:
 
 
 def apart(was: Tree, now: Tree) -> tuple[Tree, Tree]:
-    """Return the elements that differ of two lists of the same length; other values whole."""
+    """Return those elements of two lists of the same length that differ. Return other values whole."""
     if not (isinstance(was, list) and isinstance(now, list) and len(was) == len(now)):
         return was, now
     pairs = [pair for pair in zip(was, now, strict=True) if pair[0] != pair[1]]

@@ -1,4 +1,4 @@
-"""The topics of a recording: recognise RMF's, and decode their samples."""
+"""The topics of a recording: recognise RMF's topics, and decode their samples."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -18,16 +18,17 @@ TOPICS: Final = frozenset(topic.name for topic in topics.every())
 
 
 class BagError(Exception):
-    """The path holds no readable recording. The text gives the remedy."""
+    """Error: the path holds no readable recording. The text gives the remedy."""
 
 
 class NotReplayable(BagError):
-    """The recording is readable, but no decision in it can be replayed."""
+    """Error: the recording is readable, but no decision in it can be replayed."""
 
 
 @dataclass(slots=True)
 class Notes:
-    """Missing parts. `skipped`: reason -> messages. `damage`: why the end is missing, or ""."""
+    """Notes about missing parts. `skipped`: reason -> number of messages. `damage`: why the end is
+    missing; "" if it is not."""
 
     skipped: Counter[str] = field(default_factory=Counter)
     damage: str = ""
@@ -39,7 +40,7 @@ class Notes:
 
 
 class Raw(NamedTuple):
-    """A recorded message, undecoded. `at`, `wall`: ns by the recorder's and by the wall clock.
+    """A recorded message, undecoded. `at`: ns on the recorder's clock. `wall`: ns on the wall clock.
 
     `decode`: None for our own recorder's texts. `sender`: the publisher that our recorder has noted.
     """
@@ -61,7 +62,7 @@ class Source(NamedTuple):
 
 
 def source(topic: str, type_name: str, releases: list[Release]) -> Source:
-    """Make the source for a topic of this type and one of these releases."""
+    """Return the source for a topic of this type. `releases`: the type's possible releases."""
     topic = topic.removeprefix("/")
     short = topic[:LONGEST_NAME]
     message_type = MESSAGES.get(type_name)
@@ -73,7 +74,7 @@ def source(topic: str, type_name: str, releases: list[Release]) -> Source:
 
 
 def releases(type_name: str, definition: str, digest: str = "") -> list[Release]:
-    """Return a message's possible releases: all releases that have the type, unless one is recorded.
+    """Return a message's possible releases: the recorded release, else all releases that have the type.
 
     `definition`: the type's text, or "". `digest`: the type's RIHS01 hash, or "".
     """
@@ -88,7 +89,7 @@ def releases(type_name: str, definition: str, digest: str = "") -> list[Release]
 
 
 def _decoded(message_type: type[Message], sample: bytes, releases: Iterable[Release]) -> Message:
-    """Decode by the first fitting release. Raises the last release's CdrError."""
+    """Decode with the first release that fits. Raises the last release's CdrError."""
     error = cdr.CdrError("no release")
     for release in releases:
         try:

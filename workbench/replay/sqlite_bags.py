@@ -13,12 +13,13 @@ from workbench.replay.sources import BagError, Notes, Raw, releases, source
 def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
     """Yield a recording's RMF messages, undecoded. `path`: a `.db3` file, or its directory.
 
-    Damage that ends the messages is noted. Raises BagError if the recording cannot be opened.
+    If damage ends the messages, the damage goes to `notes`. Raises BagError if the recording cannot be
+    opened.
     """
     began = False
     try:
         with Reader(path) as reader:
-            if reader.compression_mode:  # a compressed message could be of any size
+            if reader.compression_mode:  # a compressed message could unpack to any size
                 raise BagError(f"{path} is compressed: ros2 bag convert can unpack it")
             began = True
             found = {c.id: source(c.topic, c.msgtype, _releases(c)) for c in reader.connections}

@@ -1,6 +1,5 @@
-"""Check recorded values against a core's own type annotations, because `value_codec.value` makes any
-type of value with anything in its fields.
-"""
+"""Check recorded values against a core's own type annotations. The check is needed because
+`value_codec.value` accepts any type of value with any content in its fields."""
 
 import math
 import types
@@ -16,9 +15,8 @@ LONGEST = 100
 
 @cache
 def types_of(decide: Callable[..., Any]) -> Mapping[str, Any]:
-    """Return a core's types: `memory`, `event`, `outputs`, `report`. `outputs` and `report` also allow
-    None.
-    """
+    """Return a core's types: `memory`, `event`, `outputs`, `report`. The types of `outputs` and
+    `report` also allow None."""
     hints = get_type_hints(decide)
     memory, outputs, report = get_args(hints["return"])
     told = {"outputs": Union[outputs, None], "report": Union[report, None]}  # noqa: UP007
@@ -26,7 +24,8 @@ def types_of(decide: Callable[..., Any]) -> Mapping[str, Any]:
 
 
 def typed(told: Tree, hint: Any) -> Any:
-    """Return a tree's value. Raises UnknownValue unless every part has its annotated type."""
+    """Return the value of a recorded tree. Raises UnknownValue if a part does not have its annotated
+    type."""
     found = value(told)
     if not _fits(found, hint):
         shown = str(told)
@@ -66,7 +65,7 @@ def _parts(found: Any, args: tuple[Any, ...]) -> Iterator[tuple[Any, Any]]:
 
 @cache
 def _fields(kind: Hashable, args: tuple[Any, ...]) -> Mapping[str, Any]:
-    """Return fields and types of a struct or named tuple; {} for other types."""
+    """Return the fields of a struct or named tuple with their types; {} for other types."""
     if not hasattr(kind, "__struct_fields__") and not hasattr(kind, "_fields"):
         return {}
     own = dict(zip(getattr(kind, "__parameters__", ()), args, strict=False))
@@ -74,7 +73,7 @@ def _fields(kind: Hashable, args: tuple[Any, ...]) -> Mapping[str, Any]:
 
 
 def _closed(hint: Any, own: Mapping[Any, Any]) -> Any:
-    """Return a type with its type variables filled in."""
+    """Return a type whose type variables are replaced by the owner's arguments."""
     if isinstance(hint, TypeVar):
         return own.get(hint, Any)
     open_ = getattr(hint, "__parameters__", ()) if get_origin(hint) else ()
