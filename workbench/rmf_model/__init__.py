@@ -1,10 +1,11 @@
 """RMF's supervisors and fleet adapters as rules, so that `judge` and the tests can play them.
 
-Taken from rmf_ros2 9dedd0f (2026-05), quirks included: no timeouts, no retries, a lift's mode ignored.
+The rules come from rmf_ros2 9dedd0f (2026-05). Quirks are included: no timeouts, no retries, a lift's
+mode ignored.
 
-There is no I/O and no clock: each party hears a message or is ticked at its `wake_at`, and returns the
-messages to publish. `now` is RMF's clock in seconds (since the epoch, where stamps matter). A restarted
-party is a new object.
+There is no I/O and no clock. Each party hears a message, or its caller ticks it at `wake_at`; the party
+returns the messages to publish. `now` is RMF's clock in seconds (since the epoch, where stamps matter).
+A restarted party is a new object.
 """
 
 from abc import ABC, abstractmethod
@@ -31,11 +32,11 @@ class Party(ABC):
         """Take a message from one of the subscribed topics."""
 
     def tick(self, now: float) -> list[Said]:
-        """Fire the timer due at `wake_at`."""
+        """Fire the timer that is due at `wake_at`."""
         return []
 
     def wake_at(self) -> float:
-        """Return the time of the next timer (s), or inf."""
+        """Time of the next timer (s); inf without a timer."""
         return NEVER
 
 

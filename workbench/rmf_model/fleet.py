@@ -32,21 +32,24 @@ RETREAT_PERCENT: Final = 12.0
 TOO_LATE_PERCENT: Final = 10.0
 IDLE: Final = d.RobotModeValue.MODE_IDLE
 Graph = Mapping[str, tuple[str, float, float]]
-"""Waypoint -> level, x, y (m)."""
+"""Waypoint -> level, x (m), y (m)."""
 Finishing = Literal["charge", "park", "nothing"]
 Doing = Literal["", "work", "charge", "idle charge", "idle park"]
 
 
 class AdapterCrashed(Exception):
-    """RMF's fleet adapter crashed on an assignment to an unknown waypoint."""
+    """Error: RMF's fleet adapter crashed on an assignment to an unknown waypoint."""
 
 
 @dataclass
 class FleetRobot:
-    """A robot. `place`: the waypoint at which it stands; "" on the road. `goes_to`: its destination.
-    `dedicated`, `waits`: its charging assignment. `doing`: its task, or its activity without a task.
-    `task_id`: "" without a task. `mode`: the last mode that a phase set. `stuck`: the robot cannot
-    drive.
+    """A robot of a fleet.
+
+    - `place`: the waypoint at which the robot stands; "" on the road. `goes_to`: its destination.
+    - `dedicated`, `waits`: its charging assignment (the waypoint, and whether it waits there).
+    - `doing`: its task, or its activity without a task. `task_id`: "" without a task.
+    - `mode`: the last mode that a phase set.
+    - `stuck`: the robot cannot drive.
     """
 
     name: str
@@ -82,8 +85,11 @@ class FleetAdapter(Party):
         finishing: Finishing = "nothing",
         jazzy: bool = False,
     ) -> None:
-        """Begin with `robots` at their parking spots. `drive_s`: the time of every drive.
-        `finishing`: the fleet's `finishing_request`. `jazzy`: by Jazzy's rules where they differ."""
+        """Begin with `robots` at their parking spots.
+
+        `drive_s`: time (s) of every drive. `finishing`: the fleet's `finishing_request`. `jazzy`:
+        follow Jazzy's rules where they differ.
+        """
         self.name = name
         self.graph = graph
         self.drive_s = drive_s
@@ -110,7 +116,8 @@ class FleetAdapter(Party):
         self._rest(self.robots[who], now)
 
     def starts_again(self, now: float) -> None:
-        """Restart after a kill: each robot has the charger of the adapter's file."""
+        """Restart the adapter after a kill. Each robot then has the charger that the adapter's file
+        names."""
         for robot in self.robots.values():
             robot.dedicated, robot.waits, robot.mode = self._spots[robot.name], False, IDLE
             self._rest(robot, now)
@@ -143,7 +150,7 @@ class FleetAdapter(Party):
         return [(FLEET_STATES, d.FleetState(self.name, states))]
 
     def wake_at(self) -> float:
-        """Return the time of the next state or arrival."""
+        """Time of the next state or arrival (s)."""
         ways = [robot.arrives_at for robot in self.robots.values() if robot.goes_to]
         return min([self._told_at + EVERY_S, *ways])
 

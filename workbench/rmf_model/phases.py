@@ -28,15 +28,16 @@ class RequestLift(Phase):
         self.wanted = LiftDestination(lift, floor, inside)
 
     def begin(self, robot: RobotContext, now: float) -> list[Said]:
-        """Send the request. If the robot is outside and the lift has come, the phase is done at
-        once."""
+        """Send the request. If the robot is outside and the lift has already come, end the phase
+        immediately."""
         if not self.wanted.inside and robot.has_lift_arrived(self.wanted.lift, self.wanted.floor):
             self.done = True
             return robot.set_lift_destination(replace(self.wanted, inside=True), now)
         return robot.set_lift_destination(self.wanted, now)
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
-        """Once the lift has come, request as a robot inside (RequestLift.cpp:322-326, _finish)."""
+        """After the lift has come, request as a robot inside the car (RequestLift.cpp:322-326,
+        _finish)."""
         match message:
             case d.LiftState(
                 lift_name=self.wanted.lift,
@@ -53,7 +54,7 @@ class RequestLift(Phase):
 
 
 class EndLiftSession(Phase):
-    """Release the lift. Done when a LiftState shows a session other than ours."""
+    """Release the lift. The phase ends when a LiftState shows a session other than ours."""
 
     def __init__(self, lift: str) -> None:
         self.lift = lift
@@ -63,7 +64,7 @@ class EndLiftSession(Phase):
         return robot.release_lift()
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
-        """Look for the session's end (EndLiftSession.cpp, _init_obs)."""
+        """End the phase at the session's end (EndLiftSession.cpp, _init_obs)."""
         if isinstance(message, d.LiftState) and message.lift_name == self.lift:
             self.done = message.session_id != robot.requester_id
         return []
@@ -72,7 +73,7 @@ class EndLiftSession(Phase):
 class DoorOpen(Phase):
     """Send OPEN at the start and every second, until the door is OPEN *and* the heartbeat lists us.
 
-    Only the latest state (of any door) and the latest heartbeat since the start count.
+    Of the messages after the start, only the latest state (of any door) and the latest heartbeat count.
     """
 
     def __init__(self, door: str) -> None:
@@ -86,7 +87,7 @@ class DoorOpen(Phase):
         return self.tick(robot, now)
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
-        """Look at the door and the heartbeat (DoorOpen.cpp, _update_status)."""
+        """Check the door and the heartbeat (DoorOpen.cpp, _update_status)."""
         match message:
             case d.DoorState():
                 self._state = message
@@ -123,7 +124,7 @@ class DoorClose(Phase):
         return self.tick(robot, now)
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
-        """Look at the heartbeat (DoorClose.cpp, _update_status)."""
+        """Check the heartbeat (DoorClose.cpp, _update_status)."""
         if isinstance(message, d.SupervisorHeartbeat):
             self.done = not has_session(message, robot.requester_id, self.door)
         return []

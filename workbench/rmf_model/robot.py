@@ -1,7 +1,7 @@
-"""A fleet adapter's context of one robot: the actions that are common to all phases.
+"""A fleet adapter's context of one robot: the actions that all phases share.
 
 Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/agv/RobotContext.cpp:1281-1324 and
-1600-1800. The phases are in `phases.py`. `jazzy`: by Jazzy's rules where they differ (branch jazzy,
+1600-1800. The phases are in `phases.py`. `jazzy` selects Jazzy's rules where they differ (branch jazzy,
 7eef65a, RobotContext.cpp:1054-1095 and 1329-1419).
 """
 
@@ -17,7 +17,7 @@ from workbench.rmf_model import NEVER, Party, Said, door_request, has_session
 
 
 class LiftDestination(Struct, frozen=True):
-    """The lift's destination for the robot; `inside`: may the robot be in the car?"""
+    """Destination of the lift for the robot. `inside`: may the robot be in the car?"""
 
     lift: str
     floor: str
@@ -27,8 +27,8 @@ class LiftDestination(Struct, frozen=True):
 class Phase(ABC):
     """One step of a robot's task.
 
-    `due_at`: when the phase's wall timer fires. `claims_lift`: the phase keeps the context from
-    releasing an idle lift.
+    `due_at`: when the phase's wall timer fires. `claims_lift`: the context must not release an idle
+    lift during this phase.
     """
 
     done = False
@@ -41,7 +41,7 @@ class Phase(ABC):
 
     @abstractmethod
     def hear(self, robot: "RobotContext", message: d.Message, now: float) -> list[Said]:
-        """Take a message; the context has applied its own rules to it before."""
+        """Take a message. The context has already applied its own rules to the message."""
 
     def tick(self, robot: "RobotContext", now: float) -> list[Said]:
         """Fire the phase's wall timer."""
@@ -49,10 +49,10 @@ class Phase(ABC):
 
 
 class RobotContext(Party):
-    """A fleet adapter's RobotContext (`requester_id` is fleet/robot) and its one running phase.
+    """A fleet adapter's RobotContext (`requester_id` is fleet/robot) and its running phase, if any.
 
-    `on_task`: has the robot a task? `in_car`: is its position inside the lift? The caller sets these
-    two. To cancel a phase: `robot.phase = None`.
+    The caller sets `on_task` (has the robot a task?) and `in_car` (is its position inside the lift?).
+    To cancel a phase, set `robot.phase = None`.
     """
 
     subscribes: Sequence[topics.AnyTopic] = (
@@ -74,7 +74,7 @@ class RobotContext(Party):
         self._tasked_at = float("-inf")
 
     def begin(self, phase: Phase, now: float) -> list[Said]:
-        """Start this phase; drop the last phase, done or not."""
+        """Start this phase. Drop the last phase, even if it is not done."""
         self.phase = phase
         return phase.begin(self, now)
 
@@ -84,7 +84,7 @@ class RobotContext(Party):
         return self.phase is None or self.phase.done
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
-        """Apply the context's own rules, then the phase's."""
+        """Apply the context's own rules, then the rules of the phase."""
         said: list[Said] = []
         match message:
             case d.LiftState():
@@ -100,7 +100,7 @@ class RobotContext(Party):
         return [] if self.phase is None or self.done else self.phase.tick(self, now)
 
     def wake_at(self) -> float:
-        """Return the time of the phase's wall timer."""
+        """Time of the phase's wall timer (s)."""
         return NEVER if self.phase is None or self.done else self.phase.due_at
 
     # ---- lift
@@ -118,7 +118,8 @@ class RobotContext(Party):
         return self.lift_arrived and at is not None and (at.lift, at.floor) == (lift, floor)
 
     def release_lift(self) -> list[Said]:
-        """Forget the lift. END follows a LiftState with our session; Jazzy also sends END at once."""
+        """Forget the lift. END follows a LiftState with our session; Jazzy also sends END
+        immediately."""
         said = []
         if self.jazzy and self.destination is not None:
             said = [self._end(self.destination.lift, self.destination.floor, 0.0)]

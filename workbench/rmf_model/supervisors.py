@@ -1,8 +1,8 @@
-"""rmf_lift_supervisor and rmf_door_supervisor, rule by rule.
+"""The rules of rmf_lift_supervisor and rmf_door_supervisor.
 
-Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/lift_supervisor/Node.cpp and
-door_supervisor/Node.cpp. Neither supervisor remembers anything across a restart. `jazzy`: by Jazzy's
-rules where they differ (branch jazzy, 7eef65a).
+Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/lift_supervisor/Node.cpp and door_supervisor/Node.cpp.
+Both supervisors forget everything in a restart. `jazzy` selects Jazzy's rules where they differ (branch
+jazzy, 7eef65a).
 """
 
 from collections.abc import Sequence
@@ -17,10 +17,10 @@ from workbench.rmf_model import Party, Said, door_request
 
 
 class LiftSupervisor(Party):
-    """rmf_lift_supervisor, which remembers for each lift the last request of its holder.
+    """rmf_lift_supervisor, which remembers the last request of the holder of each lift.
 
-    Jazzy's supervisor repeats the holder's request at every state, and sends END for an empty session
-    too.
+    Jazzy's supervisor repeats the holder's request at every state. It also sends END for an empty
+    session.
     """
 
     subscribes: Sequence[topics.AnyTopic] = (topics.ADAPTER_LIFT_REQUESTS, topics.LIFT_STATES)
@@ -30,7 +30,7 @@ class LiftSupervisor(Party):
         self._jazzy = jazzy
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
-        """Adopt, forward or silently drop adapter requests; repeat requests at states."""
+        """Adopt, forward or silently drop adapter requests. Repeat requests at states."""
         match message:
             case d.LiftRequest():
                 return self._requested(message, now)
@@ -85,7 +85,7 @@ def _satisfies(state: d.LiftState, held: d.LiftRequest) -> bool:
 class DoorSupervisor(Party):
     """rmf_door_supervisor: each door's sessions, each with the time of its newest open request.
 
-    The heartbeat is published on each adapter request and at no other time.
+    The supervisor publishes a heartbeat only on an adapter request.
     """
 
     subscribes: Sequence[topics.AnyTopic] = (topics.ADAPTER_DOOR_REQUESTS, topics.DOOR_STATES)
@@ -95,7 +95,7 @@ class DoorSupervisor(Party):
         self.sessions: dict[str, dict[str, d.Time]] = {}
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
-        """Open and close sessions at adapter requests; send reminders at states."""
+        """Begin and end sessions at adapter requests. Send reminders at states."""
         match message:
             case d.DoorRequest(requested_mode=d.DoorMode(d.DoorModeValue.MODE_OPEN)):
                 return self._opened(message, now)

@@ -2,9 +2,9 @@
 
 Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/phases/: DispenseItem.cpp and
 IngestItem.cpp (`_init_obs`, `_get_status`), Utils.cpp (`is_newer`: an equal stamp counts as newer). The
-request is repeated each second, without a stamp, until the phase ends. Nothing cancels the phase, and
-it has no time limit. tasks/Delivery.cpp gives the task's id as the guid, so two requests of one task
-have the same guid.
+phase repeats its request each second, without a stamp, until the phase ends. Nothing cancels the phase,
+and the phase has no time limit. tasks/Delivery.cpp uses the task's id as the guid, so two requests of
+one task have the same guid.
 """
 
 from typing import Final, Literal
@@ -25,7 +25,7 @@ INGESTOR: Final[tuple[AnyTopic, ...]] = (topics.INGESTOR_STATES, topics.INGESTOR
 
 
 class WorkcellPhase(Party):
-    """One phase. `outcome`: "" while it is active. `why`: the message that has ended it."""
+    """One phase. `outcome`: "" until the phase ends. `why`: the message that ended the phase."""
 
     def __init__(self, request: WorkcellRequest, now: float) -> None:
         self.request = request
@@ -41,7 +41,8 @@ class WorkcellPhase(Party):
         self._last = 0.0
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
-        """Judge the latest result and the latest state, whichever has come: rxcpp's combine_latest."""
+        """Judge the latest result and the latest state, each if it has come (rxcpp's
+        combine_latest)."""
         if isinstance(message, WorkcellResult):
             self._result = message
         if isinstance(message, WorkcellState):
@@ -59,7 +60,7 @@ class WorkcellPhase(Party):
         return [(self._topic, self.request)]
 
     def wake_at(self) -> float:
-        """Return the time of the next request (s)."""
+        """Time of the next request (s)."""
         return NEVER if self.outcome else self._next_at
 
     def _judge_result(self) -> None:
@@ -77,7 +78,8 @@ class WorkcellPhase(Party):
                 self.outcome, self.why = "failed", "a result FAILED"
 
     def _judge_state(self) -> None:
-        """A state may still turn a failure into a completion, as in `_get_status`."""
+        """Judge the latest state, which may still turn a failure into a completion, as in
+        `_get_status`."""
         state, guid = self._state, self.request.request_guid
         if state is None or state.guid != self.request.target_guid:
             return
