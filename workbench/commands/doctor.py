@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--form",
         type=Path,
         metavar="OUT",
-        help="also write the form of docs/how-to/hardware.md, for a person",
+        help="also write the form of docs/how-to/hardware.md, which a person completes",
     )
     parser.add_argument(
         "--scan", action="store_true", help="ask every unit or node of a bus, not only 1 to 16"
@@ -68,7 +68,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="check the points of docs/how-to/harden.md instead: networks, files, users",
     )
-    kill = parser.add_argument_group("the kill test, the only thing that switches an output on")
+    kill = parser.add_argument_group(
+        "the kill test, the only part of doctor that switches an output on"
+    )
     kill.add_argument(
         "--kill-test",
         action="store_true",
@@ -78,7 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--device", metavar="NAME", help="the output's device (default: the first)"
     )
     completed_by(device, device_names)
-    kill.add_argument("--output", metavar="NAME", help="the output, as walk names it")
+    kill.add_argument("--output", metavar="NAME", help="the output, by its name in walk")
     kill.add_argument("--yes", action="store_true", help="do not ask again")
     parser.add_argument("--runtime-dir", metavar="DIR", help="the daemon's runtime directory")
 

@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     completed_by(part, names("fail"))
     parser.add_argument(
-        "mode", nargs="?", choices=MODES, help="how the part fails; ok mends the part"
+        "mode", nargs="?", choices=MODES, help="the way in which the part fails; ok mends the part"
     )
 
 

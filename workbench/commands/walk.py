@@ -90,7 +90,10 @@ def _walk(
     end: signals.End,
 ) -> int:
     if not args.simulate and held.records.unreleased():
-        print(f"a dead daemon may have left outputs on: rmf-bridge outputs-off {args.file}")
+        print(
+            "a daemon died and may have left outputs on; to switch them off:"
+            f" rmf-bridge outputs-off {args.file}"
+        )
         return os.EX_UNAVAILABLE
     with ExitStack() as stack:
         path = _record_path(args, device).absolute()

@@ -108,12 +108,12 @@ def _idle(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
         if one.ended is None and one.granted is None and one.asks(clock.now)
     ]
     if not asking:
-        found.say("Nobody asks for it.", "nobody", "there is nothing to do")
+        found.say("Nobody requests the charger.", "nobody", "there is nothing to do")
         return
     first = asking[0]
     found.say(
-        f"It has been asked to charge {first.wants} {clock.since(first.first)} (request {first.who}),"
-        " and has not taken the request.",
+        f"Request {first.who} to charge {first.wants} has waited"
+        f" {clock.since(first.first)}. {charger.name} has not taken the request.",
         "the device's node",
         "take the request; a refusal is explained below, or in its log",
     )

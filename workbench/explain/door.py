@@ -87,7 +87,7 @@ def _begins(door: DoorFacts, claim: DeviceRequester | None) -> float:
 
 def _with_askers(found: Answer, door: DoorFacts, clock: TimePhrases) -> Answer:
     for claim in [one for one in door.requesters if one.wants == OPEN and one.asks(clock.now)][:3]:
-        found.say(f"{claim.who} has waited for it to be open {clock.since(claim.since)}.")
+        found.say(f"{claim.who} has waited for the door to be open {clock.since(claim.since)}.")
         found.since = min(found.since, claim.since.at)
     return found
 
@@ -142,12 +142,14 @@ def _opens(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePh
         f"open {door.name} fully, and show it by its contact",
     )
     if clock.now.at - door.mode.since.at > LONG_S:
-        found.say("That is long: an obstacle, a locked door, or a contact that shows nothing.")
+        found.say(
+            "The door should be open by now. The cause may be an obstacle, a lock, or a dead contact."
+        )
 
 
 def _not_listed(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
     if clock.now.at - claim.since.at < SETTLES_S and claim.since.seen:
-        found.say("It was asked for a moment ago.", "the supervisor", f"list {claim.who}")
+        found.say("The request came a moment ago.", "the supervisor", f"list {claim.who}")
     elif not door.hears_lists:
         found.say(
             "Nothing asks for OPEN on `door_requests`: the door supervisor does not pass the request"
@@ -192,19 +194,19 @@ def _nobody_asks(
     elif door.last_heartbeat is None and asked == OPEN:
         _asked_open(found, door, clock)
     elif door.mode.value == CLOSED:
-        found.say("Nobody waits for it.", "nobody", "there is nothing to do")
+        found.say("Nobody waits for the door.", "nobody", "there is nothing to do")
     elif door.last_heartbeat is None and not door.asks_now(clock.now):
         _nobody_tells(found, door, clock, around)
     elif for_s <= (OPENS_S if door.mode.value == OPEN else MOVES_S):
         found.say(
-            "No robot holds it, so it closes or is about to.",
+            "No robot holds the door, so the door closes or will close in a moment.",
             "nobody",
             f"wait until {door.name} is closed",
         )
     else:
         found.say(
-            "No robot holds it: a push button, somebody in the doorway or its own controller keeps it"
-            " open. CLOSE from RMF's supervisor only releases a hold, and shuts nothing.",
+            "No robot holds the door. A push button, somebody in the doorway or the door's own"
+            " controller keeps it open. CLOSE from RMF's supervisor only releases a hold.",
             "the controller",
             f"close {door.name} when nobody is in the doorway",
         )
@@ -266,7 +268,11 @@ def _held_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
     who, since = min(door.holders.items(), key=lambda one: one[1].at)
     claim = door.requesters.get(who)
     last: Moment | None = claim.last if claim else None
-    said = f"It last asked at {clock.time(last.wall)}." if last else "It was not heard asking."
+    said = (
+        f"The last request came at {clock.time(last.wall)}."
+        if last
+        else "No request from a holder was heard."
+    )
     if clock.now.at - since.at <= LONG_S:
         found.say(
             f"{said} A robot in the doorway says nothing until it is through.",

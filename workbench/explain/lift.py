@@ -42,7 +42,7 @@ def answer(
     claim = _in_question(lift, clock, focus)
     found = Answer(since=_begins(lift, claim))
     if focus and claim is None:
-        told = "its last ride is shown below" if lift.kept else "it was never heard asking"
+        told = "its last ride is shown below" if lift.kept else "no request from it was heard"
         found.say(f"{label(focus)} neither has {lift.name} nor asks for it now: {told}.")
     if claim is not None and claim.ended is None and not lift.matches(claim):
         where = claim.wants or "no floor"
@@ -90,7 +90,7 @@ def _why(
     elif claim is not None and claim.ended is None:
         not_granted(found, lift, claim, clock)
     else:
-        found.say("Nobody asks for it.", "nobody", "there is nothing to do")
+        found.say("Nobody requests the lift.", "nobody", "there is nothing to do")
 
 
 def _in_question(lift: LiftFacts, clock: TimePhrases, focus: str) -> DeviceRequester | None:
@@ -121,7 +121,7 @@ def _begins(lift: LiftFacts, claim: DeviceRequester | None) -> float:
 def _with_askers(found: Answer, lift: LiftFacts, clock: TimePhrases) -> Answer:
     for claim in [one for one in lift.asking(clock.now) if one.met is None][:3]:
         since = clock.since(claim.since)
-        found.say(f"{claim.who} has waited for it at {claim.wants or 'no floor'} {since}.")
+        found.say(f"{claim.who} has waited for the lift at {claim.wants or 'no floor'} {since}.")
         if lift.state is None:
             found.say(lift.in_car(claim.who, clock.now))
         found.since = min(found.since, claim.first.at)
@@ -219,7 +219,9 @@ def _held(found: Answer, lift: LiftFacts, clock: TimePhrases, around: common.Oth
     else:
         if found.asks != holder:
             where = theirs.wants or "no floor"
-            found.say(f"{holder} itself has waited for it at {where} {clock.since(theirs.since)}.")
+            found.say(
+                f"{holder} itself has waited for the lift at {where} {clock.since(theirs.since)}."
+            )
         _missing(found, lift, theirs, clock)
     lift_holder.forgotten(found, lift, holder, clock)
 

@@ -25,7 +25,7 @@ def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: T
         )
         return
     if clock.now.at - claim.since.at < SETTLES_S and claim.since.seen:
-        found.say("It was asked for a moment ago.", "the device's node", "grant the session")
+        found.say("The request came a moment ago.", "the device's node", "grant the session")
         return
     if _asks_for_another(found, lift, claim, clock):
         return

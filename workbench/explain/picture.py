@@ -163,7 +163,7 @@ class Picture:
     def _rows(self) -> None:
         y, before = TOP, ""
         if not self._timeline.lanes:
-            self._text(12, TOP + 4, "Nothing of it was heard in this time.", "txt ink")
+            self._text(12, TOP + 4, "Nothing was heard about the device in this time.", "txt ink")
         for lane in self._timeline.lanes:
             y += GAP if before and lane.name != before else 0.0
             if lane.name != before:

@@ -54,8 +54,8 @@ def _next(found: Answer, workcell: WorkcellFacts, clock: TimePhrases) -> None:
     waits = list(workcell.waits(clock.now))
     if not waits:
         queue = workcell.queue.value
-        left = f" It still lists {queue}, which no fleet adapter repeats." if queue else ""
-        found.say(f"Nobody asks for it.{left}", "nobody", "there is nothing to do")
+        left = f" Its state still lists {queue}, which no fleet adapter repeats." if queue else ""
+        found.say(f"Nobody requests the workcell.{left}", "nobody", "there is nothing to do")
         return
     first = waits[0]
     said = f"Request {first.who} asks for {first.wants} {clock.since(first.since)}."

@@ -97,7 +97,7 @@ RATE: Final[Law[AnyScene]] = Law(
     "RATE",
     "States keep coming, whether the hardware answers or not: never 5 s without one",
     "two states",
-    "A fleet adapter asks and releases once for each state: without states it waits for ever",
+    "A fleet adapter sends a request at each state. Without states the robot waits for ever",
     "rmf_ros2 agv/RobotContext.cpp:1700-1735",
     rate,
 )
@@ -105,7 +105,7 @@ ANSWERED: Final[Law[AnyScene]] = Law(
     "ANSWER",
     "No request causes a state: states come by timer and by change",
     "5 requests between unchanged states, after states without any request",
-    "RMF repeats its request at each state: a state for each request would loop for ever",
+    "RMF repeats its request at each state. A state for each request would loop for ever",
     "rmf_ros2 agv/RobotContext.cpp:1732-1735, lift_supervisor/Node.cpp:58-140",
     answers,
     sensed=True,  # a noisy wire may change the other fields of the state ten times a second
@@ -114,7 +114,7 @@ ONE: Final[Law[AnyScene]] = Law(
     "ONE",
     "Only one node publishes under this name",
     "10 states on a live graph: kept only if their topic has one publisher",
-    "RMF believes the latest state: with two nodes the device would jump between two states",
+    "RMF believes the latest state. With two nodes the device would jump between two states",
     "follows from RequestLift.cpp and DoorOpen.cpp, which keep one state",
     one_node,
 )
@@ -122,7 +122,7 @@ STAMP: Final[Law[AnyScene]] = Law(
     "STAMP",
     "A state that claims anything carries the time of its reading",
     "a state",
-    "Without it a reading cannot be told from a remembered value; 0 means: never read",
+    "Without this time, a remembered value looks like a reading. 0 means: never read",
     "LiftState.msg, DoorState.msg, ChargerState.msg: the time of the state",
     stamped(lambda state: True),
 )

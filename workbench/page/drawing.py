@@ -139,7 +139,7 @@ def had(stands: Stands) -> str:
     min`."""
     minutes = int(stands.for_s // 60)
     if stands.at_least:
-        return f"at least {minutes} min" if minutes else "since before this page heard of it"
+        return f"at least {minutes} min" if minutes else "since before this page listened"
     return f"{minutes} min" if minutes else "less than a minute"
 
 

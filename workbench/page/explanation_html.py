@@ -55,7 +55,7 @@ def _fault(one: FaultTold) -> str:
 def story(found: Explanation, zone: tzinfo | None = None) -> str:
     """Format the events, one line each. `zone`: time zone of the events."""
     if not found.story:
-        return "<p>Nothing was heard of it.</p>"
+        return "<p>Nothing was heard about the device.</p>"
     last = found.story[-1]
     clock = TimePhrases(Moment(last.at, last.wall), zone)
     left_out = f"<p>{found.left_out} lines before that.</p>" if found.left_out else ""

@@ -191,7 +191,7 @@ class SiteViews:
         ui.timer(AGES_S, refresh)
 
     def _card(self, key: Key) -> str:
-        return self._cards.cards.get(key, "<p>It is no longer heard.</p>")
+        return self._cards.cards.get(key, "<p>The device is no longer heard.</p>")
 
     def _why(self, key: Key, zone: tzinfo | None) -> str:
         found = self._explained(key, zone)

@@ -114,7 +114,7 @@ def test_spans_too_narrow_to_be_seen_are_joined_and_what_is_wrong_shows() -> Non
 
 
 def test_an_empty_timeline_says_so() -> None:
-    assert "Nothing of it was heard in this time." in texts(drawn())
+    assert "Nothing was heard about the device in this time." in texts(drawn())
 
 
 def test_a_picture_says_what_was_left_out() -> None:

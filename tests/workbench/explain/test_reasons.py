@@ -127,4 +127,4 @@ def test_an_end_that_is_asked_for_is_explained_instead_of_the_moment() -> None:
         site.take(one)
     site.at_its_end()
     found = site.explain("lift", NAME, UTC, for_explain())
-    assert (found.now[-1], found.next[0].who) == ("Nobody asks for it.", "nobody")
+    assert (found.now[-1], found.next[0].who) == ("Nobody requests the lift.", "nobody")

@@ -129,7 +129,7 @@ def test_an_old_state_says_that_it_is_old_and_how_old() -> None:
         (Stands(59.0, at_least=False), "less than a minute"),
         (Stands(185.0, at_least=False), "3 min"),
         (Stands(185.0, at_least=True), "at least 3 min"),
-        (Stands(5.0, at_least=True), "since before this page heard of it"),
+        (Stands(5.0, at_least=True), "since before this page listened"),
     ],
 )
 def test_a_charger_says_how_long_its_robot_has_it(stands: Stands, told: str) -> None:

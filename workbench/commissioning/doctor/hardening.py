@@ -88,7 +88,7 @@ def _zenoh(zenoh: Zenoh | None) -> Iterator[Finding]:
     do = f"certificates for every node, and connect: [tls/…]: {PAGE}"
     open_ends = [end for end in settings.connect if not end.startswith(ENCRYPTED)]
     if open_ends:
-        means = "whoever is on the way reads and forges every request, and any password"
+        means = "anybody on the path can read and forge every request, and read any password"
         yield warning(GRAPH, f"not encrypted: {', '.join(open_ends)}", means, do)
     elif not (settings.tls and settings.tls.certificate):
         means = "the router cannot tell this daemon from a stranger"
@@ -125,9 +125,9 @@ def _wire(config: Config, name: str, settings: Any) -> Finding:
     if base.startswith(ENCRYPTED):
         return ok(WIRES, f"bus '{name}' is encrypted: {base}")
     if base:
-        means = "whoever is on the way reads the token, and switches the device"
+        means = "anybody on the path can read the token, and switch the device"
         return warning(WIRES, f"bus '{name}' is not encrypted: {base}", means, f"https; or {do}")
-    means = "whoever reaches it switches its outputs, whatever the daemon does"
+    means = "anybody who reaches the bus can switch its outputs, whatever the daemon does"
     return unknown(WIRES, f"who else reaches bus '{name}' ({kind} at {host})", means, do)
 
 
@@ -194,7 +194,7 @@ def _root(mounts: str | None) -> Finding:
         return ok(ROOT, "an overlay: a restart forgets every change")
     if "ro" in options.split(","):
         return ok(ROOT, "read-only")
-    means = "a taken daemon or a power cut can change the system for good"
+    means = "an intruder or a power cut can change the system permanently"
     return warning(ROOT, f"writable ({kind})", means, f"an overlay: {PAGE}")
 
 
@@ -233,7 +233,7 @@ def _runs_as(service: dict[str, str] | None) -> Finding:
         return unknown(USERS, "the daemon's user: no service of this file is installed here")
     if (name := service["User"]) == SERVICE_USER:
         return ok(USERS, f"the daemon runs as {name}")
-    means = "a defect in the daemon would be a defect with that user's rights"
+    means = "an intruder in the daemon would have this user's rights"
     return wrong(USERS, f"the daemon runs as {name or 'root'}", means, "rmf-bridge enable FILE")
 
 
