@@ -1,8 +1,8 @@
-"""`rmf-bridge exporter`: metrics for Prometheus, of RMF's graph and of this machine's daemons.
+"""`rmf-bridge exporter`: publish metrics of RMF's graph and of this machine's daemons for Prometheus.
 
-It only listens. It needs the extra `metrics` (prometheus_client), which no daemon imports. On an
-address other than 127.0.0.1 everybody on that network can read the names, states and faults of the
-site's devices; a reverse proxy with TLS and a login prevents that.
+The exporter only listens. It needs the extra `metrics` (prometheus_client), which no daemon imports. On
+an address other than 127.0.0.1, everybody on that network can read the names, states and faults of the
+site's devices. A reverse proxy with TLS and a login prevents this.
 """
 
 import argparse
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 PORT: Final = 9763
 RECORDER: Final = Path("/var/lib/rmf-bridge-recorder")
-"""The folder of `rmf-bridge-recorder.service`."""
+"""Folder of recordings that `rmf-bridge-recorder.service` writes."""
 LISTEN_S: Final = 0.5
 
 
@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-graph",
         action="store_true",
-        help="only this machine's daemons: for every machine but one, as the graph is the same",
+        help="export only this machine's daemons, because another machine exports the graph",
     )
     parser.add_argument(
         "--runtime-dirs", type=Path, metavar="DIR", help="the folder of this machine's daemons"
@@ -61,7 +61,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 after Ctrl-C or SIGTERM; 1 if the graph cannot be joined; 69 with the remedy printed."""
+    """Return 0 after Ctrl-C or SIGTERM; 1 if the graph cannot be joined; 69 after printing the
+    remedy."""
     log.start()
     try:
         from prometheus_client import CollectorRegistry, ProcessCollector, start_http_server
@@ -93,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _serve(args: argparse.Namespace, site: "Site") -> None:
-    """Listen until interrupted."""
+    """Listen to the graph until Ctrl-C or SIGTERM."""
     if args.no_graph:
         while True:
             signal.pause()
@@ -121,7 +122,7 @@ class Site:
             self._listens = True
 
     def collect(self) -> "Iterator[Metric]":
-        """Yield every family; called by the server's threads for each scrape."""
+        """Yield every metric family. The server's threads call this method for each scrape."""
         from workbench.metrics import families, machine
 
         now = Moment(time.monotonic(), time.time())

@@ -1,7 +1,7 @@
-"""`rmf-bridge notify FILE`: tells people of a site's troubles by webhook, mail or ntfy.
+"""`rmf-bridge notify FILE`: tell people about a site's troubles, through a webhook, mail or ntfy.
 
-It only listens to RMF's graph. It runs beside the page or the recorder, never in a daemon that moves
-something.
+The command only listens to RMF's graph. It runs beside the page or the recorder, never in a daemon that
+moves hardware.
 """
 
 import argparse
@@ -42,11 +42,12 @@ from workbench.notify.troubles import troubles
 logger = logging.getLogger(__name__)
 TURN_S: Final = 1.0
 RETRY_S: Final = (5.0, 30.0, 120.0, 600.0)
-"""The pauses after failed tries; the last one is repeated."""
+"""Pauses (s) after failed tries. The last pause is repeated."""
 MOST_WAITING: Final = 200
-"""Notices that wait for a recipient out of reach; the oldest are dropped, which is logged."""
+"""Maximum number of notices that wait for an unreachable recipient. The oldest are dropped, and the log
+says so."""
 SERVICE_STATE: Final = Path("/var/lib/rmf-bridge-notify")
-"""The folder of `rmf-bridge-notify.service`."""
+"""Folder in which `rmf-bridge-notify.service` keeps what it has told."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -59,7 +60,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--ack", metavar="TROUBLE", help="stop the repeats of this trouble, as its notice names it"
     )
     parser.add_argument(
-        "--state", type=Path, default=_state(), metavar="DIR", help="the folder of what was told"
+        "--state",
+        type=Path,
+        default=_state(),
+        metavar="DIR",
+        help="the folder that keeps what people were told",
     )
     add_graph_arguments(parser)
 
@@ -73,8 +78,11 @@ def _state() -> Path:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 after Ctrl-C or SIGTERM, or if every test notice was taken; 1 if one was not, or the
-    graph cannot be joined; 73 if --ack cannot be written; 78 if FILE has an error."""
+    """Return 0 after Ctrl-C or SIGTERM, or if every recipient accepted its test notice.
+
+    Return 1 if a recipient did not accept its test notice, or the graph cannot be joined; 73 if --ack
+    cannot be written; 78 if FILE has an error.
+    """
     log.start()
     try:
         settings = load(args.file)
@@ -134,7 +142,8 @@ def _serve(args: argparse.Namespace, settings: NotifySettings) -> None:
 
 
 class Courier:
-    """Sends one recipient's notices on a thread of its own, so that none delays another's."""
+    """Sends one recipient's notices on a separate thread, so that no recipient delays another
+    recipient's notices."""
 
     def __init__(self, to: Recipient) -> None:
         self._to = to
@@ -174,7 +183,8 @@ class Courier:
 
 
 class Desk:
-    """Finds the notices of each turn, hands them to the couriers, and keeps on disk what was told."""
+    """Finds the notices of each turn, gives them to the couriers, and stores on disk what people were
+    told."""
 
     def __init__(self, settings: NotifySettings, state: Path, couriers: list[Courier]) -> None:
         self._settings = settings

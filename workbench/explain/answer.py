@@ -71,7 +71,9 @@ class FileReason:
             WAITING: f"because {self.text}",
             DIED: f"because the daemon died: {self.text}",
         }.get(self.code, f'by a person, who wrote "{self.text}"')
-        return f"This file was kept {why}. What follows is of {clock.time(clock.now.wall)}."
+        return (
+            f"This file was kept {why}. The next sentences are about {clock.time(clock.now.wall)}."
+        )
 
 
 @dataclass(frozen=True, slots=True)

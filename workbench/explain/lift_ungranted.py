@@ -48,7 +48,7 @@ def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: T
 def _asks_for_another(
     found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases
 ) -> bool:
-    """Explain that the supervisor does not forward this request. True if it forwards other requests."""
+    """Explain that the supervisor does not forward this request. Return whether that is so."""
     passed = claim.passed_on
     if not claim.own or (passed is not None and clock.now.at - passed.at < 5.0):
         return False

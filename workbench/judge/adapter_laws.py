@@ -116,8 +116,8 @@ def _enters(history: AdapterHistory) -> Finding:
     if was.met:
         return KEPT
     text = (
-        f"{shown(was.who)} asks for {shown(history.wish.wants)} before the car was shown OPEN at"
-        f" {shown(was.wants)} in its session (RMF's own: rmf_ros2#389, or Jazzy's replan)"
+        f"{shown(was.who)} requests {shown(history.wish.wants)} before a state showed its session"
+        f" OPEN at {shown(was.wants)} (RMF's own: rmf_ros2#389, or Jazzy's replan)"
     )
     return _explained(history, was, text)
 

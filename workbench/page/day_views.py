@@ -1,4 +1,5 @@
-"""The view of each device's last day and week, as this machine's recorder counted them; and its CSV."""
+"""The view of each device's last day and week, from the counts of this machine's recorder; and a CSV
+file of them."""
 
 from datetime import date
 from pathlib import Path
@@ -16,7 +17,7 @@ NONE = "<p>This machine's recorder has counted nothing in this time.</p>"
 
 
 class DayViews:
-    """The days in the recorder's folder."""
+    """Views of the days that the recorder's folder holds."""
 
     def __init__(self, folder: Path, login: Login) -> None:
         self._folder = folder
@@ -38,5 +39,5 @@ class DayViews:
             part(CSV)
 
     def csv(self) -> Response:
-        """Send every day as CSV."""
+        """Send the counts of every day as CSV."""
         return Response(days.as_csv(days.read(self._folder)), media_type="text/csv; charset=utf-8")

@@ -89,7 +89,7 @@ def test_a_refusal_for_which_a_file_is_kept_is_somebodys_to_compare(
 def test_a_dead_daemons_file_is_about_its_death(kind: Kind) -> None:
     found = explained(kind, DIED, "killed")
     assert found.now[:2] == (
-        "This file was kept because the daemon died: killed. What follows is of 08:00:20.",
+        "This file was kept because the daemon died: killed. The next sentences are about 08:00:20.",
         "The daemon of here died then. The file ends there: what came after is unknown.",
     )
     assert (found.next[0].who, "rmf-bridge status" in found.next[0].what) == ("a person", True)

@@ -41,7 +41,11 @@ def result(at: float, status: int) -> tuple[float, str, Any]:
     ("lines", "says", "who"),
     [
         (states(9, 0), "Nobody requests the workcell.", "nobody"),
-        (states(9, 0, "task"), "Its state still lists task, which no fleet adapter repeats.", "nobody"),
+        (
+            states(9, 0, "task"),
+            "Its state still lists task, which no fleet adapter repeats.",
+            "nobody",
+        ),
         (states(9, 2, "task") + asks(9), "has had no answer", "a person"),
         (states(9, 1, "task") + asks(9), "Request task asks for 1 box", "the controller"),
         (states(9, 0, "task") + asks(9), "Request task asks for 1 box", "the controller"),
