@@ -175,11 +175,11 @@ def _examined(
 
 
 def _nothing(one: Finding) -> None:
-    """Show nothing, because JSON is printed at the end."""
+    """Print nothing now, because JSON follows at the end."""
 
 
 class FindingsText:
-    """Print findings as they come, under a heading for each subject."""
+    """Print findings when they come, under a heading for each subject."""
 
     def __init__(self, out: TextIO) -> None:
         self._out = out

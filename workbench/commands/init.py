@@ -267,7 +267,7 @@ def _needed(question: Question, given: Given, args: argparse.Namespace) -> bool:
 
 
 def _of_map(name: str, given: Given, found: BuildingMap | None) -> str | None:
-    """Return the answer if the map allows only one answer."""
+    """Return the answer if the map allows only one answer; else None."""
     if found is None:
         return None
     if name == "name" and len(names := tuple(found.named[given["kind"]])) == 1:
@@ -335,10 +335,8 @@ def write(path: Path, text: str) -> None:
 
 
 def _schema_line() -> str:
-    """Return the line that names the schema for editors; "" if no schema can be stored.
-
-    This version's schema is stored in the user's data directory.
-    """
+    """Store this version's schema in the user's data directory. Return the line that names the schema
+    for editors; "" if it cannot be stored."""
     from workbench.commissioning.reference import schema
 
     base = os.environ.get("XDG_DATA_HOME") or os.path.expanduser("~/.local/share")

@@ -238,7 +238,7 @@ def _begins(args: argparse.Namespace, performance: Scenario | None) -> str:
 
 
 def tell(found: Judgement, args: argparse.Namespace) -> int:
-    """Print the verdict, write the file, and return the exit code."""
+    """Print the verdict, write the file of `--junit`, and return the exit code."""
     if args.junit is not None:
         try:
             args.junit.write_text(junit(found), "utf-8")

@@ -179,7 +179,7 @@ class Broker:
         self._client.loop_start()
 
     def is_new(self) -> bool:
-        """Has a connection been made since the last call?"""
+        """Has paho-mqtt connected after the last call?"""
         new = self._new.is_set()
         self._new.clear()
         return new

@@ -250,7 +250,7 @@ def send(
 
 
 class _Exchange:
-    """Call `exchange.step` with the clock, the transport and the terminal."""
+    """Runs `exchange.step` with a clock, a transport and a terminal."""
 
     def __init__(
         self,

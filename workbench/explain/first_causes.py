@@ -76,7 +76,7 @@ STALLS_S: Final = 0.5
 def two_nodes(
     found: Answer, device: Device, clock: TimePhrases, around: OthersHeard, topic: str
 ) -> bool:
-    """Explain two nodes that publish one device's states on this topic. True if there are two."""
+    """Explain that two nodes publish one device's states on this topic. Return whether that is so."""
     if TWO_NODES not in device.faults(clock.now) and not device.two_nodes(clock.now):
         return False
     names, nodes = device.nodes(clock.now), around.publishers(topic)

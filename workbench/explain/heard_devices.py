@@ -116,7 +116,8 @@ class HeardDevices(ObservedGraph[Device]):
         return [(kind, one) for kind in KINDS for one in sorted(d.id for d in self.stated(kind))]
 
     def kinds(self, name: str) -> list[Kind]:
-        """Return the kinds of a device of this name: by its states, else by the requests for it."""
+        """Return the kinds of the devices with this name, according to their states, else according to
+        requests."""
         found = [kind for kind in KINDS if (kind, name) in self.known]
         stated = [kind for kind in found if self.known[kind, name].state is not None]
         return stated or found or (["charger"] if name in self._coordinates() else [])

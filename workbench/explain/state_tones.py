@@ -1,4 +1,4 @@
-"""The tone of each value of RMF's states; `unknown` for numbers that RMF does not define."""
+"""The tone of each value of RMF's states. A number that RMF does not define has the tone `unknown`."""
 
 from collections.abc import Mapping
 from enum import IntEnum

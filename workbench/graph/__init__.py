@@ -1,1 +1,1 @@
-"""RMF's graph for people: join it, watch it, and send requests."""
+"""RMF's graph, for the commands that people use: join it, watch it, and send requests."""

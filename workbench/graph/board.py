@@ -76,7 +76,8 @@ class Board:
     """The latest state and diagnosis of each device."""
 
     def __init__(self, graph: ObservedGraph[Any] | None = None) -> None:
-        """Begin empty. `graph`: the memory of the devices, if another object fills it."""
+        """Begin without messages. `graph`: the memory of the devices, if another object fills that
+        memory."""
         self._graph = graph or PlainGraph()
         self._places: dict[str, str] = {}
 
@@ -255,7 +256,7 @@ def table(rows: Iterable[BoardRow]) -> list[str]:
 
 
 def changes(before: list[BoardRow], after: list[BoardRow]) -> list[BoardRow]:
-    """Return the rows that have changed, not counting ages and running seconds."""
+    """Return the rows that have changed. A new age or a running second is no change."""
     known = {(row.kind, row.name): row.news() for row in before}
     return [row for row in after if known.get((row.kind, row.name)) != row.news()]
 

@@ -1,4 +1,4 @@
-"""The retained MQTT messages that show RMF's devices to other systems, from rows and a time. Pure.
+"""The retained MQTT messages that show RMF's devices to other systems, made from rows and a time.
 
     PREFIX/status                     online, or offline by the last will
     PREFIX/KIND/ID/state              one JSON object
@@ -6,8 +6,9 @@
     HOMEASSISTANT/device/…/config     Home Assistant's discovery, one message for each device:
                                       https://www.home-assistant.io/integrations/mqtt/#device-discovery-payload
 
-A retained message has no age for its reader, so each expires at the broker unless it is renewed
-(MQTT 5, 3.3.2.3.3). ID is the device's name with every byte besides A-Z a-z 0-9 and - written as _XX.
+A reader cannot see the age of a retained message. For this reason each message expires at the broker
+if it is not renewed (MQTT 5, 3.3.2.3.3). ID is the device's name. Every byte of the name other than
+A-Z a-z 0-9 and - is written as _XX, in hexadecimal. All functions are pure.
 """
 
 import json

@@ -234,7 +234,8 @@ class History(AnyHistory, Generic[T]):
 
     @property
     def two_rhythms(self) -> bool:
-        """Do long and short gaps take turns, each always of the same length?"""
+        """Do long and short gaps alternate, with one length for all long gaps and one for all short
+        gaps?"""
         gaps = [*self._gaps]
         steady = all(abs(b - a) < STEADY_S for a, b in zip(gaps, gaps[2:], strict=False))
         uneven = all(abs(b - a) > UNEVEN_S for a, b in pairwise(gaps))

@@ -1,4 +1,4 @@
-"""Laws, and a judge's findings: kept, broken, or not seen."""
+"""Laws, and a judge's findings: a law is kept, broken, or not seen."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -63,7 +63,7 @@ class Scenario(ABC):
 
     @property
     def over(self) -> bool:
-        """Is the play finished, or unable to go on?"""
+        """Is the play finished, or can it not go on?"""
         return bool(self.failed) or self.play.over
 
     @property
@@ -297,7 +297,7 @@ class PassageScenario(Scenario):
 
 
 def _closes(door: str, now: float, who: str = DoorSupervisor.REQUESTER_ID) -> Said:
-    """Make a CLOSE of the supervisor or of a fleet adapter."""
+    """Return a CLOSE from the supervisor or from a fleet adapter."""
     direct = who == DoorSupervisor.REQUESTER_ID
     request = door_request(door, who, d.DoorModeValue.MODE_CLOSED, now)
     return topics.DOOR_REQUESTS if direct else topics.ADAPTER_DOOR_REQUESTS, request

@@ -1,4 +1,4 @@
-"""Laws that lifts, doors and chargers share; each kind numbers them in its own contract."""
+"""Laws that all kinds of device share. Each kind gives these laws its own numbers."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The history of a dispenser or ingestor: requests, what its states list, and its results."""
+"""The history of a dispenser or ingestor: its requests, the requests in its states, and its results."""
 
 from typing import Any
 

@@ -37,7 +37,7 @@ class Buttons:
         self._graph = graph
 
     def show(self, key: Key, request: Request, tab: Tab) -> None:
-        """Show the device's buttons and recent actions; nothing without a login."""
+        """Show the device's buttons and recent actions; show nothing to a user without a login."""
         if not self._login.user(request):
             return
         with ui.element("section").classes("panel").props('aria-label="Actions"'):

@@ -281,7 +281,7 @@ def _svg(width: float, height: float, said: str, inner: str) -> str:
 
 
 def robots(found: Sequence[RobotShown], now: float) -> str:
-    """Draw the robots that fleets report, as a table."""
+    """Draw a table of the robots in fleet states."""
     if not found:
         return ""
     rows = "".join(_robot(one, now) for one in found)

@@ -1,4 +1,4 @@
-"""An explanation (`workbench/explain/`) as HTML. Pure; every text is escaped."""
+"""An explanation (`workbench/explain/`) as HTML. All functions are pure, and every text is escaped."""
 
 from collections.abc import Iterator
 from datetime import tzinfo

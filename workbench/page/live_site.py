@@ -140,7 +140,7 @@ class LiveSite:
         return [_view(row, shown.get(f"{row.kind} {row.name}")) for row in rows]
 
     def changed(self, now: float, wall: float) -> list[DeviceView]:
-        """Return the devices with messages since the last call."""
+        """Return the devices that got messages after the last call."""
         changed, self._changed = self._changed, set()
         known = [found for key in sorted(changed) if (found := self._device(key))]
         rows = self._board.rows_of(known, now, wall)

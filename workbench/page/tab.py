@@ -50,7 +50,7 @@ class Tab:
         self._client.run_javascript(script)
 
     def show(self, place: str, html: str) -> None:
-        """Send the changes of this part; a browser that was away gets the whole part."""
+        """Send the changes of this part. A browser that was away gets the whole part."""
         if not self.is_here:
             self._sent.clear()
             return

@@ -174,7 +174,7 @@ async def _pump(cards: Cards) -> None:
 
 
 async def _look(here: LocalDaemons) -> None:
-    """Look for this machine's daemons, without delaying the pump."""
+    """Look for this machine's daemons in the background, so that the pump does not wait."""
     while True:
         with suppress(OSError):
             await asyncio.to_thread(here.look)

@@ -8,7 +8,8 @@ LONGEST: Final = 64
 
 
 def zone_of(name: object) -> tzinfo | None:
-    """Return the zone of this name; None, which means this machine's zone, if there is no such zone."""
+    """Return the time zone of this name. None, which means this machine's zone, stands for an unknown
+    name."""
     if not isinstance(name, str) or len(name) > LONGEST:
         return None
     try:

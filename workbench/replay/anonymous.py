@@ -1,10 +1,10 @@
 """Anonymise an incident: each of the site's names becomes `name01`, `name02` …, the same everywhere.
 
 Names come from the name fields of RMF's messages, the single words in cores' memories, the devices,
-and the YAML. They are replaced in messages, memories, notes and the YAML, also inside longer texts.
-The names' sort order stays, because cores sort by names. Words of the program itself (keys and values
-of the YAML, words of a core, topics) stay, because replacing them would change the recording. Comments
-of the YAML are removed; the addresses of its buses become `192.0.2.1`.
+and the YAML. This module replaces the names in messages, memories, notes and the YAML, also inside
+longer texts. The names' sort order stays, because cores sort by names. The program's own words stay,
+because new words would change the recording: keys and values of the YAML, words of a core, topics.
+Comments of the YAML are removed. The addresses of its buses become `192.0.2.1`.
 """
 
 import enum

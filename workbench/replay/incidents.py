@@ -49,7 +49,7 @@ def notes_in(path: Path) -> list[Note]:
 
 
 def _texts(path: Path, topic: str, notes: Notes) -> Iterator[str]:
-    """Yield our recorder's texts on one of its topics."""
+    """Yield the texts that our recorder wrote on this topic."""
     channels = set()
     try:
         for record in records(path):

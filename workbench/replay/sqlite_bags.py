@@ -31,7 +31,7 @@ def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
                     yield Raw(at, at, topic.topic, bytes(sample), topic.decode)
     except BagError:
         raise
-    except Exception as error:  # a file of arbitrary bytes can make the library raise anything
+    except Exception as error:  # arbitrary bytes can make the library raise anything
         if not began:
             raise BagError(
                 f"{path} cannot be read: {error}; try sqlite3 .recover on the .db3 file"

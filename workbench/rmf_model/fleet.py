@@ -1,21 +1,22 @@
 """A fleet adapter and its robots, for charging only.
 
 Read in rmf_ros2 9dedd0f (TaskManager.cpp, tasks/ChargeBattery.cpp, phases/WaitForCharge.cpp,
-FleetUpdateHandle.cpp) and seen with Jazzy's:
+FleetUpdateHandle.cpp), and seen with Jazzy's adapter:
 1. ChargeBattery goes to the robot's dedicated waypoint and waits there for its battery. An assignment
    with a new waypoint or mode restarts a running ChargeBattery, and moves no other robot. A waypoint
    missing in the graph crashes the adapter.
-2. ChargeBattery is a task if RMF finds the battery too low for the way to the dedicated waypoint (the
-   automatic retreat; never for a robot at that waypoint; with Jazzy never below the recharge threshold)
-   or if RMF's planner plans the task. That task ends at recharge_soc. As the fleet's
-   `finishing_request: charge` it is not a task, and lasts until the next task, however full the battery
-   is. With `nothing` a robot stays. With `park` it drives to a parking spot; Jazzy's adapter (branch
-   jazzy, 7eef65a) knows no parking spots: the robot goes where ChargeBattery would, and again at each
+2. ChargeBattery is a task in two cases. RMF's planner plans the task, or RMF finds the battery too low
+   for the way to the dedicated waypoint (the automatic retreat). A robot at that waypoint never
+   retreats; with Jazzy no robot below the recharge threshold does. The task ends at recharge_soc.
+   With `finishing_request: charge` the fleet's robots run ChargeBattery after their tasks. This
+   ChargeBattery is no task, and lasts until the next task, even with a full battery. With `nothing`
+   a robot stays. With `park` a robot drives to a parking spot. Jazzy's adapter (branch jazzy,
+   7eef65a) knows no parking spots: the robot goes to its dedicated waypoint, and again at each
    assignment.
-3. A robot without a task shows the mode IDLE and no task id, also while it charges. Only WaitForCharge
-sets CHARGING, and nothing resets CHARGING: every later task shows it too.
-4. An EasyFullControl adapter that starts has forgotten the assignments. It takes the retained
-assignment, and a moment later replaces it by the charger of its file.
+3. A robot without a task shows the mode IDLE and no task id, even while it charges. Only
+   WaitForCharge sets CHARGING, and nothing resets CHARGING: every later task shows CHARGING too.
+4. An EasyFullControl adapter forgets the assignments in a restart. It takes the retained assignment,
+   and a moment later replaces the assignment by the charger of its file.
 """
 
 from collections.abc import Mapping, Sequence
@@ -123,7 +124,7 @@ class FleetAdapter(Party):
             self._rest(robot, now)
 
     def strays(self, who: str, place: str, now: float) -> None:
-        """Drive the robot to a place where its present task does not send it."""
+        """Drive the robot to a place that does not belong to its present task."""
         self._go(self.robots[who], place, now)
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
@@ -139,7 +140,8 @@ class FleetAdapter(Party):
         return []
 
     def tick(self, now: float) -> list[Said]:
-        """Drive robots on, retreat low robots, end the tasks of full robots, and publish the state."""
+        """Move driving robots, retreat robots with a low battery, end the tasks of full robots, and
+        publish the state."""
         for robot in self.robots.values():
             self._move(robot, now)
             self._retreat(robot, now)
@@ -172,7 +174,8 @@ class FleetAdapter(Party):
             self._go(robot, robot.dedicated if self.jazzy else self._spots[robot.name], now)
 
     def _retreat(self, robot: FleetRobot, now: float) -> None:
-        """Apply consider_retreating_to_charger: not during a task, nor at the dedicated waypoint."""
+        """Retreat by the rules of consider_retreating_to_charger: not during a task, nor at the
+        dedicated waypoint."""
         low = robot.battery_percent < RETREAT_PERCENT
         if self.jazzy and robot.battery_percent <= TOO_LATE_PERCENT:
             return

@@ -16,9 +16,9 @@ REPEAT_S: Final = 1.0
 
 
 class RequestLift(Phase):
-    """Wait for a LiftState with our floor, DOOR_OPEN and our session; modes are ignored.
+    """Wait for a LiftState with our floor, DOOR_OPEN and our session. Modes are ignored.
 
-    Once a destination is set, the phase's 1 s timer publishes nothing, because the context repeats the
+    After a destination is set, the phase's 1 s timer publishes nothing, because the context repeats the
     request at each LiftState.
     """
 
@@ -60,7 +60,7 @@ class EndLiftSession(Phase):
         self.lift = lift
 
     def begin(self, robot: RobotContext, now: float) -> list[Said]:
-        """Send nothing: END_SESSION follows the next LiftState with our session."""
+        """Send nothing, because END_SESSION follows the next LiftState with our session."""
         return robot.release_lift()
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:

@@ -43,7 +43,7 @@ DEVICE_TYPE: Final = (0x1000, 0, 4)
 
 
 def answers(config: Config, bus_name: str, whole: bool) -> Iterator[Finding]:
-    """Examine one bus other than GPIO. `whole`: scan every unit or node, not only 1 to 16."""
+    """Examine a bus, but not GPIO. `whole`: scan every unit or node, not only 1 to 16."""
     subject, kind = f"bus {bus_name}", config.bus_types[bus_name]
     try:
         bus = _opened(config, bus_name)

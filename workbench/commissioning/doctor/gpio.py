@@ -34,7 +34,7 @@ KILL_TEST: Final = "rmf-bridge doctor FILE --kill-test shows it with one output"
 
 
 def gpio(machine: Machine, chip: int | None, who: User) -> Iterator[Finding]:
-    """Examine `gpio`: may the daemon use the header's chip? `chip`: from the YAML."""
+    """Examine `gpio`: may the daemon use the header's chip? `chip`: the number in the YAML, if any."""
     if not machine.installed("lgpio"):
         do = "sudo apt install python3-lgpio, or in the clone .venv/bin/pip install '.[gpio]'"
         yield wrong(GPIO, "this Python has no lgpio", "no pin can be claimed", do)

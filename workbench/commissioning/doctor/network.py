@@ -138,7 +138,7 @@ def _senders(topic: str, end: Subscription, look: GraphLook) -> Finding:
 
 
 def _rivals(ends: Sequence[Subscription], serving: bool | None) -> Iterator[Finding]:
-    """Find other nodes with the same task as ours."""
+    """Find other nodes that do the same work as our node."""
     rivals = max((end.matched() for end in ends), default=0) - (serving is not False)
     if rivals > 0:
         means = "our node only listens (passive) while the other node is there"

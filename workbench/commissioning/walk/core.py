@@ -78,7 +78,7 @@ class Switch:
 
 @dataclass(frozen=True, slots=True)
 class ByEye:
-    """The person has seen this step's effect, or its absence."""
+    """The person reports that the step's effect was seen, or was not seen."""
 
     step: int
     seen: bool

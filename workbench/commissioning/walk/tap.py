@@ -28,7 +28,7 @@ class TappedLines:
 
 
 class Tap:
-    """Wraps an open bus. `levels`: the last level of each input, by its canonical point."""
+    """Wraps an open bus. `levels`: the last level of each input, by the input's canonical point."""
 
     def __init__(self, bus: Any) -> None:
         self.levels: dict[str, int] = {}

@@ -83,7 +83,7 @@ class RequestProgress(Struct, frozen=True):
         return replace(self, first_sent_at=first, last_sent_at=now)
 
     def states_of(self, kind: type[State]) -> list[State]:
-        """Return the states heard, in order. `kind`: their type."""
+        """Return the states of this type that were heard, in order."""
         return [state for state in self.states if isinstance(state, kind)]
 
     def answer(self, kind: type[State]) -> State | None:
@@ -159,7 +159,7 @@ class Request(ABC):
 
     @abstractmethod
     def message(self, seen: RequestProgress) -> words.Requested | None:
-        """Return the message to send, without a stamp; None while it cannot be made yet."""
+        """Return the message to send, without a stamp; None if it cannot be made yet."""
 
     @abstractmethod
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:

@@ -165,7 +165,7 @@ class QueuedCharge(RobotCharge):
         )
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the obstacles: the charger's error, or no charger assigned."""
+        """Return the obstacles: the charger's error, or a robot without a charger."""
         text = f"the {COORDINATOR} has not assigned {self.who} a charger: see its log"
         return _error(seen.states_of(d.ChargerState)[-1]), Obstacle(True, text)
 

@@ -192,8 +192,10 @@ class LiftEnd(_Lift):
 
 
 def aftermath(states: Sequence[d.LiftState]) -> str:
-    """Tell who has the lift now, and whether anything moves. `states`: the state that showed the end of
-    the session, and all later states."""
+    """Tell who has the lift now, and whether the car or the door moves.
+
+    `states`: the state that showed the end of the session, and all later states.
+    """
     last = states[-1]
     who = f"{last.session_id} has it now" if last.session_id else "nobody has it now"
     if len(states) == 1:
