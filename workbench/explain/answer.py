@@ -176,7 +176,7 @@ def say_waits(found: Answer, device: Device, clock: TimePhrases) -> None:
     """Add the reasons that our daemons give for a waiting request."""
     for kind, text in device.waits_said(clock.now).items():
         whose = "daemon" if kind == device.kind else "supervisor"
-        found.say(f"Its {whose} says that the request waits {text}.")
+        found.say(f"The {whose} of {device.name} says that the request waits {text}.")
 
 
 def notes(device: Device, clock: TimePhrases) -> tuple[str, ...]:

@@ -71,7 +71,7 @@ def _next(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
         case "idle":
             _idle(found, charger, clock)
         case "assigned":
-            found.say(f"{who} has not come to its pad, or cannot be charged there yet.")
+            found.say(f"{who} has not come to the pad of {charger.name}, or cannot be charged yet.")
             long = clock.now.at - charger.condition.since.at > LONG_S
             comes = NextStep("the robot", f"{who} has to come to {charger.name} and park exactly")
             look = (
@@ -149,7 +149,7 @@ def _error(found: Answer, charger: ChargerFacts) -> None:
     }
     side, do = says.get(
         diagnosis(text),
-        ("Its text does not say whether robot or station is at fault", "check both"),
+        ("The error's text does not say whether robot or station is at fault", "check both"),
     )
     found.say(f"{side}: {text or 'no text was given'}.", "a person", do)
 
@@ -159,8 +159,8 @@ def _refusal(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
     if refusal is None or clock.now.at - refusal.at.at > REFUSED_LATELY_S:
         return
     found.say(
-        f"At {clock.time(refusal.at.wall)} it refused {refusal.who} (request {refusal.request}):"
-        f" {refusal.text}."
+        f"At {clock.time(refusal.at.wall)} {charger.name} refused {refusal.who} (request"
+        f" {refusal.request}): {refusal.text}."
     )
 
 
@@ -168,8 +168,8 @@ def _coordinated(found: Answer, charger: ChargerFacts, coordinator: Coordinator)
     """Add the coordinator's texts about this charger, the queue and the schedule."""
     of_it = coordinator.get(charger.id, "")
     if of_it:
-        found.say(f"The coordinator lists it as {label(of_it)}.")
-    for key, text in (("queue", "Its queue: "), ("schedule", "Its schedule: ")):
+        found.say(f"The coordinator lists {charger.name} as {label(of_it)}.")
+    for key, text in (("queue", "The queue: "), ("schedule", "The schedule: ")):
         told = coordinator.get(key, "-")
         if told not in ("-", ""):
             found.say(text + label(told, 300) + ".")

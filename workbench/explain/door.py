@@ -47,9 +47,9 @@ def answer(
         found.asks, found.fields = claim.who, _fields(door, claim, clock)
         found.notes += common.clock_of(claim)
     holders = [f"{who} {clock.since(since)}" for who, since in [*door.holders.items()][:4]]
-    held = f" It has been held by {', '.join(holders)}." if holders else " Nobody holds it."
+    held = f" The door has been held by {', '.join(holders)}." if holders else " Nobody holds it."
     if door.last_heartbeat is None:
-        held = " No heartbeat of its supervisor was heard." if door.hears_lists else ""
+        held = " No heartbeat of a door supervisor was heard." if door.hears_lists else ""
     found.say(f"{door.name} has been {door.mode.value} {clock.since(door.mode.since)}.{held}")
     if len(door.flaps(clock.now)) < FLAPS and (old := common.old_reading(door, clock)):
         found.say(old)

@@ -135,10 +135,10 @@ def _hold(found: Answer, lift: LiftFacts, clock: TimePhrases, *, then: bool = Fa
     motion = "" if lift.motion.value == "unknown" else f", {_motion(lift.motion.value)}"
     car = f"at {lift.floor.value}, door {lift.door.value}{motion}, mode {lift.mode.value}"
     if then:
-        found.say(f"Then {holder} had it, and the car was {car}.")
+        found.say(f"Then {holder} had the lift, and the car was {car}.")
         return
     has = f"{holder[:1].upper()}{holder[1:]}" if holder == "nobody" else holder
-    found.say(f"{has} has had it {clock.since(lift.session.since)}. The car is {car}.")
+    found.say(f"{has} has had the lift {clock.since(lift.session.since)}. The car is {car}.")
 
 
 def _motion(motion: str) -> str:
@@ -178,8 +178,8 @@ def _alarm(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
     mode, holder, floor = lift.mode.value, lift.session.value, lift.floor.value
     found.because = (mode,)
     found.say(
-        f"The lift has been in {mode} mode {clock.since(lift.mode.since)}: it takes no robot until that"
-        " ends. RMF does not look at the mode, and only sees that the lift does not come."
+        f"The lift has been in {mode} mode {clock.since(lift.mode.since)}: the lift takes no robot"
+        " until this mode ends. RMF ignores the mode, and only sees that the lift does not come."
     )
     ends = f"the {ALARMS[mode]} has to end, and be reset where the lift's settings ask for that"
     if holder == NOBODY:

@@ -61,7 +61,10 @@ class LiftFacts(Device, ObservedLift):
         """Say that the holder keeps the session during a hazard, and whether the holder may be in the
         car."""
         who = self.session.value
-        return f"{who} keeps the session meanwhile: only its END ends one. {self.in_car(who, now)}"
+        return (
+            f"{who} keeps the session meanwhile, because only END from {who} ends it."
+            f" {self.in_car(who, now)}"
+        )
 
     def retain(self, request: d.LiftRequest, now: Moment) -> None:
         """Take a request that the fleet adapter sent before we listened. The request's stamp tells

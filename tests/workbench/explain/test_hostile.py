@@ -34,7 +34,7 @@ def test_a_flood_of_requesters_displaces_no_holder() -> None:
         made = replace(ask, session_id=f"made/up{n}")
         site.take(heard(n / 100, "adapter_lift_requests", made))
     told = site.explain("lift", "Lift1", None)
-    assert any("fleet/red has had it" in sentence for sentence in told.now)
+    assert any("fleet/red has had the lift" in sentence for sentence in told.now)
     lift = site.known["lift", "Lift1"]
     assert isinstance(lift, LiftFacts)
     assert len([*lift.requesters]) == MOST_REQUESTERS

@@ -120,7 +120,7 @@ def test_after_three_thousand_made_up_names_a_real_lift_is_explained_and_nothing
     site.take(lift(later))
     explained = site.explain("lift", "Lift1", later, WALL + later, {})
     assert explained is not None
-    assert explained.now[0].startswith("Nobody has had it since")
+    assert explained.now[0].startswith("Nobody has had the lift since")
     assert len(names(site, later)) == MOST_DEVICES
     assert site.timeline("lift", "made up 0", later) is None
     real = d.FleetState("fleet", (d.RobotState("real"),))
