@@ -91,7 +91,7 @@ def test_a_gateway_is_drafted_from_its_register_table(tmp_path: Path) -> None:
     assert found["fire_alarm"] == {"at": "discrete input 4", "active": "high"}
     assert found["agv_mode"] == {"at": "input register 3", "bit": 0, "active": "high"}
     assert found["commands"]["agv_mode_request"]["at"] == "coil 2"
-    assert found["commands"]["call"]["none"] == 1  # 0 is a floor here
+    assert found["commands"]["call"]["none"] == 1  # 0 is also a floor
     assert "motion" not in found
 
 
@@ -104,7 +104,7 @@ def test_on_the_header_a_cut_wire_and_the_time_before_the_daemon_are_safe(
     file = tmp_path / "device.yaml"
     words = f"--kind {kind} --wiring gpio --contacts {contacts} --relays {relays} --yes"
     assert cli.main(["init", str(file), *words.split()]) == 0
-    load(file)  # check refuses what is unsafe
+    load(file)  # `load` refuses an unsafe draft, as `check` does
 
 
 def test_a_map_gives_the_only_lift_and_its_floors(tmp_path: Path) -> None:
@@ -118,7 +118,7 @@ def test_an_existing_file_is_never_overwritten(tmp_path: Path) -> None:
     file = tmp_path / "device.yaml"
     file.write_text("mine")
     assert cli.main(["init", str(file), "--kind", "door", "--yes"]) == 73
-    assert cli.main(["init", str(file)]) == 73  # before the first question
+    assert cli.main(["init", str(file)]) == 73  # `init` refuses before its first question
     assert file.read_text() == "mine"
 
 
@@ -175,7 +175,7 @@ def test_on_a_terminal_it_asks_one_thing_after_the_other(tmp_path: Path) -> None
     file = tmp_path / "device.yaml"
     terminal = Terminal("init", str(file), "--domain-id", "5")
     terminal.wait_for("What is it?")
-    terminal.type("\x1b[B\r")  # down arrow: door
+    terminal.type("\x1b[B\r")  # down arrow: select the door
     terminal.wait_for("The device's name on RMF's map?")
     terminal.type("ward\r")
     terminal.wait_for("How is it wired?")

@@ -1,4 +1,4 @@
-"""`mqtt-out` as a process, between RMF's graph and a real broker that is killed and restarted."""
+"""`mqtt-out` as a process between RMF's graph and a real broker. The broker is killed and restarted."""
 
 import argparse
 import json
@@ -32,7 +32,7 @@ CONFIG = "homeassistant/device/rmf_door_ward/config"
 
 
 class Reader:
-    """A client that joins the broker anew and reads what is retained there."""
+    """A client that joins the broker anew and reads the retained messages."""
 
     def __init__(self, broker: Mosquitto, user: str = "", password: str = "") -> None:
         self.retained: dict[str, str] = {}
@@ -62,7 +62,7 @@ def reader(broker: Mosquitto, user: str = "", password: str = "") -> Iterator[Re
 
 
 def holds(broker: Mosquitto, **wanted: str) -> None:
-    """Wait until the broker holds these payloads for everybody who joins now."""
+    """Wait until every client that joins now gets these payloads from the broker."""
     with reader(broker) as found:
         wait_until(
             lambda: all(found.retained.get(topic) == said for topic, said in wanted.items()),
@@ -104,13 +104,13 @@ class Door:
         self._states = self.node.publisher(topics.DOOR_STATES)
 
     def says(self, mode: int) -> None:
-        """Publish a state that was just read."""
+        """Publish a state that was read at this moment."""
         wall = self.node.wall()
         stamp = d.Time(int(wall), int(wall % 1 * 1e9))
         self._states.publish(d.DoorState(stamp, "ward", d.DoorMode(mode)))
 
     def is_shown(self, broker: Mosquitto, mode: int, word: str) -> None:
-        """Say this state until the broker holds it."""
+        """Publish this state until the broker holds it."""
         with reader(broker) as found:
 
             def shown() -> bool:

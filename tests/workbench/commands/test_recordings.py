@@ -1,4 +1,4 @@
-"""A recording that cannot be read: every command gives the same exit code, and a sentence."""
+"""For an unreadable recording every command gives the same exit code and prints a sentence."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`release` asks first the supervisor, then the lift's own daemon, unless a robot may be inside."""
+"""`release` asks first the supervisor, then the lift's daemon. It refuses if a robot may be inside."""
 
 import dataclasses
 import io
@@ -30,7 +30,10 @@ LOOK = (
 def told(
     request: LiftEnd, states: Iterable[d.LiftState], boarded: str, listeners: int = 1
 ) -> tuple[list[tuple[int, str]], list[str], Fulfilled | Failed]:
-    """Let a state come each second; return (time, way) of each request, the hints, and the end."""
+    """Deliver one state each second.
+
+    Return (time, way) of each request, the hints, and the end.
+    """
     seen = RequestProgress(0.0, 10.0, listeners, boarded=boarded)
     sent, hints = list[tuple[int, str]](), list[str]()
     for now, state in enumerate(states):

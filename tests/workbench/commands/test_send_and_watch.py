@@ -43,7 +43,7 @@ LIFT = d.LiftState(
 
 
 class Command(MemoryTransport):
-    """A node that hears a device's state as soon as it subscribes, and after each request."""
+    """A node that gets a device's state when it subscribes, and after each of its requests."""
 
     def __init__(self, device: "Device") -> None:
         super().__init__(device.network, "command")
@@ -52,7 +52,7 @@ class Command(MemoryTransport):
     def subscribe(
         self, topic: Topic[M], received: Callable[[M], None], *, others_only: bool = False
     ) -> Any:
-        """Subscribe, and hear a state at once; a real device publishes at 1 Hz."""
+        """Subscribe, and deliver a state at once. A real device publishes at 1 Hz."""
         subscription = super().subscribe(topic, received, others_only=others_only)
         self._device.tell()
         return subscription
@@ -187,7 +187,7 @@ def test_what_comes_from_the_network_cannot_move_the_cursor(
 
 
 class Interrupted(io.StringIO):
-    """A stream that gets Ctrl-C while this text is printed."""
+    """A stream that raises Ctrl-C when the command prints this text."""
 
     def __init__(self, at: str) -> None:
         super().__init__()
@@ -340,7 +340,7 @@ def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic(
         states = node.publisher(topics.LIFT_STATES)
         requests: list[d.LiftRequest] = []
         node.subscribe(topics.ADAPTER_LIFT_REQUESTS, requests.append)
-        node.publisher(topics.LIFT_REQUESTS)  # as a supervisor does
+        node.publisher(topics.LIFT_REQUESTS)  # a supervisor publishes there too
         with command("send lift Lift1 L3 --session fleet/robot", speaks, domain) as process:
             wait_until(lambda: states.matched() > 0, "send listens to lift_states")
             states.publish(LIFT)
@@ -387,9 +387,8 @@ def test_an_interrupted_send_exits_130_and_leaves_no_ghost_that_asks_for_the_doo
 
 
 def test_a_command_reaches_a_site_as_a_device_yaml_does(tmp_path: Path) -> None:
-    """`--config` gives the command the site's router, domain and keys; options beside `--config`
-    win.
-    """
+    """`--config` gives the command the router, domain and keys of the site. An option beside `--config`
+    overrides the file."""
     router = Router()
     file = tmp_path / "lift.yaml"
     shipped = (Path(__file__).parents[3] / "config" / "lift_supervisor.yaml").read_text()

@@ -1,4 +1,4 @@
-"""The rows of `rmf-bridge watch`, from messages and a time, in virtual time."""
+"""The rows of `rmf-bridge watch` in virtual time."""
 
 import argparse
 import json
@@ -93,7 +93,7 @@ def test_a_door_shows_who_the_supervisor_says_holds_it() -> None:
 
 
 def told(kind: str, name: str, *codes: str, node: str = "node") -> d.DiagnosticArray:
-    """Return the diagnostics of a device from one of our daemons."""
+    """Return the diagnostics that one of our daemons publishes about a device."""
     faults = [{"code": code, "detail": ""} for code in codes]
     status = {"faults": faults, "input_age_s": 0.1}
     return diagnosis(node, kind, {}, {name: status}, d.Time())
@@ -140,7 +140,8 @@ def test_faults_have_a_column_when_there_are_any_and_are_a_change() -> None:
 
 
 def test_a_device_is_shown_once_it_is_known_whether_it_is_simulated() -> None:
-    """A real device's daemon may never publish diagnostics, so `watch` does not wait long for them."""
+    """A real device's daemon may never publish diagnostics, so `watch` waits for diagnostics only
+    briefly."""
     young = board(LIFT)
     assert watch.settled(young, 100.0, WALL) == []
     assert [row.simulated for row in watch.settled(young, 101.5, WALL)] == [False]

@@ -1,4 +1,4 @@
-"""The daemon tests' module on the wall, for commands that act on real wires."""
+"""The Modbus module of the daemon tests, for commands that act on real wires."""
 
 from tests.runtime.conftest import module
 

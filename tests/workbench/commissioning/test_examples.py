@@ -18,7 +18,7 @@ from workbench.commissioning.examples import example
 
 
 def structs() -> list[type]:
-    """Return every struct of the reference, also structs inside others."""
+    """Return every struct of the reference, and the structs inside them."""
     tops: list[type] = [Rmf, *(named.bus_called(name).settings for name in named.bus_types())]
     tops += [shape.type.settings for shape in reference.shapes()]
     tops += [kind.settings for kind in reference.graph_kinds()]
@@ -36,7 +36,7 @@ def fields(struct: type) -> tuple[mi.Field, ...]:
 
 
 def judged(struct: type, field: mi.Field) -> list[str]:
-    """Return the loader's problems with an example."""
+    """Return the problems that the loader finds in an example."""
     page = YamlFile("example")
     root = yaml.compose(f"wanted: {{{example(struct, field)}}}")
     assert root is not None

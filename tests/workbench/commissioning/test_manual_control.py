@@ -1,4 +1,4 @@
-"""The device that a command finds in a file, also in a wrong file or among several devices."""
+"""A command finds its device in a file. The file may be wrong, or hold several devices."""
 
 import os
 from pathlib import Path

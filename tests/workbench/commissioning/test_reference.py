@@ -28,7 +28,8 @@ def validator(schema: reference.Schema) -> Draft202012Validator:
 
 
 def properties(part: object) -> Iterator[tuple[str, reference.Schema]]:
-    """Yield every property of a schema, at any depth: the text that an editor shows at a key."""
+    """Yield every property of a schema, at any depth. An editor shows the property's text beside its
+    key."""
     if isinstance(part, dict):
         yield from part.get("properties", {}).items()
     for below in (
@@ -55,7 +56,9 @@ def test_an_editor_shows_at_every_key_what_it_means(schema: reference.Schema) ->
 def test_every_shipped_file_is_right_by_the_schema(
     validator: Draft202012Validator, file: Path
 ) -> None:
-    as_json = json.loads(json.dumps(yaml.safe_load(file.read_text())))  # JSON keys are texts
+    as_json = json.loads(
+        json.dumps(yaml.safe_load(file.read_text()))
+    )  # every key in JSON is a string
     assert [e.message for e in validator.iter_errors(as_json)] == []
 
 
@@ -80,7 +83,7 @@ def test_every_link_of_the_page_leads_to_one_heading() -> None:
 
 def test_what_several_sections_have_stands_once() -> None:
     rows = [line for line in reference.page().splitlines() if line.startswith("| `point` |")]
-    assert len(rows) == 2  # the row of a contact and the row of a relay
+    assert len(rows) == 2  # one row for a contact, and one row for a relay
 
 
 def test_the_page_has_every_kind_driver_and_bus() -> None:

@@ -1,4 +1,4 @@
-"""Writes the golden texts anew: `python -m tests.workbench.explain [NAME …]`."""
+"""Writes the expected texts anew: `python -m tests.workbench.explain [NAME …]`."""
 
 import logging
 import sys

@@ -1,6 +1,6 @@
-"""The situations that `explain` must tell rightly: real cores, drivers and plants in virtual time.
+"""Situations that `explain` must describe correctly: real cores, drivers and plants in virtual time.
 
-Each gives what was heard, and the device that is asked about.
+Each function returns the messages on the graph, and the device that a person asks about.
 """
 
 from collections.abc import Callable, Mapping
@@ -23,7 +23,7 @@ Case = tuple[list[Heard], Kind, str]
 
 
 def held_by_another() -> Case:
-    """A robot waits because another has the lift."""
+    """A robot waits because another robot has the lift."""
     scene, red, blue = _two("Lift1")
     scene.until(red)
     scene.run(8.0)
@@ -32,7 +32,7 @@ def held_by_another() -> Case:
 
 
 def holder_rides() -> Case:
-    """A robot waits; the one that has the lift waits for the car itself."""
+    """One robot waits for the lift. The robot that has the lift waits for the car to arrive."""
     scene, red, _ = _two("Lift1")
     scene.until(red)
     red.asks("Lift1", "L4", inside=True)
@@ -50,7 +50,7 @@ def holder_is_dead() -> Case:
 
 
 def holder_alone_is_dead() -> Case:
-    """The holder's fleet adapter died without END, and nobody else asks."""
+    """The holder's fleet adapter died without END, and no other robot asks for the lift."""
     scene = Scene("Lift1")
     red = scene.robot("fleet/red")
     red.asks("Lift1", "L2")
@@ -80,7 +80,7 @@ def fire_with_a_robot_inside() -> Case:
 
 
 def open_but_at_no_floor() -> Case:
-    """The door is shown open by a node that does not know its floor."""
+    """A node reports an open door, but does not know the floor of its car."""
     scene = Scene()
     red = scene.robot("fleet/red")
     node = _Foreign(scene, session_id="fleet/red", current_floor="", door_state=2, motion_state=0)
@@ -92,7 +92,7 @@ def open_but_at_no_floor() -> Case:
 
 
 def floor_contact_lost() -> Case:
-    """The car stands at a floor that its code does not show."""
+    """The car stands at a floor, and the floor's contact does not show that floor."""
     scene = Scene("Lift2")
     red = scene.robot("fleet/red")
     scene.fail("Lift2", "floor_L3", "off")
@@ -102,7 +102,7 @@ def floor_contact_lost() -> Case:
 
 
 def forgotten_by_rmf() -> Case:
-    """RMF's supervisor has restarted and asks for another robot; the holder's adapter is dead."""
+    """RMF's supervisor has restarted and asks for another robot. The holder's fleet adapter is dead."""
     scene = Scene("Lift1", rmf=True)
     red, blue = scene.robot("fleet/red"), scene.robot("fleet/blue")
     red.asks("Lift1", "L2")
@@ -135,7 +135,7 @@ def foreign_node_refuses() -> Case:
 
 
 def no_supervisor() -> Case:
-    """Nobody passes the adapters' requests on."""
+    """No supervisor passes on the requests of the fleet adapters."""
     scene = Scene("Lift1")
     scene.supervisors["lift_supervisor"].kill()
     scene.run(1.0)
@@ -146,7 +146,8 @@ def no_supervisor() -> Case:
 
 
 def supervisor_is_passive() -> Case:
-    """A node that does nothing else has a publisher on `lift_requests`, so our supervisor is silent."""
+    """A node has a publisher on `lift_requests` and publishes nothing. So our supervisor stays
+    silent."""
     scene = Scene("Lift1")
     Place(scene.air, "forgotten_pub", lambda: None).publisher(topics.LIFT_REQUESTS)
     scene.run(5.0)
@@ -166,7 +167,7 @@ def reading_is_old() -> Case:
 
 
 def nobody_publishes() -> Case:
-    """The name is asked for, and nobody publishes its states."""
+    """A robot asks for a lift, and no node publishes states of that lift."""
     scene = Scene("Lift2")
     scene.robot("fleet/red").asks("Lift1", "L3")
     scene.run(30.0)
@@ -210,7 +211,7 @@ def two_nodes() -> Case:
 
 
 def all_is_well() -> Case:
-    """A ride that is over."""
+    """A ride that has ended well."""
     scene = Scene("Lift1")
     scene.rides(scene.robot("fleet/red"), "Lift1", "L2", "L3")
     scene.run(10.0)
@@ -229,7 +230,7 @@ def door_held_by_a_dead_robot() -> Case:
 
 
 def door_does_not_open() -> Case:
-    """The door is told to open and stays shut."""
+    """The door gets the command to open, and stays shut."""
     scene = Scene("ward")
     scene.fail("ward", "operator", "stuck")
     scene.robot("fleet/red").opens("ward")
@@ -238,7 +239,7 @@ def door_does_not_open() -> Case:
 
 
 def door_without_supervisor() -> Case:
-    """Nobody takes the adapters' requests."""
+    """No supervisor takes the requests of the fleet adapters."""
     scene = Scene("ward")
     scene.supervisors["door_supervisor"].kill()
     scene.run(1.0)
@@ -257,7 +258,7 @@ def door_held_open_by_a_person() -> Case:
 
 
 def charger_refuses() -> Case:
-    """A second robot asks for a charger that another one has."""
+    """A second robot asks for a charger that another robot has."""
     scene = Scene("bay1")
     scene.says(topics.CHARGER_REQUESTS, _charge("bay1", "red", "r1"))
     scene.run(3.0)
@@ -267,7 +268,7 @@ def charger_refuses() -> Case:
 
 
 def wrong_station() -> Case:
-    """A robot stands at a charger that is another's."""
+    """A robot stands at a charger that is promised to another robot."""
     scene = Scene(diagnoses=False)
     who, whose = RobotName("fleet", "red"), RobotName("fleet", "blue")
     text = Misplaced(who, "7", whose).text
@@ -280,7 +281,7 @@ def wrong_station() -> Case:
 
 
 def coordinator_queues() -> Case:
-    """More robots than chargers: the queue and its reasons."""
+    """More robots than chargers: the coordinator keeps a queue, and gives reasons."""
     scene = Scene("bay1")
     scene.coordinate("red", "blue")
     scene.run(6.0)
@@ -324,7 +325,7 @@ SCENES: Final[Mapping[str, Callable[[], Case]]] = {
 
 
 def _two(lift: str) -> tuple[Scene, Guest, Guest]:
-    """Red asks for L2 and blue, 2 s later, for L1."""
+    """Let red ask for L2, and blue for L1 2 s later."""
     scene = Scene(lift)
     red, blue = scene.robot("fleet/red"), scene.robot("fleet/blue")
     red.asks(lift, "L2")
@@ -338,7 +339,7 @@ def _charge(charger: str, robot: str, request: str) -> d.ChargerRequest:
 
 
 class _Foreign:
-    """Another maker's lift node, which says the same each second, whatever it is asked."""
+    """Another maker's lift node. It publishes the same state each second, whatever robots ask."""
 
     def __init__(self, scene: Scene, stamp_s: float = 0.0, **fields: object) -> None:
         self._scene = scene

@@ -1,6 +1,7 @@
-"""Short scenes at the soak's site, in virtual time: real cores, drivers and plants, RMF by its rules.
+"""Short scenes in virtual time, with the devices of the soak test. Cores, drivers and plants are real;
+RMF is a model that follows RMF's rules.
 
-Everything that is said on the graph is kept as `Heard`, as a recording or a listener would have it.
+Every message on the graph becomes a `Heard`, as in a recording.
 """
 
 from abc import ABC, abstractmethod
@@ -39,33 +40,33 @@ SUPERVISORS: dict[str, AnyGraphKind] = {
 
 
 class Rider(ABC):
-    """A robot as its task goes on. `robot`: what its fleet adapter knows of it."""
+    """A robot in the phases of its task. `robot` is the fleet adapter's knowledge of the robot."""
 
     robot: RobotContext
 
     @abstractmethod
     def begin(self, phase: Phase) -> None:
-        """Its task comes to this phase."""
+        """Begin this phase of the robot's task."""
 
     def asks(self, lift: str, floor: str, *, inside: bool = False) -> None:
-        """RequestLift."""
+        """Begin RequestLift."""
         self.begin(RequestLift(lift, floor, inside=inside))
 
     def ends(self, lift: str) -> None:
-        """EndLiftSession."""
+        """Begin EndLiftSession."""
         self.begin(EndLiftSession(lift))
 
     def opens(self, door: str) -> None:
-        """DoorOpen."""
+        """Begin DoorOpen."""
         self.begin(DoorOpen(door))
 
     def closes(self, door: str) -> None:
-        """DoorClose."""
+        """Begin DoorClose."""
         self.begin(DoorClose(door))
 
 
 class Guest(Rider):
-    """A fleet adapter with one robot, on the air. `behind_s`: its clock's error."""
+    """A fleet adapter with one robot, on the simulated graph. Its clock is `behind_s` seconds slow."""
 
     def __init__(self, timeline: Timeline, air: Air, name: str) -> None:
         self.robot = RobotContext(name)
@@ -84,7 +85,7 @@ class Guest(Rider):
         self._say(self.robot.begin(phase, self._now))
 
     def dies(self) -> None:
-        """Its adapter is gone, without a word."""
+        """Remove the robot's adapter from the graph, without a last message."""
         self.place.close()
         self.robot.phase = None
 
@@ -105,7 +106,10 @@ class Guest(Rider):
 
 
 class Scene:
-    """`serves`: the devices with a running daemon. `rmf`: with RMF's own supervisors, not ours."""
+    """A site on a simulated graph.
+
+    The devices in `serves` have a running daemon. `rmf` puts RMF's own supervisors in place of ours.
+    """
 
     def __init__(self, *serves: str, rmf: bool = False, diagnoses: bool = True) -> None:
         self.timeline = Timeline()
@@ -123,27 +127,27 @@ class Scene:
             daemon.start()
         self._supervise(rmf)
         self._second()
-        self.run(4.0)  # supervisors listen before they speak
+        self.run(4.0)  # supervisors listen before they publish
         self.heard.clear()
         self.run(2.0)
 
     def robot(self, name: str) -> Guest:
-        """A robot of this name, FLEET/ROBOT."""
+        """Return a robot of this name (FLEET/ROBOT)."""
         return Guest(self.timeline, self.air, name)
 
     def run(self, seconds: float) -> None:
-        """So much time passes."""
+        """Let this many seconds pass."""
         self.timeline.run(self.timeline.now + seconds)
 
     def until(self, guest: Rider, within_s: float = 90.0) -> None:
-        """Until the robot's phase is done."""
+        """Let time pass until the robot's phase is done."""
         end = self.timeline.now + within_s
         while not guest.robot.done:
             assert self.timeline.now < end, f"not within {within_s} s"
             self.run(0.25)
 
     def rides(self, guest: Rider, lift: str, start: str, end: str) -> None:
-        """A whole ride."""
+        """Let the robot ride from `start` to `end`."""
         guest.asks(lift, start)
         self.until(guest)
         self.run(5.0)
@@ -154,25 +158,25 @@ class Scene:
         self.until(guest)
 
     def press(self, device: str, signal: str, on: bool) -> None:
-        """The building acts."""
+        """Let a person or the building switch a signal of the device."""
         daemon = self.daemons[device]
         daemon.advance()
         self.devices[device].plant.press(signal, on, self.timeline.now)
         daemon.look()
 
     def fail(self, device: str, part: str, mode: Any) -> None:
-        """A wire or part fails."""
+        """Let a wire or another part of the device fail."""
         daemon = self.daemons[device]
         daemon.advance()
         self.devices[device].plant.fail(part, mode)
         daemon.look()
 
     def says(self, topic: Topic[Any], message: d.Message) -> None:
-        """Some other node says this."""
+        """Publish a message from another node."""
         Place(self.air, "somebody", lambda: None).publisher(topic).publish(message)
 
     def coordinate(self, *robots: str) -> None:
-        """A charger coordinator is started."""
+        """Start a charger coordinator for these robots."""
         settings = charging.settings(CHARGERS, robots)
         name = "coordinator"
         self.supervisors[name] = node = GraphDaemon(
@@ -196,7 +200,7 @@ class Scene:
         self.heard.append(Heard(now, EPOCH + now, topic.name, message))
 
     def _second(self) -> None:
-        """Each daemon says once a second what is wrong, as `bridges/runtime/daemon.py` has it do."""
+        """Publish each daemon's diagnostics once a second, as `bridges/runtime/daemon.py` does."""
         if self._diagnoses:
             for name, daemon in self.daemons.items():
                 if daemon.alive:

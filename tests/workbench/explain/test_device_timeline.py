@@ -1,4 +1,4 @@
-"""The lanes of a timeline, from what was heard."""
+"""The lanes of a timeline, made from messages."""
 
 import json
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ AGV = d.LiftRequest(lift_name="Lift1", session_id="fleet/red", request_type=1)
 
 
 def heard(at: float, message: d.Message, topic: str = "lift_states", wall: float = WALL) -> Heard:
-    """Heard at this time; a state is stamped then."""
+    """Return a message heard at this time. A state is stamped with the same time."""
     if isinstance(message, d.LiftState) and message.lift_time == d.Time():
         message = replace(message, lift_time=stamp(wall + at))
     return Heard(at, wall + at, topic, message)
@@ -39,7 +39,7 @@ def told(spans: Sequence[LaneSpan]) -> list[tuple[float, float, str]]:
 
 
 def in_words(timeline: Timeline) -> list[str]:
-    """A line for each row: `door 6.1 closed 9.6 moving 12.0`."""
+    """Return one line for each row, such as `door 6.1 closed 9.6 moving 12.0`."""
     lines = []
     for one in timeline.lanes:
         spans = [f"{span.from_s:.1f}-{span.to_s:.1f} {span.label}" for span in one.spans]

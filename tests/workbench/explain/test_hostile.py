@@ -1,4 +1,5 @@
-"""What anybody can send: floods of names, strange values, control characters. Bounded, and told."""
+"""`explain` bounds and reports hostile messages: floods of names, strange values, control
+characters."""
 
 import pytest
 from msgspec.structs import replace

@@ -1,4 +1,4 @@
-"""Known defects of RMF are named when what was heard leaves no doubt, and at no other time."""
+"""`explain` names a known defect of RMF only when the messages leave no doubt."""
 
 from datetime import UTC
 
@@ -13,7 +13,7 @@ from workbench.explain.heard_devices import HeardDevices
 WALL, RED, BLUE = 1_800_000_000.0, "fleet/red", "fleet/blue"
 END, AGV = 0, 1
 Second = tuple[str, str, int, list[tuple[str, int, str]]]
-"""One second: the session, floor and door that a lift shows, and the adapters' requests."""
+"""One second: the session, floor and door state that a lift shows, and the adapters' requests."""
 
 
 def notes(*seconds: Second) -> list[str]:

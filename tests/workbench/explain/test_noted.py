@@ -1,4 +1,4 @@
-"""What a daemon noted of its device, in our own incident files."""
+"""A daemon's notes about its device, in our own incident files."""
 
 import json
 from pathlib import Path

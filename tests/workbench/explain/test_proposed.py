@@ -1,4 +1,4 @@
-"""Each command that an explanation proposes names the graph that was heard, and can be copied."""
+"""Each command that an explanation proposes can be copied, and names the graph of the messages."""
 
 import re
 import shlex
@@ -22,14 +22,14 @@ WHOLE = cli.whole_parser()
 
 
 def joins(command: str) -> bool:
-    """Does this subcommand join a graph, with options that name it?"""
+    """Return whether this subcommand joins a graph and has options that name the graph."""
     (subparsers,) = (one for one in WHOLE._actions if one.dest == "command")
     assert isinstance(subparsers.choices, dict)
     return "--localhost" in subparsers.choices[command].format_help() or command == "send"
 
 
 def proposed(texts: list[str]) -> Iterator[list[str]]:
-    """The words of each command between backticks."""
+    """Yield the words of each command between backticks."""
     for text in texts:
         for command in re.findall(r"`rmf-bridge ([^`]*)`", text):
             yield shlex.split(command)

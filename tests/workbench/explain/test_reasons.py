@@ -1,4 +1,4 @@
-"""A file is explained at the moment for which our recorder kept it, whatever the reason was."""
+"""`explain` explains a file at the moment for which our recorder kept the file, for every reason."""
 
 import json
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ REFUSALS = ("floor not served", "held by another session", "charger occupied", "
 
 
 def state(kind: Kind, at: float) -> Heard:
-    """An idle device's state."""
+    """Return the state of an idle device."""
     made: dict[Kind, tuple[str, d.Message]] = {
         "lift": (
             "lift_states",
@@ -38,7 +38,8 @@ def own(at: float, topic: str, /, **told: object) -> Own:
 
 
 def recorded(kind: Kind, code: str, text: str) -> Iterator[Heard | Own]:
-    """A file of an idle device, kept in its middle for this reason; a fault is over soon."""
+    """Yield the file of an idle device. The reason to keep the file lies in its middle; a fault ends
+    soon."""
     fault = {"code": text.partition(": ")[0], "detail": text.partition(": ")[2]}
     for second in range(int(LAST_S)):
         if second == KEPT_S:

@@ -1,6 +1,6 @@
-"""What `explain` says of each common situation, word for word: `golden/*.txt`.
+"""The exact text of `explain` for each common situation, in `golden/*.txt`.
 
-`python -m tests.workbench.explain` writes them anew; read the difference before you keep it.
+`python -m tests.workbench.explain` writes the texts anew. Read the difference before you commit it.
 """
 
 from datetime import UTC
@@ -17,7 +17,7 @@ GOLDEN = Path(__file__).parent / "golden"
 
 
 def told(name: str) -> list[str]:
-    """The situation's screen."""
+    """Return the screen of `explain` for this situation."""
     heard, kind, device = SCENES[name]()
     site = HeardDevices(device)
     for one in heard:

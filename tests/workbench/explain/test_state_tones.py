@@ -1,4 +1,4 @@
-"""Tones of RMF's numbers, whose gaps must not shift them."""
+"""Tones of RMF's state numbers. A gap between two numbers must not shift the tones."""
 
 import pytest
 

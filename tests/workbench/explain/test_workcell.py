@@ -1,4 +1,4 @@
-"""A dispenser or ingestor is explained by the requests for it and by its list."""
+"""`explain` explains a dispenser or ingestor from its requests and its own list of requests."""
 
 from typing import Any
 

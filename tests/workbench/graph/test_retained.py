@@ -1,4 +1,4 @@
-"""The messages of `mqtt-out`, from states and a time, in virtual time."""
+"""The messages of `mqtt-out` for given states, in virtual time."""
 
 import json
 import re
@@ -22,7 +22,7 @@ DOOR = d.DoorState(stamp(WALL), "ward", d.DoorMode(0))
 
 
 class Site:
-    """A graph that one retainer shows; `now` is 0 s at WALL."""
+    """A graph that one retainer shows. At `now` = 0 s the wall clock reads WALL."""
 
     def __init__(self, discovery: str | None = None) -> None:
         self.graph = PlainGraph(most=2)

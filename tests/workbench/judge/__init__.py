@@ -1,1 +1,1 @@
-"""`judge`: nodes with the defects of the field, right ones, and ours, before the same laws."""
+"""`judge` applies the same laws to our nodes, to correct nodes, and to nodes with known defects."""

@@ -1,4 +1,4 @@
-"""Somebody on the graph who says what a test has written down, when it has."""
+"""A party on the graph that publishes a test's written messages at their times."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ from workbench.rmf_model import NEVER, Party, Said
 
 
 class Script(Party):
-    """`lines`: (s, topic, message), in order."""
+    """A party that publishes `lines`, each a (time in s, topic, message), in order."""
 
     subscribes: Sequence[AnyTopic] = ()
 
@@ -33,27 +33,27 @@ class Script(Party):
 
 
 def lift(session: str, floor: str, lift: str = "Lift1", kind: int = 1) -> d.LiftRequest:
-    """A LiftRequest for an open door; `kind` 0 is END."""
+    """Return a LiftRequest for an open door. `kind` 0 is END."""
     return d.LiftRequest(lift, stamp(EPOCH), session, kind, floor, 2 if kind else 0)
 
 
 def asks(at: float, session: str, floor: str, times: int = 1) -> Script:
-    """On lift_requests, once a second."""
+    """Return a party that asks on lift_requests once a second."""
     request = lift(session, floor)
     return Script(*((at + n, topics.LIFT_REQUESTS, request) for n in range(times)))
 
 
 def door(mode: int, who: str = "door_supervisor", name: str = "ward") -> d.DoorRequest:
-    """A DoorRequest."""
+    """Return a DoorRequest."""
     return d.DoorRequest(stamp(EPOCH), who, name, d.DoorMode(mode))
 
 
 def to_door(*modes: tuple[float, int]) -> Script:
-    """On door_requests: (s, mode)."""
+    """Return a party that sends each (time in s, mode) on door_requests."""
     return Script(*((at, topics.DOOR_REQUESTS, door(mode)) for at, mode in modes))
 
 
 def charge(at: float, robot: str, request_id: str, timeout_s: int = 20) -> Script:
-    """A ChargerRequest."""
+    """Return a party that sends one ChargerRequest."""
     request = d.ChargerRequest("bay1", "fleet", robot, d.Duration(timeout_s), request_id)
     return Script((at, topics.CHARGER_REQUESTS, request))

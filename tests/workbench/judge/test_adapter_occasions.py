@@ -1,4 +1,4 @@
-"""Each law of a fleet's adapter has an occasion: without it not seen, with it kept or broken."""
+"""Each law of a fleet adapter applies on an occasion. Without one the verdict is "not seen"."""
 
 from collections.abc import Callable
 
@@ -18,7 +18,7 @@ Lines = list[Line]
 
 
 def verdict(law: str, lines: Lines, name: str = "fleet") -> tuple[str, str]:
-    """The verdict, and its first evidence."""
+    """Return the verdict on a law, and the first evidence."""
     judge = Judge("adapter", name, only=[law])
     lines = sorted(lines, key=lambda line: line[0])
     for at, topic, message in lines:
@@ -61,7 +61,10 @@ def alive(until: float, **robot: str) -> Lines:
 
 
 def boards(open_at: float = 8.0, until: float = 12.0) -> Lines:
-    """RED asks for L1 from 5.5 s, has the lift from 6 s, and OPEN there from `open_at`."""
+    """Return messages in which RED boards at L1.
+
+    RED asks from 5.5 s, has the lift from 6 s, and sees OPEN at L1 from `open_at`.
+    """
     return [
         *many(0.0, 6.0, car),
         *many(5.5, until, asks),
@@ -71,7 +74,7 @@ def boards(open_at: float = 8.0, until: float = 12.0) -> Lines:
 
 
 def rides(*more: Line) -> Lines:
-    """It asks for L3 from 12 s."""
+    """Return messages in which RED boards, and asks for L3 from 12.5 s."""
     return [*boards(), *many(12.5, 15.0, lambda s: asks(s, "L3")), held(13.0), held(14.0), *more]
 
 
@@ -80,7 +83,7 @@ def arrives(until: float = 18.0) -> Lines:
 
 
 def passes(at: float, *, closes: bool = True) -> Lines:
-    """Pass the door within 10 s."""
+    """Return messages in which RED passes the door within 10 s."""
     way = [leaf(at), opens(at + 0.5), lists(at + 0.6, RED)]
     stands_open = many(at + 1.0, at + 9.0, lambda s: leaf(s, OPEN))
     return [*way, *stands_open, *([opens(at + 8.0, 0)] if closes else [])]

@@ -1,6 +1,7 @@
-"""Fleet adapters before the judge: RMF's own is acquitted, each wrong adapter is convicted by its law.
+"""The judge acquits RMF's own fleet adapter, and convicts each wrong adapter under its law.
 
-`pytest -s` prints each planted defect, the law that convicts it, and false alarms."""
+`pytest -s` prints each planted defect, the law that convicts it, and false alarms.
+"""
 
 from collections.abc import Callable
 from random import Random
@@ -22,7 +23,7 @@ Again = tuple[type[Party], float, float]
 
 
 class SlowDoor(RightDoor):
-    """It takes up to twelve seconds."""
+    """The door takes up to 12 s to open."""
 
     def moves(self, now: float, age_s: float) -> None:
         for _ in range(4 if round(now * 4) % 24 == 0 else 0):
@@ -41,9 +42,12 @@ def judged(
     again: Again | None = None,
     begins_at: float = 0.0,
 ) -> Verdicts:
-    """The verdict after LONG_S. `cut`: a party loses the network, when, and for how long. `again`: a
-    party dies, when, and comes back so much later. `begins_at`: the judge comes
-    later than the others."""
+    """Return the verdict after LONG_S.
+
+    `cut` gives the name of a party that loses the network, the time, and the duration (s). `again`
+    gives a type of party that dies, the time, and the seconds until it returns. The judge starts at
+    `begins_at`.
+    """
     world = World(Random(seed))
     world.air.weather = weather
     world.air.best_effort = {"RightAdapter", "JazzyAdapter"}

@@ -1,4 +1,4 @@
-"""Each defect of a charger's node is caught by its own law, and by no other."""
+"""The law for a defect of a charger's node catches the defect, and no other law does."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""`rmf-bridge judge` around its pure parts: the command line, recordings, and what it writes."""
+"""`rmf-bridge judge` as a command: its options, recordings and output."""
 
 import json
 from collections.abc import Iterator
@@ -62,7 +62,7 @@ def test_the_recordings_of_our_own_daemons_in_trouble_accuse_none_of_them(
 
 
 def ride_that_outlives_its_end() -> Iterator[Heard]:
-    """A lift that is asked for, told to end, and goes on."""
+    """Yield the messages of a lift whose session goes on after END."""
     for n in range(20):
         at = float(n)
         held = "fleet/red" if n > 4 else ""

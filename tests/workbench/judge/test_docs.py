@@ -1,4 +1,4 @@
-"""The laws as `rmf-bridge judge KIND --laws` and docs/reference/laws.md have them."""
+"""The laws, as `rmf-bridge judge KIND --laws` prints them and docs/reference/laws.md lists them."""
 
 import pytest
 

@@ -1,5 +1,4 @@
-"""Every limit of a law, told from just inside and from just outside: what is a little different has
-another verdict."""
+"""Every limit of a law, tested from just inside and from just outside. The verdicts differ."""
 
 from collections.abc import Callable, Iterator
 
@@ -31,7 +30,8 @@ Story = Callable[[float], list[Line]]
 
 
 def is_broken(kind: JudgedKind, law: str, lines: list[Line]) -> bool:
-    """What the judge says of these, heard in the order of their times, and 2 s later."""
+    """Return whether the judge finds the law broken, 2 s after these messages in the order of their
+    times."""
     judge = Judge(kind, NAMES[kind])
     lines.sort(key=lambda line: line[0])
     for at, topic, message in lines:
@@ -41,7 +41,7 @@ def is_broken(kind: JudgedKind, law: str, lines: list[Line]) -> bool:
     return law in {j.law.id for j in judge.end(at + 2.0, at) if j.verdict is Verdict.BROKEN}
 
 
-# ---- what is said
+# ---- messages
 
 
 def car(
@@ -54,7 +54,7 @@ def car(
     mode: int = AGV,
     read_at: float | None = None,
 ) -> Line:
-    """A LiftState; `read_at`: its stamp, where that is not `at`."""
+    """Return a LiftState stamped with `read_at`, by default with `at`."""
     read = stamp(1e3 + (at if read_at is None else read_at))
     state = d.LiftState(read, "Lift1", ("L1", "L3"), floor, to, door, 0, (AGV,), mode, session)
     return at, topics.LIFT_STATES, state
@@ -73,7 +73,7 @@ def ends(at: float, session: str = RED, floor: str = "") -> Line:
 
 
 def leaf(at: float, mode: int = CLOSED, read_at: float | None = None) -> Line:
-    """A DoorState."""
+    """Return a DoorState."""
     read = stamp(1e3 + (at if read_at is None else read_at))
     return at, topics.DOOR_STATES, d.DoorState(read, "ward", d.DoorMode(mode))
 
@@ -87,7 +87,7 @@ def robot_closes(at: float) -> Line:
 
 
 def station(at: float, state: int, request_id: str = "", read_at: float | None = None) -> Line:
-    """A ChargerState."""
+    """Return a ChargerState."""
     read = stamp(1e3 + (at if read_at is None else read_at))
     robot = ("fleet", "red") if request_id else ("", "")
     shown = d.ChargerState(read, state, "bay1", "", request_id, *robot)
@@ -104,7 +104,7 @@ def cancel(at: float, request_id: str = "r1") -> Line:
 
 
 def seconds(begin: float, end: float, line: Callable[[float], Line]) -> Iterator[Line]:
-    """A line each second, the first at `begin`, the last before `end`."""
+    """Yield one line each second, the first at `begin` and the last before `end`."""
     n = 0
     while begin + n < end:
         yield line(begin + n)
@@ -112,16 +112,18 @@ def seconds(begin: float, end: float, line: Callable[[float], Line]) -> Iterator
 
 
 def held(at: float, **state: int | str | float) -> Line:
-    """RED has the lift."""
+    """Return a LiftState in which RED has the lift."""
     return car(at, RED, **state)  # type: ignore[arg-type]
 
 
-# ---- what all three kinds have in common
+# ---- laws that all three kinds share
 
 
 def answered(times: int, early_s: float, after_s: float) -> list[Line]:
-    """States each second; then so many requests, each followed by a state `after_s` later that is
-    `early_s` before its time."""
+    """Return a state each second, and then this number of requests.
+
+    A state follows each request after `after_s`, and comes `early_s` before its second.
+    """
     lines, at = list(seconds(0.0, 12.0, leaf)), 11.0
     for _ in range(times):
         at += 1.0 - early_s
@@ -131,7 +133,7 @@ def answered(times: int, early_s: float, after_s: float) -> list[Line]:
 
 
 def back_and_forth(times: int, each_s: float, by_s: float) -> list[Line]:
-    """Stamps that go back so often by `by_s`."""
+    """Return states whose stamps go back by `by_s` this number of times."""
     steps = [(n * each_s, n) for n in range(times + 1)]
     return [
         line
@@ -144,7 +146,7 @@ def back_and_forth(times: int, each_s: float, by_s: float) -> list[Line]:
 
 
 def frozen(line: Callable[..., Line], opened: int, for_s: float) -> list[Line]:
-    """Open, with the stamp of 1 s."""
+    """Return open states with the old stamp 1 s, for `for_s`."""
     open_ = {"mode" if line is leaf else "door": opened, "read_at": 1.0}
     shown = seconds(1.0, 1.0 + for_s, lambda s: line(s, **open_))
     return [line(0.0), *shown, line(1.0 + for_s, **open_)]
@@ -177,7 +179,10 @@ def test_a_shared_law_is_broken_just_beyond_its_limit_and_not_before(
 
 
 def asked_for_long(ends_at: float, last_ask_s: float = 0.5, gap_s: float = 1.0) -> list[Line]:
-    """RED asks each second, from 1 s to 16 s and, after a gap, to the end; nobody is granted."""
+    """Return messages in which RED asks each second from 1 s, and the lift never grants.
+
+    A gap follows the request at 16 s.
+    """
     last_at = ends_at - last_ask_s
     return [
         *seconds(0.0, ends_at, car),
@@ -197,7 +202,8 @@ def asked_so_often(times: int) -> list[Line]:
 
 
 def asked_after_a_ride(free_s: float) -> list[Line]:
-    """RED is let in and ends its session; BLUE asks each second for so long, and gets nothing."""
+    """Return messages in which BLUE asks each second for `free_s`, after RED's session, and gets
+    nothing."""
     over_at = 4.0 + free_s
     return [
         *(car(0.0), asks(0.5, floor="L1"), held(1.0, to="L1", door=OPEN), ends(3.5)),
@@ -209,7 +215,10 @@ def asked_after_a_ride(free_s: float) -> list[Line]:
 
 
 def rides_with_bare_ends(times: int, waits_s: float = 0.5, goes_s: float = 0.2) -> list[Line]:
-    """So many sessions outlive an END without a floor, and end `goes_s` after one with a floor."""
+    """Return this number of sessions that outlive an END without a floor.
+
+    Each session ends `goes_s` after an END with a floor.
+    """
     lines = [car(0.0)]
     for n in range(times):
         at = 10.0 * n
@@ -220,7 +229,7 @@ def rides_with_bare_ends(times: int, waits_s: float = 0.5, goes_s: float = 0.2) 
 
 
 def reopens(times: int, each_s: float, shut_s: float) -> list[Line]:
-    """The door that is held for RED shuts so often, for so long."""
+    """Return messages in which the door held for RED shuts this number of times, for `shut_s` each."""
     lines = [car(0.0), asks(0.5, floor="L1"), held(1.0, to="L1", door=OPEN)]
     for n in range(times):
         at = 2.0 + n * each_s
@@ -237,7 +246,7 @@ def false_alarms(times: int, each_s: float) -> list[Line]:
 
 
 LIFT: list[tuple[str, Story, float, float]] = [
-    # a request that explains it is on its way for no longer than this
+    # the request that explains a session may arrive up to this long after the session
     (
         "L1.other",
         lambda x: [
@@ -343,7 +352,7 @@ def test_a_lifts_law_is_broken_just_beyond_its_limit_and_not_before(
 
 
 def stays_shut(for_s: float, asked: int = 20) -> list[Line]:
-    """OPEN is asked so often, and the door stays closed."""
+    """Return messages in which RMF asks for OPEN `asked` times, and the door stays closed."""
     return [
         *seconds(0.0, 1.0 + for_s, leaf),
         *(to_door(1.0 + n * 29.0 / (asked - 1)) for n in range(asked)),
@@ -352,7 +361,7 @@ def stays_shut(for_s: float, asked: int = 20) -> list[Line]:
 
 
 def flaps(times: int, each_s: float, shut_s: float) -> list[Line]:
-    """The door that is held shuts so often, for so long."""
+    """Return messages in which the held door shuts this number of times, for `shut_s` each."""
     lines = [leaf(0.0), to_door(0.5), leaf(1.0, OPEN)]
     for n in range(times):
         at = 2.0 + n * each_s
@@ -362,7 +371,7 @@ def flaps(times: int, each_s: float, shut_s: float) -> list[Line]:
 
 
 def open_at_once(times: int, after_s: float) -> list[Line]:
-    """So many openings, each shown so soon after it was asked."""
+    """Return this number of openings. The door shows OPEN `after_s` after each request."""
     lines = [leaf(0.0)]
     for n in range(times):
         at = 1.0 + 4.0 * n
@@ -373,8 +382,11 @@ def open_at_once(times: int, after_s: float) -> list[Line]:
 def pushed(
     times: int, closes_s: float = 2.0, shuts_s: float = 0.4, opens_s: float | None = 0.0
 ) -> list[Line]:
-    """People open it so often; RMF says CLOSE `closes_s` later, and `shuts_s` after that it moves or
-    shuts. `opens_s`: how long it takes to open; None: it does not get so far."""
+    """Return messages in which people open the door this number of times.
+
+    RMF sends CLOSE `closes_s` later. The door shows CLOSED `shuts_s` after CLOSE. `opens_s` is the time
+    to open; with None the door never reaches OPEN.
+    """
     lines = [leaf(0.0)]
     for n in range(times):
         at = 2.0 + 8.0 * n
@@ -439,7 +451,10 @@ def test_a_doors_law_is_broken_just_beyond_its_limit_and_not_before(
 
 
 def promised(for_s: float, cancelled: bool = False, charging: bool = False) -> list[Line]:
-    """The station is kept for r1, or charges it, since 1 s; a cancel comes at 2 s."""
+    """Return states in which the station is promised to r1, or charges r1, from 1 s on.
+
+    A cancel may come at 2 s.
+    """
     state = CHARGING if charging else ASSIGNED
     lines = [station(0.0, IDLE), charge(0.5), *([cancel(2.0)] if cancelled else [])]
     begun = 2.0 if cancelled else 1.0

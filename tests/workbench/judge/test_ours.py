@@ -1,4 +1,4 @@
-"""None of our own daemons is accused: on their plants, with their drivers, ridden by the judge."""
+"""The judge rides each of our daemons, with its driver and plant, and accuses none."""
 
 import pytest
 

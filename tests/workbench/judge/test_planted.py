@@ -1,5 +1,5 @@
-"""Wrong nodes planted among right ones. The judge plays with each node: it convicts each wrong node by
-its law, and no right node, even under load, without a network, or when a party restarts.
+"""Wrong nodes planted among correct nodes. The judge plays with each node, and convicts each wrong node
+under its law. It convicts no correct node under load, without a network, or when a party restarts.
 
 `pytest -s` prints each planted defect, the law that convicts it, and false alarms. The defects are
 breaches of the contract in RMF's messages, supervisors and fleet adapters.
@@ -36,7 +36,7 @@ Make = Callable[[], Party]
 
 
 class NextLift(RightLift):
-    """The neighbour: without it nobody can tell a silent network from a silent node."""
+    """A second lift. Its states tell a silent network from a silent node."""
 
     name = "Lift9"
 
@@ -57,8 +57,12 @@ def convicted(
     cut: tuple[float, float] | None = None,
     restarts: float | None = None,
 ) -> set[str]:
-    """The laws broken in a play with these nodes under one name, 0.3 s apart. `cut`: when the judge
-    loses the network, and for how long. `restarts`: when the node restarts; RMF's does too."""
+    """Return the laws that these nodes break in a play. The nodes share one name and publish 0.3 s
+    apart.
+
+    `cut` gives the time at which the judge loses the network, and the duration (s). At `restarts` (s)
+    the node and RMF restart.
+    """
     world = World(Random(seed))
     world.air.weather = weather
     world.add(NextLift())
@@ -138,14 +142,14 @@ def test_a_planted_defect_is_convicted_by_its_law_alone(
 
 
 ACQUITTED = {"D OPEN is shown before the door is open"}
-"""A busy network may hide the 0.3 s by which this defect is known."""
+"""A busy network may hide the 0.3 s that reveal this defect."""
 
 
 @pytest.mark.parametrize(("defect", "nodes", "laws"), PLANTED, ids=[one[0] for one in PLANTED])
 def test_under_load_a_planted_defect_is_convicted_by_no_other_law(
     defect: str, nodes: Sequence[Make], laws: set[str]
 ) -> None:
-    """Messages are up to 0.8 s late, and then come together."""
+    """Messages come up to 0.8 s late, and then all at once."""
     found = [convicted(*nodes, weather=LOADED, seed=seed) for seed in range(4)]
     assert set().union(*found) <= laws
     assert sum(map(bool, found)) >= (0 if defect in ACQUITTED else 3)
@@ -161,7 +165,7 @@ NAMES = [make().__class__.__name__ for make in RIGHT]
 
 @pytest.mark.parametrize("make", RIGHT, ids=NAMES)
 def test_no_right_node_is_convicted_under_load(make: Make) -> None:
-    """Messages are up to 0.8 s late, and then come together."""
+    """Messages come up to 0.8 s late, and then all at once."""
     assert [convicted(make, weather=LOADED, seed=seed) for seed in range(5)] == [set()] * 5
 
 
@@ -170,7 +174,7 @@ def test_no_right_node_is_convicted_under_load(make: Make) -> None:
 def test_no_right_node_is_convicted_for_the_silence_of_the_network(
     make: Make, for_s: float
 ) -> None:
-    """A short outage delivers everything at its end; a longer one has lost it."""
+    """A short outage delivers all messages at its end; a longer outage loses them."""
     found = [convicted(make, cut=(at, for_s)) for at in (5.0, 12.0, 19.0, 26.0, 33.0)]
     assert found == [set()] * 5
 
@@ -186,7 +190,7 @@ def test_no_right_node_is_convicted_for_a_restart(make: Make, at: float) -> None
 def test_no_right_node_is_convicted_by_a_judge_that_is_killed_and_started_again(
     make: Make, at: float
 ) -> None:
-    """The first judge leaves its session or its hold behind; the second listens, then plays."""
+    """The first judge leaves its session or its hold behind. The second judge listens, then plays."""
     world = World()
     seats = world.add(NextLift(), make())
     kind, name, scenario = play_for(seats[1].party, False)

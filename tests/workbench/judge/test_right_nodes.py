@@ -1,4 +1,4 @@
-"""A right node is not accused, however different from ours it is."""
+"""The judge does not accuse a correct node, however much the node differs from ours."""
 
 import pytest
 

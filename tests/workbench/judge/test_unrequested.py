@@ -1,5 +1,6 @@
-"""A charge that nobody requested has an id that no request has: `unrequested/…`. It changes when its
-robot's request comes, and the station's next one has it again. No law takes either for a fault."""
+"""A charge without a request has an id that no request has, `unrequested/…`. The id changes when the
+robot's request comes. The station's next charge without a request has the `unrequested/…` id again.
+No law takes either change for a fault."""
 
 import pytest
 from msgspec.structs import replace
@@ -34,7 +35,7 @@ def cancels(request_id: str) -> d.ChargerCancel:
 
 
 def broken(*said: d.ChargerState | d.ChargerRequest | d.ChargerCancel) -> set[str]:
-    """The laws that this breaks, a message each second."""
+    """Return the laws that these messages break, sent one each second."""
     judge, at = Judge("charger", "bay1"), 100.0
     for message in said:
         at += 1.0

@@ -14,7 +14,7 @@ NAMES = {"dispenser": "store", "ingestor": "intake"}
 
 
 class WorkcellLines:
-    """Lines of one kind of workcell."""
+    """Messages of one kind of workcell, each with its time and topic."""
 
     def __init__(self, kind: str) -> None:
         self.name = NAMES[kind]
@@ -45,7 +45,7 @@ class WorkcellLines:
 
 
 def stories(kind: JudgedKind, senders: Any, twins: Any) -> dict[tuple[JudgedKind, str], Any]:
-    """Return (kind, law) -> the lines of a story without occasion, a right one and a wrong one."""
+    """Return three stories for each (kind, law): without occasion, law kept, law broken."""
     of = WorkcellLines(kind)
     served = [of.ask(0.1), of.state(0.2, "a", mode=1), of.result(0.3, ACKNOWLEDGED)]
     return {

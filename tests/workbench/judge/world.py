@@ -1,4 +1,4 @@
-"""The judge at work in virtual time, on the memory transport: nodes, RMF's parties, and a run of it."""
+"""The judge in virtual time on the memory transport, with nodes and RMF's parties."""
 
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -35,7 +35,7 @@ Verdicts = dict[str, set[str]]
 
 
 class Seat:
-    """A party's place on the graph. Its clock is the wall clock, in step by `skew_s`."""
+    """A party's place on the graph. The party's clock differs from the wall clock by `skew_s`."""
 
     def __init__(self, world: "World", party: Party, skew_s: float = 0.0) -> None:
         self.party = party
@@ -53,7 +53,7 @@ class Seat:
         return EPOCH + self._world.timeline.now + self.skew_s
 
     def leave(self) -> None:
-        """It dies."""
+        """Remove the party from the graph, as when its process dies."""
         self._alarm.set(NEVER)
         self._place.close()
 
@@ -76,7 +76,7 @@ class Seat:
 
 
 class World:
-    """A graph without loss, and everybody on it."""
+    """A graph without loss, and every party on the graph."""
 
     def __init__(self, random: Random | None = None) -> None:
         self.timeline = Timeline()
@@ -95,7 +95,7 @@ class World:
         most_s: float = 600.0,
         also: Callable[[JudgeRun], None] = lambda judging: None,
     ) -> JudgeRun:
-        """Listen, or play and leave; at most `most_s`."""
+        """Let the judge listen, or play and leave, for at most `most_s`."""
         judging = JudgeRun(Judge(kind, name), scenario, for_s)
         place = Place(self.air, "judge", lambda: None)
         publishers: dict[AnyTopic, Publisher[Message]] = {}
@@ -141,7 +141,7 @@ class World:
 
 
 def told(judging: JudgeRun, now: float) -> Verdicts:
-    """The ids of the laws, by verdict."""
+    """Return the ids of the laws for each verdict."""
     found: Verdicts = {verdict.value: set() for verdict in Verdict}
     for judged in judging.judge.end(now, EPOCH + now, now - judging.began_at):
         found[judged.verdict.value].add(judged.law.id)
@@ -151,7 +151,8 @@ def told(judging: JudgeRun, now: float) -> Verdicts:
 def rides(
     *nodes: Party, robots: int = 1, restarts: bool = False, name: str = "Lift1"
 ) -> tuple[Verdicts, str]:
-    """The verdict on a lift that robots ride from L1 to L3, and why, if they did not."""
+    """Return the verdict on a lift that robots ride from L1 to L3, and the reason if they did not
+    ride."""
     world = World()
     world.add(*nodes)
     ride = RideScenario(name, ("L1", "L3"), robots, 60.0, restarts=restarts)
@@ -160,7 +161,7 @@ def rides(
 
 
 def passes(*nodes: Party, times: int = 3, restarts: bool = False) -> tuple[Verdicts, str]:
-    """The verdict on a door that a robot passes."""
+    """Return the verdict on a door that a robot passes, and the judge's note."""
     world = World()
     world.add(*nodes)
     judging = world.judge("door", "ward", PassageScenario("ward", times, 60.0, restarts=restarts))
@@ -168,7 +169,7 @@ def passes(*nodes: Party, times: int = 3, restarts: bool = False) -> tuple[Verdi
 
 
 def charges(*nodes: Party) -> tuple[Verdicts, str]:
-    """The verdict on a charger that is requested."""
+    """Return the verdict on a charger that the judge requests, and the judge's note."""
     world = World()
     world.add(*nodes)
     judging = world.judge("charger", "bay1", ChargeScenario("bay1", "fleet/red", "r1", 20.0))
@@ -176,7 +177,7 @@ def charges(*nodes: Party) -> tuple[Verdicts, str]:
 
 
 def watched(kind: JudgedKind, name: str, *parties: Party, for_s: float = 60.0) -> Verdicts:
-    """The verdict on a device that the judge only listens to."""
+    """Return the verdict on a device to which the judge only listens."""
     world = World()
     world.add(*parties)
     judging = world.judge(kind, name, for_s=for_s, most_s=for_s + 1.0)

@@ -23,7 +23,7 @@ LIFT = d.LiftState(
 
 
 def write(path: Path, lift: str = "Lift1", seconds: int = 60) -> Path:
-    """A robot rides from L1 to L3: states once a second, and the requests behind them."""
+    """Write a ride of a robot from L1 to L3: states once a second, and the requests behind them."""
     head = Head(
         "run", 1, __version__, "lift", "/etc/a.yaml", b"", {}, True, {}, RecordingSettings()
     )

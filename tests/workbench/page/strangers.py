@@ -1,4 +1,4 @@
-"""What strangers send to the page: half requests, strange frames; long names on its graph."""
+"""Hostile input for the page: half requests, strange frames, and long names on its graph."""
 
 import random
 import re
@@ -33,7 +33,11 @@ MB: Final = 1_000_000
 
 @contextmanager
 def half_requests(address: str, number: int, *, body: bool) -> Iterator[None]:
-    """So many connections that each send half a form, or a whole request and half of the next head."""
+    """Open this number of connections that each leave a request unfinished.
+
+    With `body` each sends half a form. Otherwise each sends one whole request and half of the next
+    head.
+    """
     place = urlsplit(address)
     there, host = (place.hostname or "", place.port or 0), f"Host: {place.netloc}\r\n"
     first = f"GET /favicon.ico HTTP/1.1\r\n{host}\r\nGET / HTTP/1.1\r\n"
@@ -46,14 +50,14 @@ def half_requests(address: str, number: int, *, body: bool) -> Iterator[None]:
 
 
 def client_of(address: str) -> str:
-    """A view's name for itself, as its script gets it."""
+    """Return the client id that the page gives to a view's script."""
     found = re.search(r"'client_id': '([0-9a-f-]+)'", ask(address, "/")[2])
     assert found
     return found[1]
 
 
 def strange_frames(address: str, rng: random.Random, number: int) -> int:
-    """Sockets that each send a frame that no browser would; returns how many were sent."""
+    """Send frames that no browser would send, each on its own socket. Return the number sent."""
     client, sent = client_of(address), 0
     where = f"{address.replace('http', 'ws', 1)}{SOCKET}websocket"
     view = f"&client_id={client}&next_message_id=0&implicit_handshake=true&document_id=d&tab_id=t"
@@ -76,8 +80,10 @@ def strange_frames(address: str, rng: random.Random, number: int) -> int:
 def long_names(
     transport: Transport, times: int = 1, length: int = LONGEST_FLAT - 1000
 ) -> Iterator[None]:
-    """Publish 23 lifts with names of this many characters, by default the longest that a transport
-    takes, so many times; yields after each."""
+    """Publish 23 lifts with long names, and yield after each of the `times` rounds.
+
+    The names have `length` characters. The default is about the longest that a transport takes.
+    """
     publisher = transport.publisher(topics.LIFT_STATES)
     for n in range(times):
         for lift in range(23):

@@ -1,4 +1,4 @@
-"""Who may act on the page: passwords, sessions, and tries, in virtual time."""
+"""Passwords, sessions and login attempts decide who may act on the page, in virtual time."""
 
 from pathlib import Path
 

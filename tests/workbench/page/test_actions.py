@@ -1,4 +1,4 @@
-"""The commands behind the page's buttons; each is parsed by the command line's own parser."""
+"""The commands behind the page's buttons. The command line's own parser parses each command."""
 
 import pytest
 

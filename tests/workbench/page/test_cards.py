@@ -1,4 +1,4 @@
-"""What browsers are sent: one script for all that has changed in a turn, and none where nothing has."""
+"""The page sends a browser one script for all changes of a turn, and none without a change."""
 
 import json
 
@@ -16,7 +16,7 @@ HOSTILE = "</script>\u2028\"'`${1}"
 
 
 class Wall:
-    """Keeps what one browser would be sent."""
+    """A wall that keeps the scripts for one browser."""
 
     def __init__(self) -> None:
         self.changes: list[list[str]] = []

@@ -1,4 +1,4 @@
-"""`rmf-bridge page` where it cannot serve: what it says, and its exit code."""
+"""`rmf-bridge page` when it cannot serve: its message and its exit code."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""Devices as HTML and SVG: what is told in words, what is marked, and that no name is markup."""
+"""Devices as HTML and SVG: the words, the marks, and names that never become markup."""
 
 from xml.etree import ElementTree
 

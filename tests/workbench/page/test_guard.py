@@ -1,4 +1,4 @@
-"""What is not answered at all: other host names, and sockets and forms of other origins."""
+"""Requests without an answer: other host names, and sockets and forms of other origins."""
 
 import pytest
 

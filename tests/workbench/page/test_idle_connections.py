@@ -1,4 +1,4 @@
-"""Which connections wait too long: those that have asked for nothing yet."""
+"""Connections that have sent no request yet, and have waited too long."""
 
 from workbench.page.idle_connections import MOST_SILENT_S, Silent
 

@@ -1,4 +1,4 @@
-"""What a daemon senses and drives now, from the entries of its ring."""
+"""The present inputs and outputs of a daemon, from the entries of its ring."""
 
 from pathlib import Path
 

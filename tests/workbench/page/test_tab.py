@@ -1,4 +1,4 @@
-"""What a tab is sent: the pieces that have changed, and times of a zone that exists."""
+"""A tab receives the pieces that have changed, and times in an existing time zone."""
 
 from datetime import UTC
 from random import Random

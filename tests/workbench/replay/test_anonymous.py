@@ -1,4 +1,4 @@
-"""Incidents without names: no name of the site is left, and the decisions stay the same."""
+"""An incident without names keeps no name of the site, and gives the same decisions."""
 
 import re
 import sys
@@ -77,7 +77,7 @@ def test_a_name_is_the_same_in_messages_and_decisions_and_comments_and_addresses
 def test_a_kind_whose_words_cannot_be_read_makes_nothing_anonymous(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The kind's words would be taken for the site's names, so the recording could not be replayed."""
+    """Without this rule words of the kind would count as names of the site, and replay would fail."""
     monkeypatch.setitem(sys.modules, lift.__name__ + ".report", None)
     our_words.cache_clear()
 

@@ -1,4 +1,5 @@
-"""Damaged and hostile recordings: readable parts are given in bounded memory, damage is reported."""
+"""Damaged and hostile recordings. The reader gives the readable parts in bounded memory, and reports
+the damage."""
 
 import io
 import random
@@ -41,7 +42,7 @@ def states(number: int, *, compression: CompressionType = CompressionType.NONE) 
 
 
 def record(opcode: int, body: bytes, length: int | None = None) -> bytes:
-    """Return a record; `length` is the length stated in its head."""
+    """Return a record whose head states `length`, by default the true length."""
     return struct.pack("<BQ", opcode, len(body) if length is None else length) + body
 
 
@@ -52,7 +53,7 @@ def chunk(compression: bytes, data: bytes, unpacked: int) -> bytes:
 
 
 def read(path: Path, content: bytes) -> tuple[list[str], str]:
-    """Return the lifts heard, and the report of the damage without the path."""
+    """Return the names of the lifts, and the report of the damage without the path."""
     path.write_bytes(content)
     notes = Notes()
     found = [one.message.lift_name for one in heard_in(path, notes)]  # type: ignore[union-attr]

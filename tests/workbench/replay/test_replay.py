@@ -1,4 +1,4 @@
-"""Recordings of the soak's daemons are decided again, with the same decisions and memories."""
+"""Replay decides recordings of the soak test again, with the same decisions and memories."""
 
 import os
 from pathlib import Path
@@ -70,7 +70,7 @@ def test_each_incident_of_the_soak_is_decided_as_it_was_recorded(file: Path) -> 
 
 
 def test_a_change_of_a_core_is_seen_with_what_led_to_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The changed lift reports no faults; the difference shows the events before it."""
+    """The changed lift reports no faults. The difference shows the events before the missing fault."""
     monkeypatch.setattr(lift_core, "_faults", lambda memory, view, now, limits: ())
     head, entries = opened(HERE / "Lift1_1.mcap", Notes())
 

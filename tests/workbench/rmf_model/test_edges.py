@@ -1,4 +1,4 @@
-"""RMF's rules at their edges: Jazzy's older rules, and rules that mutation showed to be untested."""
+"""Edges of RMF's rules: the older rules of Jazzy, and rules that mutation testing found untested."""
 
 from msgspec.structs import replace
 

@@ -1,4 +1,5 @@
-"""The model of RMF keeps the rules of its supervisors and fleet adapters, one rule in each test."""
+"""The model of RMF keeps the rules of RMF's supervisors and fleet adapters. Each test checks one
+rule."""
 
 from collections.abc import Iterable
 
@@ -48,7 +49,7 @@ def listing(*requesters: str, at: float = 0.0) -> d.SupervisorHeartbeat:
 
 
 def heard(party: Party, *messages: d.Message, now: float = 0.0) -> list[Said]:
-    """Return the messages that a party sends in answer to these messages, in turn."""
+    """Return the messages that a party sends in answer to each of these messages."""
     return [said for message in messages for said in party.hear(message, now)]
 
 
@@ -322,9 +323,8 @@ def test_a_waiting_robot_costs_two_requests_for_each_state_and_one_after_arrival
 
 
 def test_a_node_that_refuses_the_floorless_end_locks_two_robots_out_for_ever() -> None:
-    """So behaves RMF: the supervisor forgets A at A's END, adopts B, and then drops A's repeated
-    ENDs.
-    """
+    """RMF behaves like this. The supervisor forgets A at A's END, adopts B, and then drops A's repeated
+    ENDs."""
     supervisor, a, b = LiftSupervisor(), RobotContext(A), RobotContext(B)
     parties: list[Party] = [supervisor, a, b]
     circulate(parties, a.begin(RequestLift("Lift1", "L3", inside=True), 0.0), 0.0)

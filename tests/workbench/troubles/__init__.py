@@ -1,9 +1,9 @@
-"""Twelve troubles on a whole site, each explained twice: live, and from the file of our recorder.
+"""Twelve troubles on a whole site. `explain` explains each trouble live, and from our recorder's file.
 
-expected.toml   the verdicts, written before the code by somebody who had not seen it
-verdicts.py     reads them, and compares a screen with one of them
+expected.toml   the verdicts, written before the code by somebody who had not seen the code
+verdicts.py     reads the verdicts, and compares a screen with a verdict
 site.py         the site: daemons with their rings, RMF's supervisors, one fleet, the recorder
 fleet.py        the fleet's adapter
 asked.py        `rmf-bridge` as a person types it, in the site's time
-stories.py      each trouble, by the name that it has in expected.toml
+stories.py      each trouble, by its name in expected.toml
 """

@@ -1,6 +1,7 @@
 """`python -m tests.workbench.troubles [NAME …]`: the twelve troubles with real processes on loopback.
 
-A table at the end has each trouble's verdict, live and from its file. Exit code 1 if any is wrong.
+A table at the end shows each trouble's verdict, live and from its file. The exit code is 1 if any
+verdict is wrong.
 """
 
 import argparse
@@ -22,9 +23,12 @@ Stage = Callable[[Any], Any]
 
 @dataclass(frozen=True)
 class Real:
-    """One trouble. `serves`: the daemons that it needs. `daemon`: the owner of the file. `then`: what
-    happens after the live question, before the file is written. `dead`: the question comes once DDS has
-    noticed that a node was killed. `slow`: a part of the device that is slow all the time."""
+    """One trouble.
+
+    The trouble needs the daemons in `serves`. `daemon` owns the file. `then` happens after the live
+    question, and before the recorder writes the file. With `dead` the question waits until DDS has
+    noticed a killed node. `slow` names a part of the device that is slow all the time.
+    """
 
     stage: Stage
     kind: str = "lift"
@@ -55,7 +59,7 @@ TROUBLES: Final = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Play the troubles that are named; without a name, all."""
+    """Play the named troubles, or all without a name."""
     parser = argparse.ArgumentParser(prog="python -m tests.workbench.troubles", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", choices=[*TROUBLES, []])
     parser.add_argument("--screens", action="store_true", help="print each screen that is wrong")

@@ -1,4 +1,4 @@
-"""`rmf-bridge` as a person types it at the site: its screen. While a command waits, the site lives."""
+"""`rmf-bridge` as a person types it at the site. The site's time goes on when a command waits."""
 
 import io
 from collections import deque
@@ -21,12 +21,16 @@ LISTENS_S: Final = 10.0
 
 
 def live_screen(site: Site, device: str) -> str:
-    """`explain --live`, by a listener who comes now."""
+    """Return the screen of `explain --live` for a listener that joins now."""
     return _typed(site, "explain", "--live", device, "--for", f"{LISTENS_S:g}")
 
 
 def file_screen(site: Site, device: str, daemon: str = "", note: str = "") -> str:
-    """`explain FILE`: of the file that the recorder writes, else of a person's `incident --note`."""
+    """Return the screen of `explain FILE`.
+
+    The file is the recorder's. If the recorder writes none, a person asks for it with `incident
+    --note`.
+    """
     path = site.file(daemon or device)
     if path is None:
         assert note, "the recorder wrote no file"
@@ -38,7 +42,7 @@ def file_screen(site: Site, device: str, daemon: str = "", note: str = "") -> st
 
 
 def release_screen(site: Site, device: str) -> str:
-    """`release`, by a person who knows that the car is empty."""
+    """Return the screen of `release`. The person knows that the car is empty."""
     return _typed(site, "release", device)
 
 
@@ -62,7 +66,7 @@ def _typed(site: Site, *words: str) -> str:
 
 
 class _Time:
-    """The module `time` of a command at the site."""
+    """A replacement of the module `time` for a command at the site."""
 
     def __init__(self, timeline: Timeline) -> None:
         self._timeline = timeline
@@ -78,7 +82,7 @@ class _Time:
 
 
 class _Queue:
-    """A SimpleQueue: who waits for it lets the site live."""
+    """A replacement of SimpleQueue. The site's time goes on when a command waits for the queue."""
 
     def __init__(self, timeline: Timeline) -> None:
         self._timeline = timeline

@@ -1,10 +1,10 @@
-"""Troubles at a charging station: charger_a, under our coordinator."""
+"""Troubles at the charging station charger_a, under our coordinator."""
 
 from tests.workbench.troubles.site import CHARGER, Site
 
 
 def daemon_killed(site: Site) -> None:
-    """The station's daemon is killed while a robot charges."""
+    """Kill the station's daemon when a robot charges."""
     site.coordinates()
     site.fleet.robots.charge("red", site.fleet.wall())
     site.run(40.0)
@@ -16,7 +16,7 @@ def daemon_killed(site: Site) -> None:
 
 
 def robot_never_comes(site: Site) -> None:
-    """The coordinator has granted the station to a robot that does not drive."""
+    """Let the coordinator grant the station to a robot that does not drive."""
     site.coordinates()
     site.trouble_begins()
     site.fleet.robots.robots["red"].stuck = True
@@ -25,7 +25,7 @@ def robot_never_comes(site: Site) -> None:
 
 
 def robot_never_comes_in_time(site: Site) -> None:
-    """The same, until start_timeout is near."""
+    """Grant the station to a robot that does not drive, and wait until start_timeout is near."""
     robot_never_comes(site)
     site.run(200.0)
     site.trouble_begins()

@@ -1,4 +1,4 @@
-"""Troubles at a door: ward_door, under RMF's own supervisor."""
+"""Troubles at ward_door, under RMF's own supervisor."""
 
 from typing import Final
 
@@ -8,7 +8,7 @@ SUPERVISOR: Final = "rmf_door_supervisor"
 
 
 def open_contact_cut(site: Site) -> None:
-    """The 'opened' wire is cut after three passages; a robot asks for OPEN."""
+    """Cut the 'opened' wire after three passages, and let a robot ask for OPEN."""
     _three_passages(site)
     site.trouble_begins()
     site.fail(DOOR, "opened", "off")
@@ -17,7 +17,7 @@ def open_contact_cut(site: Site) -> None:
 
 
 def closed_contact_cut(site: Site) -> None:
-    """The 'closed' wire is cut in a passage after three others; the door is let go."""
+    """Cut the 'closed' wire in the fourth passage, and let the robot release the door."""
     _three_passages(site)
     site.red.opens(DOOR)
     site.until(site.red)
@@ -30,7 +30,7 @@ def closed_contact_cut(site: Site) -> None:
 
 
 def slow_modbus_unit(site: Site) -> None:
-    """The door's unit answers now and then."""
+    """Let the door's Modbus unit answer only sometimes."""
     site.passes(site.red, DOOR)
     site.trouble_begins()
     site.slow(DOOR)
@@ -40,7 +40,7 @@ def slow_modbus_unit(site: Site) -> None:
 
 
 def daemon_killed(site: Site) -> None:
-    """The door's daemon is killed while the door opens for a robot."""
+    """Kill the door's daemon when the door opens for a robot."""
     site.passes(site.red, DOOR)
     site.trouble_begins()
     site.red.opens(DOOR)
@@ -50,7 +50,7 @@ def daemon_killed(site: Site) -> None:
 
 
 def door_merely_closes(site: Site) -> None:
-    """A robot has passed, and its hold has just ended."""
+    """Let a robot pass. Its hold has ended a moment ago."""
     site.red.opens(DOOR)
     site.until(site.red)
     site.run(6.0)
@@ -60,7 +60,7 @@ def door_merely_closes(site: Site) -> None:
 
 
 def robot_in_doorway(site: Site) -> None:
-    """A robot's DoorOpen is over, and it stands in the doorway."""
+    """Let a robot's DoorOpen end when the robot stands in the doorway."""
     site.red.opens(DOOR)
     site.until(site.red)
     site.trouble_begins()
@@ -68,14 +68,14 @@ def robot_in_doorway(site: Site) -> None:
 
 
 def supervisor_dead_doorway(site: Site) -> None:
-    """The same, and the door supervisor has been killed."""
+    """Let a robot stand in the doorway after its DoorOpen, and kill the door supervisor."""
     robot_in_doorway(site)
     site.supervisors[SUPERVISOR].kill()
     site.run(30.0)
 
 
 def supervisor_dead(site: Site) -> None:
-    """The door supervisor has been killed; a robot asks for OPEN."""
+    """Kill the door supervisor, and let a robot ask for OPEN."""
     _three_passages(site)
     site.supervisors[SUPERVISOR].kill()
     site.trouble_begins()
@@ -84,7 +84,7 @@ def supervisor_dead(site: Site) -> None:
 
 
 def operator_dead(site: Site) -> None:
-    """The operator does not move the leaf."""
+    """Let the door operator not move the leaf."""
     _three_passages(site)
     site.fail(DOOR, "operator", "off")
     site.trouble_begins()

@@ -23,11 +23,11 @@ SAYS: Final[tuple[Topic[Any], ...]] = (
 
 
 Join = Callable[[str], Transport]
-"""Takes part in the graph as a node of this name."""
+"""A function that joins the graph as a node of this name."""
 
 
 class PartyNode:
-    """One of RMF's nodes, played by its rules. `wall`: its clock (s since the epoch)."""
+    """One of RMF's nodes, played by its rules. `wall` returns the node's clock (s since the epoch)."""
 
     def __init__(
         self,
@@ -47,19 +47,19 @@ class PartyNode:
         self._mouths = {topic.name: self._place.publisher(topic) for topic in says}
 
     def start(self) -> None:
-        """It hears what its parties subscribe to."""
+        """Subscribe to the topics of the parties."""
         heard = {topic for party in self._parties for topic in party.subscribes}
         for topic in sorted(heard, key=lambda topic: topic.name):
             self._place.subscribe(topic, self._hear)
         self._tick()
 
     def kill(self) -> None:
-        """It is killed, and leaves the graph."""
+        """Leave the graph, as when the process is killed."""
         self._place.close()
         self._parties.clear()
 
     def say(self, said: Any) -> None:
-        """Publish what a party sends, and be called when the next one is due."""
+        """Publish a party's messages, and set the alarm for the next tick."""
         for topic, message in said:
             self._mouths[topic.name].publish(message)
         left_s = min(party.wake_at() for party in self._parties) - self.wall()
@@ -76,7 +76,7 @@ class PartyNode:
 
 
 class Fleet(PartyNode):
-    """One adapter for all robots of one fleet. `behind_s`: its clock's error."""
+    """One adapter for all robots of one fleet. Its clock is `behind_s` seconds slow."""
 
     def __init__(
         self,
@@ -98,11 +98,11 @@ class Fleet(PartyNode):
         )
 
     def add(self, robot: RobotContext) -> None:
-        """The adapter speaks for this robot from now on."""
+        """Let the adapter publish for this robot from now on."""
         self._parties.append(robot)
 
     def drop(self, robot: RobotContext) -> None:
-        """The adapter speaks for this robot no longer."""
+        """Let the adapter stop publishing for this robot."""
         self._parties.remove(robot)
 
 
@@ -126,5 +126,5 @@ class Robot(Rider):
         super().ends(lift)
 
     def is_dropped(self) -> None:
-        """Its adapter says nothing for it any more."""
+        """Let the adapter stop publishing for this robot."""
         self._fleet.drop(self.robot)

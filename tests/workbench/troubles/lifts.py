@@ -1,4 +1,4 @@
-"""Troubles at a lift: Lift1, under RMF's own supervisor where nothing else is said."""
+"""Troubles at Lift1. RMF's own supervisor runs unless a docstring names another."""
 
 from typing import Final
 
@@ -23,7 +23,7 @@ FLICKERS_S: Final = 1.6
 
 
 def robot_dies_in_car(site: Site) -> None:
-    """Its adapter speaks for it no longer, and goes on for another robot."""
+    """Let the adapter fall silent for the robot in the car. It goes on for another robot."""
     site.boards(site.red, "L1", "L3")
     site.run(4.0)
     site.blue.asks(LIFT, "L1")
@@ -35,7 +35,7 @@ def robot_dies_in_car(site: Site) -> None:
 
 
 def robot_dies_in_car_b(site: Site) -> None:
-    """Its adapter does not notice."""
+    """Let the robot die in the car. Its adapter does not notice."""
     site.boards(site.red, "L1", "L3")
     site.run(4.0)
     site.trouble_begins()
@@ -45,20 +45,21 @@ def robot_dies_in_car_b(site: Site) -> None:
 
 
 def fire_mid_ride(site: Site) -> None:
-    """The car is on its way down to the recall floor, and its robot's adapter asks for that floor."""
+    """Let a fire begin in a ride. The car goes down to the recall floor, and the adapter asks for
+    it."""
     _fire_between_floors(site)
     site.red.asks(LIFT, "L1", inside=True)
     site.run(5.0)
 
 
 def fire_mid_ride_to_its_end(site: Site) -> None:
-    """The same, and the robot leaves at the recall floor."""
+    """Let a fire begin in a ride. The robot leaves at the recall floor."""
     fire_mid_ride(site)
     robot_leaves(site)
 
 
 def robot_leaves(site: Site) -> None:
-    """The robot in the car sees its floor, and drives out."""
+    """Let the robot in the car see its floor, and drive out."""
     site.until(site.red)
     site.run(2.0)
     site.red.ends(LIFT)
@@ -66,13 +67,14 @@ def robot_leaves(site: Site) -> None:
 
 
 def fire_mid_ride_b(site: Site) -> None:
-    """The car stands open at the recall floor, and the adapter goes on asking for L3."""
+    """Let a fire begin. The car stands open at the recall floor, and the adapter goes on asking for
+    L3."""
     _fire_between_floors(site)
     site.run(80.0)
 
 
 def lift_door_contact_cut(site: Site) -> None:
-    """The door's 'opened' wire is cut during a ride."""
+    """Cut the door's 'opened' wire during a ride."""
     site.boards(site.red, "L1", "L3")
     site.run(8.0)
     site.trouble_begins()
@@ -81,7 +83,7 @@ def lift_door_contact_cut(site: Site) -> None:
 
 
 def supervisor_killed(site: Site) -> None:
-    """RMF's supervisor is dead when two robots ask for the free lift."""
+    """Kill RMF's supervisor before two robots ask for the free lift."""
     site.rides(site.red, LIFT, "L1", "L2")
     site.run(5.0)
     site.supervisors[RMFS].kill()
@@ -93,7 +95,7 @@ def supervisor_killed(site: Site) -> None:
 
 
 def supervisor_killed_b(site: Site) -> None:
-    """RMF's supervisor dies during a ride; the robot leaves the car and its adapter sends END."""
+    """Kill RMF's supervisor during a ride. The robot leaves the car and its adapter sends END."""
     site.boards(site.red, "L1", "L3")
     site.run(5.0)
     site.trouble_begins()
@@ -106,7 +108,7 @@ def supervisor_killed_b(site: Site) -> None:
 
 
 def rmf_silent_robot_asks(site: Site) -> None:
-    """RMF's supervisor dies when the robot has just boarded."""
+    """Kill RMF's supervisor shortly after the robot has boarded."""
     site.red.asks(LIFT, "L1")
     site.until(site.red)
     site.run(3.0)
@@ -118,7 +120,7 @@ def rmf_silent_robot_asks(site: Site) -> None:
 
 
 def slow_modbus_unit(site: Site) -> None:
-    """The lift's unit answers now and then."""
+    """Let the lift's Modbus unit answer only sometimes."""
     site.run(5.0)
     site.trouble_begins()
     site.slow(LIFT)
@@ -128,7 +130,7 @@ def slow_modbus_unit(site: Site) -> None:
 
 
 def two_daemons_one_name(site: Site) -> dict[str, str]:
-    """A second daemon of ours, for another lift, has the same name."""
+    """Start a second daemon of ours with the same name, for another lift."""
     site.rides(site.red, LIFT, "L2", "L1")
     site.run(60.0)
     site.trouble_begins()
@@ -142,7 +144,7 @@ def two_daemons_one_name(site: Site) -> dict[str, str]:
 
 
 def two_foreign_nodes(site: Site) -> dict[str, str]:
-    """Two nodes of another maker publish the same states; our supervisor serves the lifts."""
+    """Let two nodes of another maker publish the same states. Our supervisor serves the lifts."""
     site.retires(LIFT)
     site.takes_over(LiftSupervisorSettings())
     site.run(20.0)
@@ -155,9 +157,10 @@ def two_foreign_nodes(site: Site) -> dict[str, str]:
 
 
 def robot_clock_hour_off(site: Site) -> None:
-    """The adapter's clock is an hour behind, under a supervisor that drops old requests.
+    """Set the adapter's clock an hour back, under a supervisor that drops old requests.
 
-    Ours believes a requester that repeats itself (FRESHNESS-5), so the supervisor is another maker's.
+    The supervisor is another maker's, because ours believes a requester that repeats its request
+    (FRESHNESS-5).
     """
     site.supervisors[RMFS].kill()
     PartyNode(
@@ -175,7 +178,7 @@ def robot_clock_hour_off(site: Site) -> None:
 
 
 def robot_clock_hour_off_b(site: Site) -> None:
-    """The adapter's clock is an hour ahead, under RMF's supervisor; a ride goes on."""
+    """Set the adapter's clock an hour ahead during a ride, under RMF's supervisor."""
     site.fleet.behind_s = -HOUR_S
     site.trouble_begins()
     site.boards(site.red, "L1", "L3")
@@ -184,7 +187,7 @@ def robot_clock_hour_off_b(site: Site) -> None:
 
 
 def daemon_killed(site: Site) -> None:
-    """The lift's daemon is killed during a ride."""
+    """Kill the lift's daemon during a ride."""
     site.boards(site.red, "L1", "L3")
     site.run(8.0)
     site.trouble_begins()
@@ -193,7 +196,7 @@ def daemon_killed(site: Site) -> None:
 
 
 def fleet_adapter_killed(site: Site) -> None:
-    """The adapter of the robot in the car is killed, while another robot of it waits."""
+    """Kill the adapter of the robot in the car. Another robot of this adapter waits."""
     site.boards(site.red, "L1", "L3")
     site.blue.asks(LIFT, "L2")
     site.until(site.red)
@@ -204,7 +207,7 @@ def fleet_adapter_killed(site: Site) -> None:
 
 
 def human_mode_with_fault(site: Site) -> None:
-    """The relay that asks for AGV mode reads back off."""
+    """Let the relay that asks for AGV mode read back off."""
     far = site.devices[LIFT].far
     assert isinstance(far, ModuleFar)
     far.dead = frozenset({parse("unit 1 coil 0")})
@@ -214,7 +217,7 @@ def human_mode_with_fault(site: Site) -> None:
 
 
 def human_mode_relays_off(site: Site) -> None:
-    """An unsteady input takes the relays off again and again, until they must rest."""
+    """Let an unsteady input switch the relays off again and again, until the relays must rest."""
     site.red.asks(LIFT, "L1")
     while not site.daemons[LIFT].faults() or "RELAY_RESTS" not in site.daemons[LIFT].faults():
         site.trouble_begins()
@@ -225,7 +228,7 @@ def human_mode_relays_off(site: Site) -> None:
 
 
 def human_mode_asked(site: Site) -> None:
-    """The relay asks for AGV mode, and the controller does not confirm it."""
+    """Let the relay ask for AGV mode. The controller does not confirm AGV mode."""
     site.fail(LIFT, "controller", "off")
     site.trouble_begins()
     site.red.asks(LIFT, "L1")
@@ -249,7 +252,8 @@ class StrictSupervisor(LiftSupervisor):
 
 
 class Foreign:
-    """Another maker's lift node, which says the same each second. `behind_s`: its clock's error."""
+    """Another maker's lift node. It publishes the same state each second. Its clock is `behind_s` s
+    slow."""
 
     def __init__(self, site: Site, node: str, behind_s: float = 0.0) -> None:
         self._site = site

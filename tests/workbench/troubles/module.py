@@ -1,4 +1,4 @@
-"""A Modbus module in virtual time, under the HAL's own lines: read-back, contradictions and pauses.
+"""A Modbus module in virtual time, under the HAL's own read-back, contradiction and pause rules.
 
 Only the wire is missing, with its timeouts and its backoff (`drivers/hal/modbus/bus.py`).
 """
@@ -14,7 +14,7 @@ from tests.drivers.far import PointsFar, RegisterFar
 
 
 class ModuleFar(PointsFar):
-    """The far side of a device at a module. `dead`: coils that stay off, whatever is written."""
+    """The far side of a device at a module. Coils in `dead` stay off, whatever the daemon writes."""
 
     dead: frozenset[Point] = frozenset()
 
@@ -27,7 +27,7 @@ class ModuleFar(PointsFar):
         return ModbusLines(units, *found, dict(outputs), *of_modbus)  # type: ignore[arg-type]
 
     def silent(self, why: str) -> None:
-        """It does not answer from now on, for this reason; "": it does."""
+        """Stop answering for this reason, or answer again with ""."""
         self.down = self.units.down = why
 
 

@@ -1,7 +1,7 @@
 """A whole site in virtual time: our daemons with their rings, RMF's supervisors, one fleet, and the
 machine's recorder.
 
-Everything is as at the soak's site (`tests/site`), with the names that `expected.toml` has.
+The site equals the soak test's site (`tests/site`), with the names of `expected.toml`.
 """
 
 import dataclasses
@@ -68,8 +68,11 @@ PLACES: Final = {
 
 
 class Site(Scene):
-    """`folder`: for rings and recordings. `mortal`: a daemon that will be killed as a process is.
-    `latest_s`, `slow_s`: the latest reply of a slow unit, and its pace (s)."""
+    """A site with its recorder.
+
+    Rings and recordings lie in `folder`. `mortal` names a daemon that a story will kill. `latest_s` is
+    the latest reply of a slow unit (s); `slow_s` is the unit's pace (s).
+    """
 
     def __init__(self, folder: Path, mortal: str = "") -> None:
         super().__init__(rmf=True, diagnoses=False)
@@ -102,7 +105,7 @@ class Site(Scene):
         return EPOCH + self.timeline.now
 
     def serve(self, device: Device, node: str) -> None:
-        """A daemon of ours for this device, on a machine of the site."""
+        """Start a daemon of ours for this device."""
         name = node.removeprefix("rmf_bridge_")
         self.devices[name] = device
         self.daemons[name] = daemon = DeviceDaemon(self.timeline, self.air, device, node)
@@ -110,34 +113,34 @@ class Site(Scene):
         daemon.start()
 
     def takes_over(self, settings: LiftSupervisorSettings) -> None:
-        """Our lift supervisor, in the place of RMF's."""
+        """Put our lift supervisor in the place of RMF's."""
         self.supervisors.pop("rmf_lift_supervisor").kill()
         self._ours("lift_supervisor", LIFT_SUPERVISOR, settings)
 
     def coordinates(self) -> None:
-        """Our charger coordinator, for the fleet's robots and both chargers."""
+        """Start our charger coordinator for the fleet's robots and both chargers."""
         self._ours("charger_coordinator", COORDINATOR, coordinator_settings(START_TIMEOUT_S))
 
     def trouble_begins(self) -> None:
-        """From now on the recorder's files count."""
+        """Count only files that the recorder writes from now on."""
         self._before = {path.name for path in self.recordings.folder.glob("*")}
 
     def kills(self, name: str) -> None:
-        """The daemon's process is killed; its service switches its outputs off."""
+        """Kill the daemon's process. Its service switches the outputs off."""
         if name == self._mortal and self.process:
             self.process.kill()
             self.process.wait()
         self.daemons[name].kill()
 
     def retires(self, name: str) -> None:
-        """The daemon shuts down in good order, and is not started again."""
+        """Shut the daemon down in good order, without a restart."""
         daemon = self.daemons.pop(name)
         daemon.kill()
         daemon.writer.ended(safe=True)
 
     def slow(self, name: str) -> None:
-        """The device's unit answers after 0.1 to `latest_s` from now on, so that most replies are too
-        late."""
+        """Let the device's unit answer after 0.1 s to `latest_s` from now on, so that most replies are
+        too late."""
         far = self.devices[name].far
         assert isinstance(far, ModuleFar)
         far.silent(TOO_LATE if self.random.uniform(0.1, self.latest_s) > TIMEOUT_S else "")
@@ -145,20 +148,20 @@ class Site(Scene):
         self.timeline.after(self.slow_s, lambda: self.slow(name))
 
     def close(self) -> None:
-        """The end."""
+        """End all processes."""
         if self.process:
             self.process.kill()
             self.process.wait()
 
     def boards(self, robot: Robot, start: str, end: str) -> None:
-        """The robot has come into Lift1's car, and asks for another floor."""
+        """Let the robot board Lift1 at `start`, and ask for `end`."""
         robot.asks(LIFT, start)
         self.until(robot)
         self.run(6.0)
         robot.asks(LIFT, end, inside=True)
 
     def passes(self, robot: Robot, door: str) -> None:
-        """A passage through a door."""
+        """Let the robot pass a door."""
         robot.opens(door)
         self.until(robot)
         self.run(5.0)
@@ -167,14 +170,14 @@ class Site(Scene):
         self.run(10.0)
 
     def file(self, name: str, within_s: float = 260.0) -> Path | None:
-        """The first file that the recorder writes of this daemon after the trouble began."""
+        """Return the first file that the recorder writes of this daemon after the trouble began."""
         until = self.timeline.now + within_s
         while not (found := self._written(name)) and self.timeline.now < until:
             self.run(1.0)
         return found[0] if found else None
 
     def ring(self, name: str) -> Path:
-        """The runtime directory with this daemon's ring."""
+        """Return the runtime directory with this daemon's ring."""
         return self._rings[name]
 
     # ---- inside
@@ -188,8 +191,8 @@ class Site(Scene):
         self.run(6.0)
 
     def _each_second(self) -> None:
-        """Each daemon publishes its diagnostics (`bridges/runtime/daemon.py`, `_tell`), and the
-        recorder looks at the rings."""
+        """Publish each daemon's diagnostics (as `_tell` in `bridges/runtime/daemon.py` does), and let
+        the recorder look at the rings."""
         for daemon in self.daemons.values():
             if daemon.alive:
                 told = {daemon.name: daemon.status()}
@@ -223,7 +226,8 @@ class Site(Scene):
 
 
 def devices(timeline: Timeline) -> dict[str, Device]:
-    """Two of each kind. Lift1, with two door contacts, and both doors are at Modbus modules."""
+    """Return two devices of each kind. Lift1, with two door contacts, and both doors are at Modbus
+    modules."""
     content = {**building._lift2(), "fire_reset": "auto", "alarm": "fire_alarm_trigger"}
     settings = building._convert(lift_dry_contact, content)
     other = building._shipped("lift_dry_contact", LIFT)
@@ -247,14 +251,14 @@ def _door(timeline: Timeline, name: str, content: dict[str, Any]) -> Device:
 
 
 def _at_module(timeline: Timeline, device: Device, driver: Any) -> Device:
-    """The device, with the HAL's own lines between its driver and its module."""
+    """Return the device with the HAL's own rules between its driver and its module."""
     far = ModuleFar(timeline, device.plant, driver.wires(device.settings))
     made = partial(driver.create, device.name, device.settings, far)
     return dataclasses.replace(device, far=far, driver=made)
 
 
 def coordinator_settings(start_timeout_s: float) -> CoordinatorSettings:
-    """The fleet's robots may use both chargers."""
+    """Return settings in which the fleet's robots may use both chargers."""
     waypoints = {name: Waypoint(level=at[0], x=at[1], y=at[2]) for name, at in PLACES.items()}
     chargers = [CHARGER, OTHER_CHARGER]
     robots = {name: RobotSettings(stations=chargers, waits_at=f"wait_{name}") for name in ROBOTS}

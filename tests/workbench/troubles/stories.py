@@ -9,14 +9,17 @@ from tests.workbench.troubles.site import DOOR, Site
 from tests.workbench.troubles.site import LIFT as LIFT1
 
 Stage = Callable[[Site], Mapping[str, str] | None]
-"""What happens; gives the names of nodes, for the places in braces of the verdict."""
+"""A function that stages a trouble. It returns the node names for the verdict's places in braces."""
 
 
 @dataclass(frozen=True)
 class Trouble:
-    """`daemon`: the owner of the file, if not the device's. `note`: a person's, with which to ask for a
-    file that the recorder does not write. `mortal`: the daemon that is killed. `release`: the person
-    types `rmf-bridge release`."""
+    """One trouble.
+
+    `daemon` owns the file; "" means the device's daemon. With `note` a person asks for a file that the
+    recorder does not write. `mortal` names the daemon that the story kills. With `release` the person
+    types `rmf-bridge release`.
+    """
 
     stage: Stage
     daemon: str = ""

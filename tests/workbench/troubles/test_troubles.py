@@ -1,4 +1,4 @@
-"""Each of the twelve troubles is explained as `expected.toml` has it, live and from its file."""
+"""`explain` explains each of the twelve troubles as `expected.toml` says, live and from its file."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -21,13 +21,13 @@ OTHERWISE: Mapping[str, str] = {
     "slow_modbus_unit": "a lift is OFFLINE 1 s after its last reading, so it flips faster",
     "two_foreign_nodes": "the file is our lift supervisor's",
 }
-"""Stories that are staged otherwise than they are told, and why."""
+"""Stories whose stage differs from the text of `expected.toml`, each with the reason."""
 
 
 def told(
     trouble: Trouble, verdict: Verdict, folder: Path, change: Callable[[Site], None] | None = None
 ) -> tuple[str, Mapping[str, str]]:
-    """The screen, and the names of the nodes. `change`: of the site, before the trouble."""
+    """Return the screen, and the names of the nodes. `change` alters the site before the trouble."""
     site = Site(folder, trouble.mortal)
     try:
         if change is not None:
@@ -58,8 +58,8 @@ SLOW = next(verdict for verdict in VERDICTS if verdict.key == ("slow_modbus_unit
 def test_a_unit_that_is_slow_at_another_pace_is_explained_as_expected(
     seed: int, tmp_path: Path
 ) -> None:
-    """On a busy machine the lift is OFFLINE for seconds: a listener of 10 s may hear it come back once.
-    With seed 7 the only outage is over, which is another story."""
+    """On a busy machine the lift is OFFLINE for seconds, so a listener of 10 s may hear one recovery
+    only. With seed 7 the only outage has already ended. That is another story."""
 
     def slower(site: Site) -> None:
         site.latest_s, site.slow_s, site.random = 1.7, 0.7, Random(seed)
@@ -80,7 +80,7 @@ def test_a_unit_that_is_slow_at_another_pace_is_explained_as_expected(
 def test_a_doors_own_file_names_the_robot_and_claims_nothing_of_a_heartbeat(
     stage: Callable[[Site], None], says: str, acts: str, tmp_path: Path
 ) -> None:
-    """A door's daemon records what robots ask, and not the supervisor's heartbeat."""
+    """A door's daemon records the robots' requests, and not the supervisor's heartbeat."""
     site = Site(tmp_path)
     try:
         stage(site)

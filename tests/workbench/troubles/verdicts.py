@@ -14,15 +14,18 @@ Alternatives = list[str]
 
 
 class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A next step with one of `when_next` has one of `needs` too."""
+    """A rule for each next step: a step with a phrase of `when_next` also has a phrase of `needs`."""
 
     when_next: Alternatives
     needs: Alternatives
 
 
 class Verdict(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One entry. `says`, `next_says`: each list needs one of its phrases. `never`, `next_never`: no
-    phrase of theirs may occur."""
+    """One entry of the file.
+
+    The screen needs one phrase of each list in `says`. Its next steps need one phrase of each list in
+    `next_says`. No phrase of `never` or `next_never` may occur.
+    """
 
     name: str
     view: str
@@ -54,7 +57,7 @@ RULES: Final = _READ.rule
 
 
 def wrong(verdict: Verdict, screen: str, names: Mapping[str, str]) -> list[str]:
-    """What a screen lacks, or has against the verdict. `names`: for the places in braces."""
+    """Return the differences between a screen and the verdict. `names` fill the places in braces."""
     steps = STEP.findall(screen)
     return list(_wrong(verdict, _plain(screen), [_plain(step) for step in steps], names))
 
@@ -65,7 +68,7 @@ def _wrong(
     def named(phrases: Alternatives) -> Alternatives:
         return [_plain(phrase.format_map(names)) for phrase in phrases]
 
-    following = " ".join(steps) or told  # `release` has no line of a next step
+    following = " ".join(steps) or told  # the screen of `release` has no line for a next step
     if steps and not steps[0].startswith(f"next, {verdict.acts}:"):
         yield f"acts: {verdict.acts}, not {steps[0].partition(':')[0]!r}"
     for what, text, wanted in (

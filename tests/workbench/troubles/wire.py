@@ -1,7 +1,7 @@
-"""The same site with real processes on loopback: our daemons are `rmf-bridge run --simulate`, a person
+"""The same site with real processes on loopback. Our daemons are `rmf-bridge run --simulate`, a person
 types `rmf-bridge explain`, and this process plays RMF's nodes on the same wire.
 
-A stage's time is cut short here: where it lets time pass, at most PASSES_S pass.
+Each wait of a stage is cut to at most PASSES_S.
 """
 
 import json
@@ -43,12 +43,12 @@ PASSES_S: Final = 4.0
 WITHIN_S: Final = 90.0
 RECORDED_S: Final = 100.0
 LEASE_S: Final = 25.0
-"""After this long DDS has noticed a killed node."""
+"""DDS notices a killed node within this time (s)."""
 START_TIMEOUT_S: Final = 40.0
 
 
 class WireSite:
-    """What the stages use of `site.Site`."""
+    """The part of `site.Site` that the stages use."""
 
     def __init__(self, folder: Path, domain: int, serves: tuple[str, ...]) -> None:
         self.timeline = RealTime()
@@ -141,27 +141,28 @@ class WireSite:
         self._starts("charger_coordinator", kept.of_graph("", COORDINATOR, settings).yaml)
 
     def close(self) -> None:
-        """Everybody leaves."""
+        """Stop all processes and leave the graph."""
         stop_all(self.daemons.values())
         for node in (*self.supervisors.values(), self.fleet):
             node.kill()
         self._observer.close()
 
     def waits(self, seconds: float) -> None:
-        """So much time passes."""
+        """Let this many seconds pass, at most PASSES_S."""
         until = time.monotonic() + seconds
         self.timeline.until(lambda: time.monotonic() >= until, lambda: None)
 
-    # ---- what a person types
+    # ---- commands of a person
 
     def live(self, device: str) -> str:
-        """The screen of `explain --live`."""
+        """Return the screen of `explain --live`."""
         return self._typed(
             "explain", "--live", device, "--for", "10", "--localhost", *self._graph()
         )
 
     def file(self, device: str, daemon: str) -> str:
-        """The screen of `explain FILE`: of the recorder's file, else of a person's `incident`."""
+        """Return the screen of `explain FILE`, for the recorder's file or else a person's
+        `incident`."""
         name = daemon or device
         self._until(lambda: bool(self._written(name)), RECORDED_S, must=False)
         if not (found := self._written(name)):

@@ -1,8 +1,9 @@
-"""The kernel's answers about GPIO chips: structures and requests typed from linux/gpio.h.
+"""Structures and requests of the kernel's GPIO interface, typed from linux/gpio.h.
 
-Source: include/uapi/linux/gpio.h of Linux 6.1 (these parts unchanged since 5.10): gpiochip_info,
-gpio_v2_line_attribute, gpio_v2_line_info; and the ioctl numbers by asm-generic/ioctl.h. The C compiler
-gives sizes 68 and 256, requests 8044b401 and c100b405, `flags` at 72 and `attrs` at 80.
+The source is include/uapi/linux/gpio.h of Linux 6.1: gpiochip_info, gpio_v2_line_attribute and
+gpio_v2_line_info. These parts have not changed since Linux 5.10. The ioctl numbers follow
+asm-generic/ioctl.h. The C compiler gives the sizes 68 and 256 bytes, and the requests 8044b401 and
+c100b405. In gpio_v2_line_info `flags` begins at byte 72 and `attrs` at byte 80.
 """
 
 import ctypes
@@ -39,7 +40,7 @@ class LineInfo(ctypes.Structure):
 
 
 def _request(way: int, number: int, argument: type[ctypes.Structure]) -> int:
-    """Return the number of _IOR or _IOWR of the type 0xB4."""
+    """Return the request number of _IOR or _IOWR for the ioctl type 0xB4."""
     return way << 30 | ctypes.sizeof(argument) << 16 | 0xB4 << 8 | number
 
 

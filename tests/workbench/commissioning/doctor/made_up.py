@@ -18,12 +18,12 @@ from workbench.commissioning.doctor.machine import Machine
 from workbench.commissioning.doctor.users import User
 
 OURS = os.getegid()
-"""The group of every file here; users in this group may use the files."""
+"""The group of every file of the made-up machine. Users in this group may use the files."""
 OTHERS = OURS + 4321
 
 
 class MadeUp:
-    """A machine whose files lie below `root`; `machine` is the doctor's view of them."""
+    """A machine whose files lie below `root`. The doctor reads this machine through `machine`."""
 
     def __init__(
         self, root: Path, gids: Collection[int] = (OURS,), installed: Collection[str] = ("lgpio",)
@@ -47,14 +47,14 @@ class MadeUp:
         self.write("/etc/passwd", f"pi:x:{self.machine.uid}:1000::/home/pi:/bin/bash\n")
 
     def write(self, path: str, text: str = "", mode: int = 0o660) -> None:
-        """Write a file, also in place of a device."""
+        """Write a file. A file also stands for a device."""
         place = self.root / path.lstrip("/")
         place.parent.mkdir(parents=True, exist_ok=True)
         place.write_text(text)
         place.chmod(mode)
 
     def link(self, path: str, to: str) -> None:
-        """Make a symbolic link, relative as udev makes links."""
+        """Make a relative symbolic link, as udev does."""
         place = self.root / path.lstrip("/")
         place.parent.mkdir(parents=True, exist_ok=True)
         place.symlink_to(to)
@@ -73,7 +73,8 @@ class MadeUp:
         outputs: Collection[int] = (),
         mode: int = 0o660,
     ) -> None:
-        """Make a GPIO chip. `held`: line -> its consumer; `outputs`: the driven lines."""
+        """Make a GPIO chip. `held` gives the consumer of each used line; `outputs` are the driven
+        lines."""
         self.write(f"/dev/gpiochip{number}", mode=mode)
         self._chips[f"gpiochip{number}"] = (label, held or {}, outputs)
 

@@ -1,4 +1,4 @@
-"""Every driver can be read before it is opened; the doctor reads devices in this way."""
+"""Every driver offers a way to read its device before it opens the device. The doctor uses that way."""
 
 import re
 from contextlib import closing

@@ -1,4 +1,4 @@
-"""`rmf-bridge doctor` on real wires: Modbus, HTTP and CAN, and on RMF's graph."""
+"""`rmf-bridge doctor` on real Modbus, HTTP and CAN wires, and on RMF's graph."""
 
 import io
 import json
@@ -35,12 +35,12 @@ from workbench.commissioning.doctor.served import served
 
 READS = {1, 2, 3, 4}
 LISTEN_S = "15"
-"""Time for which the doctor listens; on a busy machine nodes find each other late."""
-"""Modbus functions that change nothing."""
+"""The doctor listens for this time (s), because nodes find each other late on a busy machine."""
+"""Modbus functions that only read."""
 
 
 def doctor(file: Path, tmp_path: Path, *options: str) -> tuple[int, dict[str, list[Any]]]:
-    """Return the exit code, and for each subject its findings: (level, found)."""
+    """Return the exit code, and a list of (level, finding) for each subject."""
     words = ["doctor", str(file), "--json", "--runtime-dir", str(tmp_path / "run")]
     with redirect_stdout(io.StringIO()) as told:
         code = cli.main([*words, *options])
@@ -51,7 +51,7 @@ def doctor(file: Path, tmp_path: Path, *options: str) -> tuple[int, dict[str, li
 
 
 class Tapped:
-    """A wire to the module that notes each requested function and the number of connections."""
+    """A wire to the module. The wire records each requested function and counts the connections."""
 
     def __init__(self, module: Module) -> None:
         self.functions: set[int] = set()
@@ -284,7 +284,7 @@ def test_for_people_each_finding_has_a_line_below_its_subject(
 
 @contextmanager
 def far_side(yaml: str, bus: str, folder: Path) -> Iterator[Any]:
-    """Yield the settings for a bus whose fake is running."""
+    """Run the fake of a bus, and yield the settings for that bus."""
     (folder / "far.yaml").write_text(yaml)
     with served_by(folder / "far.yaml", bus, folder / "plant.sock") as there:
         yield there

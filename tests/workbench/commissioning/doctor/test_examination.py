@@ -1,4 +1,4 @@
-"""Every subject of a lift's file: on a made-up Raspberry Pi that is set up well, and on a bad one."""
+"""The doctor examines every subject of a lift's file, on a good and on a bad made-up Raspberry Pi."""
 
 from pathlib import Path
 

@@ -1,4 +1,5 @@
-"""The form for real hardware: the machine's answers are filled in; what a person must see is empty."""
+"""The form for real hardware holds the machine's answers. Fields that need a person's eyes are
+empty."""
 
 from pathlib import Path
 

@@ -1,4 +1,5 @@
-"""`doctor --hardening` judges each point of docs/how-to/harden.md, and admits what it cannot see."""
+"""`doctor --hardening` judges each point of docs/how-to/harden.md. It names the points it cannot
+judge."""
 
 import re
 from pathlib import Path
@@ -38,7 +39,7 @@ def made(tmp_path: Path) -> MadeUp:
 
 
 def config(rmf: str = "{transport: dds}", text: str = LIFT) -> Config:
-    """Return an example that speaks to RMF in this way, as installed on the machine."""
+    """Return an example's config with these `rmf` settings, as installed on the machine."""
     body = re.sub(r"^rmf:\n(  .*\n|\n)*", "", text, flags=re.M)
     file = Path("/etc/rmf-bridges/lift.yaml")
     return understood(file, f"rmf: {rmf}\n{body}".encode())
@@ -65,7 +66,7 @@ def test_each_point_is_a_heading_of_the_page() -> None:
 def test_a_machine_that_shows_nothing_is_unknown_and_never_well(made: MadeUp) -> None:
     of = config(TLS)
     assert {one.level for one in hardening(of, made.machine) if one.subject != points.WIRES} == {
-        "ok",  # the YAML's own words about certificates, and no sshd
+        "ok",  # the YAML itself names certificates, and the machine runs no sshd
         "unknown",
     }
     for subject in (points.FIREWALL, points.ROOT, points.FILES, points.UPDATES):

@@ -64,7 +64,7 @@ def test_the_services_user_has_the_groups_of_the_unit(made: MadeUp) -> None:
 @pytest.mark.parametrize(
     ("synchronised", "printed", "found"),
     [
-        (True, "NTP=no", [("ok", "the clock is synchronised")]),  # chrony keeps the time
+        (True, "NTP=no", [("ok", "the clock is synchronised")]),  # chrony synchronises the clock
         (False, "NTP=no", [("warning", "the clock is not synchronised, and NTP is off")]),
         (False, "NTP=yes", [("warning", "the clock is not synchronised")]),
         (None, "", [("note", "the kernel does not show whether the clock is synchronised")]),
@@ -117,7 +117,7 @@ def room(free: int, whole: int, flag: int = 0, inodes: int = 9) -> os.statvfs_re
     [
         (room(100_000, 1_000_000), "ok"),
         (room(1_000, 1_000_000), "warning"),
-        (room(200, 1_000), "ok"),  # a small disk in memory
+        (room(200, 1_000), "ok"),  # a small disk in memory (tmpfs)
         (room(0, 1_000_000), "wrong"),
         (room(100_000, 1_000_000, os.ST_RDONLY), "wrong"),
         (room(100_000, 1_000_000, inodes=0), "wrong"),

@@ -1,4 +1,4 @@
-"""The screen of a walk: every name is whole, and nothing scrolls away, also on a phone."""
+"""The screen of a walk shows every name whole, and no line scrolls away, also on a phone."""
 
 from dataclasses import replace
 from typing import Any

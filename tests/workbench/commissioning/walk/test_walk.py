@@ -1,4 +1,4 @@
-"""`rmf-bridge walk` for a person: a real terminal, a real Modbus module, a real death."""
+"""`rmf-bridge walk` on a real terminal with a real Modbus module. The process is also killed."""
 
 import json
 import os

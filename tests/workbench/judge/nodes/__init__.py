@@ -1,3 +1,3 @@
-"""Nodes of other people's making. `right_*` and `different` are right, and not like ours; each class of
-`wrong_*` has one defect that the field knows. A node is a `Party`: it hears, is ticked, and speaks.
-"""
+"""Nodes of other makers. The nodes of `right_*` and `different` are correct, but work otherwise than
+ours. Each class of `wrong_*` has one defect that is known from the field. A node is a `Party`: it
+receives messages, gets ticks, and publishes."""

@@ -1,4 +1,4 @@
-"""Fleet adapters by RMF's rules, and wrong adapters, each with one defect."""
+"""Fleet adapters that keep RMF's rules, and fleet adapters with one defect each."""
 
 from collections.abc import Iterator, Sequence
 
@@ -18,7 +18,7 @@ RESTS_S = 5.0
 
 
 def journey(robot: RobotContext) -> Iterator[Step]:
-    """Pass the door, ride up, pass the door, and ride down, on and on."""
+    """Yield the steps of an endless journey: pass the door, ride up, pass the door, ride down."""
     yield RESTS_S
     while True:
         for here, there in (("L1", "L3"), ("L3", "L1")):
@@ -36,7 +36,7 @@ def journey(robot: RobotContext) -> Iterator[Step]:
 
 
 class RightAdapter(Party):
-    """Robots on their journeys, and the fleet's state at 1 Hz."""
+    """A fleet adapter that lets its robots travel, and publishes the fleet's state at 1 Hz."""
 
     subscribes: Sequence[topics.AnyTopic] = RobotContext.subscribes
     fleet = "fleet"
@@ -83,7 +83,7 @@ class RightAdapter(Party):
         return [(topic, out) for topic, one in said for out in self.says(one, now)]
 
     def says(self, message: d.Message, now: float) -> list[d.Message]:
-        """A wrong adapter says something else."""
+        """Return the messages to send for this one. Wrong adapters override this method."""
         return [message]
 
 
@@ -96,7 +96,7 @@ class OtherFleet(RightAdapter):
 
 
 class LateToEnd(RightLift):
-    """It keeps a session for 12 s after the first END."""
+    """The lift keeps a session for 12 s after the first END."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -145,7 +145,7 @@ class EndsForEver(RightAdapter):
 
 
 class ChangesItsMind(RightAdapter):
-    """On its ride it asks for the floor between, and then for its own again."""
+    """During a ride the adapter asks once for a floor between, and then for the right floor again."""
 
     other = "L2"
     rides = 0
@@ -160,7 +160,8 @@ class ChangesItsMind(RightAdapter):
 
 
 class CallsItBack(ChangesItsMind):
-    """As RMF's own in rmf_ros2#555."""
+    """During a ride the adapter asks once for the first floor, as RMF's own adapter does
+    (rmf_ros2#555)."""
 
     other = "L1"
 
@@ -200,7 +201,7 @@ class StampsGoBack(RightAdapter):
 
 
 class EntersEarly(RightAdapter):
-    """The robot sets out when the lift has its session, wherever the car is."""
+    """The robot drives in when the lift shows the robot's session, wherever the car is."""
 
     def way(self, robot: RobotContext) -> Iterator[Step]:
         for step in journey(robot):
@@ -238,7 +239,7 @@ class DoorAskedOnce(RightAdapter):
 
 
 class StateNumbers(RightAdapter):
-    """AGV by the number of states."""
+    """The adapter sends 2, the state's number of AGV, as the request type."""
 
     def says(self, message: d.Message, now: float) -> list[d.Message]:
         if isinstance(message, d.LiftRequest) and message.request_type:

@@ -1,4 +1,4 @@
-"""Right nodes that differ from ours as much as the contract lets them: none may be accused."""
+"""Correct nodes that differ from ours as far as the contract permits. The judge must accuse none."""
 
 from msgspec.structs import replace
 
@@ -11,7 +11,8 @@ from workbench.rmf_model import Said
 
 
 class SimulatedLift(RightLift):
-    """As RMF's simulation has it: always AGV, no modes, the nearest floor, the last target kept."""
+    """The lift of RMF's simulation: always AGV, no modes, the nearest floor, and the last target
+    kept."""
 
     modes = ()
 
@@ -25,7 +26,7 @@ class SimulatedLift(RightLift):
 
 
 class SlowLift(RightLift):
-    """Each 2 s, as at a field site; its END counts at its next round."""
+    """The lift publishes every 2 s, as at a field site, and obeys an END up to 1 s later."""
 
     period_s = 2.0
     modes = (0, 1, 2, 3, 4, 5)
@@ -42,7 +43,7 @@ class SlowLift(RightLift):
 
 
 class EagerLift(RightLift):
-    """Ten times a second, whatever happens."""
+    """The lift publishes ten times a second, whether its state changes or not."""
 
     beats_at = 0.0
 
@@ -57,7 +58,8 @@ class EagerLift(RightLift):
 
 
 class LiftWithoutModes(RightLift):
-    """A destination dispatch that knows no AGV mode: UNKNOWN; no motion; and no floor names given."""
+    """A destination dispatch without an AGV mode. Mode and motion are UNKNOWN, and no floors are
+    listed."""
 
     def state(self, now: float) -> d.LiftState:
         state = super().state(now)
@@ -65,7 +67,8 @@ class LiftWithoutModes(RightLift):
 
 
 class LiftInFire(RightLift):
-    """A fire with the robot in the car: the session stays, and the recall floor is opened."""
+    """A fire begins with the robot in the car. The lift keeps the session, and opens at the recall
+    floor."""
 
     fire = False
 
@@ -79,7 +82,8 @@ class LiftInFire(RightLift):
 
 
 class DoorOnChange(RightDoor):
-    """States on change, and each 2 s; neither MOVING nor a travel longer than half a second."""
+    """The door publishes on change and every 2 s. It never shows MOVING, and travels for half a
+    second."""
 
     period_s = 2.0
 
@@ -92,7 +96,7 @@ class DoorOnChange(RightDoor):
 
 
 class LeasedDoor(RightDoor):
-    """It reports UNKNOWN when its own controller gives up, and so tells RMF that it holds no longer."""
+    """The door shows UNKNOWN when its own controller ends the hold. RMF sees that the hold is over."""
 
     def mode(self) -> int:
         return (
@@ -101,7 +105,7 @@ class LeasedDoor(RightDoor):
 
 
 class ChargerInError(RightCharger):
-    """Out of service, with its reason, and a request id of its own."""
+    """After each release the charger shows ERROR with a reason, and keeps the request's id."""
 
     def goes_on(self, now: float) -> None:
         if self.shown.state == RELEASED:

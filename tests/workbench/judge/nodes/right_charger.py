@@ -1,4 +1,4 @@
-"""A charger's node that keeps the contract in its own way: it charges whoever is promised, at once."""
+"""A charger's node that keeps the contract in its own way. It accepts each request at once if idle."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,8 @@ IDLE, ASSIGNED, CHARGING, RELEASED, ERROR = 1, 2, 3, 4, 200
 
 
 class RightCharger(Party):
-    """`comes_s`: how long after the promise the robot's current flows; None: it never comes."""
+    """A correct charger. The robot's current flows `comes_s` seconds after the promise, or never for
+    None."""
 
     subscribes: Sequence[topics.AnyTopic] = (topics.CHARGER_REQUESTS, topics.CHARGER_CANCELS)
     name = "bay1"
@@ -45,7 +46,7 @@ class RightCharger(Party):
             self.shows(RELEASED, now)
 
     def shows(self, state: int, now: float, text: str = "") -> None:
-        """The state, with the request's names in all but IDLE."""
+        """Set the state. The names and the id of the request appear in every state but IDLE."""
         self.since = now
         asked = self.request if state != IDLE else d.ChargerRequest()
         self.shown = replace(

@@ -1,4 +1,4 @@
-"""A door's node that keeps the contract in its own way: no grace, no MOVING while it can help it."""
+"""A door's node that keeps the contract in its own way. It has no grace time."""
 
 from collections.abc import Sequence
 
@@ -13,7 +13,11 @@ DWELL_S = 3.0
 
 
 class RightDoor(Party):
-    """`leaf`: 0 shut, 1 open. `pushed_at`: people open it then (s since it began); it stays DWELL_S."""
+    """A correct door. `leaf` is 0 shut and 1 open.
+
+    People open the door at each time of `pushed_at` (s after its start). It then stays open for
+    DWELL_S.
+    """
 
     subscribes: Sequence[topics.AnyTopic] = (topics.DOOR_REQUESTS,)
     period_s = 1.0

@@ -1,4 +1,4 @@
-"""A lift's node that keeps the contract in its own way, in a loop of a quarter second."""
+"""A lift's node that keeps the contract in its own way, in a loop of 0.25 s."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,10 @@ DOOR_S = 1.0
 
 
 class RightLift(Party):
-    """Publishes each `period_s` and on change. `car`: floors from the bottom; `door`: 1 is open."""
+    """A correct lift. It publishes every `period_s` and on change.
+
+    `car` counts the floors from the bottom; `door` is 0 shut and 1 open.
+    """
 
     subscribes: Sequence[topics.AnyTopic] = (topics.LIFT_REQUESTS,)
     period_s = 1.0
@@ -30,7 +33,7 @@ class RightLift(Party):
         self.began_at = self.due_at = self.told_at = float("-inf")
         self._told: d.LiftState | None = None
 
-    # ---- what it is asked
+    # ---- requests
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
         if isinstance(message, d.LiftRequest) and message.lift_name == self.name:
@@ -55,7 +58,7 @@ class RightLift(Party):
     def free(self) -> None:
         self.session = self.target = ""
 
-    # ---- what it does
+    # ---- movement
 
     def tick(self, now: float) -> list[Said]:
         if self.began_at < 0:
@@ -73,7 +76,7 @@ class RightLift(Party):
         return self.due_at if self.due_at > 0 else 0.0
 
     def moves(self, age_s: float) -> None:
-        """A quarter of a second of it. The mode follows the session."""
+        """Move car and door for 0.25 s. The mode follows the session."""
         if self.mode in (1, 2):
             self.mode = 2 if self.session else 1
         goal = float(self.floors.index(self.target)) if self.target else self.car

@@ -1,4 +1,4 @@
-"""Nodes of chargers with one defect each that the field knows: its docstring says which."""
+"""Charger nodes, each with one defect that is known from the field. Its docstring names the defect."""
 
 from msgspec.structs import replace
 
@@ -9,14 +9,14 @@ from workbench.rmf_model import Said
 
 
 class AnyCancelCancels(RightCharger):
-    """The id of a cancel is not looked at."""
+    """The charger does not compare the id of a cancel."""
 
     def cancelled(self, request_id: str, now: float) -> None:
         super().cancelled(self.shown.request_id, now)
 
 
 class ChargerAnswers(RightCharger):
-    """A state for each request, whether anything has changed or not."""
+    """The charger publishes a state for each request, whether its state has changed or not."""
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
         super().hear(message, now)
@@ -24,7 +24,7 @@ class ChargerAnswers(RightCharger):
 
 
 class ChargerFallsSilent(RightCharger):
-    """HTTP without a timeout in the callback: no state comes while the station is slow."""
+    """The callback calls HTTP without a timeout, so no state comes when the station is slow."""
 
     def tick(self, now: float) -> list[Said]:
         said = super().tick(now)
@@ -32,7 +32,7 @@ class ChargerFallsSilent(RightCharger):
 
 
 class ChargerIdleFromMemory(RightCharger):
-    """The station is not reached any more, and IDLE is said for ever."""
+    """The station is unreachable, and the charger publishes IDLE for ever."""
 
     read_at = 0.0
 
@@ -42,7 +42,7 @@ class ChargerIdleFromMemory(RightCharger):
 
 
 class ChargerIgnoresCancels(RightCharger):
-    """A cancel counts only while it charges."""
+    """The charger obeys a cancel only when it charges."""
 
     def cancelled(self, request_id: str, now: float) -> None:
         if self.shown.state == CHARGING:
@@ -50,7 +50,7 @@ class ChargerIgnoresCancels(RightCharger):
 
 
 class ChargerIsTakenOver(RightCharger):
-    """The next request takes the charge over."""
+    """The next request takes over a running charge."""
 
     def requested(self, request: d.ChargerRequest, now: float) -> None:
         super().requested(request, now)
@@ -60,7 +60,7 @@ class ChargerIsTakenOver(RightCharger):
 
 
 class ChargerNamesAnotherRobot(RightCharger):
-    """The robot's name is what stood on the pad last."""
+    """The charger names the robot that stood on the pad before."""
 
     def state(self, now: float) -> d.ChargerState:
         state = super().state(now)
@@ -68,14 +68,14 @@ class ChargerNamesAnotherRobot(RightCharger):
 
 
 class ChargerTalksAlways(RightCharger):
-    """error_message has the status line of the station in every state."""
+    """In every state error_message holds the station's status line."""
 
     def state(self, now: float) -> d.ChargerState:
         return replace(super().state(now), error_message="48.1 V 0.0 A")
 
 
 class ChargerVendorCodes(RightCharger):
-    """The station's own code is published as RMF's state: 5 is charging, 238 an error."""
+    """The charger publishes the station's own code as RMF's state: 5 is charging, 238 is an error."""
 
     def state(self, now: float) -> d.ChargerState:
         state = super().state(now)
@@ -83,28 +83,28 @@ class ChargerVendorCodes(RightCharger):
 
 
 class ChargerWaitsForEver(RightCharger):
-    """start_timeout is not looked at."""
+    """The charger ignores start_timeout."""
 
     def requested(self, request: d.ChargerRequest, now: float) -> None:
         super().requested(replace(request, start_timeout=d.Duration()), now)
 
 
 class ChargerWithoutIds(RightCharger):
-    """request_id stays empty."""
+    """The charger leaves request_id empty."""
 
     def state(self, now: float) -> d.ChargerState:
         return replace(super().state(now), request_id="")
 
 
 class ChargerWithoutStamps(RightCharger):
-    """charger_time is never filled."""
+    """The charger never fills charger_time."""
 
     def state(self, now: float) -> d.ChargerState:
         return replace(super().state(now), charger_time=d.Time())
 
 
 class ChargerHearsEveryName(RightCharger):
-    """Another station's request counts here too."""
+    """The charger obeys requests for other stations too."""
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
         if isinstance(message, d.ChargerRequest | d.ChargerCancel):
@@ -113,7 +113,7 @@ class ChargerHearsEveryName(RightCharger):
 
 
 class PromiseIsTakenOver(RightCharger):
-    """The next request gets the station that is promised to another robot."""
+    """The next request takes a station that is promised to another robot."""
 
     def requested(self, request: d.ChargerRequest, now: float) -> None:
         if self.shown.state == ASSIGNED:

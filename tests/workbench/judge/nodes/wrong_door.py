@@ -1,4 +1,4 @@
-"""Nodes of doors with one defect each that the field knows: its docstring says which."""
+"""Door nodes, each with one defect that is known from the field. Its docstring names the defect."""
 
 from msgspec.structs import replace
 
@@ -9,7 +9,7 @@ from workbench.rmf_model import Said
 
 
 class CloseDrivesShut(RightDoor):
-    """CLOSE starts the motor: the door shuts on the people who have opened it."""
+    """CLOSE starts the motor, and the door shuts on people who have opened it."""
 
     shut = False
 
@@ -24,7 +24,7 @@ class CloseDrivesShut(RightDoor):
 
 
 class DoorAnswers(RightDoor):
-    """A state for each request."""
+    """The door publishes a state for each request."""
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
         super().hear(message, now)
@@ -41,27 +41,27 @@ class DoorFallsSilent(RightDoor):
 
 
 class DoorFlaps(RightDoor):
-    """The contact of the open door is not debounced."""
+    """The contact that shows the open door is not debounced."""
 
     def mode(self) -> int:
         return 1 if self.leaf == 1.0 and int(self.due_at / LOOP_S) % 3 == 0 else super().mode()
 
 
 class DoorHearsAdapters(RightDoor):
-    """It hears adapter_door_requests: one robot's CLOSE closes on another."""
+    """The door obeys adapter_door_requests, so CLOSE of one robot shuts the door on another robot."""
 
     subscribes = (topics.ADAPTER_DOOR_REQUESTS,)
 
 
 class DoorNumbersMixed(RightDoor):
-    """OPEN is taken to be 1, which is MOVING."""
+    """The door publishes 1 for OPEN, but 1 is MOVING."""
 
     def asked(self, mode: int) -> None:
         super().asked({1: 2, 0: 0}.get(mode, -1))
 
 
 class DoorStaleOpen(RightDoor):
-    """The module is lost while the door is open; the last reading is said for ever."""
+    """The module is lost when the door is open, and the door publishes the last reading for ever."""
 
     frozen: d.DoorState | None = None
 
@@ -72,21 +72,21 @@ class DoorStaleOpen(RightDoor):
 
 
 class DoorVendorCodes(RightDoor):
-    """The operator's status word as it came: 5 is locked."""
+    """The door publishes the operator's own status word: 5 is locked."""
 
     def mode(self) -> int:
         return 5 if self.leaf == 0.0 else super().mode()
 
 
 class DoorWithoutStamps(RightDoor):
-    """door_time is never filled."""
+    """The door never fills door_time."""
 
     def state(self, now: float) -> d.DoorState:
         return replace(super().state(now), door_time=d.Time())
 
 
 class OpenAsAsked(RightDoor):
-    """OPEN because it was asked for; no sensor says so."""
+    """The door shows OPEN because a robot asked for it, without a sensor."""
 
     def mode(self) -> int:
         return 2 if self.held else 0
@@ -97,7 +97,7 @@ class OpenAsAsked(RightDoor):
 
 
 class SilenceCloses(RightDoor):
-    """No request for 10 s closes the door (lci-rmf-adapter)."""
+    """The door closes after 10 s without a request (lci-rmf-adapter)."""
 
     on_change = False
 
@@ -107,7 +107,7 @@ class SilenceCloses(RightDoor):
 
 
 class DoorHearsEveryName(RightDoor):
-    """Another door's request counts here too."""
+    """The door obeys requests for other doors too."""
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
         if isinstance(message, d.DoorRequest):
@@ -116,13 +116,13 @@ class DoorHearsEveryName(RightDoor):
 
 
 class DoorOnlyOnChange(RightDoor):
-    """A state comes only when the door moves."""
+    """The door publishes only when it moves."""
 
     period_s = 1e6
 
 
 class DoorPulses(RightDoor):
-    """OPEN is one pulse, and the operator's own timer closes the door on the robot."""
+    """OPEN is one pulse, and the operator's own timer shuts the door on the robot."""
 
     pulsed_at = 0.0
 

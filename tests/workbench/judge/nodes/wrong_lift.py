@@ -1,4 +1,4 @@
-"""Nodes of lifts with one defect each that the field knows: its docstring says which."""
+"""Lift nodes, each with one defect that is known from the field. Its docstring names the defect."""
 
 from msgspec.structs import replace
 
@@ -9,14 +9,15 @@ from workbench.rmf_model import Said
 
 
 class AnyEndEnds(RightLift):
-    """END_SESSION of anybody releases the lift (low_level_lift)."""
+    """END_SESSION of any requester releases the lift (low_level_lift)."""
 
     def ended(self, end: d.LiftRequest) -> None:
         self.free()
 
 
 class EndNeedsAFloor(RightLift):
-    """END_SESSION is refused when its floor is not served, as "" never is (lift_adapter_template)."""
+    """The lift refuses END_SESSION for a floor it does not serve. "" is such a floor
+    (lift_adapter_template)."""
 
     def ended(self, end: d.LiftRequest) -> None:
         if end.destination_floor in self.floors:
@@ -24,7 +25,7 @@ class EndNeedsAFloor(RightLift):
 
 
 class FireBoards(RightLift):
-    """The door opens for the robot outside, in a fire as well."""
+    """The door opens for a robot outside the car, even during a fire."""
 
     def moves(self, age_s: float) -> None:
         super().moves(age_s)
@@ -34,7 +35,7 @@ class FireBoards(RightLift):
 
 
 class FireFrees(RightLift):
-    """In a fire the session is cleared, though only END frees the supervisor's slot."""
+    """The lift clears the session during a fire, but only END frees the supervisor's slot."""
 
     def moves(self, age_s: float) -> None:
         if self.mode == 2 and self.door == 1.0:
@@ -58,7 +59,8 @@ ALARM = replace(topics.FIRE_ALARM_TRIGGER, publish=topics.VOLATILE)
 
 
 class FireIsVolatile(RightLift):
-    """The fire alarm is told once, and volatile: no fleet adapter hears it (low_level_lift)."""
+    """The lift publishes the fire alarm once and volatile, so no fleet adapter gets it
+    (low_level_lift)."""
 
     told = False
 
@@ -71,7 +73,8 @@ class FireIsVolatile(RightLift):
 
 
 class FireSaysFalse(RightLift):
-    """The fire alarm is told each second, as `false` while there is none (low_level_lift)."""
+    """The lift publishes `false` on the fire alarm each second when there is no fire
+    (low_level_lift)."""
 
     def tick(self, now: float) -> list[Said]:
         said = super().tick(now)
@@ -79,7 +82,7 @@ class FireSaysFalse(RightLift):
 
 
 class FloorByLastCharacter(RightLift):
-    """The floor's number is its name's last character: L10 is the floor below L1."""
+    """The lift takes the last character of a floor's name for its number, so L10 lies below L1."""
 
     floors = ("L9", "L10", "L11")
 
@@ -89,7 +92,7 @@ class FloorByLastCharacter(RightLift):
 
 
 class FloorFlickers(RightLift):
-    """The floor's code is sampled unfiltered: for a moment it is another floor."""
+    """The lift does not filter the floor's code, so the code shows another floor for a moment."""
 
     def state(self, now: float) -> d.LiftState:
         state = super().state(now)
@@ -99,7 +102,7 @@ class FloorFlickers(RightLift):
 
 
 class GoesToTheDefaultFloor(RightLift):
-    """A floor that it does not serve is taken for the first one."""
+    """The lift drives to its first floor if a request names a floor it does not serve."""
 
     def requested(self, request: d.LiftRequest) -> None:
         known = request.destination_floor in self.floors
@@ -108,13 +111,13 @@ class GoesToTheDefaultFloor(RightLift):
 
 
 class HearsAdapters(RightLift):
-    """It hears adapter_lift_requests, around the supervisor."""
+    """The lift obeys adapter_lift_requests, which bypass the supervisor."""
 
     subscribes = (topics.ADAPTER_LIFT_REQUESTS,)
 
 
 class LastOneWins(RightLift):
-    """Who asks last gets the lift, whoever is in the car."""
+    """The latest request gets the lift, even with another robot in the car."""
 
     def requested(self, request: d.LiftRequest) -> None:
         self.free()
@@ -122,7 +125,7 @@ class LastOneWins(RightLift):
 
 
 class LiftAnswers(RightLift):
-    """A state for each request, as most templates' callbacks publish it."""
+    """The lift publishes a state for each request, as callbacks of most templates do."""
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
         super().hear(message, now)
@@ -131,7 +134,7 @@ class LiftAnswers(RightLift):
 
 
 class LiftBlocks(RightLift):
-    """The callback waits for the car: no state comes meanwhile (low_level_lift, up to 60 s)."""
+    """The callback waits for the car, so no state comes for up to 60 s (low_level_lift)."""
 
     floor_s = 4.0
 
@@ -142,7 +145,7 @@ class LiftBlocks(RightLift):
 
 
 class LiftFlaps(RightLift):
-    """The door's contact is not debounced: OPEN flickers while the robot drives in."""
+    """The door's contact is not debounced, so OPEN flickers when the robot drives in."""
 
     def state(self, now: float) -> d.LiftState:
         state = super().state(now)
@@ -151,7 +154,7 @@ class LiftFlaps(RightLift):
 
 
 class LiftModeMixed(RightLift):
-    """The state's mode has the request's numbers: AGV is 1 there, and HUMAN here."""
+    """The state's mode uses the request's numbers, where AGV is 1. In a state 1 means HUMAN."""
 
     def state(self, now: float) -> d.LiftState:
         state = super().state(now)
@@ -159,7 +162,8 @@ class LiftModeMixed(RightLift):
 
 
 class LiftNumbersMixed(RightLift):
-    """A request's numbers typed anew: END 1, AGV 2, HUMAN 3 (QuikSync). AGV ends, END is nothing."""
+    """The maker typed the request numbers anew: END 1, AGV 2, HUMAN 3 (QuikSync). So AGV ends a
+    session, and END does nothing."""
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
         if isinstance(message, d.LiftRequest) and message.lift_name == self.name:
@@ -171,7 +175,8 @@ class LiftNumbersMixed(RightLift):
 
 
 class LiftStaleOpen(RightLift):
-    """The controller is lost while the door is open; what was read last is said for ever."""
+    """The controller is lost when the door is open, and the lift publishes the last reading for
+    ever."""
 
     read: d.LiftState | None = None
 
@@ -184,7 +189,7 @@ class LiftStaleOpen(RightLift):
 
 
 class LiftVendorCodes(RightLift):
-    """The door's status word of the vendor, as it came: 3 is locked."""
+    """The lift publishes the vendor's own status word of the door: 3 is locked."""
 
     def state(self, now: float) -> d.LiftState:
         state = super().state(now)
@@ -192,14 +197,14 @@ class LiftVendorCodes(RightLift):
 
 
 class LiftWithoutStamps(RightLift):
-    """lift_time is never filled."""
+    """The lift never fills lift_time."""
 
     def state(self, now: float) -> d.LiftState:
         return replace(super().state(now), lift_time=d.Time())
 
 
 class OpenNowhere(RightLift):
-    """OPEN with no floor: the floor's code is not read yet."""
+    """The lift shows OPEN and no floor, because it has not read the floor's code yet."""
 
     def state(self, now: float) -> d.LiftState:
         state = super().state(now)
@@ -208,7 +213,7 @@ class OpenNowhere(RightLift):
 
 
 class OpenWhileMoving(RightLift):
-    """OPEN is a contact that is passed on the way."""
+    """A contact that the car passes on its way makes the lift show OPEN."""
 
     def state(self, now: float) -> d.LiftState:
         state = super().state(now)
@@ -216,7 +221,7 @@ class OpenWhileMoving(RightLift):
 
 
 class OtherLiftsRequest(RightLift):
-    """The name is looked at when it is too late (sharp-rmf/low_level_lift)."""
+    """The lift compares the lift's name too late (sharp-rmf/low_level_lift)."""
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
         if isinstance(message, d.LiftRequest):
@@ -225,7 +230,7 @@ class OtherLiftsRequest(RightLift):
 
 
 class OwnSessionName(RightLift):
-    """session_id is the vendor's booking number, not the requester's."""
+    """session_id holds the vendor's booking number instead of the requester's id."""
 
     def state(self, now: float) -> d.LiftState:
         state = super().state(now)
@@ -233,7 +238,7 @@ class OwnSessionName(RightLift):
 
 
 class SessionTimesOut(RightLift):
-    """A watchdog frees the lift after 5 s with an open door, without an END."""
+    """A watchdog frees the lift after 5 s with an open door. No END has come."""
 
     opened = 0
 
@@ -245,7 +250,7 @@ class SessionTimesOut(RightLift):
 
 
 class ShowsWhatItWasAsked(RightLift):
-    """destination_floor is whatever was asked, served or not."""
+    """destination_floor repeats the requested floor, even if the lift does not serve that floor."""
 
     asked = ""
 
@@ -259,13 +264,13 @@ class ShowsWhatItWasAsked(RightLift):
 
 
 class LiftOnlyOnChange(RightLift):
-    """A state comes only when something has changed."""
+    """The lift publishes only when its state has changed."""
 
     period_s = 1e6
 
 
 class LeavesWithoutSession(RightLift):
-    """The session is over for the node when the car leaves for the robot's floor."""
+    """The node ends the session when the car leaves for the robot's floor."""
 
     def moves(self, age_s: float) -> None:
         super().moves(age_s)
@@ -274,8 +279,8 @@ class LeavesWithoutSession(RightLift):
 
 
 class LiftReadsDoorOnce(RightLift):
-    """The door's module is lost while the door is open. The stamp is the time of publishing, and the
-    floor is read on."""
+    """The door's module is lost when the door is open. The lift still reads its floor, and stamps each
+    state with the time of publishing."""
 
     read = 0
 
@@ -286,7 +291,7 @@ class LiftReadsDoorOnce(RightLift):
 
 
 class LiftListsOtherFloors(RightLift):
-    """available_floors has the controller's numbers, current_floor the map's names."""
+    """available_floors holds the controller's numbers, but current_floor holds the map's names."""
 
     def serves(self, request: d.LiftRequest) -> bool:
         return True
@@ -296,6 +301,6 @@ class LiftListsOtherFloors(RightLift):
 
 
 class HearsBothTopics(RightLift):
-    """It hears the supervisor and, around it, the fleet adapters."""
+    """The lift obeys both the supervisor and the fleet adapters, which bypass the supervisor."""
 
     subscribes = (topics.LIFT_REQUESTS, topics.ADAPTER_LIFT_REQUESTS)

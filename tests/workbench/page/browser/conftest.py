@@ -1,4 +1,4 @@
-"""A page of its own process, a graph on loopback that the test plays, and a real browser."""
+"""The page in its own process, a graph that the test plays on loopback, and a real browser."""
 
 import os
 import subprocess
@@ -36,16 +36,16 @@ FLAGS = [
     "--disable-component-update",
 ]
 WITHIN_S = 120.0
-"""A bound for a busy machine; nothing is expected to take so long."""
+"""The longest wait (s) for a busy machine. No step normally takes this long."""
 USER, PASSWORD = "ann", "correct horse"
 SCHEMES: Final[tuple[Literal["light", "dark"], ...]] = ("light", "dark")
 SHOTS = Path("build/screenshots")
 VIOLATIONS = {"resultTypes": ["violations"]}
-"""axe-core reports only these in full."""
+"""Options for axe-core, so that its report has details of violations only."""
 
 
 class Graph:
-    """The daemons of a site, as they are heard: each state once a second while `going`."""
+    """The daemons of a site, as the page hears them. Each state comes once a second in `turn`."""
 
     def __init__(self, domain: int, transport: Transport | None = None) -> None:
         self.options = on_graph(domain)
@@ -63,7 +63,7 @@ class Graph:
     def lift(
         self, name: str, floor: str = "L1", door: int = 0, session: str = "", motion: int = 0
     ) -> None:
-        """A lift of three floors stands so from now on. `motion`: or moves."""
+        """Set the state of a lift with three floors. `motion` is RMF's motion_state."""
         floors = ("L1", "L2", "L3")
         state = d.LiftState(
             lift_name=name,
@@ -78,15 +78,15 @@ class Graph:
         self._said_at = 0.0
 
     def turn(self) -> None:
-        """Publish what is due."""
+        """Publish all states, at most once a second."""
         if time.monotonic() - self._said_at < 1.0:
             return
         self._said_at = time.monotonic()
-        with suppress(TransportError):  # it has gone, and comes back
+        with suppress(TransportError):  # the transport may be gone for a time
             self.say()
 
     def say(self) -> None:
-        """Publish everything, now."""
+        """Publish all states now."""
         now = stamp(time.time())
         for lift in self.lifts.values():
             self._lifts.publish(replace(lift, lift_time=now))
@@ -101,7 +101,7 @@ class Graph:
         self._diagnostics.publish(diagnosis("node", "lift", {}, status, now))
 
     def close(self) -> None:
-        """Leave."""
+        """Leave the graph."""
         self._transport.close()
 
 
@@ -116,9 +116,9 @@ def graph(module_domain: int) -> Iterator[Graph]:
 def program(
     *words: str, ends: int = 0, state: Path | None = None, log: Path = Path("/dev/stderr")
 ) -> Iterator[subprocess.Popen[str]]:
-    """A process of ours; it is ended by SIGTERM, and exits with `ends`."""
+    """Run a process of ours. SIGTERM ends the process, which must exit with `ends`."""
     command = [sys.executable, "-m", "bridges.cli", *words]
-    # With this in its environment NiceGUI believes that it is the one to be tested.
+    # With PYTEST_CURRENT_TEST in its environment NiceGUI would believe that NiceGUI is under test.
     environment = {k: v for k, v in os.environ.items() if k != "PYTEST_CURRENT_TEST"}
     if state is not None:
         environment["STATE_DIRECTORY"] = str(state)
@@ -142,20 +142,21 @@ def page(
     state: Path | None = None,
     log: Path = Path("/dev/stderr"),
 ) -> Iterator[str]:
-    """A page at a free port; its address. `state`: where it keeps who did what."""
+    """Run a page at a free port, and yield its address. The page records who did what in `state`."""
     with program("page", "--listen", listen, *words, state=state, log=log) as started:
         assert started.stdout is not None
         yield started.stdout.readline().split()[4]
 
 
 def on_graph(domain: int) -> tuple[str, ...]:
-    """The options of a page on this domain."""
+    """Return the options of a page on this domain."""
     return ("--localhost", "--domain-id", str(domain), "--transport", wire())
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Passwords, recordings, and the runtime directories of this test's daemons."""
+    """Return the folder for passwords, recordings, and the runtime directories of this test's
+    daemons."""
     made = tmp_path_factory.mktemp("page")
     access.add_user(made / "passwords", USER, PASSWORD)
     (made / "run").mkdir()
@@ -166,7 +167,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def address(module_domain: int, folder: Path) -> Iterator[str]:
-    """The page of a site where a user may log in."""
+    """Yield the address of the page of a site where a user may log in."""
     words = ["--passwords", str(folder / "passwords"), "--incidents", str(folder / "incidents")]
     words += ["--runtime-dirs", str(folder / "run")]
     with page(*on_graph(module_domain), *words) as found:
@@ -183,13 +184,13 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture
 def complaints() -> list[str]:
-    """What the browser's console and network complained of."""
+    """Return the list of complaints from the browser's console and network."""
     return []
 
 
 @pytest.fixture(scope="module")
 def profile(browser: Browser) -> Iterator[BrowserContext]:
-    """The page's scripts are fetched and compiled once for all tests of a module."""
+    """Yield one browser profile, so that all tests of a module fetch and compile the scripts once."""
     made = browser.new_context(viewport={"width": 1200, "height": 800})
     made.set_default_timeout(WITHIN_S * 1e3)
     yield made
@@ -198,7 +199,7 @@ def profile(browser: Browser) -> Iterator[BrowserContext]:
 
 @pytest.fixture
 def context(profile: BrowserContext) -> Iterator[BrowserContext]:
-    """A browser without cookies and tabs."""
+    """Yield the browser without cookies and tabs."""
     yield profile
     for tab in profile.pages:
         tab.close()
@@ -207,7 +208,7 @@ def context(profile: BrowserContext) -> Iterator[BrowserContext]:
 
 @pytest.fixture
 def tab(context: BrowserContext, address: str, complaints: list[str]) -> Iterator[Page]:
-    """An empty tab. It fails at its end if the browser complained or asked another machine."""
+    """Yield an empty tab. The test fails if the browser complains or asks another machine."""
     opened = context.new_page()
     opened.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
     opened.on("pageerror", lambda error: complaints.append(str(error)))
@@ -222,7 +223,7 @@ def _own(url: str, address: str) -> bool:
 
 
 def log_in(tab: Page, address: str, password: str, to: str = "/lift/Lift1") -> None:
-    """Fill the form, and send it."""
+    """Fill in the login form, and send it."""
     tab.goto(f"{address}login?next={to}")
     tab.get_by_label("User").fill(USER)
     tab.get_by_label("Password").fill(password)
@@ -230,12 +231,12 @@ def log_in(tab: Page, address: str, password: str, to: str = "/lift/Lift1") -> N
 
 
 def settled(tab: Page) -> None:
-    """Wait until nothing fades in or out any more: what is half transparent has no contrast."""
+    """Wait until all fades have ended, because contrast cannot be judged on half-transparent text."""
     tab.wait_for_function("document.getAnimations().every(one => one.playState !== 'running')")
 
 
 def serious_faults(tab: Page) -> list[tuple[str, str, list[str]]]:
-    """What axe-core finds that keeps somebody from using the page, by day and by night, and where."""
+    """Return axe-core's serious findings, by day and by night, with their places."""
     found: list[tuple[str, str, list[str]]] = []
     for scheme in SCHEMES:
         tab.emulate_media(color_scheme=scheme)
@@ -252,7 +253,7 @@ Until = Callable[[Callable[[], bool], str], None]
 
 @pytest.fixture
 def until(graph: Graph, tab: Page) -> Until:
-    """Let the site go on until something has come about."""
+    """Return a function that lets the site go on until a condition holds."""
 
     def wait(ready: Callable[[], bool], what: str) -> None:
         deadline = time.monotonic() + WITHIN_S
@@ -266,7 +267,8 @@ def until(graph: Graph, tab: Page) -> Until:
 
 @pytest.fixture
 def shot(tab: Page) -> Shot:
-    """Keep pictures of what the tab shows: on a phone and on a wall, by day and by night."""
+    """Return a function that keeps pictures of the tab: on a phone and on a wall, by day and by
+    night."""
 
     def take(name: str) -> None:
         SHOTS.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""The page on bad days: a network that goes and comes, a browser that never reads, idle sockets."""
+"""The page with a network that fails and returns, a browser that never reads, and idle sockets."""
 
 import re
 import socket
@@ -23,7 +23,7 @@ from tests.workbench.page.browser.test_safety import ask
 pytestmark = pytest.mark.browser
 MOST_GROWTH_MB = 60
 LONG = 4000 * "x"
-"""Of a session's name, so that a socket's buffers are soon full."""
+"""The end of a session's name. Long names soon fill a socket's buffers."""
 RELOADED = "window.loadedOnce === undefined"
 
 
@@ -37,7 +37,7 @@ def router() -> Iterator[Router]:
 
 @pytest.fixture(scope="module")
 def graph(module_domain: int, router: Router) -> Iterator[Graph]:
-    """A site that goes by a router."""
+    """Yield a site that reaches the page through a router."""
     settings = Zenoh(connect=(router.endpoint,), mode="client")
     transport = ZenohTransport("site", module_domain, loopback=False, settings=settings)
     made = Graph(module_domain, transport)
@@ -47,7 +47,7 @@ def graph(module_domain: int, router: Router) -> Iterator[Graph]:
 
 @pytest.fixture(scope="module")
 def said(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the page's log is kept."""
+    """Return the path of the page's log."""
     return tmp_path_factory.mktemp("log") / "page"
 
 
@@ -98,7 +98,8 @@ def test_a_browser_that_never_reads_is_ended_and_others_see_all(
     turn = 0
 
     def ended() -> bool:
-        """The site moves in each look, so that there is much to send."""
+        """Change all lifts, so that there is much to send. Return whether the page ended the deaf
+        socket."""
         nonlocal turn
         turn += 1
         for number in range(20):
@@ -128,7 +129,7 @@ def test_idle_sockets_and_nonsense_keep_nobody_out(tab: Page, address: str) -> N
 
 
 def is_closed(opened: socket.socket) -> bool:
-    """Whether the other end has ended it; waits for that."""
+    """Wait until the other end has closed the socket, and return True."""
     opened.settimeout(60.0)
     try:
         while opened.recv(4096):
@@ -140,7 +141,7 @@ def is_closed(opened: socket.socket) -> bool:
 
 @contextmanager
 def deaf(address: str) -> Iterator[None]:
-    """The socket of a view, opened as the library's script does, and never read."""
+    """Open a view's socket as the library's script does, and never read from the socket."""
     _, _, text = ask(address, "/")
     found = re.search(r"'client_id': '([0-9a-f-]+)'", text)
     assert found
@@ -165,7 +166,7 @@ def deaf(address: str) -> Iterator[None]:
 
 
 def page_pid(address: str) -> int:
-    """The process that listens at this address."""
+    """Return the id of the process that listens at this address."""
     port = f":{urlsplit(address).port}"
     listening = [
         line.split()[9]

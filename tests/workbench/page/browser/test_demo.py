@@ -1,4 +1,4 @@
-"""The page of `make demo-page`: the address that the demo prints opens, and its password lets in."""
+"""The page of `make demo-page` opens at the printed address, and accepts the printed password."""
 
 from pathlib import Path
 from urllib.parse import urlsplit

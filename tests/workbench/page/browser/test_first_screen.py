@@ -1,4 +1,4 @@
-"""The first screen says what is wrong and what to do; a tab gets what has changed."""
+"""The first screen says what is wrong and how to mend it. A tab receives only changes."""
 
 import json
 from collections.abc import Iterator
@@ -39,7 +39,7 @@ def overloaded(graph: Graph) -> Iterator[str]:
 
 
 def stands_at(tab: Page, floor: str) -> bool:
-    """Is the car drawn at this floor?"""
+    """Return whether the car is drawn at this floor."""
     return f"car at {floor}" in drawn(tab, "Lift1")
 
 
@@ -142,7 +142,7 @@ def test_a_tab_gets_what_has_changed(
 def test_a_phone_shows_the_wiring_when_it_is_asked_for(
     tab: Page, address: str, overloaded: str, until: Until
 ) -> None:
-    """The tables of a lift are longer than six screens."""
+    """The tables of a lift need more than six screens."""
     for width, unfolded in ((390, False), (1200, True)):
         tab.set_viewport_size({"width": width, "height": 844})
         tab.goto(address)

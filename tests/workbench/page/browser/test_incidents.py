@@ -1,4 +1,4 @@
-"""Recordings on the page: the list, one of them with its timeline and its why, and the file itself."""
+"""Recordings on the page: the list, one recording with its timeline and explanation, and its file."""
 
 import shutil
 from collections.abc import Iterator
@@ -42,7 +42,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def address(folder: Path) -> Iterator[str]:
-    """A page that has opened one recording, without a graph, and knows a folder of them."""
+    """Yield the address of a page without a graph. The page has opened one recording, and knows a
+    folder."""
     with page(str(folder / "ride.mcap"), "--incidents", str(folder)) as found:
         yield found
 
@@ -84,7 +85,7 @@ def test_an_incident_opens_with_its_sentences_and_its_timeline(
 def test_the_list_shows_device_reason_and_the_browsers_time_and_has_a_filter(
     browser: Browser, address: str
 ) -> None:
-    """The filter finds the shown day, which in this zone is not the day in the file's name."""
+    """The filter finds the shown day. In this time zone the file's name has another day."""
     zone = ZoneInfo("Pacific/Kiritimati")
     with browser.new_context(timezone_id=zone.key) as context:
         tab = context.new_page()

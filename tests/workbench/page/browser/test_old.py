@@ -1,4 +1,4 @@
-"""What is old is never shown as now: a page frozen or killed, a connection that carries nothing."""
+"""The page never shows an old value as now: when the page freezes or dies, or the connection stalls."""
 
 import os
 import signal
@@ -19,12 +19,13 @@ from tests.workbench.page.browser.test_page import card
 pytestmark = pytest.mark.browser
 WITHIN_MS = 3000
 MORE = [f"door{number}" for number in range(20)]
-"""So many that the view is longer than the screen."""
+"""Enough doors to make the view longer than the screen."""
 LEFT = "window.loadedOnce = true"
 
 
 class Relay:
-    """A wire between the browser and the page. `cut`: it carries nothing more, and closes nothing."""
+    """A wire between the browser and the page. With `cut` it carries nothing more, and closes no
+    socket."""
 
     def __init__(self, address: str) -> None:
         self.behind, place = address, urlsplit(address)
@@ -66,7 +67,7 @@ def relay(module_domain: int) -> Iterator[Relay]:
 
 @pytest.fixture(scope="module")
 def address(relay: Relay) -> str:
-    """The page, through the wire."""
+    """Return the address of the page behind the wire."""
     return relay.address
 
 
@@ -82,7 +83,10 @@ def all_is_old(tab: Page) -> bool:
 
 @contextmanager
 def seen_as_old(tab: Page, graph: Graph, until: Until, address: str) -> Iterator[None]:
-    """Three seconds of the browser's own clock after what happens inside, every card is old."""
+    """Let the block stop the page, and check that every card is old.
+
+    The cards turn old within WITHIN_MS of the browser's own clock.
+    """
     graph.lift("Lift1", "L1", 2, "fleet/robot")
     graph.doors |= {name: d.DoorState(door_name=name) for name in ("ward", *MORE)}
     tab.clock.install()
@@ -138,4 +142,4 @@ def test_a_killed_page_is_old_within_three_seconds_on_a_devices_own_view_too(
             started.wait()
         other.clock.run_for(WITHIN_MS)
         assert "\nwas\n" in other.locator("article.card").inner_text()
-    complaints.clear()  # of a page that is gone
+    complaints.clear()  # these complaints are about the dead page

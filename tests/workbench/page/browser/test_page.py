@@ -22,13 +22,13 @@ HOSTILE = '<img src=x onerror="document.title=1">'
 
 
 def card(tab: Page, name: str) -> str:
-    """The text of a device's card; "" if there is none."""
+    """Return the text of a device's card, or "" without a card."""
     found = tab.locator("article.card", has=tab.locator("h3", has_text=name))
     return found.first.inner_text() if found.count() else ""
 
 
 def drawn(tab: Page, name: str) -> str:
-    """What the drawing of a device says it shows."""
+    """Return the text that describes a device's drawing."""
     found = tab.locator("article.card", has=tab.locator("h3", has_text=name)).locator("svg")
     return (found.first.get_attribute("aria-label") or "") if found.count() else ""
 
@@ -98,7 +98,7 @@ def test_a_page_that_was_opened_too_early_shows_its_device_once_it_is_heard(
 
 
 def see_lift_held(tab: Page, address: str, graph: Graph, until: Until) -> None:
-    """fleet/robot has a lift, and the site shows it."""
+    """Let fleet/robot have a lift, and wait until the page shows that."""
     graph.lift("Lift1", "L1", 2, "fleet/robot")
     tab.goto(address)
     until(lambda: "fleet/robot" in card(tab, "Lift1"), "the lift")

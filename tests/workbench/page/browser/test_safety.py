@@ -1,4 +1,4 @@
-"""What the page's server refuses, asked as a program would ask it."""
+"""Requests of a program that the page's server refuses."""
 
 import http.client
 import os
@@ -18,7 +18,7 @@ FORM = {"Content-Type": "application/x-www-form-urlencoded"}
 
 
 PROXY, GUESSER, FLOOD = "127.0.0.9", "127.0.0.8", "127.0.0.7"
-"""Addresses from which the page is asked, so that each has a limit of its own."""
+"""Addresses that ask the page. Each address has its own rate limit."""
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def ask(
     method: str = "",
     came_from: str = "127.0.0.1",
 ) -> tuple[int, dict[str, str], str]:
-    """The status, the headers and the body of an answer."""
+    """Return the status, the headers and the body of an answer."""
     place, at = urlsplit(address), (came_from, 0)
     connection = http.client.HTTPConnection(
         place.hostname or "", place.port or 0, timeout=60, source_address=at

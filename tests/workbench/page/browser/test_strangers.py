@@ -1,4 +1,4 @@
-"""What strangers send closes the page for nobody, and fills neither its log nor its memory."""
+"""A stranger's messages shut nobody out of the page, and fill neither its log nor its memory."""
 
 import os
 import random
@@ -19,12 +19,12 @@ from tests.workbench.page.strangers import MB, half_requests, long_names, strang
 
 pytestmark = pytest.mark.browser
 MOST_MB = 200
-"""Of the unit's 256 MB."""
+"""The most memory of the page (MB). The service's unit permits 256 MB."""
 
 
 @pytest.fixture(scope="module")
 def said(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the page's log is kept."""
+    """Return the path of the page's log."""
     return tmp_path_factory.mktemp("log") / "page"
 
 

@@ -1,2 +1,2 @@
-"""Incidents of the soak as the recorder writes them; `python -m tests.workbench.replay.corpus`
+"""Incidents of the soak test, as the recorder writes them. `python -m tests.workbench.replay.corpus`
 renews them."""

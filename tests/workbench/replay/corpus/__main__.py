@@ -1,7 +1,7 @@
-"""`python -m tests.workbench.replay.corpus` keeps the first incident of each daemon of the soak.
+"""`python -m tests.workbench.replay.corpus` keeps the first incident of each daemon of the soak test.
 
-Run it after a deliberate change of a core's decisions; `git diff --stat` then shows the incidents with
-changed decisions.
+Run this module after a deliberate change of a core's decisions. `git diff --stat` then shows the
+incidents with changed decisions.
 """
 
 import sys
@@ -20,7 +20,8 @@ CHOSEN = {
     1: ("Lift1", "Lift2", "store", "bay1", "bay2", "coordinator"),
     3: ("ward", "lift_supervisor"),
 }
-"""Seed of a day -> the daemons whose incidents are kept. More daemons would only repeat these."""
+"""The daemons whose incidents are kept, by the seed of a simulated day. More daemons would repeat
+these."""
 HOURS = 0.3
 BEFORE_S, AFTER_S = 5.0, 12.0
 
@@ -39,7 +40,7 @@ def incident(ring: Path) -> Incident | None:
 
 
 def main() -> int:
-    """Renew every file."""
+    """Write every incident file anew."""
     for seed, names in CHOSEN.items():
         with tempfile.TemporaryDirectory(dir="/dev/shm") as scratch:
             site = Site(seed)
