@@ -1,1 +1,1 @@
-"""The black box: what it records, and how recordings are read."""
+"""The black box: its recordings, and the reading of recordings."""

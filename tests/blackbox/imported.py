@@ -1,4 +1,4 @@
-"""`python -m tests.blackbox.imported run FILE …` runs the command, then prints the imported modules."""
+"""`python -m tests.blackbox.imported run FILE …` runs the command and prints the imported modules."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""The soak's site with a ring for each daemon: a day of recordings for replays."""
+"""The soak test's site with a ring for each daemon. A day's recordings serve the replays."""
 
 from collections.abc import Callable
 from functools import partial
@@ -53,7 +53,7 @@ def of_graph(name: str, kind: AnyGraphKind, settings: Any) -> Head:
 
 
 def keep(site: Site, folder: Path, size: int) -> dict[str, Path]:
-    """Make each daemon of a site write a ring of this size; return the ring's path by daemon."""
+    """Let each daemon of a site write a ring of this size. Return each daemon's ring path."""
     found = {}
     for daemon in (*site.daemons.values(), *site.nodes):
         if isinstance(daemon, DeviceDaemon):

@@ -1,6 +1,6 @@
 """Wrong recordings and rings that still decode: wrong types, times, releases, versions and nesting.
 
-Each mutant is a valid recording (`corpus`) with some decoded values changed.
+Each mutant is a valid recording of `corpus` with some changed values.
 """
 
 import io
@@ -70,7 +70,7 @@ TREES: Final[tuple[Any, ...]] = (
     [{"": "core.decision.Fault", "code": "X", "detail": 3}],
 )
 KEPT: Final = 70
-"""The number of entries used of each recording; with so few, changes hit most entries."""
+"""The number of entries kept of each recording. With so few entries a change hits most of them."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Plain:
 
 
 def corpus() -> list[Plain]:
-    """Return the soak's incidents, each with the messages among its entries."""
+    """Return the soak test's incidents, each with the messages among its entries."""
     return [_plain(path) for path in sorted(CORPUS.glob("*.mcap"))]
 
 
@@ -106,7 +106,7 @@ def _spoken(at: float, topic: str, message: Message) -> Spoken:
 
 
 class Mutator:
-    """Makes wrong recordings from valid recordings; the same seed gives the same recordings."""
+    """A maker of wrong recordings from valid recordings. The same seed gives the same recordings."""
 
     def __init__(self, seed: int) -> None:
         self._rng = random.Random(seed)
@@ -169,7 +169,7 @@ class Mutator:
         return _copy(self._rng.choice((*NUMBERS, *TEXTS, *TREES)))
 
     def _version(self, told: Plain) -> None:
-        """Replace a name of a type, field or topic, as another version would."""
+        """Replace a name of a type, field or topic, as another version could."""
         entry = self._rng.choice(told.entries)
         if is_message(entry):
             entry[self._rng.choice((3, 4, 5))] = self._rng.choice((*TEXTS, *MESSAGES, *RELEASES))
@@ -221,7 +221,7 @@ def _trees(tree: Any) -> Iterator[dict[str, Any]]:
 
 
 def _places(tree: Any) -> Iterator[tuple[Any, Any]]:
-    """Yield every place in the tree: its container and its key."""
+    """Yield every place in the tree as (container, key)."""
     keys = list(tree) if isinstance(tree, dict) else range(len(tree))
     for key in keys:
         yield tree, key
@@ -267,7 +267,7 @@ def write_file(told: Plain, path: Path) -> None:
 
 
 def is_message(entry: list[Any]) -> bool:
-    """Is the entry a message of a known type?"""
+    """Return whether the entry is a message of a known type."""
     match entry:
         case [1, _, _, str(), str() as kind, _, bytes(), *_]:
             return kind in MESSAGES
@@ -323,7 +323,8 @@ def ended(words: Sequence[str]) -> tuple[int, str]:
 
 
 def endings(mutator: Mutator, times: int, folder: Path) -> Counter[str]:
-    """Count the endings of the commands for so many wrong recordings; raise at a wrong ending."""
+    """Count the exit codes of the commands over `times` wrong recordings. Raise an error at a wrong
+    ending."""
     found: Counter[str] = Counter()
     for _ in range(times):
         told = mutator.next()

@@ -17,14 +17,14 @@ from bridges.messages.definitions import Message
 PLAIN: dict[Any, Any] = {bool: True, int: 1, float: 1.5, str: "a", None: None, type(None): None}
 BOXES: dict[Any, Any] = {tuple: tuple, frozenset: frozenset, set: frozenset}
 Bound = Mapping[Any, Any]
-"""The type that each parameter of a generic type stands for."""
+"""A concrete type for each parameter of a generic type."""
 
 
 @cache
 def recordable() -> tuple[Any, ...]:
     """Return the types inside any memory, event, output, report or message of a kind.
 
-    A generic type comes with its parameters.
+    A generic type comes with its parameters filled in.
     """
     found: dict[Any, None] = {}
     for start in _starts():
@@ -57,12 +57,12 @@ def _walk(hint: Any, bound: Bound, found: dict[Any, None]) -> None:
         )
         for part in fields(one).values():
             _walk(part, {}, found)
-        for below in plain.__subclasses__():  # a field of a type also takes its subclasses
+        for below in plain.__subclasses__():  # a field may also hold a subclass of its type
             _walk(below, {}, found)
 
 
 def fields(one: Any) -> dict[str, Any]:
-    """Return the fields of a struct, with the parameters of a generic struct filled in."""
+    """Return the fields of a struct. A generic struct has its parameters filled in."""
     plain = typing.get_origin(one) or one
     if _is_enum(plain):
         return {}
@@ -80,7 +80,7 @@ def _filled(hint: Any, bound: Bound) -> Any:
 
 
 def _single(hint: Any) -> Iterator[Any]:
-    """Yield the parts of a union one by one, and an annotated type without its annotation."""
+    """Yield each part of a union. An annotated type comes without its annotation."""
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
         for part in typing.get_args(hint):
             yield from _single(part)

@@ -1,4 +1,5 @@
-"""Recordings of earlier versions stay readable; each type of this version has a permanent name."""
+"""Recordings of earlier versions stay readable. Each recordable type of this version has a fixed
+name."""
 
 import gzip
 import subprocess
@@ -30,7 +31,7 @@ ENDED = {
     "lift.memory.Session.own_stamp",
     "lift.signals.FromAdapter.stamp",
 }
-"""Fields that a core no longer has (`lift.memory.Session.level`); their values are left out."""
+"""Fields that no core has any more. A reader drops the values of these fields."""
 
 
 def files(pattern: str) -> list[Path]:
@@ -45,7 +46,7 @@ def _own_texts() -> Iterator[None]:
 
 
 def test_every_type_that_a_daemon_can_record_has_a_name_and_comes_back() -> None:
-    """Missing names are added to `RECORDED` of the kind, or of `bridges/kinds/shared/recorded.py`."""
+    """Add a missing name to `RECORDED` of the kind, or of `bridges/kinds/shared/recorded.py`."""
     nameless = []
     for one in recordable():
         kind = typing.get_origin(one) or one
@@ -73,7 +74,8 @@ def test_a_name_is_given_once_to_a_type_that_a_daemon_records_and_begins_with_it
 
 @pytest.mark.parametrize("day", DAYS, ids=lambda day: day.name)
 def test_no_name_and_no_field_of_an_earlier_version_is_lost(day: Path) -> None:
-    """A renamed type keeps its name in the table, a renamed field by `msgspec.field(name=…)`."""
+    """A renamed type keeps its name in the table. A renamed field keeps it through
+    `msgspec.field(name=…)`."""
     told = msgspec.json.decode((day / "values.json").read_bytes())
     lost = set()
     for earlier in chain.from_iterable(told.values()):
@@ -82,7 +84,7 @@ def test_no_name_and_no_field_of_an_earlier_version_is_lost(day: Path) -> None:
 
 
 def _lost(was: Any, now: Any) -> set[str]:
-    """Return the fields that are no longer read."""
+    """Return the fields that this version no longer reads."""
     if isinstance(was, list) and isinstance(now, list):
         return {lost for one, other in zip(was, now, strict=True) for lost in _lost(one, other)}
     if not isinstance(was, dict) or not isinstance(now, dict):
@@ -110,7 +112,7 @@ def test_a_ring_of_an_earlier_version_is_read_and_replayed(file: Path, tmp_path:
 
 
 def _is_read(file: Path) -> None:
-    """Check that every value is known. Decisions are not compared, as later cores may differ."""
+    """Check that every value is known. Decisions are not compared, because later cores may differ."""
     notes = Notes()
     head, entries = opened(file, notes)
     everything = list(entries)

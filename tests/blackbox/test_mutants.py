@@ -1,4 +1,4 @@
-"""A wrong recording that still decodes ends each command with an exit code and a sentence."""
+"""For a wrong recording that still decodes each command prints a sentence and gives an exit code."""
 
 import math
 from pathlib import Path

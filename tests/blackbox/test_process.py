@@ -29,7 +29,7 @@ def lift(tmp_path: Path) -> Path:
 
 
 class Told(NamedTuple):
-    """The output of a command, and its exit code."""
+    """The output and the exit code of a command."""
 
     returncode: int
     stdout: str
@@ -45,7 +45,7 @@ def bridge(*words: str | Path) -> Told:
 
 
 def states(place: Path) -> int:
-    """Return how many messages the ring has."""
+    """Return the number of messages in the ring."""
     try:
         return sum(isinstance(one, Spoken) for one in RingContent(place / "ring").entries())
     except Exception:  # noqa: BLE001 - the ring is not there yet

@@ -25,7 +25,7 @@ OWN, OTHER = "/rmf_bridge_Lift1", "/rmf_bridge_lift_north"
 
 
 def in_file(path: Path, *entries: AnyEntry) -> list[Heard]:
-    """Write them as the recorder does, and read them as explain does."""
+    """Write entries as the recorder does, and read them as `explain` does."""
     mcap_write.write(path, Incident(HEAD, [Clocks(0.0, 1e9), *entries]))
     return list(heard_in(path))
 
@@ -40,7 +40,7 @@ def nodes(heard: list[Heard]) -> list[str | None]:
 
 
 def test_the_ring_and_the_file_name_each_publisher(tmp_path: Path) -> None:
-    """Discovery may tell the node's name after its first message, and before the ring is written."""
+    """Discovery may give the node's name after its first message, but before the ring is written."""
     clock = Clock(lambda: 0.0, lambda: 1e9)
     writer = RingWriter(lambda: Ring(tmp_path, HEAD, 100_000), clock, lambda: KILTED)
     found_later, unknown = Sender(), Sender()

@@ -1,4 +1,4 @@
-"""The recorder: when it makes a file, what the file has, and how many files it keeps."""
+"""The recorder: the reasons for a file, the file's content, and the number of kept files."""
 
 import os
 import re
@@ -88,7 +88,7 @@ class Machine:
         self.writer.flush()
 
     def live(self, seconds: int, each: Callable[[], None] = lambda: None) -> None:
-        """Let time pass; each second the daemon decides on a reading, and the recorder looks."""
+        """Let time pass. Each second the daemon decides on a reading, and the recorder looks."""
         for _ in range(seconds):
             self.now += 1.0
             self.decide(SAMPLE)

@@ -1,4 +1,4 @@
-"""The ring: entries survive a kill, and a torn last entry is not read."""
+"""The ring: entries survive a kill, and a torn last entry is never read."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Values of cores become trees and the same values again; decoding a tree can run no code."""
+"""Values of cores become trees, and trees become the same values. Decoding a tree cannot run code."""
 
 from typing import Any
 

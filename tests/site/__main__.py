@@ -1,6 +1,7 @@
 """`python -m tests.site --seed 7 --hours 24`: play one day.
 
-If a law is broken or something grows, print the command that plays the day again; the exit code is 1.
+If a law is broken or a resource grows, the exit code is 1. The command then prints how to play the day
+again.
 """
 
 import argparse

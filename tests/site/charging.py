@@ -1,7 +1,8 @@
-"""Charging as RMF does it: a fleet adapter's reports on its robot, and a coordinator's places.
+"""RMF's charging: a fleet adapter's reports on its robot, and the coordinator's dedicated places.
 
-ChargeBattery drives to the robot's dedicated place and waits there in the mode CHARGING until the
-battery is full (rmf_ros2 9dedd0f, ChargeBattery.cpp). `charging_assignments` names the dedicated place.
+ChargeBattery drives to the robot's dedicated place. There the robot waits in the mode CHARGING until
+the battery is full (rmf_ros2 9dedd0f, ChargeBattery.cpp). `charging_assignments` names the dedicated
+place.
 """
 
 from bridges.kinds.charger_coordinator.settings import (
@@ -18,7 +19,7 @@ LOW, FULL = 30.0, 100.0
 
 
 def settings(chargers: tuple[str, ...], robots: tuple[str, ...]) -> CoordinatorSettings:
-    """Return a coordinator's settings: each robot may use every charger, and waits at its own place."""
+    """Return a coordinator's settings. Each robot may use every charger, and waits at its own place."""
     places = [*chargers, *map(waits_at, robots)]
     waypoints = {name: Waypoint(level="L1", x=10.0 * n, y=0.0) for n, name in enumerate(places)}
     known = {
@@ -36,7 +37,7 @@ def waits_at(robot: str) -> str:
 
 
 class Charge:
-    """A fleet adapter's reports on its robot. `place` is the robot's waypoint, "" on the road."""
+    """A fleet adapter's reports on its robot. `place` is the robot's waypoint, or "" on the road."""
 
     def __init__(self, robot: str, known: CoordinatorSettings) -> None:
         self.robot = robot
@@ -48,16 +49,16 @@ class Charge:
         self._tasks = 0
 
     def begins(self) -> None:
-        """Begin a charging task: the battery is low."""
+        """Begin a charging task, because the battery is low."""
         self._tasks += 1
         self.task_id, self.battery = f"charge-{self._tasks}", LOW
 
     def ends(self) -> None:
-        """End the charging task: the battery is full, or the robot was called away."""
+        """End the charging task. The battery is full, or RMF called the robot away."""
         self.task_id, self.battery, self.place = "", FULL, ""
 
     def hear(self, message: d.ChargingAssignments) -> None:
-        """Note the dedicated place of the robot, which may be new."""
+        """Note the robot's dedicated place, which the coordinator may have changed."""
         for assignment in message.assignments:
             if assignment.robot_name == self.robot:
                 self.dedicated = assignment.waypoint_name

@@ -1,9 +1,9 @@
 """The daemons of the site: a node for each device, and the supervisors. Each can die and come back.
 
-A device is scanned at each request, at its core's `wake_at`, when a contact of its plant changes (on a
-polled bus one poll later), and every SCAN_S. Between these instants no input changes and no time runs
-out, so a scan would only repeat the last decision. Therefore the day needs no scans at the 20 Hz of the
-real loop. (The tests of the cores prove that nothing changes before `wake_at`.)
+A daemon scans its device at each request, at its core's `wake_at`, and every SCAN_S. It also scans when
+a contact of its plant changes, on a polled bus one poll later. Between these instants no input changes
+and no time runs out, so a scan would only repeat the last decision. Therefore the day needs no scans at
+the real loop's 20 Hz. The tests of the cores prove that no decision changes before `wake_at`.
 """
 
 from collections import Counter
@@ -33,17 +33,21 @@ from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
 from workbench.rmf_model.supervisors import DoorSupervisor, LiftSupervisor
 
 SCAN_S = 0.9
-"""Less than the permitted age of a state (1 s). `wake_at` makes the states go out at 1 Hz."""
+"""Time between scans (s), less than the permitted age of a state (1 s). `wake_at` gives states at 1
+Hz."""
 LEAST_GAP_S = 0.001
 
 
 class DeviceDaemon:
-    """Serves one device. `wall_step_s` is the step of its wall clock. `node` is its name on the graph,
-    the device's if none is given.
+    """The daemon of one device. `wall_step_s` is the step of its wall clock (s). `node` is its name on
+    the graph, by default the device's name.
 
-    `looks` is called with each time at which the plant is about to change or be scanned, `scanned`
-    after each scan, `relayed` with each edge of a relay, `started` at the start, `hears` with each
-    message that arrives.
+    Tests set these callbacks:
+    - `looks` gets each time at which the plant is about to change or to be scanned.
+    - `scanned` runs after each scan.
+    - `relayed` gets each edge of a relay.
+    - `started` runs at the start.
+    - `hears` gets each message that arrives.
     """
 
     def __init__(self, timeline: Timeline, air: Air, device: Device, node: str = "") -> None:
@@ -73,7 +77,7 @@ class DeviceDaemon:
         self._place: Place
 
     def start(self) -> None:
-        """Start a new daemon, which remembers nothing but what is on `disk`."""
+        """Start a new daemon, which remembers only the content of `disk`."""
         self.started(self)
         device, kind = self.device, self.device.kind
         self._place = Place(self._air, self.node, lambda: None)
@@ -102,7 +106,8 @@ class DeviceDaemon:
         self.scan()
 
     def kill(self) -> None:
-        """Kill the daemon; its outputs are switched off, by itself or by `rmf-bridge outputs-off`."""
+        """Kill the daemon. The outputs go off, through the daemon or through `rmf-bridge
+        outputs-off`."""
         self.alive = False
         self._alarm.set(NEVER)
         self._node.make_safe()
@@ -140,7 +145,7 @@ class DeviceDaemon:
         self.looks(self, now)
 
     def look(self) -> None:
-        """Scan after a change of the plant: at once, or at the next poll."""
+        """Scan after a change of the plant, at once or at the next poll."""
         self._timeline.after(self.device.poll_s, self.scan)
 
     def status(self) -> Status:
@@ -148,7 +153,7 @@ class DeviceDaemon:
         return self._node.status()
 
     def says(self, topic: Topic[Any], message: Message) -> None:
-        """Publish this message beside those of the node."""
+        """Publish this message beside the messages of the node."""
         self._place.publisher(topic).publish(message)
 
     def faults(self) -> list[str]:
@@ -156,7 +161,7 @@ class DeviceDaemon:
         return [fault["code"] for fault in self.status()["faults"]] if self.alive else []
 
     def _edge(self, edge: Edge) -> None:
-        """Handle an edge of the plant; the plant's own record is not needed."""
+        """Handle an edge of the plant. The plant's own record is not needed."""
         self.device.plant.edges.clear()
         if edge.what == "relay":
             self.relayed(edge)
@@ -187,7 +192,7 @@ RIVAL = "rmf_lift_supervisor"
 
 
 class RmfsSupervisor:
-    """The stand-in for a supervisor of RMF's own: in place of ours, or beside ours by mistake."""
+    """A stand-in for RMF's own supervisor. It replaces ours, or runs beside ours by mistake."""
 
     def __init__(
         self,
@@ -221,7 +226,7 @@ class RmfsSupervisor:
         self._place.close()
 
     def summary(self) -> Mapping[str, Status]:
-        """Return nothing: RMF's supervisors show no status."""
+        """Return nothing, because RMF's supervisors show no status."""
         return {}
 
     def _hear(self, message: Any) -> None:
@@ -241,7 +246,7 @@ def rmfs_door_supervisor(timeline: Timeline, air: Air) -> RmfsSupervisor:
 
 
 class GraphDaemon:
-    """Serves a kind without hardware. `wall_skew`: how far its clock is ahead (s)."""
+    """The daemon of a kind without hardware. Its clock is `wall_skew` seconds ahead."""
 
     def __init__(
         self,
@@ -288,7 +293,7 @@ class GraphDaemon:
         self._round()
 
     def says(self, topic: Topic[Any], message: Message) -> None:
-        """Publish this message beside those of the node."""
+        """Publish this message beside the messages of the node."""
         self._place.publisher(topic).publish(message)
 
     def summary(self) -> Mapping[str, Status]:

@@ -33,29 +33,29 @@ from tests.site.trouble import BY_RESET_S, Ill, Ills, Mortal, Trouble, breakable
 
 ROBOTS = ("red", "green", "blue", "white", "black")
 WIND_DOWN_S = BOUND_S + 90.0
-"""The wind-down's length (s). In it nothing more goes wrong, and every robot ends its tour."""
+"""The wind-down's length (s). In the wind-down no new trouble begins, and every robot ends its tour."""
 ADOPTS_S = 5.0
-"""RMF's restarted supervisor ends the shown session and then takes the next requester.
+"""Time (s) for RMF's restarted supervisor to end the shown session and to take the next requester.
 
-If another robot than the one in the car asks first, RMF lets it in beside the first; only RMF can mend
-that.
+If another robot asks before the robot in the car, RMF lets the other robot in too. Only RMF can mend
+that defect.
 """
 SWEEP_S = 45.0
-"""Before the end (s). By then every robot is at home."""
+"""Time (s) before the end of the day at which every robot is at home."""
 LOOK_EVERY_S = 5.0
 HOUR_S = 3600.0
 
 
 SUPERVISORS = ("ours", "kilted", "jazzy")
-"""The supervisors of a day: ours, or RMF's own by the rules of a release."""
+"""The supervisors of a day: ours, or RMF's own with the rules of the named release."""
 
 
 class Site:
     """The day of one seed. `run` raises `laws.Broken` when a law is broken.
 
-    `rmf` is one of SUPERVISORS; without it the seed decides. On a day with our supervisors the seed
+    `rmf` is one of SUPERVISORS. Without `rmf` the seed decides. With our supervisors the seed also
     decides the release of the fleet adapters. With `kill_every_s` the only trouble is the death of
-    RMF's lift supervisor: it dies so often (s), and is restarted within seconds.
+    RMF's lift supervisor. The supervisor dies every `kill_every_s` seconds and restarts within seconds.
     """
 
     def __init__(
@@ -104,9 +104,9 @@ class Site:
         return [lifts, rmfs_door_supervisor(self.timeline, self.air)]
 
     def run(self, hours: float, told: Callable[[Look], None] = lambda look: None) -> None:
-        """Run the whole day; `told` is called with each hour's look."""
+        """Run the whole day. `told` gets the look of each hour."""
         end = hours * HOUR_S
-        the_random.seed(self.seed)  # supervisors that meet a rival wait for a random time
+        the_random.seed(self.seed)  # a supervisor that meets a rival waits for a random time
         self._open()
         if self.kill_every_s is None:
             self.trouble.begin(until=end - WIND_DOWN_S)
@@ -163,7 +163,7 @@ class Site:
         self.timeline.after(LOOK_EVERY_S, self._watch)
 
     def _mend_queue(self) -> None:
-        """Reset the coordinator, as a technician does who has mended the failed robots and stations."""
+        """Reset the coordinator, like a technician who has mended the failed robots and stations."""
         if not (self.coordinated and self.coordinator.alive):
             return
         calm = self.ills.calm_since() + BY_RESET_S < self.timeline.now
@@ -171,7 +171,7 @@ class Site:
             self.coordinator.reset()
 
     def _live(self) -> None:
-        """Let people use lifts and doors as well, which is no trouble."""
+        """Let people use lifts and doors too. Their use does not count as trouble."""
         people = self._people
         name = people.choice([*LIFTS, *DOORS])
         signal = f"hall_{people.choice(FLOORS)}" if name in LIFTS else "push"
@@ -187,7 +187,7 @@ class Site:
             robot.homing = True
 
     def _sweep(self) -> None:
-        """Restart RMF's supervisors, which still hold devices for robots whose adapters died."""
+        """Restart RMF's supervisors, because they still hold devices for robots whose adapters died."""
         for supervisor in self.supervisors:
             if isinstance(supervisor, RmfsSupervisor):
                 supervisor.kill()
@@ -204,7 +204,7 @@ class Site:
                 self.laws.require(empty, f"{supervisor.name}: {name} {waiting} at the end")
 
     def _speakers(self, topic: str) -> int:
-        """Return how many supervisors publish. Ours and a rival that has just come count as one."""
+        """Return how many supervisors publish. Ours and a new rival count as one."""
         speaking = [end.node.name for end in self.air.memory.publishers[topic]]
         if RIVAL in speaking and self.rmf == "ours":
             return 1
@@ -225,7 +225,7 @@ class Site:
         self.laws.crossed(robot.name)
         for door in DOORS:
             if self.devices[door].plant.contact("obstruction") and self._people.random() < 0.2:
-                self._follows(door)  # somebody walks in behind the robot
+                self._follows(door)  # a person walks in behind the robot
             self._obstruct(door)
 
     def _follows(self, door: str) -> None:
@@ -257,7 +257,7 @@ class Site:
         return plant.battery >= 1.0
 
     def _obstruct(self, door: str) -> None:
-        """Set the light curtain: it sees robots, people and obstructions in the doorway."""
+        """Set the light curtain, which sees robots, people and obstructions in the doorway."""
         there = any(robot.doorway == door for robot in self.robots)
         there = there or self.ills.has(door, "press obstruction")
         there = there or self.timeline.now < self._people_at.get(door, 0.0)
@@ -301,7 +301,7 @@ class Site:
         return self.devices[random.choice(random.choice((LIFTS, DOORS, CHARGERS)))]
 
     def _rival(self, random: Random) -> Ill:
-        """Return a trouble: RMF's own lift supervisor is started beside ours, and stopped again."""
+        """Return a trouble that starts RMF's own lift supervisor beside ours, and stops it again."""
         rival = rmfs_lift_supervisor(self.timeline, self.air, jazzy=self.jazzy)
 
         def begin() -> None:
@@ -315,11 +315,12 @@ class Site:
         return Ill("rival", rival.name, "rival", begin, end, most_s=40.0)
 
     def _restart_rmfs(self, random: Random) -> Ill:
-        """Return a trouble: a supervisor of RMF forgets all, and may then speak for other robots."""
+        """Return a trouble in which RMF's supervisor forgets all, and may then speak for other
+        robots."""
         supervisor = random.choice([s for s in self.supervisors if isinstance(s, RmfsSupervisor)])
         devices = LIFTS if supervisor.name == RIVAL else DOORS
 
-        why = f"supervisor {random.random()}"  # unique, as two restarts may be close together
+        why = f"supervisor {random.random()}"  # unique, because two restarts may be close together
 
         def begin() -> None:
             supervisor.kill()
@@ -337,7 +338,7 @@ class Site:
         return Ill("supervisor", supervisor.name, "daemon", begin, end, least_s=0.2, most_s=20.0)
 
     def _kill(self) -> None:
-        """Kill RMF's lift supervisor and start a new one, while everybody goes on."""
+        """Kill RMF's lift supervisor and start a new one. All other parties go on."""
         if self.timeline.now > self.trouble.over_at:
             return
         supervisor = next(s for s in self.supervisors if s.name == RIVAL)
@@ -350,7 +351,7 @@ class Site:
         self.timeline.after(self.kill_every_s or NEVER, self._kill)
 
     def _distrust(self, devices: Sequence[str], why: str) -> None:
-        """Note that requests in a robot's name may now not be the robot's own wish."""
+        """Note that a request in a robot's name may from now on not be the robot's own wish."""
         for name in devices:
             self.ills.begin(name, why)
         for robot in self.robots:
@@ -422,11 +423,11 @@ class Site:
         self.daemons[device.name].look()
 
     def _restart(self, random: Random) -> Ill:
-        """Return a trouble: a party dies and comes back with a step of its clock.
+        """Return a trouble in which a party dies and comes back with a stepped clock.
 
         Beside RMF's own door supervisor no adapter's clock steps back. The supervisor would ignore the
-        adapter's CLOSE as too old and send a heartbeat; the adapter would answer each heartbeat with
-        another CLOSE, as fast as the wire is.
+        adapter's CLOSE as too old and send a heartbeat. The adapter would answer each heartbeat with
+        another CLOSE, at the speed of the wire.
         """
         ours = [node for node in self.nodes if isinstance(node, GraphDaemon)]
         sorts: list[list[Mortal]] = [[*self.daemons.values()], [*self.robots], [*ours]]
@@ -461,7 +462,7 @@ class Site:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Log nothing: a day's log would fill the memory of the process that captures it."""
+    """Log nothing, because a day's log would fill the memory of the process that captures it."""
     before = logging.root.manager.disable
     logging.disable(logging.CRITICAL)
     try:

@@ -1,4 +1,4 @@
-"""Growth that a day must not cause: threads, file descriptors, objects and memory, each hour."""
+"""The growth that a day must not cause: threads, file descriptors, objects and memory, each hour."""
 
 import gc
 import os
@@ -9,7 +9,7 @@ from pathlib import Path
 
 PAGE = os.sysconf("SC_PAGE_SIZE")
 WARM_UP = 2
-"""Looks to skip: caches, queues and the laws' logs grow to their full size first."""
+"""The number of looks to skip. Caches, queues and the laws' logs first grow to their full size."""
 MOST_OBJECTS = 1.05
 MOST_MB = 4.0
 
@@ -32,7 +32,7 @@ class Look:
 
 
 def look(hour: float) -> Look:
-    """Free all unused objects; return the resources in use."""
+    """Free all unused objects, and return the resources in use."""
     gc.collect()
     rss_mb = int(Path("/proc/self/statm").read_text().split()[1]) * PAGE / 1e6
     descriptors = len(os.listdir("/proc/self/fd"))
@@ -40,7 +40,8 @@ def look(hour: float) -> Look:
 
 
 def growth(looks: Sequence[Look]) -> list[str]:
-    """Return in words what has grown since the warm-up; an empty list for a day without growth."""
+    """Return a sentence for each resource that grew after the warm-up. The list is empty without
+    growth."""
     if len(looks) <= WARM_UP:
         return []
     first, found = looks[WARM_UP - 1], []

@@ -1,10 +1,11 @@
-"""Laws that hold at every moment of the day. No law here asks a core's memory or a report.
+"""Laws that hold at every moment of the day. No law here reads a core's memory or a report.
 
-Whatever the graph shows is judged by the laws of `rmf-bridge judge` (`workbench/judge/`), from the
-messages that reach the node. The laws here need more: the relays as driven at the terminal block, and
-the true places of car, doors, robots and current. A node cannot know that a sensor lies (a stuck or
-noisy wire). While a sensor lies, and a moment longer, the states that depend on that sensor are not
-judged. A cut wire is no excuse.
+The laws of `rmf-bridge judge` (`workbench/judge/`) judge all messages that reach the node. The laws
+here also need the driven relays at the terminal block, and the true state of car, doors, robots and
+current.
+
+A node cannot know that a sensor lies (a stuck or noisy wire). States that depend on a lying sensor are
+not judged until shortly after its repair. A cut wire is no excuse.
 """
 
 from collections import deque
@@ -29,44 +30,46 @@ from workbench.judge.judge import LAWS, Judge, JudgedKind
 from workbench.judge.law import Verdict
 
 AT_ONCE_S = 0.3
-"""The longest debounce, a poll and a scan."""
+"""The longest debounce plus one poll plus one scan (s)."""
 SENSED_S = 0.3
 SETTLES_S = 2.0
 STALE_S = 1.0 + AT_ONCE_S
 DEAD_TIME_S = 0.29
 GRACE_S = 3.0 + AT_ONCE_S
-"""Lift outputs may stay on for so long after the session has disappeared from the states."""
+"""Time (s) for which lift outputs may stay on after the session has disappeared from the states."""
 BOUND_S = 300.0
-"""The longest wait of any robot once everything is repaired."""
+"""The longest wait (s) of any robot after all repairs."""
 LATEST_S = 2.1
 LATE_S = 5.0
-"""More than the longest delay of a message, unless a node is cut off."""
+"""A time (s) above the longest delay of a message. A node that is cut off may wait longer."""
 
 ARRIVED_S = 3.5
-"""The longest time in which a door may still be let go after RMF has let a robot through.
+"""The longest time (s) after RMF has let a robot through in which the door may still be released.
 
-RMF lets robots through on a state that may be older than the request. The request may still be on its
-way while an earlier CLOSE ends: a late message, plus the repetition by our supervisor.
+RMF lets a robot through on a state that may be older than the request. The request may still be on its
+way when an earlier CLOSE ends. The bound is a late message plus the repetition by our supervisor.
 """
 
 STATED = (d.LiftState, d.DoorState, d.ChargerState)
 NO_DWELL = "D2.people"
-"""This law is left out: unlike real doors, the plants' doors close as soon as nobody pushes."""
+"""A law that is not judged here, because the plants' doors close at once when nobody pushes."""
 SHOWN = ("floor", "door", "motion")
-"""The groups of a lift's lines on which an open door depends."""
+"""The groups of lines that decide whether a lift may show an open door."""
 
 
 class Broken(AssertionError):
-    """A broken law; the text names the law and the time."""
+    """A broken law. The text names the law and the time."""
 
 
 @dataclass
 class LiftTruth:
-    """The truth about one lift: when its door was last open at each floor, and what was last published.
+    """The true state of one lift: when its door was last open at each floor, and the last published
+    state.
 
-    `last` is the session before; within the grace it resumes unchanged. `offered`: the lift has shown
-    OPEN at the session's destination. `crossing` and `inside` are the robots there, with the time of
-    their arrival. `ended` has the time of each session's last END.
+    `last` is the session before, which resumes unchanged within the grace time. `offered` means that
+    the lift has shown OPEN at the session's destination. `crossing` and `inside` are the robots on the
+    threshold and in the car, with the time of their arrival. `ended` holds the time of each session's
+    last END.
     """
 
     open_at: dict[str, float] = field(default_factory=dict)
@@ -80,7 +83,7 @@ class LiftTruth:
 
 
 class Judges:
-    """The judges of one daemon. Laws on sensors are judged only while the device is well."""
+    """The judges of one daemon. They apply laws about sensors only while the device has no ill."""
 
     def __init__(self, daemon: DeviceDaemon) -> None:
         kind = cast(JudgedKind, daemon.device.kind.name)
@@ -109,7 +112,7 @@ class Judges:
 
 
 class Laws:
-    """All laws of the site. `log` has the latest events, for the report of a failure."""
+    """All laws of the site. `log` keeps the latest events for the report of a failure."""
 
     def __init__(self, timeline: Timeline, ills: Ills) -> None:
         self.log: deque[tuple[float, str]] = deque(maxlen=600)
@@ -162,7 +165,7 @@ class Laws:
         self._judges[daemon.name] = Judges(daemon)
 
     def _hears(self, daemon: DeviceDaemon, topic: topics.Topic[Any], message: Any) -> None:
-        """Let the node's judges hear a message that reaches the node."""
+        """Give the node's judges a message that reaches the node."""
         now = self._timeline.now
         well = self._ills.well_since(daemon.name) + LATE_S < now
         broken = self._judges[daemon.name].hear(Heard(now, EPOCH + now, topic.name, message), well)
@@ -242,7 +245,7 @@ class Laws:
         )
 
     def _sensed_s(self, name: str) -> float:
-        """Return the greatest age of a shown state (s): a reading counts until it is stale."""
+        """Return the greatest age of a shown state (s). A reading counts until it is stale."""
         return STALE_S if self._ills.since(name, "bus") <= self._timeline.now else SENSED_S
 
     def _door_state(self, name: str, state: d.DoorState) -> None:
@@ -269,7 +272,7 @@ class Laws:
         true = bool(lied) or self._timeline.now - self._currents[name] <= unsure_s
         self.require(true, f"{name} is CHARGING without current")
 
-    # ---- outputs, and the places of things
+    # ---- outputs, and the true state of cars, doors and robots
 
     def scanned(self, daemon: DeviceDaemon) -> None:
         """Check the laws after a scan of a device."""
@@ -296,7 +299,7 @@ class Laws:
             self._currents[name] = at
 
     def _relay(self, edge: Edge) -> None:
-        """Check an edge of a relay. (A charger's clearing of errors is a pulse, and no relay.)"""
+        """Check an edge of a relay. A charger clears errors by a pulse, which is no relay here."""
         name, now = edge.device, self._timeline.now
         plant = self._daemons[name].device.plant
         if isinstance(plant, ChargerPlant):
@@ -335,7 +338,8 @@ class Laws:
             self._not_onto_an_obstruction(name, plant)
 
     def _lets_nobody_go(self, name: str, crossing: dict[str, float]) -> None:
-        """Require a healthy door to stay held while a robot in it is told that the door is held."""
+        """Require that a healthy door stays held as long as its state tells a robot in it that it is
+        held."""
         for robot, since in crossing.items():
             well = self._ills.well_since(name) + LATE_S <= since
             just = self._timeline.now - since < ARRIVED_S
@@ -351,7 +355,7 @@ class Laws:
             self.require(early, f"{name} lets its door go onto an obstruction")
 
     def _hazard_since(self, name: str) -> float:
-        """Return the time since which the node can see a hazard; inf if there is none."""
+        """Return the time at which the node could first see a hazard, or inf without a hazard."""
         return max(self._ills.hazard_since(name), self._ills.since_over(name, "bus", "daemon"))
 
     def _lift_outputs(self, name: str) -> None:
@@ -381,7 +385,7 @@ class Laws:
     # ---- robots
 
     def boards(self, robot: str, lift: str, floor: str) -> None:
-        """Let a robot cross the threshold inwards, with RMF's permission."""
+        """Let a robot enter the car over its threshold, with RMF's permission."""
         truth = self._lifts[lift]
         others = sorted(set(truth.inside) - {robot})
         self.require(not others, f"{robot} is let into {lift}, where {others} is")
@@ -390,7 +394,7 @@ class Laws:
         truth.crossing[robot] = (floor, self._timeline.now)
 
     def leaves(self, robot: str, lift: str, floor: str) -> None:
-        """Let a robot cross the threshold outwards."""
+        """Let a robot leave the car over its threshold."""
         self.note(f"{robot} goes out of {lift} at {floor}")
         self._lifts[lift].crossing[robot] = (floor, self._timeline.now)
 
@@ -400,7 +404,7 @@ class Laws:
         self._doorways[door][robot] = self._timeline.now
 
     def crossed(self, robot: str) -> None:
-        """Forget the robot's crossing: the robot is across, or nobody knows any more."""
+        """Forget the robot's crossing, because the robot is across or its place is unknown."""
         for truth in self._lifts.values():
             truth.crossing.pop(robot, None)
         for doorway in self._doorways.values():
@@ -411,7 +415,7 @@ class Laws:
         self._lifts[lift].inside.pop(robot, None)
 
     def abandoned(self, robot: str) -> None:
-        """Forget the robot: requests in its name may no longer be its own wish."""
+        """Forget the robot, because a request in its name may no longer be its own wish."""
         self.crossed(robot)
         for truth in self._lifts.values():
             truth.inside.pop(robot, None)
@@ -433,13 +437,13 @@ class Laws:
             self.require(open_now, f"{name} is not open for {robot} in its doorway")
 
     def lift_is_open(self, lift: str, floor: str) -> bool:
-        """Is the lift truly open now?"""
+        """Return whether the lift is truly open now."""
         self._daemons[lift].advance()
         self._see(self._daemons[lift], self._timeline.now)
         return self._lifts[lift].open_at.get(floor) == self._timeline.now
 
     def door_is_open(self, door: str) -> bool:
-        """Is the door truly open now?"""
+        """Return whether the door is truly open now."""
         self._daemons[door].advance()
         self._see(self._daemons[door], self._timeline.now)
         return self._doors[door] == self._timeline.now
@@ -469,7 +473,7 @@ class Laws:
         )
 
     def at_rest(self) -> None:
-        """Require, at the end of the day, that nothing is driven, shown or held."""
+        """Require at the end of the day that no output is on, and that no session or hold is left."""
         for name, on in self._relays.items():
             self.require(not on, f"{name} drives {sorted(on)} at the end of the day")
         for name, truth in self._lifts.items():

@@ -1,11 +1,12 @@
 """The site's graph: the `memory` transport, with a network between its ends.
 
-It stays within the promises of RELIABLE and KEEP_LAST: a reader gets each sample of one writer in
-order, late if the network had to repeat the sample. A reader that is best effort in the field (RMF's
-own readers of states, on Fast DDS) loses some samples. To be harsher than DDS, all other readers lose a
-few too, and a few samples come twice. A node that is cut off for less than a lease gets everything
-afterwards in one burst. A node that is cut off for longer loses everything meanwhile, and then gets the
-messages that others retain for it.
+The network keeps the promises of RELIABLE and KEEP_LAST. A reader gets the samples of one writer in
+order, and late if the network had to repeat a sample. RMF's own readers of states are best effort in
+the field on Fast DDS, so here they lose some samples. The network is harsher than DDS: all other
+readers lose a few samples too, and a few samples come twice.
+
+A node that is cut off for less than a lease gets all samples afterwards in one burst. A node that is
+cut off for longer loses all samples of that time. It then gets the messages that others retain.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,14 +25,15 @@ from tests.transports.memory import MemoryNetwork, MemoryTransport
 LEASE_S = 10.0
 STATES = (LIFT_STATES.name, DOOR_STATES.name)
 RETAINED = "retained"
-"""The speaker's name while a late joiner gets retained messages."""
+"""The speaker's name during the delivery of retained messages to a late joiner."""
 
 Watch = Callable[[str, Topic[Any], Message], None]
 
 
 @dataclass(frozen=True)
 class Weather:
-    """Probabilities: a sample is lost, a state to RMF is lost, a sample is late or comes twice."""
+    """Probabilities that a sample is lost, that a state to RMF is lost, and that a sample is late or
+    doubled."""
 
     lost: float = 0.005
     states_lost: float = 0.02
@@ -44,7 +46,7 @@ CLEAR = Weather(0.0, 0.0, 0.0, 0.0)
 
 
 class Air:
-    """The air between nodes. `best_effort` nodes hear states as RMF does; `watch` hears all."""
+    """The network between the nodes. `best_effort` nodes hear states as RMF does. `watch` hears all."""
 
     def __init__(self, timeline: Timeline, random: Random) -> None:
         self.timeline = timeline
@@ -60,13 +62,13 @@ class Air:
         self._arrived: dict[tuple[str, str, str], float] = {}
 
     def cut_off(self, name: str, until: float) -> None:
-        """Let nothing reach or leave this node until then."""
+        """Block all messages to and from this node until this time."""
         self._cut[name] = until
         lost = until - self.timeline.now > LEASE_S
         self.timeline.at(until, partial(self._found_again, name, lost))
 
     def delays(self, speaker: str, hearer: str, topic: Topic[Any]) -> Sequence[float]:
-        """Return the delays of a sample's copies (s), an empty sequence for a lost sample."""
+        """Return the delay of each copy of a sample (s). A lost sample has no copy."""
         weather, random, now = self.weather, self._random.random, self.timeline.now
         until = max(self._cut.get(speaker, 0.0), self._cut.get(hearer, 0.0))
         delay = 0.002 + 0.02 * random()
@@ -112,7 +114,7 @@ class Air:
                 self._give_again(name, end)
 
     def _give_again(self, name: str, end: Any) -> None:
-        """Give the subscription the messages that the returned node has retained."""
+        """Give the subscription the messages that the returned node retains."""
         for publisher in self.memory.publishers[end.topic.name]:
             if publisher.node.name == name and _wants_retained(end, publisher):
                 for message in list(publisher.retained):
@@ -120,7 +122,7 @@ class Air:
 
 
 class Place(MemoryTransport):
-    """One node's place on the graph. `heard` is called after each sample that the node gets."""
+    """One node's place on the graph. `heard` runs after each sample that the node gets."""
 
     def __init__(self, air: Air, name: str, heard: Callable[[], None]) -> None:
         super().__init__(air.memory, name, air.release)

@@ -1,6 +1,6 @@
-"""The same robots in real time, on DDS: each fleet adapter and each daemon is a node of its own.
+"""The same robots in real time, on DDS. Each fleet adapter and each daemon is a node of its own.
 
-Each daemon is a process, and is killed as a process. The edges of the plants, read from their control
+Each daemon is a process, and a test kills that process. The plants' edges, read from their control
 sockets, must keep RMF's promises to the robots.
 """
 
@@ -34,7 +34,7 @@ LIFT, DOOR = "Lift1", "ward_door"
 PLACES = Places(["L1", "L2"], [LIFT], [DOOR])
 PACE = 0.05
 PATIENCE_S = 240.0
-"""The longest wait, even with a party killed meanwhile and a busy machine."""
+"""The longest wait (s), even after the death of a party on a busy machine."""
 
 
 class RealTime(Timeline):
@@ -46,11 +46,12 @@ class RealTime(Timeline):
         self._posted: SimpleQueue[Callable[[], None]] = SimpleQueue()
 
     def post(self, what: Callable[[], None]) -> None:
-        """Let this happen now; may be called from any thread."""
+        """Run this now. Any thread may call this method."""
         self._posted.put(what)
 
     def until(self, done: Callable[[], bool], check: Callable[[], None]) -> None:
-        """Let time pass until `done` is true; `check` raises when waiting has become useless."""
+        """Let time pass until `done` is true. `check` raises an error when the wait has become
+        useless."""
         while not done():
             self.run(time.monotonic() - self._began)
             check()
@@ -63,7 +64,7 @@ class RealTime(Timeline):
 
 
 class DdsPlace:
-    """A node on DDS whose messages arrive at the timeline's own time."""
+    """A node on DDS whose messages arrive in the timeline's own time."""
 
     speaks = "dds"
 
@@ -88,7 +89,7 @@ class DdsPlace:
         return self._inner.subscribe(topic, post, others_only=others_only)
 
     def sender(self) -> None:
-        """None: messages come later than their publishers are known."""
+        """Return None. Publishers are known before their late messages arrive here."""
 
     @property
     def lives(self) -> bool:
@@ -110,7 +111,7 @@ class DdsPlace:
 
 
 class RealSite:
-    """A lift, a door, both supervisors, and robots that compete for them (`robots.Ground`)."""
+    """A lift, a door, both supervisors, and robots that compete for lift and door (`robots.Ground`)."""
 
     def __init__(self, directory: Path, domain: int, names: tuple[str, ...]) -> None:
         self.timeline = RealTime()
@@ -140,7 +141,7 @@ class RealSite:
             daemon.follow(lambda edge: self.timeline.post(partial(self._edge, edge)))
 
     def restart(self, party: str, how: signal.Signals) -> None:
-        """Kill a daemon by this signal (SIGKILL permits no last word), and start another."""
+        """Kill a daemon with this signal, and start another. SIGKILL permits no last message."""
         daemon = self.daemons.pop(party)
         if party in ("lift", "door"):
             device = LIFT if party == "lift" else DOOR
@@ -152,14 +153,14 @@ class RealSite:
         self.start(party)
 
     def restart_adapter(self, robot: Resident) -> None:
-        """Start a new fleet adapter for this robot, which stays where it is."""
+        """Start a new fleet adapter for this robot. The robot stays at its place."""
         robot.kill()
         self._across.pop(robot.name, None)
         self._inside.discard(robot.name)
         robot.start()
 
     def check(self) -> None:
-        """Check that all daemons live and no robot waits for too long; raise if not."""
+        """Raise an error unless all daemons live and each robot's wait is short enough."""
         for daemon in self.daemons.values():
             daemon.check()
         for robot in self.robots:
@@ -167,7 +168,7 @@ class RealSite:
             assert not robot.waits_for or waited_s < PATIENCE_S, f"{robot.name}: {robot.waits_for}"
 
     def until(self, done: Callable[[], bool]) -> None:
-        """Let everybody go on until the condition holds."""
+        """Let all parties go on until the condition holds."""
         self.timeline.until(done, self.check)
 
     def done(self, what: str) -> int:
@@ -175,11 +176,11 @@ class RealSite:
         return sum(robot.done[what] for robot in self.robots)
 
     def driven(self) -> list[tuple[str, str]]:
-        """Return the outputs that are on at the terminal blocks: (device, relay)."""
+        """Return (device, relay) of each output that is on at the terminal blocks."""
         return [key for key, on in self._edges.items() if on and key[1] in RELAYS]
 
     def close(self) -> None:
-        """Stop all robots and daemons, whatever has happened."""
+        """Stop all robots and daemons, also after a failure."""
         for robot in self.robots:
             if robot.alive:
                 robot.kill()

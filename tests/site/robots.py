@@ -1,8 +1,8 @@
-"""The robots: each with its fleet adapter (RMF's rules, `workbench.rmf_model`) and a day without end.
+"""Robots with an endless day. Each has its own fleet adapter by RMF's rules (`workbench.rmf_model`).
 
-Again and again a robot goes through a door, by lift to another floor, through another door, sometimes
-to a charger; sometimes it rests. Now and then a task is cancelled while the robot waits. After its
-death an adapter knows only where its robot stands, so the robot first leaves that place.
+A robot passes a door, rides a lift to another floor, and passes another door, again and again.
+Sometimes it goes to a charger or rests. Sometimes RMF cancels the task when the robot waits. An adapter
+that restarts knows only the place of its robot, so the robot first leaves that place.
 """
 
 from collections.abc import Callable, Generator
@@ -20,9 +20,9 @@ from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, Requ
 from workbench.rmf_model.robot import Phase, RobotContext
 
 FRESH_S = 2.5
-"""The age (s) from which a charger's state does not permit driving onto the pad."""
+"""The age (s) at which a charger's state is too old to permit driving onto the pad."""
 PAD_S = 2.0
-"""The time (s) from the pad's edge onto the pad, and off again."""
+"""The time (s) to drive from the pad's edge onto the pad, and back."""
 CHARGER_PATIENCE_S = 8.0
 
 
@@ -38,7 +38,7 @@ class Places:
 
 @dataclass(frozen=True)
 class Within:
-    """A phase that is cancelled after its patience (s)."""
+    """A phase that RMF cancels after the patience (s)."""
 
     phase: Phase
     patience_s: float = NEVER
@@ -46,14 +46,15 @@ class Within:
 
 Want = Within | float
 Day = Generator[Want, bool, None]
-"""A day yields its next wait (a phase or seconds) and receives whether the phase was done."""
+"""A generator that yields its next wait (a phase or seconds), and receives whether the phase was
+done."""
 
 
 class Ground(Protocol):
     """The true places of the robots, and the building's part in their passages."""
 
     def may_enter_lift(self, robot: "Resident", lift: str, floor: str) -> bool:
-        """Does the robot see an open car there?"""
+        """Return whether the robot sees an open car at this floor."""
 
     def boards(self, robot: "Resident", lift: str, floor: str) -> None:
         """Let the robot cross the threshold of the car inwards."""
@@ -68,7 +69,7 @@ class Ground(Protocol):
         """Note that the robot is out of the car."""
 
     def may_enter_door(self, robot: "Resident", door: str) -> bool:
-        """Does the robot see an open door?"""
+        """Return whether the robot sees an open door."""
 
     def in_doorway(self, robot: "Resident", door: str) -> None:
         """Let the robot stand in the doorway."""
@@ -80,15 +81,15 @@ class Ground(Protocol):
         """Note that the robot has left the pad."""
 
     def charged(self, charger: str) -> bool:
-        """Is the battery on this charger full?"""
+        """Return whether the battery on this charger is full."""
 
 
 class Resident:
-    """One robot. `waits_for` names the thing that the robot waits for, `since` the start of the wait.
+    """One robot. It waits for `waits_for` from the time `since` on.
 
-    `join(name)` gives its adapter a place on the graph. `pace` is the factor of its pauses, compared
-    with a real robot. `disturbed_at` is the time of its adapter's last death: after that, requests in
-    its name may not be its own wish.
+    `join(name)` gives its adapter a place on the graph. `pace` is the length of its pauses relative to
+    a real robot. Its adapter last died at `disturbed_at`. After that time a request in its name may not
+    be its own wish.
     """
 
     def __init__(
@@ -137,7 +138,7 @@ class Resident:
     # ---- the adapter
 
     def start(self) -> None:
-        """Start a new fleet adapter, which knows only where its robot is."""
+        """Start a new fleet adapter, which knows only the place of its robot."""
         self.alive = True
         self.robot = RobotContext(self.name, self._jazzy)
         self.robot.in_car = self.in_car is not None
@@ -158,7 +159,7 @@ class Resident:
         self._go_on(True, first=True)
 
     def kill(self) -> None:
-        """Kill the adapter; the robot stays where it is."""
+        """Kill the adapter. The robot stays at its place."""
         self.alive = False
         self.disturbed_at = self._timeline.now
         self._alarm.set(NEVER)
@@ -169,7 +170,7 @@ class Resident:
 
     @property
     def at_rest(self) -> bool:
-        """Has the robot nothing more to do?"""
+        """Return whether the robot has nothing more to do."""
         return self.homing and not (self.waits_for or self.in_car or self.doorway or self.pad)
 
     @property
@@ -248,12 +249,12 @@ class Resident:
             yield 60.0
 
     def _pause(self, least_s: float, most_s: float) -> float:
-        """Return the duration of a drive or rest, during which the robot waits for nothing."""
+        """Return the duration of a drive or rest (s). The robot waits for nothing in that time."""
         self.waits_for = ""
         return self._pace * self._random.uniform(least_s, most_s)
 
     def _patience(self) -> float:
-        """Return the patience (s) with a phase: seldom short, so that the task is cancelled."""
+        """Return the patience with a phase (s). A rare short patience makes RMF cancel the task."""
         return self._random.uniform(0.5, 20.0) if self._random.random() < 0.04 else NEVER
 
     def _get_clear(self) -> Day:
@@ -268,7 +269,7 @@ class Resident:
             self._task.ends()
         if self.in_car:
             lift, _, target = self.in_car
-            if self._random.random() < 0.5:  # RMF sees our session meanwhile and ends it
+            if self._random.random() < 0.5:  # RMF sees our session in this time and ends it
                 yield self._pause(1.0, 4.0)
             yield from self._ride_on(lift, target)
         yield self._pause(0.1, 3.0)
@@ -292,7 +293,7 @@ class Resident:
         target = self._random.choice([f for f in self._places.floors if f != self.floor])
         came = yield Within(RequestLift(lift, self.floor, inside=False), self._patience())
         if not came:
-            return  # another task; the context ends the session after 30 s without a request
+            return  # a new task: the context ends the session after 30 s without a request
         while not self._ground.may_enter_lift(self, lift, self.floor):
             yield 0.5
         self.in_car = (lift, self.floor, target)
@@ -319,13 +320,13 @@ class Resident:
     # ---- charging by RMF's own task, with our coordinator
 
     def _charge_as_told(self) -> Day:
-        """Go to the dedicated place, which may change, until the robot has charged."""
+        """Drive to the dedicated place, which may change, until the robot has charged."""
         assert self._task is not None
         self.waits_for, self.since = "a charger", self._timeline.now
         self._task.begins()
         while not self.homing:
             where = self._task.dedicated
-            yield self._random.uniform(4.0, 12.0)  # the way there
+            yield self._random.uniform(4.0, 12.0)  # the drive to the station
             if where in self._places.chargers:
                 if self._is_kept(where) and (yield from self._charge_on(where)):
                     break
@@ -337,13 +338,13 @@ class Resident:
         self._task.ends()
 
     def _is_kept(self, charger: str) -> bool:
-        """Is the station assigned to this robot?"""
+        """Return whether the station is assigned to this robot."""
         state = self._station(charger)
         assigned = state is not None and state.state == d.ChargerStateValue.CHARGER_ASSIGNED
         return assigned and state is not None and f"fleet/{state.robot_name}" == self.name
 
     def _charge_on(self, charger: str) -> Generator[Want, bool, bool]:
-        """Charge until the battery is full or the time is over; return True if current has flowed."""
+        """Charge until the battery is full or the time is over. Return True if current has flowed."""
         assert self._task is not None
         yield PAD_S
         if not self._is_kept(charger):
@@ -366,7 +367,7 @@ class Resident:
     # ---- charging without a coordinator: RMF sends no such requests, so the robot sends its own
 
     def _charge(self) -> Day:
-        """Try the stations until one is granted; drive there, charge, leave."""
+        """Try the stations until a station grants the request. Drive there, charge, and leave."""
         self.waits_for, self.since = "a charger", self._timeline.now
         while not self.homing:
             for charger in self._random.sample(self._places.chargers, len(self._places.chargers)):
@@ -378,7 +379,7 @@ class Resident:
                     continue
                 request_id = self._new_request()
                 if (yield from self._is_assigned(charger, request_id)):
-                    yield self._random.uniform(4.0, 12.0)  # the way there
+                    yield self._random.uniform(4.0, 12.0)  # the drive to the station
                     if (yield from self._charge_at(charger, request_id)):
                         return
                 yield from self._cancel(charger, request_id)
@@ -396,7 +397,7 @@ class Resident:
         return False
 
     def _charge_at(self, charger: str, request_id: str) -> Generator[Want, bool, bool]:
-        """Charge on the pad while the station is ours; return True if current has flowed."""
+        """Charge on the pad as long as the station is ours. Return True if current has flowed."""
         if not self._is_ours(charger, request_id):
             return False
         yield PAD_S
@@ -418,7 +419,7 @@ class Resident:
         self._ground.off_pad(self, charger)
 
     def _cancel(self, charger: str, request_id: str) -> Day:
-        """Send the cancellation until the station no longer shows the request."""
+        """Repeat the cancellation until the station no longer shows the request."""
         for _ in range(5):
             self._say([(topics.CHARGER_CANCELS, d.ChargerCancel(charger, request_id))])
             yield 1.0
@@ -432,7 +433,7 @@ class Resident:
         return assigned and state is not None and state.request_id == request_id
 
     def _station(self, charger: str) -> d.ChargerState | None:
-        """Return the station's latest state if it is fresh."""
+        """Return the station's latest state if the state is fresh."""
         at, state = self._stations.get(charger, (-NEVER, None))
         return state if self._timeline.now - at <= FRESH_S else None
 
@@ -442,7 +443,7 @@ class Resident:
 
 
 def _words(phase: Phase) -> str:
-    """Return what a phase waits for, in words."""
+    """Return the goal of a phase in words."""
     match phase:
         case RequestLift():
             inside = " from inside" if phase.wanted.inside else ""

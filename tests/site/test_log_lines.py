@@ -1,7 +1,8 @@
-"""No line is logged for ever: ten minutes in virtual time under each fault, with waiting robots.
+"""No fault makes a daemon log the same line for ever. Each fault lasts ten minutes of virtual time,
+with waiting robots.
 
-Lifts, doors, chargers, supervisors and the coordinator are those of the daemons. Lines count as equal
-if only their numbers differ.
+Lifts, doors, chargers, supervisors and the coordinator are those of the daemons. Two lines count as
+equal if only their numbers differ.
 """
 
 import re
@@ -20,11 +21,11 @@ from tests.workbench.explain.story import Scene
 
 SERVED = ("Lift1", "Lift2", "ward", "gate", "bay1")
 MOST = 3
-"""The limit for equal lines in the last five minutes: fewer than one per minute."""
+"""The most equal lines in the last five minutes, fewer than one a minute."""
 
 
 class Hospital(Scene):
-    """A scene with all devices and nodes; one robot has requested a lift, another a door."""
+    """A scene with all devices and nodes. One robot has requested a lift, and another robot a door."""
 
     def __init__(self) -> None:
         super().__init__(*SERVED, diagnoses=False)
@@ -44,7 +45,7 @@ Trouble = Callable[[Hospital, pytest.MonkeyPatch], None]
 
 
 def each(scene: Hospital, seconds: float, do: Callable[[], None]) -> None:
-    """Do this now and again and again."""
+    """Call `do` now, and then every `seconds` seconds."""
 
     def again() -> None:
         do()
@@ -132,7 +133,7 @@ TROUBLES: dict[str, Trouble] = {
 
 
 CHANGES = ("hardware_that_comes_and_goes", "two_nodes_for_each_device")
-"""Faults under which facts change all the time; the log's filter then holds back repeats."""
+"""Faults under which facts change all the time. Under these the log's filter holds back repeats."""
 
 
 @pytest.mark.parametrize("trouble", TROUBLES)

@@ -1,4 +1,4 @@
-"""Robots compete for one lift and one door on DDS; every daemon and one adapter is killed once."""
+"""Robots compete for one lift and one door on DDS. The test kills each daemon and one adapter once."""
 
 import signal
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from tests.site.on_dds import RealSite
 def site(
     domain: int, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[RealSite]:
-    directory: Path = tmp_path_factory.mktemp("s")  # a socket's name has at most 107 characters
+    directory: Path = tmp_path_factory.mktemp("s")  # a socket's path has at most 107 characters
     monkeypatch.setenv("XDG_STATE_HOME", str(directory))
     monkeypatch.setenv("TRANSPORT", runs_here())
     site = RealSite(directory, domain, ("red", "green", "blue"))

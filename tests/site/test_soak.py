@@ -1,4 +1,4 @@
-"""A short day at the site, for a few seeds; `make soak` plays whole days."""
+"""A short day at the site for a few seeds. `make soak` plays whole days."""
 
 import pytest
 
@@ -9,17 +9,17 @@ from tests.site.growth import Look, growth
 from tests.site.laws import Broken
 
 SEEDS = depth([2], [1, 2, 3])
-"""Each seed has other supervisors; tests/workbench/replay/test_replay.py plays 1 and 3 anyway."""
+"""Each seed has other supervisors. tests/workbench/replay/test_replay.py also plays seeds 1 and 3."""
 MINUTES = depth(8, 20)
-"""The day is long enough for more than the last minutes, in which robots go home (`WIND_DOWN_S`)."""
+"""The day's length (min). It exceeds the last minutes, in which robots go home (`WIND_DOWN_S`)."""
 
 
 @pytest.mark.long(5)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_site_lives_through_its_troubles(seed: int) -> None:
-    """On a failure `make soak SEED=… HOURS=0.3333` plays the day again and prints the events before.
+    """After a failure `make soak SEED=… HOURS=0.3333` plays the day again and prints the events before.
 
-    The seed chooses the supervisors: RMF's of either release, or ours.
+    The seed chooses our supervisors, or RMF's of either release.
     """
     site = Site(seed)
     site.run(MINUTES / 60)

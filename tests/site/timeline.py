@@ -6,11 +6,11 @@ from functools import partial
 
 NEVER = float("inf")
 EPOCH = 1_800_000_000.0
-"""The wall clock when the day begins (s)."""
+"""The wall clock at the day's beginning (s since the epoch)."""
 
 
 class Timeline:
-    """The clock of the day and its events; `now` is seconds since the day began.
+    """The clock of the day and its events. `now` counts seconds from the beginning of the day.
 
     Two events at the same time happen in the order in which they were added.
     """
@@ -21,18 +21,18 @@ class Timeline:
         self._count = 0
 
     def at(self, when: float, what: Callable[[], None]) -> None:
-        """Let this happen at this time; never, if the time is inf."""
+        """Call `what` at this time, or never at inf."""
         if when == NEVER:
             return
         self._count += 1
         heapq.heappush(self._due, (max(when, self.now), self._count, what))
 
     def after(self, seconds: float, what: Callable[[], None]) -> None:
-        """Let this happen so many seconds from now."""
+        """Call `what` after this many seconds."""
         self.at(self.now + seconds, what)
 
     def next_at(self) -> float:
-        """When the next thing happens; inf: never."""
+        """Return the time of the next event, or inf without events."""
         return self._due[0][0] if self._due else NEVER
 
     def run(self, until: float) -> None:
@@ -45,7 +45,7 @@ class Timeline:
 
 
 class Alarm:
-    """The alarm clock of one party: it rings at the time that was set last."""
+    """The alarm clock of one party. It rings at the time of the latest `set`."""
 
     def __init__(self, timeline: Timeline, ring: Callable[[], None]) -> None:
         self._timeline = timeline
@@ -54,7 +54,7 @@ class Alarm:
         self._number = 0
 
     def set(self, at: float) -> None:
-        """Ring at this time, instead of the time set before."""
+        """Ring at this time instead of the earlier time."""
         if at == self._at:
             return
         self._at = at

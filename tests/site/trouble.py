@@ -1,9 +1,9 @@
 """Troubles and their repair, from the seed alone.
 
-Trouble comes in bouts: a few things break within a minute, and each is mended after a while. Then comes
-a calm, sometimes so long that no robot may still be waiting. After mending a wire, a part or a fire
-latch, the technician also resets the device (`rmf-bridge reset`). Nobody resets after restarts, cuts,
-lost buses or hazards that clear by themselves.
+Trouble comes in bouts. In each bout a few parts break within a minute, and each is mended some time
+later. Then comes a calm, sometimes so long that no robot may still wait. After the repair of a wire, a
+part or a fire latch the technician resets the device (`rmf-bridge reset`). Nobody resets a device after
+restarts, cuts, lost buses or hazards that clear alone.
 """
 
 from collections.abc import Callable, Iterator
@@ -23,12 +23,12 @@ WIRE_MODES: tuple[FailureMode, ...] = ("off", "stuck", "slow", "garbage", "wrong
 LIES: tuple[FailureMode, ...] = ("stuck", "slow", "garbage", "wrong")
 RESET = ", to be reset"
 BY_RESET_S = 4.0
-"""The time from the repair to a healthy device (s): hazards clear, and the technician resets."""
+"""The time from a repair to a healthy device (s): hazards clear, and the technician resets."""
 LIFT_HAZARDS = ("fire_alarm", "code_blue", "manual_mode", "earthquake")
 
 
 class Ills:
-    """The ills of each party, with the start of present ills and the end of past ills.
+    """The ills of each party: the start of present ills, and the end of past ills.
 
     A `device` may be any party.
     """
@@ -54,15 +54,15 @@ class Ills:
         self._calm_at = self._timeline.now
 
     def has(self, device: str, what: str) -> bool:
-        """Has the device this ill?"""
+        """Return whether the device has this ill."""
         return what in self._now.get(device, {})
 
     def any(self, device: str) -> bool:
-        """Has the device any ill?"""
+        """Return whether the device has any ill."""
         return bool(self._now.get(device))
 
     def since(self, device: str, what: str) -> float:
-        """Return the start of this ill; inf if the device has no such ill."""
+        """Return the start of this ill, or inf without this ill."""
         return self._now.get(device, {}).get(what, NEVER)
 
     def since_over(self, device: str, *what: str) -> float:
@@ -71,13 +71,13 @@ class Ills:
         return max(over.get(one, -NEVER) for one in what)
 
     def well_since(self, device: str) -> float:
-        """Return the time since which the device has had no ill; inf if it has an ill."""
+        """Return the end of the device's last ill, or inf during an ill."""
         if self.any(device):
             return NEVER
         return max(self._over.get(device, {}).values(), default=-NEVER)
 
     def lying(self, device: str, settles_s: float) -> Iterator[str]:
-        """Yield the wires and parts that lie, or did so a moment ago."""
+        """Yield the wires and parts that lie, or that lied less than `settles_s` ago."""
         for (name, what), mode in self._modes.items():
             if name != device or mode not in LIES:
                 continue
@@ -86,7 +86,7 @@ class Ills:
                 yield what
 
     def hazard_since(self, device: str) -> float:
-        """Return the time since which a hazard is on a sound wire; inf if there is none."""
+        """Return the time at which a hazard began on a sound wire, or inf without a hazard."""
         now, over = self._now.get(device, {}), self._over.get(device, {})
         return min(
             (
@@ -100,15 +100,15 @@ class Ills:
         )
 
     def obstruct(self, device: str) -> None:
-        """Note that somebody stands in the doorway from now on."""
+        """Note that a person stands in the doorway from now on."""
         self._obstructed[device] = self._timeline.now
 
     def obstructed_since(self, device: str) -> float:
-        """Return the time since which somebody stands in the doorway; NEVER if nobody does."""
+        """Return the time at which a person stepped into the doorway, or NEVER."""
         return self._obstructed.get(device, NEVER)
 
     def calm_since(self) -> float:
-        """Return the time since which no party has had an ill; inf if any has."""
+        """Return the time at which the last ill of any party ended, or inf during an ill."""
         return NEVER if any(self._now.values()) else self._calm_at
 
     def all(self) -> list[str]:
@@ -129,10 +129,12 @@ class Mortal(Protocol):
 
 @dataclass(frozen=True)
 class Ill:
-    """One possible trouble: the party, the ill, its begin and end, and its duration (s).
+    """One possible trouble: the party, the ill, the functions that begin and end it, and its duration
+    (s).
 
-    `sort` is the heading for counting. `reset` is the technician's action after the repair. It is left
-    out if the ill lasted no longer than `heals_s` (s), because the device then recovers by itself.
+    `sort` is the heading for counting. `reset` is the technician's action after the repair. The
+    technician does not reset after an ill of at most `heals_s` (s), because the device then recovers
+    alone.
     """
 
     sort: str
@@ -167,7 +169,7 @@ class Trouble:
         self._note = note
 
     def begin(self, until: float) -> None:
-        """Begin the first bout, and more bouts after it; all end by then."""
+        """Begin the first bout. More bouts follow, and all end by `until`."""
         self.over_at = until
         self._timeline.after(self._random.uniform(20.0, 60.0), self._bout)
 
@@ -183,7 +185,7 @@ class Trouble:
             self._timeline.at(last + calm_s, self._bout)
 
     def _strike(self, at: float) -> float:
-        """Draw a trouble that begins at this time; return the time of its repair."""
+        """Draw a trouble that begins at this time. Return the time of its repair."""
         ill = self._draw(self._random)
         lasts_s = self._random.uniform(ill.least_s, ill.most_s)
         if self._random.random() < 0.1:
@@ -215,7 +217,7 @@ class Trouble:
             self._timeline.after(BY_RESET_S, lambda: self._reset(ill))
 
     def _reset(self, ill: Ill) -> None:
-        """Reset as a technician, who waits for the device: a silent device cannot be reset."""
+        """Reset the device as a technician does, who waits because a silent device cannot be reset."""
         assert ill.reset is not None
         if self._ills.has(ill.device, "bus") or self._ills.has(ill.device, "daemon"):
             self._timeline.after(BY_RESET_S, lambda: self._reset(ill))
@@ -228,7 +230,7 @@ Breakable = list[tuple[str, tuple[FailureMode, ...]]]
 
 
 def breakable(device: Device) -> tuple[Breakable, Breakable]:
-    """Return the wires and the parts of a device, with the ways in which each can fail."""
+    """Return the wires and the parts of a device, each with its possible failures."""
     plant = device.plant
     wires = [(signal, WIRE_MODES) for signal in (*plant._sensors, *plant._relays)]
     if isinstance(plant, LiftPlant):

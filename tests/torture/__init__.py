@@ -1,3 +1,1 @@
-"""Disturbs real daemons from outside, on loopback (`make torture`); see
-docs/explanation/reliability.md.
-"""
+"""Attacks on real daemons over loopback (`make torture`). See docs/explanation/reliability.md."""

@@ -1,4 +1,5 @@
-"""Deaths and shortages of a door's daemon on a real Modbus server; the server's relay is watched."""
+"""Deaths and shortages of a door's daemon on a real Modbus server. The tests watch the server's
+relay."""
 
 import os
 import random
@@ -23,7 +24,7 @@ PATIENCE_S = 60.0
 
 
 class Door:
-    """A module on the wall, and an RMF that asks for OPEN all the time."""
+    """A Modbus module, and an RMF that asks for OPEN all the time."""
 
     def __init__(self, directory: Path, domain: int) -> None:
         directory.mkdir()
@@ -35,7 +36,7 @@ class Door:
         self._asks.start()
 
     def is_on(self) -> bool:
-        """Is the module's relay on?"""
+        """Return whether the module's relay is on."""
         return self.module.relay()[-1:] == [True]
 
     def daemon(self, **env: str) -> Daemon:
@@ -50,7 +51,7 @@ class Door:
         return running
 
     def outputs_off(self, **env: str) -> int:
-        """Run outputs-off as the systemd unit does; return the exit code."""
+        """Run outputs-off as the systemd unit does, and return the exit code."""
         off = command("outputs-off", self.module.file, "--runtime-dir", self.run)
         environ = environment(**(SERVICE | env))
         return subprocess.run(off, env=environ, capture_output=True).returncode
@@ -83,7 +84,7 @@ def door(directory: Path) -> Iterator[Door]:
 
 
 def kills(directory: Path, rng: random.Random, times: int, table: Table) -> None:
-    """Kill a daemon with -9 at random moments; every second daemon is started by hand, with a guard."""
+    """Kill a daemon with -9 at random moments. Every second daemon runs as if started by hand, with a guard."""
     pause = threading.Event()
     with door(directory) as here:
         for n in range(times):
@@ -110,7 +111,7 @@ def _released(run: Path) -> bool:
 
 
 def signals(directory: Path, table: Table) -> None:
-    """Send each signal that would end or suspend a process, while the relay is on."""
+    """Send each signal that would end or suspend a process when the relay is on."""
     with door(directory) as here:
         for number in sorted(ENDING - set(range(signal.SIGRTMIN + 1, signal.SIGRTMAX))):
             code = here.held().end(number)

@@ -1,4 +1,4 @@
-"""Forged bytes on each wire for a fixed time. The daemon lives, logs little, and ends when told."""
+"""Forged bytes on each wire for a fixed time. The daemon must live, log little, and end on SIGTERM."""
 
 import os
 import pty
@@ -22,11 +22,12 @@ from tests.torture.table import Table
 SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
 SERIAL = r"/dev/serial/by-id/[^ ,}\n]*"
 LINES_MOST = 200
-"""Most lines of a log that strangers must not be able to fill."""
+"""The most lines of a daemon's log. A stranger must not be able to fill the log."""
 
 
 class Liar:
-    """Answers everything with forged bytes until it is closed. `count` is the number of answers."""
+    """A server that answers everything with forged bytes until it is closed. `count` is the number of
+    answers."""
 
     def __init__(self, rng: random.Random) -> None:
         self.count = 0
@@ -44,7 +45,7 @@ class Liar:
         raise NotImplementedError
 
     def _forged(self, heard: bytes) -> bytes:
-        """Return bytes that often begin like a true answer but never are a whole true answer."""
+        """Return bytes that often begin like a true answer, but never form a whole true answer."""
         self.count += 1
         forged = heard[: self._rng.randrange(12)] + self._rng.randbytes(self._rng.randrange(1, 40))
         return b"HTTP/1.1 200 OK\r\n" + forged if heard.startswith(b"GET") else forged
@@ -82,7 +83,7 @@ class TcpLiar(Liar):
 
 
 class LineLiar(Liar):
-    """A forger at the other end of a serial line: Modbus RTU, or CAN behind slcan."""
+    """A forger at the other end of a serial line, for Modbus RTU, or for CAN through slcan."""
 
     def __init__(self, rng: random.Random) -> None:
         self._far, near = pty.openpty()
@@ -106,9 +107,8 @@ class LineLiar(Liar):
 
 
 class DatagramLiar(Liar):
-    """A forger on DDS: sends messages that begin like RTPS to every port of the domain's first
-    processes.
-    """
+    """A forger on DDS. It sends messages that begin like RTPS to every port of the domain's first
+    processes."""
 
     def __init__(self, rng: random.Random, domain: int) -> None:
         self._domain = domain
@@ -184,7 +184,7 @@ def _line(name: str, place: str) -> Callable[[random.Random, int], tuple[Liar, s
 
 
 def _shipped(name: str, domain: int, place: str, there: str) -> str:
-    """Return a shipped YAML on loopback, with its bus pointed at the forger."""
+    """Return a shipped YAML on loopback whose bus points at the forger."""
     text = (ROOT / "config" / name).read_text()
     rmf = f"rmf: {{transport: dds, network: localhost, domain_id: {domain}}}\n"
     text = re.sub(r"^rmf:\n(  .*\n)*", rmf, text, flags=re.MULTILINE)

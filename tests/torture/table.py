@@ -1,11 +1,11 @@
-"""The table of torture: each disturbance, its number, and its result."""
+"""The table of the torture: each disturbance, its number, and its result."""
 
 import threading
 from collections import Counter
 
 
 class Table:
-    """Disturbances and results, counted by several threads."""
+    """A count of disturbances and results. Several threads may count."""
 
     def __init__(self) -> None:
         self._counts: Counter[tuple[str, str]] = Counter()

@@ -60,7 +60,7 @@ def _memory(address: str, domain: int) -> float:
 
 
 def recordings(directory: Path, seed: int, times: int, table: Table) -> None:
-    """Read recordings that decode but are wrong, and a small file that unpacks to much."""
+    """Read wrong recordings that decode, and a small file that unpacks to much data."""
     for ending, number in endings(Mutator(seed), times, directory).items():
         command, _, code = ending.partition(": ")
         table.count(f"wrong recordings, {command}", f"exit code {code}", number)

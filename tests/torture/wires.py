@@ -25,7 +25,7 @@ TOKENS: Final = 5000
 
 
 def wires(directory: Path, rng: random.Random, each_s: float, times: int, table: Table) -> None:
-    """Run all of these disturbances in turn."""
+    """Run all disturbances of this file in turn."""
     directory.mkdir()
     _replies(directory, rng, each_s, table)
     _silences(rng, 20 * times, table)
@@ -35,7 +35,7 @@ def wires(directory: Path, rng: random.Random, each_s: float, times: int, table:
 
 
 class Almost(TcpLiar):
-    """A module whose door is open, and whose replies about the door have one wrong part."""
+    """A module whose door is open. One part of each reply about the door is wrong."""
 
     def _forged(self, heard: bytes) -> bytes:
         if len(heard) < 12:  # too short for a request: hang up
@@ -98,7 +98,7 @@ def _silences(rng: random.Random, times: int, table: Table) -> None:
 
 @contextmanager
 def _on_zenoh(directory: Path, name: str, **env: str) -> Iterator[tuple[Daemon, Module, Path]]:
-    """Yield a door's daemon that must stay on this machine."""
+    """Yield the daemon of a door that must stay on this machine."""
     here = directory / name
     here.mkdir()
     with domain_for_a_while() as domain:
@@ -157,7 +157,7 @@ def _tokens(directory: Path, table: Table) -> None:
 
 
 def _past(directory: Path, table: Table) -> None:
-    """Set the clock of the daemon's process alone; Linux refuses to be set to such a time."""
+    """Set the clock of the daemon's process alone, because Linux refuses such a time."""
     source, library = Path(__file__).with_name("past.c"), directory / "past.so"
     subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source, "-ldl"], check=True)
     past = directory / "past"

@@ -1,7 +1,7 @@
-"""Files that earlier versions wrote, a folder for each day. A folder is never renewed.
+"""Files that earlier versions wrote, one folder for each day. Nobody ever renews a folder.
 
-`values.json` has a specimen of each recordable type, as trees, by the type's name. `*.ring.gz` are
-daemons' rings, `*.mcap` the recorder's files, `*.kept` the memory of kinds without hardware.
+`values.json` holds a specimen of each recordable type as a tree, under the type's name. `*.ring.gz` are
+daemons' rings, `*.mcap` are the recorder's files, and `*.kept` are memories of kinds without hardware.
 `claimed-*.json` are records of claimed outputs.
 """
 
