@@ -1,1 +1,2 @@
-"""Tests of the YAML loader, with a kind, drivers and buses of the tests (`site/`) and the real ones."""
+"""Tests of the YAML loader with the real kinds, drivers and buses, and with those of the folder
+`site/`."""

@@ -1,4 +1,4 @@
-"""The kinds, drivers and buses of `site/` beside the real ones, and the place of the tests' files."""
+"""Fixtures that add the kinds, drivers and buses of `site/`, and give the tests a file."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +14,7 @@ SITE = Path(__file__).parent / "site"
 
 @pytest.fixture(scope="package", autouse=True)
 def site() -> Iterator[None]:
-    """Add the folders of `site/` to the packages in which names are looked up."""
+    """Add the folders of `site/` to the packages in which the loader looks for names."""
     with pytest.MonkeyPatch.context() as patch:
         for package, folder in (
             (bridges.kinds, "kinds"),
@@ -27,5 +27,5 @@ def site() -> Iterator[None]:
 
 @pytest.fixture(scope="package")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the path of a file to write and load repeatedly."""
+    """Return the path of a file that tests write and load repeatedly."""
     return tmp_path_factory.mktemp("settings") / "gate.yaml"

@@ -1,4 +1,4 @@
-"""Read a file as the loader's tests need it: from text to a Config, or to the printed problems."""
+"""Reads a file for the loader's tests, from text to a Config or to the printed problems."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""For any content of a file the loader makes a Config or raises SettingsError."""
+"""The loader makes a Config or raises SettingsError for any content of a file."""
 
 from pathlib import Path
 

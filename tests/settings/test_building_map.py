@@ -1,4 +1,4 @@
-"""`rmf-bridge check FILE --building-map MAP`: our names against RMF's, on maps of both forms."""
+"""`rmf-bridge check FILE --building-map MAP` compares our names with RMF's, on maps of both forms."""
 
 import os
 from pathlib import Path
@@ -98,7 +98,7 @@ coordinator:
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Work in a folder with maps, so file names are given as a user gives them."""
+    """Work in a folder with maps, so that a test gives file names like a user."""
     monkeypatch.chdir(tmp_path)
     Path("building.yaml").write_text(BUILDING)
     Path("graph.yaml").write_text(GRAPH)

@@ -1,4 +1,4 @@
-"""`rmf-bridge check` prints problems or the wiring table, as a person sees them."""
+"""`rmf-bridge check` prints problems or the wiring table for a person."""
 
 import os
 import subprocess
@@ -40,7 +40,7 @@ OK
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Work in an empty folder, so file names are given as a user gives them, with a wide terminal."""
+    """Work in an empty folder with a wide terminal, so that a test gives file names like a user."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "130")
 

@@ -122,7 +122,7 @@ def gates(draw: st.DrawFn) -> dict[str, Any]:
 
 
 class Quoting(yaml.SafeDumper):
-    """A YAML writer that quotes every text, keys too, and is otherwise PyYAML's."""
+    """A YAML writer that quotes every string, also each key, and otherwise equals PyYAML's."""
 
 
 Quoting.add_representer(

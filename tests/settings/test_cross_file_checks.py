@@ -1,4 +1,4 @@
-"""Files that are checked together, for problems that no single file shows."""
+"""Checks of several files together, for problems that no single file shows."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Files that are no device YAML give one clear problem each, with its place."""
+"""A file that is no device YAML gives one clear problem with its place."""
 
 import os
 import socket

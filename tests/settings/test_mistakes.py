@@ -19,11 +19,11 @@ OTHERWISE: Final = {
     "pin twice in and out": "wrong: the pin's level at boot is named before its second use",
     "host name": "accepted: a module may have a name, and doctor resolves it",
 }
-"""Mistakes that `check` treats otherwise than their author expected -> the reason."""
+"""Mistakes that `check` treats otherwise than their author expected, each with the reason."""
 
 
 def file_of(mistake: dict[str, Any], folder: Path) -> Path:
-    """Write the example with the mistake in it."""
+    """Write the example with the mistake, and return the path."""
     text = (CONFIG / mistake["example"]).read_text()
     for old, new in mistake.get("changes", ()):
         assert text.count(old) == 1, old
@@ -36,7 +36,7 @@ def file_of(mistake: dict[str, Any], folder: Path) -> Path:
 
 
 def said_of(path: Path) -> tuple[str, list[str]]:
-    """Return what `check` does with the file, and its messages, the first one first."""
+    """Return the outcome of `check` for the file, and its messages in order."""
     try:
         warnings = load(path).warnings
     except SettingsError as error:
@@ -45,7 +45,7 @@ def said_of(path: Path) -> tuple[str, list[str]]:
 
 
 def unlike(mistake: dict[str, Any], folder: Path) -> str:
-    """Say how `check` differs from what the mistake's author expects; "" if it does not."""
+    """Return how `check` differs from the expectation of the mistake's author, or ""."""
     severity, told = said_of(file_of(mistake, folder))
     if mistake["severity"] == "none":
         return "" if severity != "error" else f"refused: {told[0]}"

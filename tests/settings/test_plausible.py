@@ -1,4 +1,4 @@
-"""Values that the types allow but no integrator intends give an error or a warning."""
+"""Values that the types allow, but that no integrator intends, give an error or a warning."""
 
 from pathlib import Path
 

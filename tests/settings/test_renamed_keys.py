@@ -1,4 +1,4 @@
-"""A YAML with a key of an earlier version is read, with a warning, and `migrate` rewrites it."""
+"""The loader reads a YAML with an earlier version's key, and warns. `migrate` rewrites the key."""
 
 import os
 from pathlib import Path
@@ -39,7 +39,7 @@ MAP = "".join(
 
 @pytest.fixture
 def old(tmp_path: Path) -> Path:
-    """Return a charger's file as the first version wanted it, with the old name in the map."""
+    """Return a charger's file in the form of the first version, with the old name in the map."""
     file = tmp_path / "bay.yaml"
     file.write_text(HEAD + BAY + MAP)
     return file
@@ -70,7 +70,7 @@ def test_a_service_that_starts_logs_its_old_keys(
 ) -> None:
     monkeypatch.setenv(
         "RMF_BRIDGE_FITS", "nothing"
-    )  # a unit without drop-in: the daemon ends at once
+    )  # a unit without drop-in: its daemon ends at once
     assert cli.main(["run", str(old)]) == os.EX_CONFIG
     told = capsys.readouterr().err
     assert told.count("has a new name") == 1

@@ -1,4 +1,4 @@
-"""Texts, numbers and choices that YAML could misread, or that are out of bounds."""
+"""Strings, numbers and choices that YAML could misread, or that are out of bounds."""
 
 from pathlib import Path
 

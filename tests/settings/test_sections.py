@@ -1,4 +1,4 @@
-"""Problems across the sections of a file: kinds, drivers, buses, devices and their wires."""
+"""Problems between the sections of a file: kinds, drivers, buses, devices and their wires."""
 
 from pathlib import Path
 

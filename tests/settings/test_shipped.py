@@ -1,4 +1,4 @@
-"""Every shipped YAML is correct; after any one change that spoils it, the loader names the place."""
+"""Every shipped YAML is correct. After one spoiling change the loader names the place of the change."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -42,15 +42,15 @@ T = TypeVar("T")
 
 CONFIG = Path(__file__).parents[2] / "config"
 FILES = device_yamls()
-NAMES = ['"17"', "x", ""]  # as a name these may be right, or wrong in another place
+NAMES = ['"17"', "x", ""]  # as a name each may be right, or wrong in another place
 SORTS = {"accept_unsafe": "signal", "setpoints": "setpoint", "values": "value", "when": "value"}
-"""Words for the keys of sections whose keys are called something else than `key`."""
+"""Words for the keys of some sections. Elsewhere the word is `key`."""
 TRAPS = ["017", "1:30", "no", "1e3", "~", "1.0", "17", "[]", *NAMES]
 
 
 @dataclass(frozen=True)
 class Place:
-    """A mapping's entry in a file's text; `parent` is the key of the mapping around the entry."""
+    """A mapping's entry in a file's text. `parent` is the key of the mapping around the entry."""
 
     key: ScalarNode
     value: Node
@@ -59,7 +59,7 @@ class Place:
 
     @property
     def end(self) -> int:
-        """Return the end of the entry's text; YAML's own end of a block value is too late."""
+        """Return the end of the entry's text. YAML's own end of a block value is too late."""
         node = self.value
         while isinstance(node, CollectionNode) and not node.flow_style and node.value:
             last = node.value[-1]
@@ -115,7 +115,7 @@ def spots(problems: list[str]) -> list[str]:
 
 
 def own_names(config: Path) -> set[str]:
-    """Return the freely chosen names of a file: of buses, of devices, and in the kind's section."""
+    """Return the freely chosen names of a file: buses, devices, and names in the kind's section."""
     loaded = load(config)
     in_buses = (name for bus in loaded.buses.values() for name in names_in(bus))
     return {*loaded.buses, *loaded.devices, *names_in(loaded.section), *in_buses}
@@ -131,12 +131,12 @@ def names_in(value: object) -> set[str]:
 
 
 def some(of: Sequence[T], config: Path, turn: int) -> Sequence[T]:
-    """Return every twelfth item, with another start for each file and each turn."""
+    """Return every twelfth item. The first item differs for each file and each turn."""
     return part(of, 12, (FILES.index(config) + 4 * turn) % 12)
 
 
 def is_own(name: str, names: set[str]) -> bool:
-    """Is the key chosen by the site? Floors and codes are `L1` and `1` in these files."""
+    """Return whether the site chose the key. Floors and codes are `L1` and `1` in these files."""
     return name in names or name[0].isupper() or name[0].isdigit()
 
 
@@ -165,7 +165,7 @@ def test_a_shipped_files_devices_are_what_msgspec_makes_of_them(config: Path) ->
 
 
 def leaves(wanted: Type) -> Iterator[Type]:
-    """Yield every type in a struct, down to texts and numbers."""
+    """Yield every type in a struct, down to strings and numbers."""
     if isinstance(wanted, Metadata):
         yield from leaves(wanted.type)
     elif isinstance(wanted, StructType):
@@ -194,9 +194,9 @@ def test_every_field_of_every_driver_and_bus_is_of_a_sort_that_is_read() -> None
 
 
 ANSWERS = ("values", "between_floors", "open", "closed", "moving", "stopped", "up", "down")
-"""Keys of values in an HTTP answer, which may be anything."""
+"""Keys whose values in an HTTP answer may be anything."""
 NAMED_FREELY = ("temperatures",)
-"""Sections whose keys are freely chosen names."""
+"""Sections with freely chosen keys."""
 
 
 def test_every_misspelt_key_is_found_where_it_stands(config: Path, file: Path) -> None:
@@ -257,10 +257,10 @@ def test_every_key_that_is_taken_out_leaves_a_right_file_or_is_missed(
 
 
 def is_blamed(leaf: Leaf, trap: str, found: list[str]) -> bool:
-    """Does one of these problems lead to this value?
+    """Return whether one of these problems leads to this value.
 
-    A missing or changed number can be valid by itself, and then conflicts with another value. The
-    problem then points at the mapping around the value, or names the value's key.
+    A missing or changed number can be valid alone, but conflict with another value. The problem then
+    points at the mapping around the value, or names the value's key.
     """
     if at(leaf.node) in spots(found):
         return True

@@ -1,4 +1,5 @@
-"""Slips of the keyboard are named in plain words: no parser's words, no pattern, always a subject."""
+"""`check` describes typing mistakes in plain words with a subject, without parser's words or
+patterns."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""One file with every type of mistake: all mistakes are reported at once, in the order of the file."""
+"""One file with every type of mistake. The loader reports all mistakes at once, in the file's order."""
 
 from pathlib import Path
 

@@ -84,7 +84,7 @@ def door(directory: Path) -> Iterator[Door]:
 
 
 def kills(directory: Path, rng: random.Random, times: int, table: Table) -> None:
-    """Kill a daemon with -9 at random moments. Every second daemon runs as if started by hand, with a guard."""
+    """Kill a daemon with -9 at random moments. Every second daemon is no service, but has a guard."""
     pause = threading.Event()
     with door(directory) as here:
         for n in range(times):

@@ -1,3 +1,1 @@
-"""Tests on a whole machine: Debian on a kernel with gpio-sim and vcan, booted in QEMU. `make
-test-vm`.
-"""
+"""Tests on a whole machine (`make test-vm`). QEMU boots Debian on a kernel with gpio-sim and vcan."""

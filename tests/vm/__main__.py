@@ -1,5 +1,6 @@
-"""`make test-vm` boots the machine and prints a line for each check. Exit code 1: a check failed; 69:
-none ran.
+"""`make test-vm` boots the machine and prints a line for each check.
+
+The exit code is 1 if a check failed, and 69 if no check ran.
 """
 
 import argparse
@@ -28,11 +29,12 @@ RESTARTS: dict[str, Callable[[Machine], None]] = {
 ROOT = Path(__file__).parents[2]
 CACHE = ROOT / "build/vm"
 NEXT = "next"
-"""The folder, among the packages, of the next version's packages (`guest/upgrades.py`)."""
+"""The folder of the next version's packages, below the folder of packages (`guest/upgrades.py`)."""
 
 
 def main() -> int:
-    """Build what is missing, then run; the whole run uses one machine for each part, all at once."""
+    """Build what is missing, then run the checks. A whole run uses one machine for each part, all at
+    once."""
     args = _arguments()
     folder = CACHE / f"last-{args.arch}"
     folder.mkdir(parents=True, exist_ok=True)
@@ -106,9 +108,8 @@ def _as_next(package: Path, folder: Path) -> None:
 
 
 def _with_a_new_module(archive: Path, folder: Path) -> None:
-    """Pack the same tree again, with an `outputs-off` that needs a module missing in the version
-    before.
-    """
+    """Pack the same tree again, with an `outputs-off` that needs a module. The version before lacks
+    that module."""
     with tarfile.open(archive) as packed:
         packed.extractall(folder, filter="tar")
     (package,) = folder.glob("lib/python*/site-packages/bridges")
@@ -125,7 +126,7 @@ def _with_a_new_module(archive: Path, folder: Path) -> None:
 
 
 def _run(machine: Machine, steps: Iterable[str], log: Path) -> int:
-    """Take every step; return the number of failed checks."""
+    """Take every step, and return the number of failed checks."""
     failed = 0
     with log.open("w") as out:
         for step in steps:

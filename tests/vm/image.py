@@ -1,9 +1,11 @@
-"""A bootable Debian, built as an ordinary user and cached by its kernel and its list of packages.
+"""A bootable Debian. An ordinary user builds it; kernel and list of packages identify the cached image.
 
-`mmdebstrap` makes an archive of Debian, and `mke2fs -d` makes a file system of the archive, under
-fakeroot, so that nothing is mounted. The first RAM disk is our own (`ram_disk.py`), because Debian's is
-made by a program of the target. No installer of another architecture is emulated: installers leave the
-same text in /etc and /var on each architecture, so the other packages are unpacked over this machine's
+`mmdebstrap` makes an archive of Debian, and `mke2fs -d` makes a file system from the archive. Both run
+under fakeroot, so nothing is mounted. The first RAM disk is our own (`ram_disk.py`), because a program
+of the target system makes Debian's.
+
+The build does not emulate installers of another architecture. Installers leave the same text in /etc
+and /var on each architecture. So the other architecture's packages are unpacked over this machine's
 tree.
 """
 
@@ -19,7 +21,7 @@ from typing import Final
 from tests.vm.ram_disk import ram_disk
 
 KERNEL: Final = "7.3.4+deb13"
-"""A kernel of trixie-backports, which keeps old kernels. Debian 13's own kernel has no gpio-sim."""
+"""A kernel of trixie-backports, which keeps old kernels. Debian 13's own kernel lacks gpio-sim."""
 MIRROR: Final = "http://deb.debian.org/debian"
 SUITES: Final = ("trixie", "trixie-backports")
 SIZE: Final = "1500M"
@@ -51,10 +53,11 @@ MODULES: Final = (
     "net/9p",
     "net/can",
 )
-"""The kernel's modules that the image keeps; all modules have 400 MB."""
+"""The kernel's modules in the image. All modules would take 400 MB."""
 DPKG: Final = "var/lib/dpkg"
 KEPT: Final = ("--exclude=./dev", "--exclude=./etc", "--exclude=./var")
-"""Folders of this machine's installers, kept when the other architecture's files are unpacked."""
+"""Folders from this machine's installers. They stay when the other architecture's files are
+unpacked."""
 LEFT_OUT: Final = ("usr/share/doc", "usr/share/locale", "usr/share/man")
 TOOLS: Final = {
     "depmod": "kmod",
@@ -63,13 +66,13 @@ TOOLS: Final = {
     "mke2fs": "e2fsprogs",
     "mmdebstrap": "mmdebstrap",
 }
-"""Program -> its package."""
+"""The package of each program."""
 FILES: Final = Path(__file__).parent / "root"
-"""Files copied over the tree, with which this Debian runs the checks."""
+"""Files copied over the tree, so that this Debian runs the checks."""
 
 
 class Unusable(Exception):
-    """This machine cannot build the image or boot it; the text says what to do."""
+    """An error: this machine cannot build or boot the image. The text gives the remedy."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,9 +85,7 @@ class Image:
 
 
 def image(arch: str, cache: Path) -> Image:
-    """Return the cached image of this architecture; build the image first if it is missing. Raises
-    Unusable.
-    """
+    """Return the image of this architecture from the cache, or build it. Raises Unusable."""
     folder = cache / f"{arch}-{KERNEL}-{_key()}"
     made = Image(folder / "vmlinuz", folder / "initrd", folder / "root.ext4")
     if not folder.exists():
@@ -120,7 +121,7 @@ def _build(arch: str, folder: Path) -> None:
             *_filled(arch, folder, log.fileno()),
             f"mkdir {tree}/dev",
             f"cp -R {FILES}/. {tree}/",
-            f"chmod -R u+rX {tree}",  # /etc/gshadow is readable by nobody, and mke2fs is not root
+            f"chmod -R u+rX {tree}",  # no user may read /etc/gshadow, and mke2fs does not run as root
             f"chown -R 0:0 {tree}/etc",
             f"depmod -b {tree} {KERNEL}-{arch}",
             f"mke2fs -q -t ext4 -L root -d {tree} {folder}/root.ext4 {SIZE}",
@@ -134,7 +135,7 @@ def _build(arch: str, folder: Path) -> None:
 
 
 def _filled(arch: str, folder: Path, log: int) -> list[str]:
-    """Make archives; return the shell's lines that make the tree from the archives."""
+    """Make archives, and return the shell's lines that make the tree from the archives."""
     here = subprocess.check_output(["dpkg", "--print-architecture"], text=True).strip()
     kernel = [f"linux-{part}-{KERNEL}-{arch}" for part in ("binary", "modules")]
     tree, ours, other = folder / "tree", folder / "ours.tar", folder / "other.tar"
@@ -165,7 +166,8 @@ def _run(words: Iterable[str], log: int) -> None:
 
 
 def _mmdebstrap(arch: str, variant: str, packages: Iterable[str], archive: Path) -> list[str]:
-    """Return the command; an ordinary user needs a user namespace, and uidmap's programs for it."""
+    """Return the command of mmdebstrap. For an ordinary user it needs a user namespace, and uidmap's
+    programs."""
     if os.geteuid() != 0:
         needed({"newuidmap": "uidmap"})
     return [

@@ -1,7 +1,7 @@
-"""QEMU with our image: boot, run a check, cut the power. KVM if it really boots, else TCG.
+"""QEMU with our image: boot, run a check, cut the power. QEMU uses KVM if KVM boots here, else TCG.
 
-Under TCG the machine's clock counts instructions, one for each nanosecond (`-icount shift=0`): times
-measured inside are times of a core of 1,000 MIPS, however busy the host is.
+Under TCG the machine's clock counts instructions, one for each nanosecond (`-icount shift=0`). So times
+measured inside are those of a core of 1,000 MIPS, even on a busy host.
 """
 
 import json
@@ -18,12 +18,12 @@ from tests.vm.image import Image, Unusable, needed
 PROBE_S: Final = 10.0
 BOOT_S: Final = 1800.0
 ANSWER_S: Final = 3600.0
-"""Limits far above need: both are times of the host, which may be busy."""
+"""Limits (s) far above need. They are times of the host, which may be busy."""
 
 
 @dataclass(frozen=True, slots=True)
 class Arch:
-    """QEMU's options for an architecture. `tcg`: with counted instructions."""
+    """QEMU's options for an architecture. `tcg` are the options with counted instructions."""
 
     program: str
     package: str
@@ -33,10 +33,10 @@ class Arch:
 
 
 FAST: Final = "mitigations=off"
-"""A word for the kernel: protection against leaks of real processors costs TCG much time.
+"""A kernel option that leaves out protection against leaks of real processors. TCG pays much for it.
 
-Five levels of pages and the kernel's protection from a program's pages (SMAP) cost time too, so amd64's
-processor has neither.
+Five levels of page tables, and the kernel's protection from a program's pages (SMAP), cost time too. So
+the processor for amd64 has neither.
 """
 COUNTED: Final = ("-accel", "tcg", "-icount", "shift=0")
 ARCHS: Final = {
@@ -56,12 +56,12 @@ ARCHS: Final = {
     ),
 }
 ENDS_WITH_US: Final = ("setpriv", "--pdeathsig", "KILL")
-"""Words before a program: the kernel kills the program when the thread that started it is gone."""
+"""Words before a program, so that the kernel kills the program when its starting thread ends."""
 KVM: Final = ("-accel", "kvm", "-cpu", "host")
 
 
 def accelerated(arch: str, image: Image) -> bool:
-    """Does KVM boot this kernel here? A device that can be opened may still hang."""
+    """Return whether KVM boots this kernel here. A device that opens may still hang."""
     if not os.access("/dev/kvm", os.R_OK | os.W_OK):
         return False
     found = ARCHS[arch]
@@ -80,9 +80,9 @@ def _kernel(image: Image, words: str) -> list[str]:
 
 
 class Machine:
-    """A running machine. Its disk survives a power cut, but is discarded when the machine ends.
+    """A running machine. Its disk survives a power cut, but vanishes when the machine ends.
 
-    `shared`: folders by their 9p tags. `folder` has the console's log and QEMU's sockets.
+    `shared` gives folders by their 9p tags. `folder` holds the console's log and QEMU's sockets.
     """
 
     def __init__(
@@ -121,14 +121,14 @@ class Machine:
         self.booted()
 
     def booted(self) -> None:
-        """Wait until the machine says that it is up. Raises Unusable."""
+        """Wait until the machine reports that it is up. Raises Unusable."""
         self._port.settimeout(BOOT_S)
         while "booted" not in (heard := self._heard()):
             if not heard["passed"]:  # the result of a check that ends with a restart
                 raise Unusable(f"{heard['found']}\n{heard['log']}")
 
     def check(self, name: str) -> dict[str, Any]:
-        """Run one check; return its result."""
+        """Run one check, and return its result."""
         self._port.settimeout(ANSWER_S)
         self._port.sendall(name.encode() + b"\n")
         return self._heard()
@@ -139,7 +139,7 @@ class Machine:
         self.booted()
 
     def cut_power(self) -> None:
-        """Reset the machine: data not yet on the disk are lost."""
+        """Reset the machine. Data that are not yet on the disk are lost."""
         with self._connect("qmp") as qmp, qmp.makefile("rb") as answers:
             for command in ("qmp_capabilities", "system_reset"):
                 qmp.sendall(json.dumps({"execute": command}).encode())

@@ -1,4 +1,4 @@
-"""The order of the checks: functions in `guest/`, and the host's acts between them."""
+"""The order of the checks, which are functions in `guest/`, and the host's acts between the checks."""
 
 import os
 from typing import Final
@@ -6,9 +6,9 @@ from typing import Final
 CUT: Final = "power cut"
 REBOOT: Final = "reboot"
 CUT_OFF: Final = "upgrades.cut"
-"""A check that cuts the power itself, inside the machine, at a random moment."""
+"""A check that cuts the power from inside the machine, at a random moment."""
 CUTS: Final = int(os.environ.get("CUTS", "3"))
-"""Number of cuts; each takes a boot and two upgrades, minutes of a busy host."""
+"""The number of power cuts. Each takes a boot and two upgrades, which is minutes of a busy host."""
 LIFT: Final = ("install.package", "install.lift")
 PARTS: Final = {
     "lift": (
@@ -71,12 +71,11 @@ PARTS: Final = {
         "upgrades.purged",
     ),
 }
-"""Each part runs on one machine from its first boot on; a check may need the checks before it."""
+"""The checks of each part. A part runs on one machine from its first boot; a check may need earlier
+checks."""
 WHOLE: Final = ("lift", "site", "upgrade")
-"""The parts that together have every check; they run side by side."""
+"""The parts that together have every check. All run at once."""
 ALSO: Final = {("arm64", "lift"): ("inside.demo", "inside.transport")}
-"""Further checks on arm64, for differences from CI's own machine, an amd64."""
+"""More checks on arm64, because arm64 differs from CI's own amd64 machine."""
 NOT_ON: Final = {"arm64": ("network.late",)}
-"""Checks not run on arm64: it uses zenoh, which finds another machine only by a router, and there is
-none.
-"""
+"""Checks that do not run on arm64. There zenoh would need a router to find another machine."""

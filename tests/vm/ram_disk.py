@@ -1,8 +1,7 @@
-"""The first RAM disk: busybox, the modules for reaching the root file system, and a script of ten
-lines.
+"""The first RAM disk: busybox, modules to reach the root file system, and a script of ten lines.
 
-The archive's format is in the kernel's Documentation/driver-api/early-userspace/buffer-format.rst
-("newc").
+The archive's format is "newc" in the kernel's
+Documentation/driver-api/early-userspace/buffer-format.rst.
 """
 
 import lzma
@@ -35,13 +34,13 @@ def ram_disk(tree: Path, kernel: str) -> bytes:
 
 
 def _modules(folder: Path) -> Iterator[Path]:
-    """Yield the wanted modules, each after the modules that it needs."""
+    """Yield the wanted modules, each after the modules it needs."""
     lines = (folder / "modules.dep").read_text().splitlines()
     needs = {name: rest.split() for name, _, rest in (line.partition(":") for line in lines)}
     told: set[str] = set()
     for wanted in WANTED:
         found = [name for name in needs if name.rpartition("/")[2].split(".")[0] == wanted]
-        for name in found:  # modules.dep names the farthest last; none if it is built in
+        for name in found:  # modules.dep names the farthest last; a built-in one has none
             for each in (*reversed(needs[name]), name):
                 if each not in told:
                     told.add(each)

@@ -1,4 +1,4 @@
-"""Makes the folder of tests that the machine runs on the libraries of the installed package."""
+"""Makes the folder of tests for the machine. They run with the libraries of the installed package."""
 
 import shutil
 import subprocess
@@ -14,8 +14,8 @@ NEEDED: Final = ("hypothesis", "pytest", "pytest-timeout", "trustme")
 
 
 def suite(arch: str, root: Path, folder: Path) -> Path:
-    """Return a folder with `tests`, the fakes, `config` and `pyproject.toml`; `site` has the test
-    libraries.
+    """Return a folder with `tests`, the fakes, `config` and `pyproject.toml`. `site` in it holds the
+    test libraries.
 
     Raises Unusable.
     """
@@ -30,7 +30,8 @@ def suite(arch: str, root: Path, folder: Path) -> Path:
 
 
 def _fetch(arch: str, root: Path, site: Path) -> None:
-    """Fetch by deb/wheels.py, as for the package: pip alone would judge needs by this machine."""
+    """Fetch the libraries with deb/wheels.py, as for the package. pip alone would judge needs by this
+    machine."""
     fresh = site.with_name("site.new")
     shutil.rmtree(fresh, ignore_errors=True)
     words = ["--arch", arch, "--python", PYTHON, "--target", str(fresh)]

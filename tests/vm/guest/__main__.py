@@ -1,4 +1,4 @@
-"""Runs the checks that the host names, each in a separate process, and tells the host the results."""
+"""Runs each check that the host names in a separate process, and sends the result to the host."""
 
 import io
 import json
@@ -12,15 +12,15 @@ from typing import Final
 PORT: Final = Path("/dev/virtio-ports/checks")
 LONGEST_S: Final = 240.0
 BYTE_CODE: Final = ("-X", "pycache_prefix=/run/checks")
-"""Options that compile the checks once for each boot, as their folder is read only. Commands have
-none.
-"""
+"""Options that compile the checks once for each boot, because their folder is read only. Commands lack
+these options."""
 
 
 def main() -> int:
-    """Say that the machine is up, then read a name (`deaths.phases`) from each line, for ever."""
+    """Report that the machine is up. Then read the name of a check (`deaths.phases`) from each line,
+    for ever."""
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-    # The checks begin after the boot, so that they do not disturb measurements of the boot.
+    # Wait for the end of the boot, so that the checks do not disturb measurements of the boot.
     subprocess.run(["systemctl", "is-system-running", "--wait"], stdout=subprocess.DEVNULL)
     while not PORT.exists():
         time.sleep(0.1)

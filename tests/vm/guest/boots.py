@@ -1,4 +1,4 @@
-"""Relays across a boot. Between two checks the host cuts the power or lets the machine restart."""
+"""Relays across a boot. Between two checks the host cuts the power or restarts the machine."""
 
 from tests.vm.guest import header
 from tests.vm.guest.rides import LIFT, energise, send
@@ -16,7 +16,7 @@ from tests.vm.guest.system import (
 
 SERVICE = unit("lift")
 LOW = 7
-"""The output of low.yaml, which is on at low."""
+"""The output of low.yaml. Its relay is on at the level low."""
 STARTS = 10
 
 
@@ -26,13 +26,13 @@ def energised() -> str:
 
 
 def reboot() -> str:
-    """(the machine restarts in good order)"""
+    """The machine restarts in good order."""
     sh("systemctl", "reboot")
     return "it does"
 
 
 def off() -> str:
-    """The machine is up again: no relay has been on since the kernel started."""
+    """The machine is up again, and no relay has been on since the kernel started."""
     until(lambda: is_active(SERVICE), "the service is ready")
     writes = [each for each in header.writes() if each.line in LIFT]
     on = [each for each in writes if each.level == LIFT[each.line]]
@@ -45,7 +45,8 @@ def off() -> str:
 
 
 def active_low() -> str:
-    """Ten starts with a relay that is on at low: never on, not for a moment, until a request."""
+    """A relay that is on at low stays off through ten starts, without a pulse, until a request
+    comes."""
     header.pull(LOW, high=True)  # the relay board's resistor
     began = header.now()
     service = enable("low")
@@ -58,7 +59,7 @@ def active_low() -> str:
     )  # the door cannot move
     opened = _written(asked)
     disable("low")
-    sh("sync")  # the power may be cut next
+    sh("sync")  # the host may cut the power next
     if 0 in starts or len(starts) < STARTS or 0 not in opened:
         raise Wrong(f"written by {STARTS} starts: {starts}; after a request: {opened}")
     return f"{len(starts)} writes, all of them high; a request wrote {opened[0]}"

@@ -1,4 +1,4 @@
-"""Deaths of a daemon whose relays are on. "Off" is a write that the kernel has traced."""
+"""Deaths of a daemon whose relays are on. A relay counts as off when the kernel traces the write."""
 
 import os
 import signal
@@ -24,17 +24,16 @@ from tests.vm.guest.system import (
 
 SERVICE = unit("lift")
 MODE, HOLD = {18}, set(HELD)
-"""Outputs that are on together: the mode alone, then the mode and the door's hold."""
+"""Outputs that are on together: the mode alone, or the mode and the door's hold."""
 ODD = 5
-"""The floor code's lowest bit, which falls when the car passes L2."""
+"""The lowest bit of the floor code. It falls when the car passes L2."""
 KILLED_S, STOPPED_S = 1.0, 4.0
-"""Limits in docs/explanation/reliability.md for a core of 1,000 MIPS."""
+"""Limits (s) in docs/explanation/reliability.md for a core of 1,000 MIPS."""
 
 
 def phases() -> str:
-    """kill -9 at each phase of a ride, during a start and after END, relays on: off, and the service is
-    back.
-    """
+    """After kill -9 in each phase of a ride, in a start and after END, relays go off and the service
+    returns."""
     took = {}
     with asking("lift", "Lift1", "L3", "--session", "vm/robot"):
         took["mode asked for"] = _dies_with(set(), MODE)
@@ -48,16 +47,14 @@ def phases() -> str:
 
 
 def _dies_with(*outputs: set[int], at: Callable[[], bool] = lambda: True) -> float:
-    """Kill -9 after exactly these sets of outputs were on in turn, and `at` holds; return the time to
-    off (s).
-    """
+    """Kill -9 when these sets of outputs were on in turn and `at` holds. Return the time to off (s)."""
     old = pid(SERVICE)
     _on(*outputs, at=at)
     return _killed(old, outputs[-1])
 
 
 def _on(*outputs: set[int], at: Callable[[], bool] = lambda: True) -> None:
-    """Wait until exactly these sets of outputs were on last, one after the other, and `at` holds."""
+    """Wait until these sets of outputs were the last ones on, in this order, and `at` holds."""
     until(
         lambda: header.together(LIFT)[-len(outputs) :] == [*outputs] and at(),
         f"lines {outputs} are on, one set after the other",
@@ -74,9 +71,10 @@ def _killed(old: int, relays: set[int]) -> float:
 
 
 def _dies_at_start() -> float:
-    """Kill -9 a starting daemon while its `outputs-off` runs and the relays are still on.
+    """Kill -9 a starting daemon when its `outputs-off` runs and the relays are still on.
 
-    Kill a daemon and the `outputs-off` after its death; then kill the next daemon while it starts.
+    First a daemon dies, and the `outputs-off` after its death dies too. Then the next daemon dies in
+    its start.
     """
     old, running = pid(SERVICE), _group() / "cgroup.procs"
     _on(MODE, HOLD)
@@ -105,22 +103,23 @@ def _group() -> Path:
 
 
 def hang() -> str:
-    """Stop the daemon with two relays on. The watchdog kills it, and the relays go off."""
+    """The daemon hangs with two relays on. The watchdog kills the daemon, and the relays go off."""
     return f"off after {_dies(lambda: kill(SERVICE, 'STOP'), STOPPED_S):.2f} s"
 
 
 def crash() -> str:
-    """A crash in C code (SIGSEGV by the kernel), two relays on: off, and the service is back."""
+    """The daemon crashes in C code (SIGSEGV) with two relays on. They go off, and the service
+    returns."""
     return f"off after {_dies(lambda: kill(SERVICE, 'SEGV')):.2f} s"
 
 
 def out_of_memory() -> str:
-    """The unit's memory is used up, two relays on: off, and the service is back."""
+    """The unit runs out of memory with two relays on. They go off, and the service returns."""
     limit = _group() / "memory.max"
     before = limit.read_text()
 
     def starve() -> None:
-        limit.write_text("4M")  # the kernel returns after the kill
+        limit.write_text("4M")  # the kernel returns from this write after the kill
         limit.write_text(before)
 
     took = _dies(starve)
@@ -129,7 +128,7 @@ def out_of_memory() -> str:
 
 
 def _dies(act: Callable[[], object], within_s: float = KILLED_S) -> float:
-    """Let `act` end the daemon while two relays are on; return the time until they were off (s)."""
+    """Let `act` end the daemon when two relays are on. Return the time until both were off (s)."""
     relays, old = energise(), pid(SERVICE)
     when = header.now()
     act()
@@ -139,7 +138,7 @@ def _dies(act: Callable[[], object], within_s: float = KILLED_S) -> float:
 
 
 def off_after(relays: Mapping[int, bool], when: float, within_s: float = KILLED_S) -> float:
-    """Return how long after `when` (s) the last of these relays was written off."""
+    """Return the time from `when` until the last of these relays was written off (s)."""
     found = until(lambda: _all_off(relays, when), "each relay is written off", 30.0)
     took = max(found.values()) - when
     if took > within_s:
@@ -153,7 +152,8 @@ def _all_off(relays: Mapping[int, bool], when: float) -> dict[int, float]:
 
 
 def clean_stop() -> str:
-    """`systemctl stop`, two relays on: off by the daemon; `outputs-off` has nothing to do."""
+    """`systemctl stop` with two relays on: the daemon switches them off, and `outputs-off` finds no
+    work."""
     relays, mark = energise(), cursor()
     when = header.now()
     sh("systemctl", "stop", SERVICE)
@@ -167,9 +167,8 @@ def clean_stop() -> str:
 
 
 def two_on_one_pin() -> str:
-    """A second service on the lift's pins: `enable` refuses it; started by hand it names the pins'
-    holder.
-    """
+    """`enable` refuses a second service on the lift's pins. Started by hand, it names the pins'
+    holder."""
     copy = Path("/etc/rmf-bridges/second.yaml")
     copy.write_text(Path("/etc/rmf-bridges/lift.yaml").read_text().replace("Lift1", "Lift2"))
     sh("rmf-bridge", "enable", str(copy), fails=True)

@@ -1,6 +1,5 @@
-"""A service that does nothing, for comparison. `empty.py` serves, `empty.py off` is its
-ExecStopPost.
-"""
+"""A service that does nothing, for comparison. `empty.py` serves, and `empty.py off` is its
+ExecStopPost."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""Times and memory compared with an empty Python service: ratios do not depend on the machine."""
+"""Times and memory compared with an empty Python service. Ratios do not depend on the machine."""
 
 import re
 import time
@@ -9,7 +9,7 @@ from tests.vm.guest.system import KEPT, Wrong, kill, pid, ready_s, sh, unit, unt
 SERVICES = ("lift", "door", "charger", "lift_supervisor", "door_supervisor")
 WHOLE_MB = 200.0
 MOST = (25, 10, 10)
-"""Largest ratios to the empty service: start to ready, memory, kill -9 to off."""
+"""The largest ratios to the empty service: start to ready, memory, kill -9 to off."""
 EMPTY = """
 [Service]
 Type=notify
@@ -19,7 +19,7 @@ ExecStopPost=/usr/bin/python3 /mnt/tests/vm/guest/empty.py off
 
 
 def memory() -> str:
-    """Lift, door, charger and both supervisors together: below 200 MB."""
+    """Lift, door, charger and both supervisors together use less than 200 MB."""
     each = {name: pss_mb(unit(name)) for name in SERVICES}
     whole = sum(each.values())
     text = ", ".join(f"{name} {mb:.0f}" for name, mb in each.items())
@@ -29,7 +29,8 @@ def memory() -> str:
 
 
 def ratios() -> str:
-    """Lift, door and charger compared with an empty Python service: start, memory, off after a kill."""
+    """Lift, door and charger cost a bounded multiple of an empty Python service in start, memory and
+    time to off."""
     Path("/run/systemd/system/empty.service").write_text(EMPTY)
     sh("systemctl", "daemon-reload")
     sh("systemctl", "start", "empty.service")

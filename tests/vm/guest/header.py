@@ -1,7 +1,8 @@
 """The GPIO chip of a Raspberry Pi's header, simulated by gpio-sim, with every write to its outputs.
 
-Kernel documentation: admin-guide/gpio/gpio-sim.rst, and trace events of the group `gpio`. gpio-sim lets
-an output fall when its line is released, so after a death only a write proves off, not a level.
+Sources are the kernel's admin-guide/gpio/gpio-sim.rst and its trace events of the group `gpio`. An
+output of gpio-sim falls when its line is released. So after a death only a traced write proves that a
+daemon switched it off; the level proves nothing.
 """
 
 import re
@@ -16,15 +17,15 @@ from typing import Final
 CONFIGFS: Final = Path("/sys/kernel/config/gpio-sim/header")
 TRACING: Final = Path("/sys/kernel/tracing")
 LABELS: Final = {"pinctrl-bcm2835": 54, "pinctrl-rp1": 54, "pinctrl-bcm2711": 58}
-"""Labels of the header's chips, and their numbers of lines: Raspberry Pi 3 and older, 5, 4."""
+"""Labels of the header's chips with their number of lines: Raspberry Pi 3 and older, 5, and 4."""
 PI_4: Final = "pinctrl-bcm2711"
 OTHER: Final = "raspberrypi-exp-gpio"
-"""A chip that is not the header's, and has the lower number here."""
+"""A chip beside the header's. Here it gets the lower chip number."""
 
 
 @dataclass(frozen=True, slots=True)
 class Write:
-    """A write to a line at this time (monotonic s)."""
+    """A write to a line, with its time (monotonic s)."""
 
     at: float
     line: int
@@ -32,14 +33,14 @@ class Write:
 
 
 def main() -> int:
-    """Prepare the header at boot: watch first, so that no write is missed."""
+    """Prepare the header at boot. Start the trace first, so that it misses no write."""
     watch()
     plug(PI_4)
     return 0
 
 
 def plug(label: str) -> None:
-    """Make the header's chip beside another chip."""
+    """Make the header's chip and another chip."""
     for bank, name, lines in (("other", OTHER, 8), ("bank0", label, LABELS[label])):
         folder = CONFIGFS / bank
         folder.mkdir(parents=True)
@@ -66,7 +67,7 @@ def _lines() -> Path:
 
 
 def line(number: int) -> Path:
-    """Return the directory of a line: `pull` sets an input's level, `value` shows a level."""
+    """Return the directory of a line. `pull` in it sets an input's level, and `value` shows a level."""
     return _lines() / f"sim_gpio{number}"
 
 
@@ -111,9 +112,8 @@ def _base() -> int:
 
 
 def on(lines: dict[int, bool], since: float = 0.0) -> dict[int, float]:
-    """Return the outputs whose last write was on, with its time. `lines`: each with its level for
-    on.
-    """
+    """Return the outputs whose last write was on, with its time (s). `lines` gives each line's level
+    for on."""
     last = {each.line: each for each in writes(since)}
     return {n: last[n].at for n, high in lines.items() if n in last and last[n].level == high}
 

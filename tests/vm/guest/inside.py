@@ -1,15 +1,15 @@
-"""The demo and the tests of the transport, on the libraries that the package has installed."""
+"""The demo and the transport tests, with the libraries from the installed package."""
 
 from typing import Final
 
 from tests.vm.guest.system import PYTHON, Wrong, mounted, sh
 
 PATIENCE: Final = "6"
-"""Factor for the demo's waits compared with a laptop: three daemons share one slow core."""
+"""Factor for the demo's waits compared with a laptop, because three daemons share one slow core."""
 
 
 def demo() -> str:
-    """The demo on zenoh: a robot goes through the door, rides the lift and charges."""
+    """In the demo on zenoh a robot passes the door, rides the lift and charges."""
     suite = mounted("suite", "/media")  # this folder has the files of config/
     env = ("env", f"PYTHONPATH={suite}", "TRANSPORT=zenoh", "HOME=/root", "TERM=dumb")
     told = sh(*env, PYTHON, "-m", "hal_fakes.demo", "--patience", PATIENCE)
@@ -17,7 +17,7 @@ def demo() -> str:
 
 
 def transport() -> str:
-    """The tests of zenoh, the transport that works here without ROS."""
+    """The tests of zenoh pass. Zenoh is the transport that works here without ROS."""
     suite = mounted("suite", "/media")
     tests = sorted(str(path) for path in (suite / "tests/transports").glob("test_zenoh_*.py"))
     path = f"PYTHONPATH={suite}:{suite / 'site'}"

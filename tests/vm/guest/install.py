@@ -1,4 +1,4 @@
-"""Installation of the packages, and services made from YAMLs."""
+"""The installation of the packages, and of services from YAMLs."""
 
 import grp
 import time
@@ -32,7 +32,7 @@ EXPOSED = 2.0
 
 
 def package() -> str:
-    """`apt install ./rmf-bridges_….deb ./rmf-bridges-workbench_….deb` on a fresh Debian."""
+    """`apt install ./rmf-bridges_….deb ./rmf-bridges-workbench_….deb` works on a fresh Debian."""
     found = debs()
     install(*found)
     chip = (header.CONFIGFS / "bank0/chip_name").read_text().strip()
@@ -45,38 +45,39 @@ def package() -> str:
 
 
 def install(*files: Path) -> None:
-    """Install these files as people do, but without questions."""
+    """Install these files with apt, without questions."""
     apt = ("env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "--yes")
     sh(*apt, "--no-install-recommends", *map(str, files))
 
 
 def debs(folder: str = ".", names: Sequence[str] = OURS) -> list[Path]:
-    """Return the packages of these names in the host's folder; `next` has the next version."""
+    """Return the packages of these names in the host's folder. The folder `next` has the next
+    version."""
     there = mounted("packages", "/srv") / folder
     return [file for (file,) in (there.glob(f"{name}_*.deb") for name in names)]
 
 
 def lift() -> str:
-    """`rmf-bridge enable lift.yaml`: the service starts, and is ready."""
+    """After `rmf-bridge enable lift.yaml` the service starts, and is ready."""
     far_side("lift")
     name = enable("lift")
     return f"ready after {ready_s(name):.2f} s"
 
 
 def supervisors() -> str:
-    """`rmf-bridge enable` for RMF's two supervisors."""
+    """`rmf-bridge enable` starts both of our supervisors."""
     took = [ready_s(enable(name)) for name in ("lift_supervisor", "door_supervisor")]
     return f"ready after {took[0]:.2f} and {took[1]:.2f} s"
 
 
 def recorder() -> str:
-    """The recorder of incidents runs since the package was installed."""
+    """The recorder of incidents has run since the installation of the package."""
     until(lambda: is_active("rmf-bridge-recorder.service"), "the recorder is ready")
     return f"ready after {ready_s('rmf-bridge-recorder.service'):.2f} s"
 
 
 def wrong_yaml() -> str:
-    """A wrong YAML: exit code 78, and no restart."""
+    """A service with a wrong YAML ends with exit code 78, and systemd does not restart it."""
     file = Path("/etc/rmf-bridges/wrong.yaml")
     file.write_text("kind: lift\nflors: [L1]\n")
     service = unit("wrong")
@@ -91,7 +92,8 @@ def wrong_yaml() -> str:
 
 
 def page() -> str:
-    """The web page, in its own package: started by systemd, it answers below its memory limit."""
+    """systemd starts the web page from its own package. The page answers, and stays below its memory
+    limit."""
     install(*debs(names=["rmf-bridges-page"]))
     began = time.monotonic()
     sh("systemctl", "start", PAGE)
@@ -118,7 +120,8 @@ def _answers() -> bool:
 
 
 def security() -> str:
-    """`systemd-analyze security` of each live unit of ours: 2.0 or less; these checks' own has more."""
+    """`systemd-analyze security` gives each live unit of ours at most 2.0. The unit of these checks has
+    more."""
     scores = _scores()
     units = sh("systemctl", "list-units", "--plain", "--no-legend", "rmf-bridge*.service")
     ours = {line.split()[0]: scores[line.split()[0]] for line in units.splitlines()}
@@ -128,15 +131,14 @@ def security() -> str:
 
 
 def _scores() -> dict[str, float]:
-    """Return the exposure of each service: 0 to 10."""
+    """Return the exposure of each service, from 0 to 10."""
     table = (line.split() for line in sh("systemd-analyze", "security", "--no-pager").splitlines())
     return {words[0]: float(words[1]) for words in table if words and ".service" in words[0]}
 
 
 def upgrade() -> str:
-    """The next version is installed while two relays are on: they go off and stay off, the service is
-    back.
-    """
+    """The next version is installed with two relays on. They go off and stay off, and the service
+    returns."""
     service = unit("lift")
     relays, old = energise(), pid(service)
     when = header.now()

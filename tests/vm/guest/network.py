@@ -1,4 +1,4 @@
-"""A network that comes late, and changes."""
+"""A network that comes late, and that changes."""
 
 import time
 from typing import Final
@@ -6,13 +6,14 @@ from typing import Final
 from tests.vm.guest.system import Wrong, disable, enable, far_side, pid, sh
 
 SITE: Final = ("ip", "-n", "site")
-"""Commands on the other machine: a network namespace at the other end of a cable."""
+"""The start of a command on the other machine, a network namespace at the other end of a cable."""
 MOVES: Final = (("10.7.0", "open"), ("10.8.0", "close"))
 """Each new network, and the request sent over it."""
 
 
 def late() -> str:
-    """The service starts without a network. A network comes, then another: requests are fulfilled."""
+    """The service starts without a network. One network comes, then another. It fulfils requests on
+    both."""
     sh("ip", "netns", "add", "site")
     sh("ip", "link", "add", "eth0", "type", "veth", "peer", "name", "eth1", "netns", "site")
     sh(*SITE, "link", "set", "lo", "up")
@@ -29,9 +30,8 @@ def late() -> str:
 
 
 def _moved(addresses: str, word: str) -> float:
-    """Give both ends addresses of this network; return the time until a request from there moved the
-    door.
-    """
+    """Give both ends addresses of this network. Return the time from a request there until the door
+    moved."""
     for ip, name, last in ((("ip",), "eth0", 2), (SITE, "eth1", 3)):
         sh(*ip, "link", "set", name, "down")
         sh(*ip, "addr", "flush", "dev", name)

@@ -8,29 +8,28 @@ from tests.vm.guest.system import Wrong, beside, sh, until
 
 ROOM = ("--domain-id", "7", "--localhost")
 LIFT = dict.fromkeys((18, 16, 22, 23, 24), True)
-"""The outputs of lift.yaml, each of which is on at high."""
+"""The outputs of lift.yaml. Each is on at the level high."""
 HELD = [16, 18]
-"""The outputs that a session holds: door and mode."""
+"""The outputs that a session holds on: door and mode."""
 
 
 def send(*words: str, fails: bool = False) -> str:
-    """Send one of RMF's requests and wait for its effect; with `fails` the effect must not come in
-    time.
-    """
+    """Send one of RMF's requests and wait for its effect. With `fails` the effect must not come in
+    time."""
     return sh("rmf-bridge", "send", *words, *ROOM, fails=fails)
 
 
 @contextmanager
 def asking(*words: str) -> Iterator[None]:
-    """Send a request each second during the block, also to a service that restarts; wait for the effect
-    at the end.
-    """
+    """Send a request each second in the block, even to a service that restarts. Wait for the effect at
+    the end."""
     with beside("rmf-bridge", "send", *words, *ROOM, "--direct", "--timeout", "150"):
         yield
 
 
 def energise() -> dict[int, bool]:
-    """Let a session of the lift hold two relays; return their lines, each with its level for on."""
+    """Let a session of the lift hold two relays on. Return the relays' lines, each with its level for
+    on."""
     began = header.now()
     send("lift", "Lift1", "L1", "--session", "vm/robot", "--direct")
     until(lambda: sorted(header.on(LIFT, began)) == HELD, "two relays are on")
@@ -44,9 +43,8 @@ def end() -> None:
 
 
 def ride() -> str:
-    """A robot rides from L1 to L3 by requests from outside the service; the header's lines show the
-    ride.
-    """
+    """A robot rides from L1 to L3 by requests from outside the service. The header's lines show the
+    ride."""
     began = header.now()
     send("lift", "Lift1", "L1", "--session", "vm/robot", "--direct")
     send("lift", "Lift1", "L3", "--session", "vm/robot", "--direct")

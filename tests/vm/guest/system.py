@@ -1,4 +1,4 @@
-"""Commands, systemd units and waiting, for the checks."""
+"""Commands, systemd units and waits for the checks."""
 
 import re
 import subprocess
@@ -12,19 +12,19 @@ from typing import Final, TypeVar
 CONFIG: Final = Path("/mnt/tests/vm/guest/config")
 PYTHON: Final = "/usr/lib/rmf-bridges/current/bin/python3"
 LATE_S: Final = 60.0
-"""Limit for waits without their own limit."""
+"""The limit (s) for waits without their own limit."""
 KEPT: Final = Path("/var/lib/checks-kept")
-"""A line for each service: the time from kill -9 until its relays were off (s)."""
+"""A file with one line for each service: the time from kill -9 until its relays were off (s)."""
 
 Found = TypeVar("Found")
 
 
 class Wrong(Exception):
-    """A check has failed; the text gives the findings."""
+    """A failed check. The text gives the findings."""
 
 
 def sh(*words: str, fails: bool = False) -> str:
-    """Return a command's output. Raises Wrong if its exit code is not 0; with `fails`, if it is 0."""
+    """Return a command's output. Raises Wrong if its exit code is not 0, or with `fails` if it is 0."""
     done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     print(f"{time.monotonic():.3f} $ {' '.join(words)} -> {done.returncode}\n{done.stdout}", end="")
     if (done.returncode != 0) is not fails:
@@ -59,14 +59,14 @@ def until(
 
 
 def mounted(tag: str, place: str) -> Path:
-    """Mount this folder of the host, read only."""
+    """Mount this folder of the host read only, and return the place."""
     if not Path(place).is_mount():
         sh("mount", "-t", "9p", "-o", "ro,trans=virtio,version=9p2000.L", tag, place)
     return Path(place)
 
 
 def unit(name: str) -> str:
-    """Return the service of a YAML."""
+    """Return the name of the service of a YAML."""
     return f"rmf-bridge@{name}.service"
 
 
@@ -77,7 +77,7 @@ def shown(service: str, *names: str) -> dict[str, str]:
 
 
 def is_active(service: str) -> bool:
-    """Is the service running and ready?"""
+    """Return whether the service is running and ready."""
     return shown(service, "ActiveState")["ActiveState"] == "active"
 
 
@@ -98,7 +98,7 @@ def ready_s(service: str) -> float:
 
 
 def since_boot_s(service: str, name: str) -> float:
-    """Return this property of a unit, a time (monotonic s)."""
+    """Return the value of a property of a unit that is a time (monotonic s)."""
     return int(shown(service, name)[name]) / 1e6
 
 
@@ -124,7 +124,7 @@ def keep(name: str, took_s: float) -> None:
 
 
 def cursor() -> str:
-    """Return the journal's end."""
+    """Return the journal's present end."""
     text = sh("journalctl", "-n", "0", "--show-cursor")
     return text.partition("-- cursor: ")[2].strip()
 
@@ -140,7 +140,8 @@ def _monotonic(after: str, service: str) -> tuple[str, ...]:
 
 
 def heard(after: str, service: str, pattern: str) -> float:
-    """Return when a service logged a line with this pattern after `after` (monotonic s)."""
+    """Return the time (monotonic s) at which a service logged this pattern, after the cursor
+    `after`."""
     words = ["journalctl", "--follow", "--no-tail", *_monotonic(after, service)]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as follows:
         late = Timer(LATE_S, follows.kill)
@@ -158,7 +159,7 @@ def heard(after: str, service: str, pattern: str) -> float:
 
 
 def enable(name: str) -> str:
-    """Make a service of one of our YAMLs; return its unit once the service is ready."""
+    """Enable the service of one of our YAMLs, wait until the service is ready, and return its unit."""
     sh("rmf-bridge", "enable", str(CONFIG / f"{name}.yaml"))
     until(lambda: is_active(unit(name)), f"{name} is ready")
     return unit(name)

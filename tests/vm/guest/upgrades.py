@@ -1,4 +1,5 @@
-"""Upgrades to another version: refused, with an adapter away, on a full disk, cut at any moment."""
+"""Upgrades to another version: refused, with a missing adapter, on a full disk, and with a power
+cut."""
 
 import os
 import random
@@ -25,22 +26,22 @@ from tests.vm.guest.wires import tell
 
 SERVICES = ("lift", "door", "charger", "lift_supervisor", "door_supervisor", "low")
 OFF_S, READY_S = 12.0, 20.0
-"""Limits in docs/explanation/reliability.md after a power cut, from the kernel's start."""
+"""Limits (s) in docs/explanation/reliability.md after a power cut, from the kernel's start."""
 YAML = Path("/etc/rmf-bridges/lift.yaml")
 CURRENT = Path("/usr/lib/rmf-bridges/current")
 NOT_OURS = ("/var/cache/", "/run/systemd/", "/var/tmp/systemd-private-")
 """Files of apt, and files that systemd keeps for a unit until the next boot."""
 UPGRADE_S = 45.0
-"""A cut comes within this time; an upgrade takes less time."""
+"""The power cut comes within this time (s). A whole upgrade takes less."""
 FORCE = ("dpkg", "--force-confold", "--install")
 BEFORE, NEXT = ".", "next"
 """The folders of both versions, among the packages."""
 TARGET = Path("/var/lib/checks-target")
-"""The file with the packages that were being installed when the power was cut."""
+"""The file with the packages whose installation the power cut interrupted."""
 
 
 def site() -> str:
-    """Lift, two doors, charger and both supervisors serve; relays of the lift and of a door are on."""
+    """Lift, two doors, charger and both supervisors serve. Relays of the lift and of a door are on."""
     enable("low")
     wait = [since_boot_s(unit(name), "ActiveEnterTimestampMonotonic") for name in SERVICES]
     send("door", "ward_door", "open", "--direct")
@@ -51,7 +52,8 @@ def site() -> str:
 
 
 def booted() -> str:
-    """The whole site is up again after a power cut: outputs off within 12 s, all ready within 20 s."""
+    """After a power cut the whole site returns: outputs are off within 12 s, all services ready within
+    20 s."""
     until(lambda: all(map(is_active, map(unit, SERVICES))), "every service is ready")
     first, on = _first_writes()
     ready = {n: since_boot_s(unit(n), "ActiveEnterTimestampMonotonic") for n in SERVICES}
@@ -66,9 +68,8 @@ def booted() -> str:
 
 
 def _first_writes() -> tuple[float, list[header.Write]]:
-    """Return the time of the first write of the last lift output, and the writes that switched an
-    output on.
-    """
+    """Return the time of the first write to the last lift output, and the writes that switched an
+    output on."""
     writes = [each for each in header.writes() if each.line in LIFT]
     if {each.line for each in writes} != LIFT.keys():
         raise Wrong(f"written: {writes}")
@@ -77,7 +78,7 @@ def _first_writes() -> tuple[float, list[header.Write]]:
 
 
 def _wires_back() -> None:
-    """Start the equipment at the wires again: the boot has ended it, as it runs in this machine."""
+    """Start the equipment at the wires again, because the boot has ended its process."""
     if not Path("/sys/class/net/vcan0").exists():
         sh("ip", "link", "add", "vcan0", "type", "vcan")
         sh("ip", "link", "set", "vcan0", "up")
@@ -97,18 +98,19 @@ def _states() -> str:
 
 
 def _is_whole() -> bool:
-    """Does dpkg have all packages installed, in one version?"""
+    """Return whether dpkg has all packages installed in one version."""
     states = set(_states().split(", "))
     return len(states) == 1 and states.pop().startswith("installed ")
 
 
 def _force(folder: str, fails: bool = False) -> str:
-    """Install the packages of this folder by dpkg alone, as after a cut; return dpkg's output."""
+    """Install the packages of this folder with dpkg alone, as after a power cut. Return dpkg's
+    output."""
     return sh(*FORCE, *map(str, debs(folder)), fails=fails)
 
 
 def _held() -> dict[int, bool]:
-    """Hold two relays on; the supervisor is stopped, because it would end an unknown session."""
+    """Hold two relays on. The supervisor is stopped, because it would end an unknown session."""
     sh("systemctl", "stop", unit("lift_supervisor"))
     return energise()
 
@@ -125,7 +127,7 @@ def _status() -> str:
 
 
 def refused() -> str:
-    """A YAML that the next version refuses: file and line are named, nothing else happens."""
+    """An upgrade that refuses a YAML names file and line, and changes nothing else."""
     old, tree, text = pid(unit("lift")), CURRENT.readlink(), YAML.read_text()
     YAML.write_text(text + "flors: [L1]\n")
     try:
@@ -143,7 +145,7 @@ def refused() -> str:
 
 
 def absent() -> str:
-    """After the YAML is mended, with an adapter away, `dpkg --configure -a` starts every service."""
+    """With a mended YAML and a missing adapter `dpkg --configure -a` starts every service."""
     tell("door", "fail ward_door server off")
     began = time.monotonic()
     told = sh("dpkg", "--configure", "-a")
@@ -159,7 +161,7 @@ def absent() -> str:
 
 
 def back() -> str:
-    """The version before is installed again, two relays on: off, and every service is back."""
+    """The earlier version is installed with two relays on. They go off, and every service returns."""
     relays, when = _held(), header.now()
     _force(BEFORE)
     sh("systemctl", "start", unit("lift_supervisor"))
@@ -171,7 +173,7 @@ def back() -> str:
 
 @contextmanager
 def _full() -> Iterator[None]:
-    """Fill the disk, also for root, during the block."""
+    """Fill the disk until the end of the block, also for root."""
     filler = Path("/var/filler")
     try:
         with filler.open("wb") as out:
@@ -185,11 +187,11 @@ def _full() -> Iterator[None]:
 
 
 def full_var() -> str:
-    """/var and its whole disk are full: `enable`, a ride and an upgrade leave all services running."""
+    """/var and its disk are full. `enable`, a ride and an upgrade leave all services running."""
     with _full():
         sh(
             "sh", "-c", f"rmf-bridge enable {YAML} || true"
-        )  # the room of its own record may suffice
+        )  # the room of its old record may suffice for `enable`
         until(lambda: is_active(unit("lift")), "the lift's service is back")
         energise()
         _status()
@@ -204,7 +206,7 @@ def full_var() -> str:
 
 
 def cut() -> str:
-    """(the power is cut at a random moment of an upgrade or of the way back)"""
+    """The power fails at a random moment of an upgrade or a downgrade."""
     target = debs((NEXT, BEFORE)[version().endswith(".1")])
     TARGET.write_text(" ".join(map(str, target)))
     _held()
@@ -219,9 +221,8 @@ def cut() -> str:
 
 
 def completed() -> str:
-    """After that cut: off at boot, all serve in one version; dpkg completes the other, and all
-    serve.
-    """
+    """After that power cut outputs are off at boot, and all services serve one version. dpkg completes
+    the other version, and all services serve."""
     moment = Path("/var/lib/checks-moment").read_text()
     until(lambda: all(map(is_active, map(unit, SERVICES))), "every service is ready")
     first, on = _first_writes()
@@ -245,7 +246,7 @@ def completed() -> str:
 
 
 def purged() -> str:
-    """`apt purge`: only the user and the groups of the package are left."""
+    """`apt purge` leaves only the user and the groups of the package."""
     sh("env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "purge", "--yes", *OURS)
     left = sh("find", "/etc", "/usr", "/var", "/run", "-xdev", "-name", "*rmf-bridge*").split()
     left = [name for name in left if not name.startswith(NOT_OURS)]

@@ -1,4 +1,4 @@
-"""A door on RS-485 and a charger on CAN: services whose relays lie at the far end of a wire."""
+"""A door on RS-485 and a charger on CAN. The relays of these services lie at the far end of a wire."""
 
 import json
 import socket
@@ -27,13 +27,13 @@ KILLED_S: Final = 2.0
 
 
 def door_service() -> str:
-    """`rmf-bridge enable` for a door on RS-485, whose port is a pseudo-terminal."""
+    """`rmf-bridge enable` starts a door on RS-485 whose port is a pseudo-terminal."""
     far_side("door")
     return f"ready after {ready_s(enable('door')):.2f} s"
 
 
 def door() -> str:
-    """A door on RS-485 is held open, and closes."""
+    """A request holds a door on RS-485 open, and another request closes the door."""
     began = time.monotonic()
     send("door", "ward_door", "open", "--direct")
     opened = time.monotonic() - began
@@ -42,13 +42,13 @@ def door() -> str:
 
 
 def door_killed() -> str:
-    """kill -9 of a door's service while a relay on RS-485 is on: off at the module."""
+    """After kill -9 of a door's service the relay at the RS-485 module goes off."""
     send("door", "ward_door", "open", "--direct")
     return _killed("door")
 
 
 def adapter_pulled() -> str:
-    """The RS-485 adapter is pulled out and plugged in again: a fault comes and ends."""
+    """A fault comes when the RS-485 adapter is pulled out, and ends when the adapter is plugged in."""
     return _fault_ends(
         "door ward_door usb-rs485",
         lambda: tell("door", "fail ward_door server off"),
@@ -57,7 +57,7 @@ def adapter_pulled() -> str:
 
 
 def charger_service() -> str:
-    """`rmf-bridge enable` for a charger on SocketCAN."""
+    """`rmf-bridge enable` starts a charger on SocketCAN."""
     sh("ip", "link", "add", "vcan0", "type", "vcan")
     sh("ip", "link", "set", "vcan0", "up")
     far_side("charger")
@@ -65,7 +65,7 @@ def charger_service() -> str:
 
 
 def charge() -> str:
-    """A robot is charged on SocketCAN, and the charge is cancelled."""
+    """A robot charges on SocketCAN, and a cancel ends the charge."""
     _charge("vm-1")
     mark = cursor()
     send("charger", "charger_b", "--cancel", "vm-1")
@@ -82,13 +82,14 @@ def _charge(request: str) -> None:
 
 
 def charger_killed() -> str:
-    """kill -9 of a charger's service during a charge on CAN: the receiver is told to stop."""
+    """After kill -9 of a charger's service in a charge the CAN receiver gets the command to stop."""
     _charge("vm-2")
     return _killed("charger")
 
 
 def interface_down() -> str:
-    """CAN's interface goes down and comes back: a fault that names the interface comes and ends."""
+    """A fault names the CAN interface when the interface goes down, and ends when the interface is
+    up."""
     return _fault_ends(
         "charger charger_b vcan0",
         lambda: sh("ip", "link", "set", "vcan0", "down"),
@@ -97,7 +98,8 @@ def interface_down() -> str:
 
 
 def bus_off() -> str:
-    """CAN's controller reports bus-off and its end: a fault that names bus-off comes and ends."""
+    """A fault names bus-off when the CAN controller reports bus-off, and ends when the controller
+    recovers."""
     return _fault_ends(
         "charger charger_b bus-off",
         lambda: tell("charger", "fail charger_b bus wrong"),
@@ -106,8 +108,9 @@ def bus_off() -> str:
 
 
 def _fault_ends(what: str, breaks: Callable[[], object], mends: Callable[[], object]) -> str:
-    """Break a wire and mend it; the fault must come and end. `what`: service, device, a word of the
-    fault.
+    """Break a wire and mend it. The fault must come and end.
+
+    `what` names the service, the device, and a word of the fault.
     """
     name, device, word = what.split()
     mark, began = cursor(), time.monotonic()
@@ -131,7 +134,7 @@ def _killed(name: str) -> str:
 
 
 def _relay_off_at(name: str, act: Callable[[], object]) -> float:
-    """Return the time (monotonic s) at which a relay of this far side goes off after `act`."""
+    """Return the time (monotonic s) at which `act` made a relay of this far side go off."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as control, control.makefile() as lines:
         control.settimeout(LATE_S)
         control.connect(f"/run/far-{name}")

@@ -1,4 +1,4 @@
-"""Changes around a service: its file, its disks, its clock, the model of the Pi."""
+"""Changes around a service: its YAML, its disks, its clock, the model of the Pi."""
 
 import os
 import re
@@ -14,19 +14,20 @@ from tests.vm.guest.system import Wrong, back, far_side, is_active, kill, pid, s
 SERVICE = unit("lift")
 YAML = Path("/etc/rmf-bridges/lift.yaml")
 MOVED = {"BCM18": "BCM25", "BCM16": "BCM26"}
-"""Pins of the outputs that a session holds -> free pins."""
+"""Pins of the outputs that a session holds, each with a free pin."""
 EVENT = re.compile(r"[a-z_]+( [a-z_]+=\S|$)")
 SYSRQ = Path("/proc/sysrq-trigger")
 STEPS = (10, -20, 10)
-"""Years by which the clock steps: ten ahead, then ten behind, then right again."""
+"""Steps of the clock (years): ten ahead, then ten behind, then right again."""
 MEANWHILE_S = 12.0
-"""Longer than the watchdog's time and a node's lease, so that a sleep by the wall clock is noticed."""
+"""A time (s) above the watchdog's and a node's lease, so that a sleep by the wall clock shows
+itself."""
 HEARD_S = 20.0
-"""Latest effect of a request after a step; 5 s of this time are the ride."""
+"""The latest effect (s) of a request after a step. The ride takes 5 s of this time."""
 
 
 def edited_yaml() -> str:
-    """The YAML gets other pins while two relays are on, then kill -9: the old pins go off."""
+    """The YAML gets other pins when two relays are on. After kill -9 the old pins go off."""
     relays, old, text = energise(), pid(SERVICE), YAML.read_text()
     YAML.write_text(re.sub("|".join(MOVED), lambda found: MOVED[found[0]], text))
     when = header.now()
@@ -44,9 +45,7 @@ def edited_yaml() -> str:
 
 
 def full_run() -> str:
-    """/run is full, two relays are on, kill -9: off; the service is back when there is room, or
-    before.
-    """
+    """/run is full and two relays are on. After kill -9 the relays go off, and the service returns."""
     relays, old = energise(), pid(SERVICE)
     filler = Path("/run/filler")
     with filler.open("wb") as out:
@@ -65,7 +64,8 @@ def full_run() -> str:
 
 
 def clock() -> str:
-    """The clock steps by ten years, forth and back: two relays stay on, and requests are fulfilled."""
+    """The clock steps by ten years, forth and back. Two relays stay on, and the service fulfils
+    requests."""
     relays, old, waits = energise(), pid(SERVICE), []
     for years, floor in zip(STEPS, ("L3", "L1", "L3"), strict=True):
         when = header.now()
@@ -79,9 +79,8 @@ def clock() -> str:
 
 
 def _goes_to(floor: str) -> float:
-    """Return how long a new node's request takes to have its effect, with the session's relays on
-    (s).
-    """
+    """Return the time (s) until a new node's request takes effect. The session's relays must stay
+    on."""
     began = header.now()
     send("lift", "Lift1", floor, "--session", "vm/robot", "--direct")
     took = header.now() - began
@@ -91,10 +90,11 @@ def _goes_to(floor: str) -> float:
 
 
 def read_only_root() -> str:
-    """The root file system is read only: the service starts, serves, dies, and is off."""
+    """With a read-only root file system the service starts and serves, and after its death outputs are
+    off."""
     sh("systemctl", "stop", SERVICE)
     sh("journalctl", "--relinquish-var")
-    SYSRQ.write_text("u")  # remounts read only, as the kernel does for a damaged disk
+    SYSRQ.write_text("u")  # remounts the root read only, as the kernel does for a damaged disk
     until(lambda: "ro" in _options("/"), "the root is read only")
     try:
         sh("systemctl", "start", SERVICE)
@@ -116,9 +116,9 @@ def _options(mount: str) -> set[str]:
 
 
 def labels() -> str:
-    """The header's chip is found by its label: Raspberry Pi 3, 5 and 4."""
+    """The service finds the header's chip by its label on Raspberry Pi 3, 5 and 4."""
     sh("systemctl", "stop", SERVICE, "far-lift.service")
-    for label in header.LABELS:  # the last label is the label of the other checks
+    for label in header.LABELS:  # the other checks use the last label
         header.unplug()
         header.plug(label)
         sh("udevadm", "settle")

@@ -1,1 +1,1 @@
-"""A helper module of a bus's file, and no bus itself."""
+"""A helper module beside the buses. It is no bus."""

@@ -1,4 +1,4 @@
-"""A bus whose points have names in words; a table shows them as written."""
+"""A bus whose points have names in words. A table shows these names unchanged."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""Pins A0 to A9, also called 0A to 9A; A9 has no pull, A8 is an input."""
+"""A bus with the pins A0 to A9, also called 0A to 9A. A9 has no pull, and A8 is an input."""
 
 import re
 from collections.abc import Iterable

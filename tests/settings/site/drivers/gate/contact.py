@@ -1,4 +1,4 @@
-"""A driver with wires, and with every type of field that a struct may have."""
+"""A driver with wires. Its structs have every type of field that a struct may have."""
 
 from enum import Enum
 from typing import Annotated, Literal
@@ -23,7 +23,7 @@ class Side(Enum):
 
 
 class Lane(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One lane that needs more than a name."""
+    """A lane with its own required fields."""
 
     side: Side = Side.LEFT
     heights: tuple[Annotated[float, Meta(gt=0, lt=5, extra={"unit": "m"})], ...] = ()
@@ -42,7 +42,7 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     label: Annotated[str, Meta(pattern="^[a-z]+$", extra={"pattern": "a small word"})] | int = 0
 
     def problems(self) -> Remarks:
-        """Yield problems that concern several fields together."""
+        """Yield problems between several fields."""
         if self.close_s is not None and self.close_s > self.open_s:
             yield ("close_s",), "'close_s' may not be longer than 'open_s'"
 
