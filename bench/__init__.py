@@ -1,1 +1,1 @@
-"""Benchmarks: the daemons' cost as a ratio to a bare transport node's cost, in the same run."""
+"""Benchmarks: the daemons' cost divided by a bare transport node's cost in the same run."""

@@ -1,7 +1,7 @@
 """`make bench`: latency and memory of the daemons compared with a bare transport node, in one run.
 
 Everything runs on loopback, on fake hardware, in processes of its own. The tables go to stdout, the
-figures to bench/results/bench.json. To run only some parts: `python -m bench idle buses`.
+figures to bench/results/bench.json. `python -m bench idle buses` runs only these two parts.
 """
 
 import json
@@ -30,7 +30,7 @@ SECTIONS = {
 
 
 def main(words: list[str]) -> int:
-    """Measure, print, write."""
+    """Measure, print the tables, and write the figures."""
     parser = ArgumentParser(
         prog="python -m bench", description="Parts to measure; without parts, all."
     )

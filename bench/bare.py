@@ -1,4 +1,4 @@
-"""The baseline: a transport node that only answers, run as a separate process."""
+"""The baseline: a transport node that only answers, in a separate process."""
 
 import signal
 import sys

@@ -1,7 +1,7 @@
-"""A door behind an MQTT broker compared with the same door on Modbus TCP: a command's time, and memory.
+"""A door behind an MQTT broker and the same door on Modbus TCP: a command's time, and memory.
 
-The two daemons run side by side and get their requests in turn. The time is from RMF's request to the
-edge of the far side's relay. On MQTT it includes the way through the broker, mosquitto.
+The two daemons run side by side and get their requests in turn. The time begins at RMF's request and
+ends at the edge of the far side's relay. On MQTT the way leads through the broker, mosquitto.
 """
 
 import subprocess
@@ -24,7 +24,7 @@ LIMITS = {"limits": {"close_grace_s": 0, "stale_after_s": 30}}
 
 
 def measure(scratch: Path) -> Tables:
-    """Measure; the rows name the bus."""
+    """Return the tables, with a row for each bus."""
     on_modbus = doors(1)
     on_modbus["doors"] = {"modbus": {**on_modbus["doors"]["door_1"], **LIMITS}}
     on_mqtt = shipped("door_mqtt")
@@ -39,7 +39,7 @@ def measure(scratch: Path) -> Tables:
             plants[name] = open_ends.enter_context(Caller(scratch / name / "plant.sock"))
             plants[name].order("follow")
             pids[name] = child.pid
-        time.sleep(1.0)  # the requests' reader may not have matched yet
+        time.sleep(1.0)  # the daemon's reader may not have matched yet
         for _ in range(WARM_UP + ROUNDS):
             for name, plant in plants.items():
                 found[name].append(_held(requests, name, plant))
@@ -55,7 +55,7 @@ def _door(
 
 
 def _held(requests: Publisher[DoorRequest], name: str, plant: Caller) -> float:
-    """Return the seconds from a request to the relay that holds the door; release the door again."""
+    """Return the seconds from a request to the relay that holds the door. Release the door again."""
     sent_at = time.monotonic()
     _request(requests, name, DoorModeValue.MODE_OPEN)
     took = plant.edge("hold_open", True) - sent_at

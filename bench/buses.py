@@ -1,6 +1,5 @@
-"""The limits of buses: a serial line of doors, many doors on TCP with a dead door, HTTP chargers of
-which some are bad, and a full CAN bus. Each bus is compared with its theoretical least time.
-"""
+"""The limits of buses. One serial line has many doors; TCP has many doors with a dead one among them;
+some HTTP chargers are bad; a CAN bus is full. Each bus is compared with its theoretical least time."""
 
 import statistics
 import threading
@@ -31,7 +30,7 @@ from hal_fakes.simulate import Simulation
 
 
 def measure(scratch: Path) -> Tables:
-    """Measure; return a table for each bus."""
+    """Return a table for each bus."""
     return {
         "8 doors at 19200 baud": _serial(scratch),
         "states of doors on one TCP gateway": _many_doors(scratch),
@@ -59,14 +58,17 @@ CYCLES: Final = 60
 WARM_UP: Final = 3
 REQUEST: Final = 8
 REPLY: Final = 6
-"""Characters in a request for bits, and in a reply with up to eight bits, including unit and CRC."""
+"""REQUEST and REPLY count the characters of a request for bits and of its reply, with unit and CRC."""
 READINGS: Final = 2
-"""A door's coil and inputs."""
+"""The number of readings of a door: its coil and its inputs."""
 
 
 def _serial(scratch: Path) -> Rows:
-    """Compute the wire's time: every character, and 3.5 characters of silence before each frame."""
-    daemon(doors(POLLED, LINE), scratch / "serial")  # writes the file
+    """Compare a poll cycle with the wire's least time.
+
+    The wire carries every character, and 3.5 characters of silence before each frame.
+    """
+    daemon(doors(POLLED, LINE), scratch / "serial")  # writes the YAML
     config = load(scratch / "serial.yaml")
     serial = config.buses["line"].serial
     exchange_s = (REQUEST + REPLY) * serial.character_s + 2 * serial.gap_s
@@ -96,7 +98,7 @@ def _cycles(config: Config, scratch: Path) -> list[float]:
     return times[WARM_UP:]
 
 
-# ---- many doors on TCP: the states' ages for a subscriber, and the time between a door's states
+# ---- many doors on TCP: the states' age at a subscriber, and the time between a door's states
 
 WATCHED_S: Final = 20.0
 MANY: Final = 200
@@ -105,7 +107,7 @@ States = dict[str, list[tuple[float, DoorState]]]
 
 
 def _many_doors(scratch: Path) -> Rows:
-    """Poll each door every 0.1 s; each door's state comes each second."""
+    """Poll each door every 0.1 s. Each door's state comes each second."""
     with _doors(scratch, MANY):
         many = _ages(_door_states())
     with _doors(scratch, DEAD_OF) as plant:
@@ -127,7 +129,7 @@ def _doors(scratch: Path, many: int) -> Iterator[Caller]:
 
 
 def _door_states() -> States:
-    """Collect this time's states: (wall time of arrival, state), by door."""
+    """Return (wall time of arrival, state) of the states heard in the measured time, by door."""
     seen: States = defaultdict(list)
     with graph() as transport:
         transport.subscribe(
@@ -156,7 +158,7 @@ LOOK_S: Final = 0.02
 
 
 class Known:
-    """Charger -> wall time (s) of its last known reading; any thread may note."""
+    """The wall time (s) of each charger's last known reading. Any thread may add a reading."""
 
     def __init__(self) -> None:
         self.read_at: dict[int, float] = {}
@@ -167,8 +169,10 @@ class Known:
 
 
 def _bad_chargers(scratch: Path) -> Rows:
-    """Measure our daemon and, on the same servers at the same time, a naive loop: `requests.get` for
-    each charger in turn, each second, with a timeout that applies to each read.
+    """Measure our daemon, and at the same time a naive loop on the same servers.
+
+    The naive loop calls `requests.get` for each charger in turn, each second. Its timeout applies to
+    each read.
     """
     rmf, plain, done = Known(), Known(), threading.Event()
     with http_chargers(SOUND, DEAD, TRICKLING) as ports, graph() as transport:
@@ -187,7 +191,7 @@ def _bad_chargers(scratch: Path) -> Rows:
 
 
 def _mixed(ports: Sequence[int]) -> list[int]:
-    """Spread the bad chargers among the sound chargers."""
+    """Return the ports in an order that spreads the bad chargers among the sound chargers."""
     bad, sound = list(ports[SOUND:]), list(ports[:SOUND])
     every = len(ports) // len(bad)
     mixed = [
@@ -212,7 +216,7 @@ def _sequential(ports: Sequence[int], known: Known, done: threading.Event) -> No
 
 
 def _known_ages(chargers: Sequence[int], knowns: dict[str, Known]) -> Rows:
-    """Sample the ages of the known readings of these chargers, in poll periods."""
+    """Return the ages of the known readings of these chargers, in poll periods."""
     never = time.time() - SETTLE_S
     ages: dict[str, list[float]] = {name: [] for name in knowns}
     for _ in range(round(1.5 * WATCHED_S / LOOK_S)):
@@ -231,11 +235,11 @@ LASTS_S: Final = 10.0
 BATCH_S: Final = 0.005
 SCAN_S: Final = 0.2
 OURS: Final = (0x58A, 0x70A, 0x123, 0x321)
-"""Ids of every second frame; the other frames are foreign."""
+"""Ids of every second frame. The other frames belong to other devices."""
 
 
 def _flooded(read: Callable[[str, threading.Event, list[int]], float]) -> Row:
-    """Send frames at a full bus's pace; count the wanted frames at a reader."""
+    """Send frames at a full bus's pace, and count the wanted frames at a reader."""
     channel = f"bench-{read.__name__}"
     ended, heard, seconds = threading.Event(), [0], list[float]()
     reader = threading.Thread(target=lambda: seconds.append(read(channel, ended, heard)))
@@ -253,7 +257,7 @@ def _flooded(read: Callable[[str, threading.Event, list[int]], float]) -> Row:
 
 
 def _send(channel: str) -> tuple[int, float]:
-    """Send paced frames; return their number and the seconds taken."""
+    """Send frames at a fixed pace. Return their number, and the seconds taken."""
     bus = can.Bus(channel, interface="virtual")
     begun_at = time.monotonic()
     sent = 0
@@ -282,7 +286,7 @@ def _bare_can(channel: str, ended: threading.Event, heard: list[int]) -> float:
 
 
 def _our_can(channel: str, ended: threading.Event, heard: list[int]) -> float:
-    """Return the CPU seconds of our bus, with four ids wanted."""
+    """Return the CPU seconds of our bus when a driver wants four ids."""
     settings = CanSettings(socketcan="can0", scan_s=SCAN_S)
     bus = CanBus(settings, vendor=lambda: can.Bus(channel, interface="virtual"))
 

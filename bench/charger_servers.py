@@ -16,7 +16,7 @@ from typing import Any, Final
 BODY: Final = b'{"state": 0, "error_msg": ""}'
 HEAD: Final = b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n"
 TRICKLE_S: Final = 0.25
-"""Seconds between two bytes: shorter than any timeout for one read."""
+"""Seconds between two bytes, less than any timeout for one read."""
 
 
 PERIOD_S: Final = 1.0
@@ -26,7 +26,7 @@ CODES: Final = {"idle": [0], "charging": [5], "error": [8]}
 
 @contextmanager
 def http_chargers(sound: int, dead: int = 0, trickling: int = 0) -> Iterator[list[int]]:
-    """Serve these numbers of chargers; yield their ports."""
+    """Serve these numbers of chargers, and yield their ports."""
     counts = [str(count) for count in (sound, dead, trickling)]
     command = [sys.executable, "-m", "bench.charger_servers", *counts]
     far = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
@@ -41,7 +41,7 @@ def http_chargers(sound: int, dead: int = 0, trickling: int = 0) -> Iterator[lis
 
 
 def chargers_at(ports: Sequence[int]) -> dict[str, Any]:
-    """Return a daemon's YAML: a bus and a charger at each port."""
+    """Return a daemon's YAML with a bus and a charger for each port."""
     settings = {"type": "http", "timeout_s": TIMEOUT_S, "scan_s": PERIOD_S}
     return {
         "kind": "charger",
@@ -57,7 +57,7 @@ def chargers_at(ports: Sequence[int]) -> dict[str, Any]:
 
 
 async def _sound(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """Answer at once, on a kept connection."""
+    """Answer each request at once, on a kept connection."""
     with contextlib.suppress(OSError, asyncio.IncompleteReadError):
         while await reader.readuntil(b"\r\n\r\n"):
             writer.write(HEAD % len(BODY) + BODY)
@@ -74,7 +74,7 @@ async def _dead(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> N
 
 
 async def _trickling(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """Send one byte now and then."""
+    """Send one byte every TRICKLE_S."""
     with contextlib.suppress(OSError, asyncio.IncompleteReadError):
         await reader.readuntil(b"\r\n\r\n")
         for byte in HEAD % len(BODY) + BODY:

@@ -1,4 +1,4 @@
-"""Start and stop the measured processes, talk to them, and measure their cost."""
+"""Starts and stops the measured processes, talks to them, and measures their cost."""
 
 import os
 import signal
@@ -29,7 +29,7 @@ SETTLE_S = 3.0
 
 @contextmanager
 def graph(speaks: Wire = "dds") -> Iterator[Transport]:
-    """Join the daemons' graph with this process."""
+    """Join the daemons' graph with this process, and yield the transport."""
     rmf = Rmf(transport=speaks, domain_id=DOMAIN)
     transport = open_transport(rmf, "bench", localhost=True)
     try:
@@ -40,7 +40,7 @@ def graph(speaks: Wire = "dds") -> Iterator[Transport]:
 
 @contextmanager
 def running(command: list[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """Run a process; end it by SIGTERM."""
+    """Run a process until the end of the block, and end it with SIGTERM."""
     with log.open("wb") as out:
         pipe = subprocess.PIPE
         child = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=out)
@@ -59,7 +59,7 @@ def running(command: list[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def shipped(name: str) -> Content:
-    """Read an example of `config/`."""
+    """Return the content of an example of `config/`."""
     content: Content = yaml.safe_load((ROOT / f"config/{name}.yaml").read_text())
     return content
 
@@ -67,7 +67,7 @@ def shipped(name: str) -> Content:
 def daemon(
     content: Content, directory: Path, transport: str = "dds", *, simulate: bool = True
 ) -> list[str]:
-    """Return a daemon's command; this transport and loopback replace the YAML's."""
+    """Return a daemon's command. This transport and loopback replace those of the YAML."""
     file = directory.with_suffix(".yaml")
     rmf = {"transport": transport, "network": "localhost"}
     file.write_text(yaml.safe_dump({**content, "rmf": rmf}, sort_keys=False))
@@ -78,7 +78,7 @@ def daemon(
 
 @contextmanager
 def ready(command: list[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """Run a process; yield it once its log says that it is ready."""
+    """Run a process, and yield it when its log says that it is ready."""
     with running(command, log) as child:
         wait_for_log(log, "ready")
         yield child
@@ -94,7 +94,7 @@ def wait_for_log(log: Path, word: str, deadline_s: float = 20.0) -> None:
 
 
 def cost(command: list[str], log: Path, watched_s: float = 10.0) -> Row:
-    """Measure an idle process: memory, threads, CPU, time to be ready."""
+    """Return the cost of an idle process: memory, threads, CPU, and the time to be ready."""
     started_at = time.monotonic()
     with ready(command, log) as child:
         ready_s = time.monotonic() - started_at
@@ -103,7 +103,7 @@ def cost(command: list[str], log: Path, watched_s: float = 10.0) -> Row:
 
 
 def cost_of(pid: int, watched_s: float) -> Row:
-    """Measure the cost of a process from now on."""
+    """Return the cost of a process over the next `watched_s` seconds."""
     before_s = cpu_s(pid)
     time.sleep(watched_s)
     used_s = cpu_s(pid) - before_s

@@ -1,4 +1,4 @@
-"""The time of a simulated day: two robots ride two lifts all day, through our supervisor."""
+"""The real time of a simulated day, in which two robots ride two lifts through our supervisor."""
 
 import time
 from pathlib import Path
@@ -13,13 +13,13 @@ DAY_S = 86400.0
 
 
 def measure(scratch: Path) -> Tables:
-    """Return the real seconds taken, and the rides."""
+    """Return the real seconds of the day, and the number of rides."""
     began = time.perf_counter()
     world = World()
     for name in ("Lift1", "Lift2"):
         _Lift(world, name)
     OurSupervisor(world)
-    trips = [("L1", "L3"), ("L3", "L1")] * 2000  # more than fit into a day
+    trips = [("L1", "L3"), ("L3", "L1")] * 2000  # more trips than fit into a day
     robots = [_Rider(world, f"fleet/{name}", *trips) for name in ("a", "b")]
     while world.now < DAY_S:
         world.run(min(world.now + 3600.0, DAY_S))
@@ -30,11 +30,11 @@ def measure(scratch: Path) -> Tables:
 
 
 class _Lift(LiftNode):
-    SCAN_S = 0.9  # and at every wake_at, request and edge; between those nothing can change
+    SCAN_S = 0.9  # also at every wake_at, request and edge; in between nothing can change
 
 
 class _Rider(Rider):
-    """Rides the two lifts in turn, and is busy for a minute between rides."""
+    """A robot that rides the two lifts in turn, and is busy for a minute between rides."""
 
     REST_S = 60.0
 

@@ -1,7 +1,7 @@
-"""A day's recording of a busy lift, explained: seconds of CPU and memory, in a process of its own.
+"""The explanation of a busy lift's day: CPU (s) and memory in a process of its own.
 
-86,400 s and 4,000 rides of two robots, with states, requests, the supervisor's repeats and diagnostics
-at 1 Hz. Writing the file is not measured.
+The recording has 86,400 s and 4,000 rides of two robots, with states, requests, the supervisor's
+repeats and diagnostics at 1 Hz. The time to write the file does not count.
 """
 
 import json
@@ -29,7 +29,7 @@ VALUES = ("mode", "floor", "door", "motion", "session", "boarded", "destination"
 
 
 def measure(scratch: Path) -> dict[str, Any]:
-    """Explain the day in a process of its own."""
+    """Return the figures of a process that explains the day."""
     from tests.workbench.replay.written import write
 
     bag = write(scratch / "day", day(), NEWEST)
@@ -47,7 +47,7 @@ def measure(scratch: Path) -> dict[str, Any]:
 
 
 def day() -> Iterator[Heard]:
-    """Return the messages heard in the day."""
+    """Yield the messages of the day."""
     every = DAY_S / RIDES
     for second in range(DAY_S):
         ride, at = divmod(second, every)
@@ -86,7 +86,7 @@ def _heard(second: int, part: float, topic: str, message: d.Message) -> Heard:
 
 
 def main(bag: Path) -> None:
-    """Explain, and print figures as JSON."""
+    """Explain the day, and print figures as JSON."""
     from workbench.explain.heard_devices import HeardDevices
     from workbench.replay.recordings import RecordingSpan, told_between
 

@@ -33,7 +33,7 @@ def each_more(rows: Rows, counts: Sequence[int]) -> Row:
 
 
 def lines(title: str, rows: Rows) -> list[str]:
-    """Format a table."""
+    """Return the lines of a table."""
     headings = list(dict.fromkeys(heading for row in rows.values() for heading in row))
     table = [f"{title:34}" + "".join(f"{heading:>12}" for heading in headings)]
     for name, row in rows.items():

@@ -1,4 +1,4 @@
-"""The cost of idle daemons compared with a bare transport node, and of each further device."""
+"""The cost of idle daemons compared with a bare transport node, and the cost of each further device."""
 
 from itertools import count
 from pathlib import Path
@@ -14,9 +14,8 @@ SLCAN = {"port": "/dev/serial/by-id/simulated", "bitrate": 250000}
 
 
 def measure(scratch: Path) -> Tables:
-    """Measure the bare node on each wire, a lift on zenoh, the shipped devices, and many devices of
-    each kind on dds.
-    """
+    """Measure a bare node on each wire, a lift on zenoh, and the shipped devices. Then measure many
+    devices of each kind on dds."""
     one = {f"bare node on {wire}": cost([*BARE, wire], scratch / f"{wire}.log") for wire in WIRES}
     lift = daemon(shipped("lift_dry_contact"), scratch / "on_zenoh", "zenoh")
     one["lift_dry_contact on zenoh"] = cost(lift, scratch / "on_zenoh.log")
@@ -42,7 +41,8 @@ def _many(scratch: Path, name: str, contents: dict[int, Content]) -> Rows:
 
 
 def _http(scratch: Path) -> Rows:
-    """Measure HTTP chargers. Their servers are a separate process, so they cost the daemon nothing."""
+    """Measure HTTP chargers. Their servers run in a separate process, and so cost the daemon
+    nothing."""
     rows: Rows = {}
     for n in HTTP_CHARGERS:
         with http_chargers(n) as ports:
@@ -51,7 +51,7 @@ def _http(scratch: Path) -> Rows:
 
 
 def lifts(many: int) -> Content:
-    """Return this number of the shipped lift, each on its own Modbus module."""
+    """Return a YAML with this number of the shipped lift, each on its own Modbus module."""
     content = shipped("lift_dry_contact")
     one = content["lifts"]["Lift1"]
     lifts = {f"Lift{unit}": _on_module(one, unit) for unit in range(1, many + 1)}
@@ -75,7 +75,7 @@ def _on_module(lift: Any, unit: int) -> Any:
 
 
 def doors(many: int, bus: Content = TCP) -> Content:
-    """Return doors with two limit switches and a relay; each door is a unit on one line."""
+    """Return a YAML of doors with two limit switches and a relay. Each door is a unit on one line."""
     return {
         "kind": "door",
         "driver": "dry_contact",
@@ -93,7 +93,7 @@ def _door(unit: int) -> Content:
 
 
 def canopen(many: int) -> Content:
-    """Return CANopen receivers on one simulated adapter."""
+    """Return a YAML of CANopen receivers on one simulated adapter."""
     return {
         "kind": "charger",
         "driver": "canopen",

@@ -1,8 +1,7 @@
-"""The times from request to relay, input to RMF, and hazard to all outputs off, compared with a bare
-round trip and a bare edge callback; with ROS 2 installed, also compared with a bare rclpy node.
+"""Three times: request to relay, input to RMF, and hazard to all outputs off.
 
-The far end, which sends and measures the times, is the same for each path: on `dds`, with the least
-cost.
+A bare round trip and a bare edge callback are the baseline. With ROS 2 installed a bare rclpy node is
+one more baseline. The same far end sends and measures for each path. It uses `dds`, which costs least.
 """
 
 import queue
@@ -42,13 +41,13 @@ ROUNDS = 300
 HAZARDS = 100
 WARM_UP = 20
 PAUSE_S = 0.12
-"""Pause (s) between all rounds: a daemon sends ten states a second at most, and idle CPUs sleep."""
+"""Pause (s) between rounds. A daemon sends at most ten states a second, and idle CPUs sleep."""
 MINIMAL = [sys.executable, "-m", "bench.minimal_ros", str(DOMAIN)]
 Times = list[float]
 
 
 def measure(scratch: Path) -> Tables:
-    """Return milliseconds, p50 and p99, of each path."""
+    """Return the milliseconds of each path, p50 and p99."""
     latencies: Rows = {}
     for wire in reversed(WIRES):  # the hazard's figures are those of the last wire, dds
         round_trips = _bare_round_trips(scratch, wire)
@@ -87,7 +86,7 @@ def _with_ros(scratch: Path) -> Tables:
 
 
 class Graph:
-    """This process's end of the graph: sends LiftRequests, and times the LiftStates received."""
+    """This process's end of the graph. It sends LiftRequests, and times the LiftStates received."""
 
     def __init__(self, transport: Transport) -> None:
         self._requests = transport.publisher(LIFT_REQUESTS)
@@ -98,7 +97,7 @@ class Graph:
         time.sleep(0.5)  # the other side may not have matched yet
 
     def send(self, session: str, request_type: LiftRequestType, floor: str) -> float:
-        """Publish a request; return the time (monotonic s)."""
+        """Publish a request, and return the time (monotonic s)."""
         at = time.monotonic()
         self._requests.publish(
             LiftRequest(
@@ -112,7 +111,7 @@ class Graph:
         return at
 
     def state(self, since: float, true: Callable[[LiftState], bool]) -> float:
-        """Return when (monotonic s) the first state after `since` arrived for which `true` holds."""
+        """Return the arrival (monotonic s) of the first state after `since` that fulfils `true`."""
         while True:
             at, state = self._states.get(timeout=10.0)
             if at > since and true(state):
@@ -137,7 +136,7 @@ def _round_trip(far: Graph) -> float:
 
 
 def _quick_lift() -> Content:
-    """Return the shipped lift without deliberate delays, so only the path is measured."""
+    """Return the shipped lift without deliberate delays, so that only the path counts."""
     content = shipped("lift_dry_contact")
     lift = content["lifts"]["Lift1"]
     for contact in _contacts(lift["inputs"]):
@@ -157,9 +156,9 @@ def _contacts(part: Any) -> list[dict[str, Any]]:
 def daemon_paths(
     scratch: Path, transport: str, ours: Wire = "dds", *, keep: str = ""
 ) -> tuple[Times, Times, Times, float]:
-    """Return seconds from request to relay, edge to RMF and hazard to all off, and memory (MB).
+    """Return the seconds from request to relay, edge to RMF and hazard to all off, and the memory (MB).
 
-    `ours`: the wire of this end. `keep`: the setting for recording; without it the default.
+    `ours` is the wire of this end. `keep` is the setting for recording, or "" for the default.
     """
     directory = scratch / f"quick_{transport}{keep}"
     recording = {"recording": {"keep": keep}} if keep else {}
@@ -201,7 +200,7 @@ def _to_outputs_off(far: Graph, plant: Caller, hand: Caller) -> float:
     hand.order("press Lift1 fire_alarm on")
     at = plant.edge("fire_alarm", True)
     took = plant.edge("agv_mode_request", False) - at
-    # During the fire: a session that survived the fire would switch its relay on again at once.
+    # End the session during the fire. If it survived the fire, it would switch its relay on again.
     ended_at = far.send("bench", LiftRequestType.REQUEST_END_SESSION, "")
     far.state(ended_at, lambda state: not state.session_id)
     hand.order("press Lift1 fire_alarm off")
@@ -211,8 +210,8 @@ def _to_outputs_off(far: Graph, plant: Caller, hand: Caller) -> float:
 
 
 def _bare_callbacks(scratch: Path) -> Times:
-    """Measure from the contact to gpiozero's callback, in an otherwise idle process."""
-    daemon(_quick_lift(), scratch / "callbacks")  # writes the file
+    """Return the times from the contact to gpiozero's callback, in an otherwise idle process."""
+    daemon(_quick_lift(), scratch / "callbacks")  # writes the YAML
     settings = load(scratch / "callbacks.yaml").devices["Lift1"]
     assert isinstance(settings, DryContactLiftSettings)
     plant = build("Lift1", settings)

@@ -1,7 +1,8 @@
-"""The baseline on ROS: an rclpy node that only sets a pin, run as a separate process.
+"""The baseline on ROS: an rclpy node that only sets a pin, in a separate process.
 
-A LiftRequest switches the pin. `on` and `off` on stdin switch an input, and its edge is published as a
-LiftState. Each edge is a line on stdout: signal, level, time (monotonic s).
+A LiftRequest switches the pin. `on` and `off` on stdin switch an input, and the node publishes each
+edge of the input as a LiftState. Each edge also gives a line on stdout: signal, level, time (monotonic
+s).
 """
 
 import os

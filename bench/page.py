@@ -1,13 +1,13 @@
-"""The page with 50 lifts, 200 doors and 50 chargers at 1 Hz, looked at by three real browsers.
+"""The page with 50 lifts, 200 doors and 50 chargers at 1 Hz, shown by three real browsers.
 
-A lift's session contains the time of publishing; a script in each browser notes the time on screen. `a
-tenth changes`: as on a busy site. `all change`: every card changes each second. Each device's daemon
-publishes its diagnostics too.
+A lift's session holds the time of publishing. A script in each browser notes the time on screen. The
+row `a tenth changes` is like a busy site. In the row `all change` every card changes each second. Each
+device's daemon publishes its diagnostics too.
 
-`an hour` (only with BENCH_PAGE_HOUR_S=N, for N seconds): every half minute the memory of the page, and
-after a garbage collection the memory of two browsers, which show the site and a device. The first ten
-minutes do not count, because a device's page first fills with ten minutes of history. `first` and
-`last` are the least memory in ten minutes.
+The row `an hour` needs BENCH_PAGE_HOUR_S=N and runs for N seconds. Every half minute it notes the
+memory of the page. It also notes the memory of two browsers after a garbage collection; they show the
+site and a device. The first ten minutes do not count, because a device's page first fills with ten
+minutes of history. `first` and `last` are the least memory in ten minutes.
 """
 
 import os
@@ -52,7 +52,8 @@ WATCH: Final = """() => { window.late = []; const seen = new Set();
 
 
 def measure(scratch: Path) -> Tables:
-    """Measure seconds from publishing to screen, the page's CPU and memory, the browsers' heaps."""
+    """Return the seconds from publishing to screen, the page's CPU and memory, and the browsers'
+    heaps."""
     rows = {}
     for name, share in (("a tenth changes", 10), ("all change", 1)):
         with _page(share, scratch) as seen:
@@ -105,7 +106,7 @@ def _tabs(playwright: Playwright, site: "_Site", address: str) -> list[Page]:
 
 
 class _Site:
-    """Publishes every state once a second, spread over the second."""
+    """A publisher that sends every state once a second, spread over the second."""
 
     def __init__(self, domain: int, share: int) -> None:
         self._share = share
@@ -132,7 +133,7 @@ class _Site:
             self._told("charger", charger.charger_name)
 
     def _told(self, kind: str, name: str) -> None:
-        """Return the diagnostics of the device's daemon."""
+        """Publish the diagnostics of the device's daemon."""
         devices = {name: {"input_age_s": 0.05, "waiting": "-"}}
         self._diagnose(diagnosis(f"{name}_node", kind, {}, devices, stamp(time.time())))
 
@@ -155,7 +156,7 @@ class _Site:
         return d.ChargerState(stamp(time.time()), state, f"charger{number:02}")
 
     def live(self, seconds: float, tab: Page) -> None:
-        """Publish for this time (s). `tab`: any browser, whose events are served meanwhile."""
+        """Publish for this time (s). Events of `tab`, any one browser, are served in this time."""
         began, said = time.monotonic(), 0
         while (at := time.monotonic() - began) < seconds:
             while said < at * DEVICES:
@@ -169,7 +170,7 @@ class _Site:
 
 
 def _looked_at(seen: Seen) -> Row:
-    """Measure the time from publishing to screen, and the cost."""
+    """Return the time from publishing to screen, and the cost."""
     loads: list[str] = []
     for tab in seen.tabs:
         tab.evaluate(WATCH)
@@ -190,7 +191,7 @@ def _looked_at(seen: Seen) -> Row:
 
 
 def _hour(seen: Seen) -> Rows:
-    """Measure the memory kept, and its growth."""
+    """Return the memory kept, and its growth."""
     *_, site, device = seen.tabs
     device.goto(f"{device.url}lift/lift00")
     kept: list[tuple[float, float, float, float]] = []

@@ -1,6 +1,5 @@
-"""The cost of a ring, compared with a daemon without a ring, and the replay speed of a day's
-recording.
-"""
+"""The cost of a ring compared with a daemon without a ring, and the replay speed of a day's
+recording."""
 
 import os
 import time
@@ -42,7 +41,7 @@ CONFIG = Path(__file__).parent.parent / "config/lift_dry_contact.yaml"
 
 
 def measure(scratch: Path) -> Tables:
-    """Measure a lift with and without a ring in turn, its paths, and a day of a lift at 20 Hz."""
+    """Measure a lift with and without a ring in turn, the lift's paths, and its day at 20 Hz."""
     return {
         "a lift, left alone": _idle(scratch),
         "its paths, with a ring": _paths(scratch),
@@ -79,7 +78,7 @@ def _paths(scratch: Path) -> Rows:
 
 
 def _day(scratch: Path) -> Row:
-    """Record a day continuously; then read the messages heard, and replay all decisions."""
+    """Record a whole day. Then read the messages, and replay all decisions."""
     began = time.perf_counter()
     Day(scratch).play()
     made_s = time.perf_counter() - began
@@ -164,7 +163,7 @@ def _floor(now: float) -> str:
 
 
 def events(now: float) -> Iterator[object]:
-    """Yield the lift's readings and requests: a ride in each RIDE_S."""
+    """Yield the lift's readings and requests, with one ride every RIDE_S."""
     into, before = now % RIDE_S, _floor(now - RIDE_S)
     agv = 0.5 < into < 16.0
     if into < 2.0:

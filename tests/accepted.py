@@ -1,4 +1,5 @@
-"""Accept requests as the daemon's service does, for stories in which a core runs without it."""
+"""Accepts requests as the daemon's service does, for stories in which a core runs without the
+service."""
 
 from typing import Any
 
@@ -12,7 +13,7 @@ from bridges.runtime.device import AnyNode
 def accepted(
     node: AnyNode, kind: AnyDeviceKind, settings: Any, *heard: tuple[Topic[Any], Message]
 ) -> list[Any]:
-    """Return the events of requests, each heard on its topic; tell the node of refused requests."""
+    """Return the events of requests, each heard on its topic. The node learns of refused requests."""
     events = []
     for topic, request in heard:
         try:

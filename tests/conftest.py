@@ -18,14 +18,13 @@ from tests.processes import end_with_us
 ON_WIRES = ("commands", "drivers", "hal_fakes", "transports", "runtime", "site", "workbench")
 """Folders whose tests use threads, processes and sockets. Other tests run in virtual time."""
 WIRES_HANG_AFTER_S = 900
-"""No passing test takes so long, however busy the machine is."""
+"""Time limit of a test on wires (s). No passing test takes this long, even on a busy machine."""
 
 if not DEEP and missing_of_ros():
     os.environ.setdefault("TRANSPORT", "zenoh")
-"""The wire between processes in stories about other things: zenoh, as on a Raspberry Pi. A daemon
-starts on zenoh with half the CPU that dds takes. `make deep`, and a run beside ROS, use dds where dds
-is installed.
-"""
+"""The transport between processes in tests of other subjects is zenoh, as on a Raspberry Pi. With zenoh
+a daemon starts on half the CPU that dds takes. `make deep`, and a run beside ROS, use dds where dds
+is installed."""
 
 settings.register_profile(
     "here",
@@ -35,15 +34,16 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("here")
-"""Draw the same examples in each run, without a wall-clock limit on drawing or trying an example."""
+"""Draw the same examples in each run. No wall clock limits the drawing or trying of an example."""
 
 signal.signal(
     signal.SIGHUP, signal.SIG_DFL
-)  # or daemons inherit the setting of nohup or of a CI's shell
+)  # otherwise daemons inherit the setting of nohup or of a CI's shell
 
 gc.disable()
 atexit.register(gc.freeze)
-"""The garbage collector is off while pytest collects tests (no garbage) and at a worker's end."""
+"""The garbage collector is off during the collection of tests, which makes no garbage, and at a
+worker's end."""
 
 end_with_us()
 
@@ -52,7 +52,7 @@ _deselected: list[str] = []
 
 @pytest.fixture(autouse=True)
 def _log_as_before() -> Iterator[None]:
-    """Undo, before the next test, the log setup of a command that was called in this process."""
+    """Undo the log setup of a command before the next test in this process."""
     root = logging.getLogger()
     handlers, level = list(root.handlers), root.level
     yield
@@ -63,7 +63,7 @@ def _log_as_before() -> Iterator[None]:
 
 @pytest.fixture
 def domain() -> Iterator[int]:
-    """Yield a DDS domain that nobody else on this machine uses."""
+    """Yield a DDS domain that no other test on this machine uses."""
     with domain_for_a_while() as free:
         yield free
 
@@ -88,16 +88,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Freeze the collected objects: they live until the end, so no scan for garbage is needed."""
+    """Freeze the collected objects. They live until the end, so the garbage collector need not scan
+    them."""
     gc.freeze()
     gc.enable()
 
 
-@pytest.hookimpl(optionalhook=True)  # in a run without xdist
+@pytest.hookimpl(optionalhook=True)  # optional: a run without xdist lacks this hook
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
-    """Run a test with all its parameters on one worker, if `--dist loadscope` is given.
+    """With `--dist loadscope`, run a test with all its parameters on one worker.
 
-    A module's fixture (an echo process, a schema) is then made once. Any other test goes to the next
+    Each module's fixture (an echo process, a schema) is then made once. Any other test goes to the next
     free worker.
     """
     from xdist.scheduler import LoadScopeScheduling  # type: ignore[import-untyped]
@@ -110,9 +111,9 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
 
 
 def _mixed(items: list[pytest.Item]) -> list[pytest.Item]:
-    """Mix tests that wait with tests that compute, to keep all cores busy.
+    """Mix waiting tests with computing tests, to keep all cores busy.
 
-    Whole files are mixed, always in the same order. The long tests come in the first quarter, the
+    The mix keeps files whole, and is the same each time. The long tests come in the first quarter, the
     longest first.
     """
     random = Random(1)
@@ -123,7 +124,7 @@ def _mixed(items: list[pytest.Item]) -> list[pytest.Item]:
 
 
 def _seconds(item: pytest.Item) -> float:
-    """Return how long the test takes alone, according to its mark; 0 without a mark."""
+    """Return the time (s) of the test when it runs alone, from its mark, or 0 without a mark."""
     mark = item.get_closest_marker("long")
     return float(mark.args[0]) if mark else 0.0
 
@@ -133,14 +134,14 @@ def _is_on_wires(item: pytest.Item) -> bool:
 
 
 def pytest_deselected(items: Sequence[pytest.Item]) -> None:
-    """Remember the tests that were left out because ROS is missing."""
+    """Remember the tests that pytest leaves out because ROS is missing."""
     _deselected.extend(item.nodeid for item in items if item.get_closest_marker("ros"))
 
 
 def pytest_terminal_summary(
     terminalreporter: pytest.TerminalReporter, config: pytest.Config
 ) -> None:
-    """Report the tests left out: a green run without ROS has not tested the ros2 transport."""
+    """Report the tests left out, because a green run without ROS has not tested the ros2 transport."""
     if missing := missing_of_dds():
         terminalreporter.write_line(f"not run: the tests of the dds transport, as {missing}")
     if _deselected and config.getoption("markexpr") == "not ros and not browser":

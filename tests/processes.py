@@ -1,4 +1,4 @@
-"""Find the processes that a test has left, and end all processes of a run that was killed."""
+"""Finds processes that a test has left, and ends all processes of a killed run."""
 
 import os
 from contextlib import suppress
@@ -7,7 +7,7 @@ from secrets import token_hex
 from typing import Final
 
 RUN: Final = "TEST_RUN"
-"""The environment variable that names the test run; every process started by the run has it."""
+"""The environment variable with the name of the test run. Every process of the run has it."""
 REAPER: Final = """
 read -r _
 for round in 1 2 3 4 5 6 7 8 9 10; do
@@ -18,17 +18,18 @@ for round in 1 2 3 4 5 6 7 8 9 10; do
     done
 done
 """
-"""Wait until the run closes its end of the pipe, then kill the run's processes.
+"""A program that waits until the run closes its end of the pipe, and then kills the run's processes.
 
-The guard of a killed daemon may have started another process meanwhile, so look again.
+The guard of a killed daemon may have started another process in the meantime, so the program looks
+again.
 """
 
 
 def end_with_us() -> None:
     """End all later children of this process, and their children, when this process ends.
 
-    This holds after SIGKILL too. PR_SET_PDEATHSIG would not do: its signal comes when the starting
-    thread ends, and a child's own children do not inherit it.
+    The children end after SIGKILL too. PR_SET_PDEATHSIG would not suffice, because its signal comes
+    when the starting thread ends, and because grandchildren do not inherit it.
     """
     if RUN in os.environ:
         return  # the run that started this worker ends the worker's processes
@@ -48,10 +49,10 @@ def end_with_us() -> None:
 
 
 def running(directory: Path) -> list[str]:
-    """Return the command lines of all processes that have this directory among their arguments."""
+    """Return the command lines of all processes with this directory among their arguments."""
     found = []
     for path in Path("/proc").glob("[0-9]*/cmdline"):
-        with suppress(OSError):  # the process has just ended
+        with suppress(OSError):  # the process has ended in the meantime
             line = path.read_bytes().decode(errors="replace")
             if str(directory) in line:
                 found.append(line)

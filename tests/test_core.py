@@ -1,4 +1,4 @@
-"""The core imports no extra (decision 0123), and needs no library but its own."""
+"""The core imports no extra, and needs only its own libraries (decision 0123)."""
 
 import sys
 import tomllib
@@ -17,7 +17,7 @@ BUSES = ("can", "gpio", "http", "modbus")
 PACKAGES = (
     "bridges", "bridges.commands", "bridges.kinds", "bridges.transports", "drivers", "drivers.hal",
 )  # fmt: skip
-"""Folders of the core whose contents are listed one by one."""
+"""Folders of the core. CORE lists their contents one by one."""
 INSIDE = {
     "bridges": "blackbox cli exit_codes messages observe runtime settings system yaml",
     "bridges.commands": "backup check completion disable enable incident log migrate outputs_off"
@@ -32,23 +32,24 @@ INSIDE = {
     " serial_port",
 }
 CORE = [f"{package}.{name}" for package, listed in INSIDE.items() for name in listed.split()]
-"""Modules and whole folders of the core. A driver there that knows only other buses is an extra."""
+"""Modules and whole folders of the core. A driver in them that knows only an extra's bus is an
+extra."""
 LIBRARIES = {
     "argcomplete": "argcomplete", "can": "python-can", "canopen": "canopen", "cantools": "cantools",
     "cyclonedds": "cyclonedds", "gpiozero": "gpiozero", "lgpio": "lgpio", "mcap": "mcap",
     "msgspec": "msgspec", "pymodbus": "pymodbus", "requests": "requests", "serial": "pyserial",
     "urllib3": "requests", "xxhash": "xxhash", "yaml": "PyYAML", "zenoh": "eclipse-zenoh",
 }  # fmt: skip
-"""The core's libraries: module -> the distribution that brings it."""
+"""The distribution that brings each module of the core's libraries."""
 FLEET = ("bridges.runtime.fleet", "bridges.settings.fleet_site", "bridges.settings.nav_graph")
-"""A fleet's rooms, which stand in the core's folders and are extras."""
+"""Modules for a fleet's rooms. They stand in the core's folders, but are extras."""
 ON_REQUEST = {
     ("drivers.hal.http", "drivers.hal.http_push"),
     ("bridges.runtime.service", "bridges.runtime.fleet.service"),
     ("bridges.commands.run", "bridges.settings.fleet_site"),
     ("bridges.commands.check", "bridges.settings.fleet_site"),
 }
-"""Extras that the core imports only where a YAML asks for them."""
+"""Extras that the core imports only if a YAML asks for them."""
 OF_ROS = {"rclpy", "launch", "launch_ros", "_typeshed"}
 
 
@@ -59,7 +60,7 @@ def graph() -> grimp.ImportGraph:
 
 @cache
 def extra_drivers() -> set[str]:
-    """Return the drivers that stand in the core's folders, but know only an extra's buses."""
+    """Return the drivers in the core's folders that know only an extra's buses."""
     return {
         f"drivers.{kind}.{name}"
         for kind in DEVICES
@@ -69,7 +70,7 @@ def extra_drivers() -> set[str]:
 
 
 def is_core(module: str) -> bool:
-    """Is the module part of the core?"""
+    """Return whether the module belongs to the core."""
     listed = any(module == one or module.startswith(f"{one}.") for one in CORE)
     listed = listed and not any(module == one or module.startswith(f"{one}.") for one in FLEET)
     return module in PACKAGES or (listed and module not in extra_drivers())

@@ -1,4 +1,4 @@
-"""All processes that a test run started end with the run, however the run ends."""
+"""All processes that a test run started end with the run, whether the run finishes or is killed."""
 
 import os
 import subprocess
@@ -22,7 +22,8 @@ starts.start()
 starts.join()
 sys.stdin.read()
 """
-"""Start a child in its own session from a thread that then ends; that child has a child too."""
+"""A program that starts a child in its own session from a thread. The thread ends. The child has a
+child."""
 
 
 def test_what_a_killed_run_has_started_is_killed(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Wait for events outside this thread: in a real process, on a real socket, on DDS."""
+"""Waits for events outside this thread: in a real process, on a real socket, on DDS."""
 
 import re
 import threading
@@ -11,20 +11,20 @@ from drivers import DriverError
 T = TypeVar("T")
 
 PATIENCE_S = 120.0
-"""Long enough for a very busy machine; no passing test waits so long."""
+"""The longest wait (s), enough for a very busy machine. No passing test waits this long."""
 
 TOO_LATE = re.compile(
     r" within [\d.]+ s\b|first bytes are not the echo|echo came late|is half a frame"
     r"|is not a frame: a collision"
 )
-"""A bus's words for an answer that is late, or that collides with the next answer on a serial line."""
+"""A bus's words for a late answer, or for two answers that collide on a serial line."""
 
 LEASE_S = 9.5
-"""Less than the 10 s after which DDS notices that a node left without a farewell."""
+"""A wait (s) below the 10 s after which DDS notices that a node left without a farewell."""
 
 
 def wait_until(condition: Callable[[], object], what: str, patience_s: float = PATIENCE_S) -> None:
-    """Look repeatedly until the condition holds; fail with the name `what` if it never holds.
+    """Look repeatedly until the condition holds. If it never holds, fail with the name `what`.
 
     The pauses grow with the time waited, because each look costs CPU that the awaited process needs.
     """
@@ -37,9 +37,9 @@ def wait_until(condition: Callable[[], object], what: str, patience_s: float = P
 
 
 def at_last(step: Callable[[], T], what: str, between: Callable[[], object] = lambda: None) -> T:
-    """Return the result of a step on a wire, repeated while answers are late, as on a busy machine.
+    """Return the result of a step on a wire. Repeat the step on late answers, which busy machines give.
 
-    `between` is called before each repetition. Any DriverError other than a late answer is raised.
+    `between` runs before each repetition. Any DriverError other than a late answer is raised.
     """
     done: list[T] = []
 

@@ -1,4 +1,4 @@
-"""Walk through all states that can be reached in some steps, and all histories of some moves."""
+"""Walks through all states that some steps can reach, and through all histories of some moves."""
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,11 +8,11 @@ W = TypeVar("W")
 M = TypeVar("M")
 
 Seen = Callable[[Any], None]
-"""A function that is called with every step on the way."""
+"""A function that gets every step on the way."""
 
 
 def unseen(step: object) -> None:
-    """Ignore the step: for walks that check no steps."""
+    """Ignore the step, for walks that check no steps."""
 
 
 def reached(
@@ -23,7 +23,7 @@ def reached(
 ) -> list[W]:
     """Return every state within `depth` steps of the roots once, breadth first.
 
-    `key` is equal for states that cannot behave differently.
+    States that cannot behave differently have the same `key`.
     """
     found = {key(root): root for root in roots}
     edge = list(found.values())
@@ -42,7 +42,7 @@ def reached(
 def histories(
     state: W, moves: Sequence[M], depth: int, after: Callable[[W, M], W]
 ) -> Iterator[tuple[W, tuple[M, ...]]]:
-    """Yield each history of `depth` moves: last state and moves. `after` returns a new state."""
+    """Yield (last state, moves) of each history of `depth` moves. `after` returns a new state."""
     if depth == 0:
         yield state, ()
         return
@@ -53,7 +53,7 @@ def histories(
 
 @dataclass(frozen=True)
 class Walker(Generic[W, M]):
-    """The steps of a world: moves, which take no time, and waits (s). Each step is given to `seen`."""
+    """The steps of a world: moves, which take no time, and waits (s). `seen` gets each step."""
 
     moves: Mapping[str, M]
     waits: Sequence[float]

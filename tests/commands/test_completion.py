@@ -1,4 +1,4 @@
-"""Shell completion and the manual page are both made from the commands' parsers."""
+"""The commands' parsers give both the shell completion and the manual page."""
 
 import os
 import subprocess
@@ -26,11 +26,12 @@ for told, line in zip(sys.argv[1::2], sys.argv[2::2]):
         cli.main([])
     assert os.waitpid(child, 0)[1] == 0
 """
-"""Completes each line in its own process, as a shell does, but forked after all imports."""
+"""A program that completes each line in its own process, as a shell does. It forks after all
+imports."""
 
 
 def completed(folder: Path, *lines: str) -> list[list[str]]:
-    """Return the words offered at the end of each line, by argcomplete's own protocol."""
+    """Return the words that argcomplete's own protocol offers at the end of each line."""
     told = [folder / str(n) for n in range(len(lines))]
     words = [str(word) for each in zip(told, lines, strict=True) for word in each]
     environ = os.environ | {"_ARGCOMPLETE_IFS": "\n", "_ARGCOMPLETE_SHELL": "bash"}

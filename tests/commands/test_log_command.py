@@ -1,4 +1,4 @@
-"""`rmf-bridge log`: the command line for journalctl, and the lines that the pattern finds."""
+"""`rmf-bridge log`: its command line for journalctl, and the lines that its pattern finds."""
 
 import argparse
 import os

@@ -1,7 +1,8 @@
 """Small packages with our own maintainer scripts, and a root into which the real dpkg installs them.
 
-The scripts call real commands except `systemctl`, which keeps a file for each unit. Each command that
-changes something is counted; at a chosen count everything is killed, dpkg included, as by a power cut.
+The scripts call real commands except `systemctl`. The stand-in for `systemctl` keeps a file for each
+unit. A counter counts each command that changes something. At a chosen count the test kills all
+processes, dpkg included, as a power cut would.
 """
 
 import os
@@ -55,7 +56,8 @@ esac
 
 
 def package(folder: Path, version: str, modules: Collection[str], *, old: bool = False) -> Path:
-    """Return one of our packages. `old`: as before 0.1.0+r, when dpkg owned the tree."""
+    """Return one of our packages. `old` makes a package from before 0.1.0+r, when dpkg owned the
+    tree."""
     work = folder / version
     tree = work / LIB if old else work.with_suffix(".tree")
     (tree / "bin").mkdir(parents=True)
@@ -101,7 +103,7 @@ def _replace(file: Path, text: str) -> None:
 
 
 class System:
-    """A root directory with services, on a systemd that only keeps files."""
+    """A root directory with services. Its systemd only keeps files."""
 
     def __init__(self, folder: Path) -> None:
         self.root, self.fakes = folder / "root", folder / "fakes"
@@ -148,7 +150,7 @@ class System:
         }
 
     def dpkg(self, *words: str | Path, cut: int = 0) -> subprocess.CompletedProcess[str]:
-        """Run dpkg; `cut` is the number of the counted command at which everything is killed."""
+        """Run dpkg. At the counted command number `cut` all processes die."""
         (self.fakes / "count").unlink(missing_ok=True)
         (self.fakes / "cut").write_text(str(cut))
         force = [f"--force-{each}" for each in FORCE]
@@ -162,7 +164,7 @@ class System:
         return done
 
     def fails(self, name: str) -> Callable[[], None]:
-        """Let a command fail, as on a full disk; return a function that mends the command."""
+        """Let a command fail, as on a full disk. Return a function that mends the command."""
         file = self.fakes / "bin" / name
         real = file.read_text()
         file.write_text("#!/bin/sh\nexit 1\n")

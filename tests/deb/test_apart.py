@@ -1,6 +1,7 @@
 """The daemons' package alone, with the workbench's package, and with a workbench of another version.
 
-The tree has our own code and the libraries of the tests' environment. The real dpkg installs the tree.
+The tree holds our own code and the libraries of the tests' environment. The real dpkg installs the
+tree.
 """
 
 import os
@@ -54,7 +55,7 @@ def workbench(folder: Path, version: str) -> Path:
 
 
 Debs = dict[str, tuple[Path, Path]]
-"""Version -> the packages of the daemons and of the workbench."""
+"""The packages of the daemons and of the workbench for each version."""
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +65,7 @@ def debs(tmp_path_factory: pytest.TempPathFactory) -> Debs:
 
 
 def ask(made: System, *words: str | Path, **also: str) -> subprocess.CompletedProcess[str]:
-    """Run the installed `rmf-bridge`; return the finished process."""
+    """Run the installed `rmf-bridge`, and return the finished process."""
     command = [made.root / "usr/lib/rmf-bridges/bin/rmf-bridge", *words]
     env = {**os.environ, "HOME": str(made.root), **also}
     env.pop("PYTHONPATH", None)
@@ -89,7 +90,8 @@ def how(version: str) -> str:
 
 
 def serves(made: System) -> bool:
-    """Do the daemons' commands work, and does each workbench command name the package to install?"""
+    """Return whether the daemons' commands work and each workbench command names the missing
+    package."""
     for asked in (("check", LIFT), ("outputs-off", NO_OUTPUTS), ("--help",)):
         assert code(made, *asked) == 0
     for words in (("watch",), ("walk", "--help"), ("run", "--simulate", LIFT)):

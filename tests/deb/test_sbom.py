@@ -1,4 +1,4 @@
-"""deb/sbom.py lists a package's libraries, and lets none go without the text of its licence."""
+"""deb/sbom.py lists a package's libraries, and refuses a library without the text of its licence."""
 
 import json
 import subprocess

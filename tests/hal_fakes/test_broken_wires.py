@@ -1,7 +1,7 @@
 """A lift with one broken wire at a time, read through plant, wires, mock pins, gpiozero and driver.
 
 The car rides in AGV mode from L1 to L3, where the door opens and closes. Each reading must be true,
-unknown or a fault: never a closed door read as open, never a wrong floor.
+unknown or a fault. A closed door is never read as open, and no floor is ever read wrong.
 """
 
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""The five failures of a wire, as histories of the level at its far end."""
+"""The five failures of a wire, each as a history of the level at the wire's far end."""
 
 from typing import Any
 
@@ -14,7 +14,8 @@ def wire(active: Any = "high", pull: Any = "down", direction: Any = "in") -> Wir
 
 
 def shown(contact: Contact, fed: str, step: float = 1.0) -> str:
-    """Return the level at the far end at each second for these fed levels: 1 is asserted."""
+    """Return the level at the far end at each second, for these levels at the near end. 1 is
+    asserted."""
     seen = ""
     for i, value in enumerate(fed):
         contact.feed(value == "1", i * step)

@@ -106,7 +106,7 @@ def test_a_caller_who_leaves_or_never_reads_does_not_stop_the_plants(world: Worl
     world.callers.remove(gone)
     plant = world.running.plants["Lift1"]
     told = 0
-    while told < 2000:  # far more than a socket keeps for a caller who does not read
+    while told < 2000:  # far more than a socket holds for a caller that does not read
         for i in range(50):
             plant.drive("door_open", i % 2 == 0, time.monotonic())
         told += len(list(islice(well.edges(), 50)))

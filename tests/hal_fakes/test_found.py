@@ -1,4 +1,4 @@
-"""Each fake named by a driver or a bus exists, so that every driver and every bus can be simulated."""
+"""Each driver and each bus names a fake that exists, so `--simulate` works for all."""
 
 from importlib import import_module
 

@@ -1,4 +1,4 @@
-"""`run config/door_register.yaml --simulate` without the daemon: doors on registers that move."""
+"""`run config/door_register.yaml --simulate` without the daemon: doors on registers move."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""`run --simulate` without the daemon: real buses, with fakes on the far side, in real time."""
+"""`run --simulate` without the daemon: real buses in real time, with fakes on the far side."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -32,7 +32,7 @@ class SimulatedLift:
         self.driver.open()
 
     def until(self, reached: Callable[[LiftSample], bool]) -> LiftSample:
-        """Read at each edge, as the loop does, until the sample is as wanted."""
+        """Read at each edge, as the loop does, until a sample fulfils the condition."""
         while not reached(sample := self.driver.read()):
             assert self._edge.wait(PATIENCE_S), f"no edge for long after {sample}"
             self._edge.clear()

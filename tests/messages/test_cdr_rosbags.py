@@ -1,4 +1,4 @@
-"""Our bytes and type hashes against those of rosbags, a second implementation."""
+"""Our bytes and type hashes equal those of rosbags, a second implementation."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ from tests.messages.test_definitions import FIELDS
 from tests.transports.values import MESSAGE_TYPES, repeatable, values
 
 STORE = get_typestore(Stores.EMPTY)
-for _name, _text in FIELDS.items():  # as in a .msg file: one field per line
+for _name, _text in FIELDS.items():  # one field per line, as in a .msg file
     _package, _message = _name.split("/")
     STORE.register(get_types_from_msg(_text.replace(",", "\n"), f"{_package}/msg/{_message}"))
 EVERY_TYPE = pytest.mark.parametrize("kind", MESSAGE_TYPES, ids=lambda kind: kind.__name__)
@@ -27,7 +27,7 @@ def name(kind: type) -> str:
 
 
 def theirs(value: Any) -> Any:
-    """Return our value as rosbags expects it, with rows of numbers as arrays."""
+    """Return our value in the form of rosbags, with lists of numbers as arrays."""
     if isinstance(value, Struct):
         made = STORE.types[name(type(value))]
         members = {name: theirs(getattr(value, name)) for name in value.__struct_fields__}

@@ -1,14 +1,18 @@
 """`definitions.py` and `releases.py` against tables typed from the .msg files of each release.
 
-Source: every line of rmf_lift_msgs/msg, rmf_door_msgs/msg, rmf_charger_msgs/msg,
-rmf_dispenser_msgs/msg and rmf_ingestor_msgs/msg (where both kinds of workcell have the same constants),
-rmf_task_msgs/msg/Alert and its AlertParameter, and in rmf_fleet_msgs/msg of EmergencySignal,
-FleetState, ChargingAssignments and their parts, in open-rmf/rmf_internal_msgs at
-3d4df023bacaf7a091564e98f4aff0776f72a612 (4.1.0). Time, Duration, Bool and Header are from ROS 2 Jazzy's
-builtin_interfaces and std_msgs, and diagnostic_msgs from ros2/common_interfaces
-c0c0bc57f958eb54a142446f0c2a475754367eee. Jazzy's differences are from the same files at tag 3.3.1,
-a351d51602383eb09a8138d302827a76241630a5. Kilted has the files of 4.1.0, as branch kilted (3.5.0) shows
-at c0f72ce5e2129411d2868414b25f6fab1460fcdb.
+The source is open-rmf/rmf_internal_msgs at 3d4df023bacaf7a091564e98f4aff0776f72a612 (4.1.0):
+- every line of rmf_lift_msgs/msg, rmf_door_msgs/msg and rmf_charger_msgs/msg
+- every line of rmf_dispenser_msgs/msg and rmf_ingestor_msgs/msg, where both kinds of workcell have the
+  same constants
+- Alert and AlertParameter of rmf_task_msgs/msg
+- EmergencySignal, FleetState, ChargingAssignments and their parts of rmf_fleet_msgs/msg
+
+Time, Duration, Bool and Header come from ROS 2 Jazzy's builtin_interfaces and std_msgs. diagnostic_msgs
+comes from ros2/common_interfaces c0c0bc57f958eb54a142446f0c2a475754367eee.
+
+Jazzy's differences come from the same files at tag 3.3.1, a351d51602383eb09a8138d302827a76241630a5.
+Kilted has the files of 4.1.0: branch kilted (3.5.0) at c0f72ce5e2129411d2868414b25f6fab1460fcdb shows
+the same content.
 """
 
 import typing
@@ -181,7 +185,7 @@ JAZZY: dict[str, str | None] = {
     "rmf_task_msgs/Alert": None,
     "rmf_task_msgs/AlertParameter": None,
 }
-"""Differences of Jazzy's files from the table above; None: Jazzy has no such file."""
+"""Jazzy's differences from the table above. None means that Jazzy has no such file."""
 NOT_IN_JAZZY = {
     d.RobotModeValue: {"MODE_PERFORMING_ACTION", "MODE_ACTION_COMPLETED"},
     d.AlertTier: {"TIER_INFO", "TIER_WARNING", "TIER_ERROR"},
@@ -200,7 +204,8 @@ def test_there_are_no_constants_besides_those_of_the_table() -> None:
 
 
 def test_no_constant_that_jazzy_lacks_is_sent() -> None:
-    """Alert's tiers go out only with Alert, which Jazzy lacks too; only RMF sends the missing modes."""
+    """Our nodes send Alert's tiers only with Alert, which Jazzy lacks too. Only RMF sends the missing
+    modes."""
     assert NOT_IN_JAZZY[d.AlertTier] == CONSTANTS[d.AlertTier].keys()
     assert not releases.JAZZY.has(d.Alert)
     ours = set(CONSTANTS[d.RobotModeValue]) - NOT_IN_JAZZY[d.RobotModeValue]

@@ -13,7 +13,7 @@ SEEN_ON_JAZZY = {
     d.DoorState: "1cb9d98f19c66cbc1f9acb16faaa90c63a7b65021bd26c69958d96f0a0388bb2",
     d.ChargerState: "13638f4a1149cb44d0e56c42f41e2ea752846d25010e16de13f2d1b05f4fe9f0",
 }
-"""Hashes announced by nodes of ROS 2 Jazzy, built from rmf_internal_msgs."""
+"""Type hashes announced by nodes of ROS 2 Jazzy, built from rmf_internal_msgs."""
 
 COMPUTED_BY_ROSBAGS = {
     d.Time: "b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197",
@@ -43,7 +43,7 @@ COMPUTED_BY_ROSBAGS = {
     d.AlertParameter: "e9a425e5c02657274d36ceeba4f9132e02c309e7796c4f819732cc8f5f4269f3",
     d.Alert: "3da5029edcd10f458262542961e3ff75e9e20d2d028f0d5235ab672af39ebfbb",
 }
-"""Hashes of the .msg files at rmf_internal_msgs 3d4df02, by rosbags 0.11's `hash_rihs01`."""
+"""Hashes of the .msg files at rmf_internal_msgs 3d4df02, from `hash_rihs01` of rosbags 0.11."""
 
 BUILT_INTO_JAZZY = {
     d.Header: "f49fb3ae2cf070f793645ff749683ac6b06203e41c891e17701b1cb597ce6a01",
@@ -61,9 +61,10 @@ JAZZYS: dict[Any, str | None] = {
     d.Alert: None,
     d.AlertParameter: None,
 }
-"""Jazzy's differences, by rosbags 0.11 from the .msg files at tag 3.3.1 (a351d51); None: no message.
+"""Jazzy's differing hashes. None means that Jazzy lacks the message.
 
-For 3.5.0 (kilted, c0f72ce) rosbags computes the same hashes as for 4.1.0.
+rosbags 0.11 computed these from the .msg files at tag 3.3.1 (a351d51). For 3.5.0 (kilted, c0f72ce)
+rosbags computes the same hashes as for 4.1.0.
 """
 
 HASHES: dict[Any, str] = {**SEEN_ON_JAZZY, **COMPUTED_BY_ROSBAGS, **BUILT_INTO_JAZZY}

@@ -1,4 +1,4 @@
-"""Messages in virtual time, and how each changes the memory of one device."""
+"""Messages in virtual time, and the change that each makes in the memory of one device."""
 
 from dataclasses import dataclass, field
 
@@ -23,7 +23,7 @@ OPEN, CLOSED = 2, 0
 
 @dataclass
 class Story:
-    """The course of messages and time; `news` has a line for each change that a message makes."""
+    """A course of messages and time. `news` has one line for each change that a message makes."""
 
     graph: PlainGraph = field(default_factory=PlainGraph)
     tally: SiteTally = field(default_factory=SiteTally)
@@ -70,7 +70,7 @@ class Story:
     def asks(
         self, who: str, floor: str = "L2", kind: int = AGV, *, passed: bool = False
     ) -> "Story":
-        """Let a LiftRequest arrive: from a fleet adapter or, if `passed`, from the supervisor."""
+        """Let a LiftRequest arrive from a fleet adapter, or with `passed` from the supervisor."""
         topic = "lift_requests" if passed else "adapter_lift_requests"
         floor = "" if kind == END else floor
         return self.hear(topic, d.LiftRequest("Lift1", stamp(WALL + self.now), who, kind, floor))

@@ -1,4 +1,4 @@
-"""What `watch`, `explain` and the page say of alarms, from the statements of our daemons."""
+"""The texts of `watch`, `explain` and the page about alarms, from our daemons' diagnostics."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ CAUSE = (AlarmCause("Panel", "fire"),)
 
 
 def told(at: float, state: str, *fleets: str, panel: Any = None, **daemon: Any) -> Heard:
-    """A panel's daemon states its alarm."""
+    """Return the diagnostics in which a panel's daemon states its alarm."""
     report = FleetAlarmReport(state, CAUSE if state == "alarm" else ())
     status = {**daemon, "alarm": alarming.statement(report, frozenset(fleets))}
     devices = {} if panel is None else {"Panel": panel}

@@ -1,4 +1,4 @@
-"""All devices: the bounds of memory, the clock, the age of messages, and two nodes of one name."""
+"""The memory of all devices: its bounds, the clock, the age of messages, and two nodes of one name."""
 
 import pytest
 from msgspec.structs import replace

@@ -114,7 +114,7 @@ def test_a_robot_repeats_end_until_its_last_is_old() -> None:
 
 
 def not_passed_on(story: Story) -> str:
-    """Who asks in vain."""
+    """Return the requester whose requests the supervisor does not pass on."""
     lift = story.device("lift", "Lift1")
     assert isinstance(lift, ObservedLift)
     one = lift.not_passed_on(story.graph.now)

@@ -1,4 +1,4 @@
-"""Two publishers of one device's states, and all that only looks like two."""
+"""Two publishers of one device's states, and cases that only look like two."""
 
 from bridges.messages.heard import Heard, Sender
 from bridges.observe.all_devices import PlainGraph
@@ -12,7 +12,8 @@ A, B, C = (Sender(f"/{name}") for name in "abc")
 def publishers(
     *told: Sender | None, step_s: float = 0.5, after_s: float = 0.0
 ) -> tuple[Sender, ...]:
-    """The publishers `after_s` after these published the same state in turn."""
+    """Return the publishers that count `after_s` after these senders published the same state in
+    turn."""
     graph, at = PlainGraph(), 0.0
     for at, sender in enumerate(told):
         graph.hear(Heard(at * step_s, WALL, "lift_states", LIFT, sender))
@@ -31,7 +32,7 @@ def test_a_node_that_restarts_or_a_listener_that_joins_again_is_no_second_publis
     assert publishers(A, A, A) == (A,)
     assert publishers(A, A, B) == (B,)
     assert publishers(A, B, C) == (C,)
-    assert publishers(A, B, A, step_s=SLOWEST_S) == (A,)  # it came back after the other had gone
+    assert publishers(A, B, A, step_s=SLOWEST_S) == (A,)  # A came back after B had gone
 
 
 def test_two_are_one_again_once_the_other_has_gone() -> None:

@@ -1,7 +1,7 @@
 """The unsafe control actions of `hazards.toml`.
 
-`python -m tests.reference.hazards [ID …]` takes each guard out in a copy of the tree, and runs the test
-of that row, which must fail.
+`python -m tests.reference.hazards [ID …]` removes each guard in a copy of the tree, and runs the test
+of that row. The test must fail.
 """
 
 import re
@@ -22,7 +22,7 @@ END: Final = "<!-- end of the table -->\n"
 
 
 class Cut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The change that takes a guard out of its file."""
+    """The change that removes a guard from its file."""
 
     file: str
     cut: str
@@ -30,9 +30,10 @@ class Cut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class UnsafeAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One row: an action with its guard and its test, or with `gap`, the reason why it has neither.
+    """One row: an action with its guard and its test. With `gap` the row gives the reason for having
+    neither.
 
-    `also`: further guards, each enough alone, which must go out together with the first.
+    `also` lists further guards. Each alone would suffice, so a cut removes all of them together.
     """
 
     id: str
@@ -48,23 +49,23 @@ class UnsafeAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def cuts(self) -> list[Cut]:
-        """Every change that takes this row's guards out."""
+        """Return every change that removes this row's guards."""
         return [Cut(str(self.file), self.cut, self.put), *self.also]
 
     @property
     def file(self) -> Path:
-        """The guard's file, relative to the tree."""
+        """Return the guard's file, relative to the tree."""
         return Path(self.guard.partition("::")[0])
 
 
 def actions() -> list[UnsafeAction]:
-    """Read every row."""
+    """Return every row."""
     rows = tomllib.loads(Path(__file__).with_suffix(".toml").read_text())["action"]
     return msgspec.convert(rows, list[UnsafeAction])
 
 
 def page() -> str:
-    """Return the page of hazards, with its table made of the rows."""
+    """Return the page of hazards, with its table made from the rows."""
     before, _, rest = PAGE.read_text().partition(BEGIN)
     head = "| action | may lead to | prevented by | proved by |\n|---|---|---|---|\n"
     rows = "".join(_row(action) for action in actions())
@@ -83,7 +84,7 @@ def _row(row: UnsafeAction) -> str:
 
 
 def fails_without(row: UnsafeAction, tree: Path) -> bool:
-    """Does the row's test pass in this tree, and fail there without the guard?"""
+    """Return whether the row's test passes in this tree, and fails in the tree without the guard."""
     whole = {tree / one.file: (tree / one.file).read_text() for one in row.cuts}
     passes = _exit_code(row.test, tree) == 0
     for one in row.cuts:

@@ -1,7 +1,7 @@
 """`python -m tests.reference.pages` writes the generated pages of docs/.
 
-These are docs/reference/, the index of decisions and the table of hazards; `test_pages.py`
-compares each page with its file.
+The generated pages are docs/reference/, the index of decisions and the table of hazards.
+`test_pages.py` compares each page with its file.
 """
 
 import argparse
@@ -133,7 +133,7 @@ the same.
 
 
 def every_topic() -> str:
-    """Return the page of topics, with the kinds that publish or hear each topic."""
+    """Return the page of topics, with the kinds that publish or subscribe to each topic."""
     sent: dict[str, set[str]] = {topics.DIAGNOSTICS.name: {"every daemon"}}
     heard: dict[str, set[str]] = {}
     examples = [load(file) for file in device_yamls()]

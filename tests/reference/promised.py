@@ -1,7 +1,7 @@
-"""The names that users build on: YAML keys, commands, options, exit codes, JSON, topics and faults.
+"""The names on which users build: YAML keys, commands, options, exit codes, JSON, topics and faults.
 
-`promised.txt` has them, a line each. Within a major version a line is only added: `make reference` does
-so.
+`promised.txt` has one name a line. Within a major version lines are only added. `make reference` adds
+new lines.
 """
 
 import argparse
@@ -29,12 +29,12 @@ JSON: Final = {
     "status": DaemonStatus,
     "watch": BoardRow,
 }
-"""Command -> the object in the output of its `--json`. `judge`, `replay` and `log` are not listed."""
+"""The struct that each command prints with `--json`. `judge`, `replay` and `log` are not listed."""
 FILE: Final = Path(__file__).with_suffix(".txt")
 
 
 def promised() -> list[str]:
-    """Return the lines of the file."""
+    """Return the lines of `promised.txt`."""
     return FILE.read_text().splitlines()
 
 
@@ -52,7 +52,7 @@ def present() -> set[str]:
 def _fields(shape: type) -> Iterator[str]:
     schema = msgspec.json.schema(shape)
     found = _keys(schema, schema, ())
-    return (path for path in found if not path.endswith(".headings"))  # the keys of a row, there
+    return (path for path in found if not path.endswith(".headings"))  # leads to a row's keys
 
 
 def _keys(node: Any, root: Any, path: tuple[str, ...]) -> Iterator[str]:

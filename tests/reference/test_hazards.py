@@ -1,4 +1,4 @@
-"""Every output has its rows in `hazards.toml`, and each row names a guard and a test that exist."""
+"""Every output has its rows in `hazards.toml`. Each row names a guard and a test that exist."""
 
 import re
 
@@ -13,11 +13,12 @@ from tests.reference.hazards import PAGE, ROOT, UnsafeAction, actions, page
 ROWS = actions()
 WAYS = ("given", "not_given", "timing", "duration")
 NO_COMMANDS = {"door.between_pulses", "dispenser.guid", "dispenser.item"}
-"""These tell the driver why the hold is off, and the content of a start; they drive nothing."""
+"""Fields that drive nothing. They give the driver the reason for an ended hold, or a start's
+content."""
 
 
 def test_the_page_has_the_table() -> None:
-    """`make reference` brings the page up to date."""
+    """`make reference` renews the page."""
     assert PAGE.read_text() == page()
 
 
@@ -26,7 +27,7 @@ def test_every_output_of_every_kind_has_its_four_rows() -> None:
         "lift": LiftOutputs,
         "door": DoorOutputs,
         "charger": ChargerOutputs,
-        "dispenser": WorkcellOutputs,  # and of an ingestor
+        "dispenser": WorkcellOutputs,  # also the outputs of an ingestor
     }
     outputs = {f"{kind}.{field}" for kind, of in kinds.items() for field in of.__struct_fields__}
     wanted = {f"{output}.{way}" for output in outputs - NO_COMMANDS for way in WAYS}

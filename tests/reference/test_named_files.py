@@ -26,7 +26,8 @@ THERE = [
     if "__pycache__" not in path.parts
 ]
 PATH = re.compile(r"`([\w.-]+(?:/[\w.-]+)*(?:/|\.(?:py|md|yaml|dbc)))`")
-"""A file or a folder in a text. Paths with `<kind>` or `*` stand for many files and are not checked."""
+"""A file or a folder in a text. A path with `<kind>` or `*` stands for many files and is not
+checked."""
 WAYS = ("a request", "an edge", "a register", "a frame", "a YAML")
 
 
@@ -42,7 +43,7 @@ def test_every_file_that_is_named_exists(page: str) -> None:
 
 
 def test_each_program_that_a_page_names_by_its_folder_exists() -> None:
-    """Decisions too: they name a moved file by its present place."""
+    """Decisions count too, because they name a moved file by its present place."""
     programs = [path for path in THERE if path.suffix == ".py"]
     lost = [
         f"{page.name}: {found}"

@@ -1,4 +1,4 @@
-"""No promised name goes away within a major version, unless the reader still knows the old name."""
+"""A promised name stays for a whole major version, or the reader still knows the old name."""
 
 import re
 from fnmatch import fnmatch
@@ -20,7 +20,7 @@ def test_every_promised_name_is_there() -> None:
 
 
 def test_every_name_of_this_version_is_promised() -> None:
-    """`make reference` adds what is new."""
+    """`make reference` adds new names."""
     assert present() - set(promised()) == set()
 
 

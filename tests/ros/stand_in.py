@@ -1,7 +1,7 @@
-"""A stand-in for rclpy in a folder of its own: enough for a daemon to start and be refused.
+"""A stand-in for rclpy in a folder of its own. A daemon can start on the stand-in and refuse.
 
-When the interpreter ends, the stand-in prints whether its executor's thread still runs. With such a
-thread the real rclpy aborts the process (SIGABRT): its C++ objects go while the thread uses them.
+At the interpreter's end the stand-in prints whether its executor's thread still runs. With such a
+thread the real rclpy aborts the process (SIGABRT): its C++ objects go when the thread still uses them.
 """
 
 from pathlib import Path

@@ -45,7 +45,8 @@ LIFT = ROOT / "config" / "lift_dry_contact.yaml"
 
 
 def launched(kind: str, file: Path) -> str:
-    """Return what `ros2 launch rmf_bridges KIND.launch.py config:=FILE simulate:=true` starts."""
+    """Return the command that `ros2 launch rmf_bridges KIND.launch.py config:=FILE simulate:=true`
+    starts."""
     launch_file = str(ROOT / "ros" / "launch" / f"{kind}.launch.py")
     command = [sys.executable, "-c", LAUNCHED, launch_file, str(file)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)

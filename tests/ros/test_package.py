@@ -1,4 +1,4 @@
-"""The files for colcon and `ros2 launch` agree with the project, and setup.py includes all of it."""
+"""The files for colcon and `ros2 launch` agree with the project, and setup.py includes all of them."""
 
 import ast
 import subprocess

@@ -1,6 +1,6 @@
-"""Without the workbench the daemons' commands work, and the other commands name the package to install.
+"""Without the workbench the daemons' commands work. The other commands name the package to install.
 
-`tests/deb/test_apart.py` checks what our Debian packages print.
+`tests/deb/test_apart.py` checks the texts from our Debian packages.
 """
 
 import subprocess
@@ -15,7 +15,7 @@ LACKS = "not installed: in the clone, .venv/bin/pip install .\n"
 
 
 def alone(*words: str) -> subprocess.CompletedProcess[str]:
-    """Run `rmf-bridge WORDS` where only the daemons are installed."""
+    """Run `rmf-bridge WORDS` in an environment with only the daemons."""
     return subprocess.run([sys.executable, "-c", ALONE, *words], capture_output=True, text=True)
 
 

@@ -1,4 +1,4 @@
-"""Log lines have the words of the field, and nothing of Python."""
+"""Log lines use the field's terms, and show nothing of Python."""
 
 import json
 import logging

@@ -1,4 +1,4 @@
-"""The unit with the drop-in of each shipped file, judged by systemd itself."""
+"""systemd itself judges the unit with the drop-in of each shipped file."""
 
 import configparser
 import re
@@ -25,9 +25,8 @@ OTHERS = (RECORDER, PAGE, EXPORTER, NOTIFY, EARLY)
 CONFIG = device_yamls()
 VERIFY = ("systemd-analyze", "verify", "--man=no")
 MOST = 2.0
-"""The limit of exposure. On systemd 252 a file on the network has 1.5, with GPIO or a serial port 1.7,
-with CAN's own sockets 1.7: AF_CAN counts as an exotic family (0.2).
-"""
+"""The limit of exposure. On systemd 252 a service on the network has 1.5; GPIO or a serial port gives
+1.7. CAN's own sockets also give 1.7, because AF_CAN counts as an exotic family (0.2)."""
 
 needs_systemd = pytest.mark.skipif(
     shutil.which("systemd-analyze") is None, reason="systemd-analyze is not installed"
@@ -35,7 +34,7 @@ needs_systemd = pytest.mark.skipif(
 
 
 def system(folder: Path, file: Path) -> str:
-    """Make a root directory with the service of this file; return the service's name."""
+    """Make a root directory with the service of this file, and return the service's name."""
     units = folder / "etc/systemd/system"
     name = f"rmf-bridge@{file.stem}.service"
     (units / f"{name}.d").mkdir(parents=True)
@@ -46,7 +45,7 @@ def system(folder: Path, file: Path) -> str:
 
 
 def exposure(folder: Path, name: str) -> float:
-    """Return the score of `systemd-analyze security`: 0 exposes nothing, 10 everything."""
+    """Return the score of `systemd-analyze security`, from 0 (exposes nothing) to 10."""
     done = subprocess.run(
         ["systemd-analyze", "security", "--offline=true", f"--root={folder}", name],
         capture_output=True,

@@ -1,4 +1,4 @@
-"""The demo itself: real processes on real DDS."""
+"""The demo, with real processes on real DDS."""
 
 import os
 import signal
@@ -17,7 +17,7 @@ from tests.waiting import PATIENCE_S, wait_until
 
 CONFIG = Path(__file__).parents[3] / "config"
 PATIENTLY = ("--patience", "10")
-"""Options for a busy machine, which must not make a day wrong."""
+"""Options for a busy machine, so that its slowness does not fail the demo."""
 
 
 @contextmanager
@@ -44,7 +44,7 @@ def demo(directory: Path, *options: str, on: Wire | None = None) -> Iterator[sub
 
 @pytest.fixture
 def directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a short path, since the path of a socket has at most 107 characters."""
+    """Return a short path, because the path of a socket has at most 107 characters."""
     return tmp_path_factory.mktemp("d")
 
 

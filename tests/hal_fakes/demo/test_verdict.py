@@ -1,4 +1,4 @@
-"""The demo calls only a right day right: it sees and names each possible mistake."""
+"""The demo accepts only a correct day. It sees and names each possible mistake."""
 
 from collections.abc import Callable
 from typing import Any

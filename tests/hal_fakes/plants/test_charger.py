@@ -20,7 +20,7 @@ def at(plant: ChargerPlant, now: float) -> Reading:
 
 
 def parked(*failures: tuple[str, FailureMode]) -> ChargerPlant:
-    """Return a station with these failures; a robot comes onto its pad at 1 s."""
+    """Return a station with these failures. A robot comes onto its pad at 1 s."""
     plant = ChargerPlant("a")
     for part, mode in failures:
         plant.fail(part, mode)
