@@ -51,7 +51,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     grown = growth(site.looks)
     if grown:
         return _failed(site, "growth: " + ", ".join(grown), options)
-    _print("every law held, nobody waited for ever, nothing grew")
+    _print("every law held, no robot waited too long, and no resource grew")
     return 0
 
 

@@ -183,14 +183,14 @@ class Laws:
             case d.ChargerState():
                 self._charger_state(speaker, message)
             case d.LiftRequest() if topic == topics.LIFT_REQUESTS:
-                self.require(self.speakers(topic.name) == 1, "two opinions on lift_requests")
+                self.require(self.speakers(topic.name) == 1, "two supervisors on lift_requests")
                 if message.request_type == d.LiftRequestType.REQUEST_END_SESSION:
                     self._lifts[message.lift_name].ended[message.session_id] = self._timeline.now
                 self._note_request(message.lift_name, f"{speaker}: {_words(message)}")
             case d.LiftRequest() if message.request_type == d.LiftRequestType.REQUEST_END_SESSION:
                 self._lifts[message.lift_name].inside.pop(message.session_id, None)
             case d.DoorRequest() if topic == topics.DOOR_REQUESTS:
-                self.require(self.speakers(topic.name) == 1, "two opinions on door_requests")
+                self.require(self.speakers(topic.name) == 1, "two supervisors on door_requests")
                 self._note_request(message.door_name, f"{speaker}: {_words(message)}")
 
     def _note_request(self, name: str, words: str) -> None:
@@ -319,7 +319,7 @@ class Laws:
     def _lift_relay(self, name: str, edge: Edge) -> None:
         on, calls = self._relays[name], edge.signal.startswith("call_")
         called = [signal for signal in on if signal.startswith("call_")]
-        self.require(len(called) <= 1, f"{name} is called to two floors")
+        self.require(len(called) <= 1, f"{name} drives calls for two floors at once")
         self.require(
             not (called and "door_open" in on), f"{name} is called while its door is held open"
         )
@@ -343,7 +343,7 @@ class Laws:
         for robot, since in crossing.items():
             well = self._ills.well_since(name) + LATE_S <= since
             just = self._timeline.now - since < ARRIVED_S
-            self.require(just or not well, f"{name} is let go with {robot} in it")
+            self.require(just or not well, f"{name} is released with {robot} in it")
 
     def _not_onto_an_obstruction(self, name: str, plant: DoorPlant) -> None:
         if not self._daemons[name].alive or "obstruction" not in plant._sensors:
@@ -352,7 +352,7 @@ class Laws:
         since = max(self._ills.well_since(name), self._ills.obstructed_since(name))
         if seen and not plant.contact("closed"):
             early = since + AT_ONCE_S > self._timeline.now
-            self.require(early, f"{name} lets its door go onto an obstruction")
+            self.require(early, f"{name} releases its door onto an obstruction")
 
     def _hazard_since(self, name: str) -> float:
         """Return the time at which the node could first see a hazard, or inf without a hazard."""
@@ -380,7 +380,7 @@ class Laws:
         releases = self._daemons[name].device.settings.on_fire == "release"
         sick = self._hazard_since(name) + AT_ONCE_S < self._timeline.now
         held = releases and sick and self._relays[name] and not self._ills.has(name, "bus")
-        self.require(not held, f"{name} is held in a fire that releases it")
+        self.require(not held, f"{name} holds its door in a fire that must release it")
 
     # ---- robots
 

@@ -58,7 +58,7 @@ def main() -> int:
     except Unusable as error:
         print(error, file=sys.stderr)
         return os.EX_UNAVAILABLE
-    print(f"{failed} failed; {time.monotonic() - began:.0f} s; the logs are in {folder}")
+    print(f"{failed} checks failed; {time.monotonic() - began:.0f} s; the logs are in {folder}")
     return 1 if failed else 0
 
 
@@ -78,7 +78,7 @@ def _packages(arch: str, folder: Path) -> Path:
     """Return a folder with the packages of this architecture for Debian 13. Raises Unusable."""
     found = sorted((ROOT / "dist").glob(f"*+deb13_{arch}.deb"))
     if not found:
-        raise Unusable(f"no package: make deb ARCHS={arch} PYTHONS=3.13")
+        raise Unusable(f"the package is missing; build it: make deb ARCHS={arch} PYTHONS=3.13")
     packages = folder / "packages"
     shutil.rmtree(packages, ignore_errors=True)
     (packages / NEXT).mkdir(parents=True)

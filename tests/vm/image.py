@@ -104,7 +104,7 @@ def needed(tools: dict[str, str]) -> None:
     path = f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin"
     missing = sorted({deb for tool, deb in tools.items() if not shutil.which(tool, path=path)})
     if missing:
-        raise Unusable(f"missing here: sudo apt install {' '.join(missing)}")
+        raise Unusable(f"this machine lacks programs: sudo apt install {' '.join(missing)}")
 
 
 def _key() -> str:
@@ -162,7 +162,7 @@ def _run(words: Iterable[str], log: int) -> None:
     done = subprocess.run([*words], stdout=log, stderr=log, env={**os.environ, "PATH": path})
     if done.returncode:
         name = os.readlink(f"/proc/self/fd/{log}")
-        raise Unusable(f"the image could not be built; the end of {name} says why")
+        raise Unusable(f"cannot build the image; read the end of {name} for the reason")
 
 
 def _mmdebstrap(arch: str, variant: str, packages: Iterable[str], archive: Path) -> list[str]:

@@ -159,7 +159,9 @@ class Machine:
         except TimeoutError:
             line = b""
         if not line:
-            raise Unusable("the machine is silent: the end of console.log may say why")
+            raise Unusable(
+                "the machine does not answer; read the end of console.log for the reason"
+            )
         heard: dict[str, Any] = json.loads(line)
         return heard
 
@@ -171,7 +173,7 @@ class Machine:
                 connected.connect(str(self._sockets[name]))
             except OSError as error:
                 if self._process.poll() is not None or time.monotonic() > deadline:
-                    raise Unusable(f"QEMU has not started: {error}") from error
+                    raise Unusable(f"QEMU did not start: {error}") from error
                 time.sleep(0.1)
             else:
                 return connected

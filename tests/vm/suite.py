@@ -38,5 +38,5 @@ def _fetch(arch: str, root: Path, site: Path) -> None:
     for name in NEEDED:
         command = [sys.executable, str(root / "deb/wheels.py"), name, *words]
         if subprocess.run(command, stderr=subprocess.DEVNULL).returncode:
-            raise Unusable(f"{name} could not be fetched for {arch}: {' '.join(command)}")
+            raise Unusable(f"cannot fetch {name} for {arch}: {' '.join(command)}")
     fresh.rename(site)

@@ -37,7 +37,7 @@ def off() -> str:
     writes = [each for each in header.writes() if each.line in LIFT]
     on = [each for each in writes if each.level == LIFT[each.line]]
     if on or {each.line for each in writes} != LIFT.keys():
-        raise Wrong(f"written on: {on}; written at all: {writes}")
+        raise Wrong(f"lines written on: {on}; all writes: {writes}")
     ready = since_boot_s(SERVICE, "ActiveEnterTimestampMonotonic")
     far_side("lift")
     first = min(each.at for each in writes)
@@ -61,7 +61,7 @@ def active_low() -> str:
     disable("low")
     sh("sync")  # the host may cut the power next
     if 0 in starts or len(starts) < STARTS or 0 not in opened:
-        raise Wrong(f"written by {STARTS} starts: {starts}; after a request: {opened}")
+        raise Wrong(f"writes of {STARTS} starts: {starts}; writes after a request: {opened}")
     return f"{len(starts)} writes, all of them high; a request wrote {opened[0]}"
 
 

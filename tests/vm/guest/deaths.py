@@ -91,7 +91,7 @@ def _dies_at_start() -> float:
     post = until(others, "outputs-off runs after the death", pause_s=0.02)
     for each in post:
         os.kill(each, signal.SIGKILL)
-    until(lambda: len(others() - post) > 1, "the next daemon has outputs-off run", pause_s=0.02)
+    until(lambda: len(others() - post) > 1, "the next daemon runs outputs-off", pause_s=0.02)
     if header.off_at(LIFT, when):
         raise Wrong("the relays were off before the start")
     return _killed(pid(SERVICE), HOLD)
@@ -161,7 +161,7 @@ def clean_stop() -> str:
     took = off_after(relays, when)
     text = journal(mark, SERVICE)
     if "nothing_to_switch_off" not in text:
-        raise Wrong("outputs-off ran once more")
+        raise Wrong("outputs-off switched off again")
     sh("systemctl", "start", SERVICE)
     return f"off after {took:.2f} s, stopped after {stopped:.2f} s"
 
@@ -185,5 +185,5 @@ def two_on_one_pin() -> str:
     copy.unlink()
     sh("systemctl", "daemon-reload")
     if pid(SERVICE) != before:
-        raise Wrong("the first service did not live on")
+        raise Wrong("the first service did not keep running")
     return "the first one serves on"

@@ -24,5 +24,5 @@ def transport() -> str:
     told = sh("env", "-C", str(suite), path, "HOME=/root", PYTHON, "-m", "pytest", *tests)
     last = told.strip().splitlines()[-1]
     if " passed" not in last:
-        raise Wrong(f"nothing has passed: {last}")
+        raise Wrong(f"no test has passed: {last}")
     return last

@@ -147,6 +147,6 @@ def upgrade() -> str:
     version = sh("dpkg-query", "-W", "-f", "${Version}", "rmf-bridges")
     off = header.off_at(relays, when)
     if off.keys() != relays.keys() or header.on(relays, when) or not version.endswith(".1"):
-        raise Wrong(f"{version}: of {sorted(relays)} off {off}, on {header.on(relays, when)}")
+        raise Wrong(f"{version}: relays {sorted(relays)}, off {off}, on {header.on(relays, when)}")
     down_s = since_boot_s(service, "ActiveEnterTimestampMonotonic") - max(off.values())
     return f"{version}: relays off, the service is back after {down_s:.1f} s"

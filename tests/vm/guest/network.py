@@ -22,7 +22,7 @@ def late() -> str:
     old = pid(service)
     took = [_moved(addresses, word) for addresses, word in MOVES]
     if pid(service) != old:
-        raise Wrong("it was restarted")
+        raise Wrong("systemd has restarted the service")
     disable("far")
     sh("systemctl", "stop", "far-far.service")
     sh("ip", "netns", "del", "site")

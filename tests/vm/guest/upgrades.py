@@ -72,7 +72,7 @@ def _first_writes() -> tuple[float, list[header.Write]]:
     output on."""
     writes = [each for each in header.writes() if each.line in LIFT]
     if {each.line for each in writes} != LIFT.keys():
-        raise Wrong(f"written: {writes}")
+        raise Wrong(f"writes: {writes}")
     first = {line: min(w.at for w in writes if w.line == line) for line in LIFT}
     return max(first.values()), [each for each in writes if each.level == LIFT[each.line]]
 
@@ -199,7 +199,7 @@ def full_var() -> str:
         old = pid(unit("lift"))
         told = _force(NEXT, fails=True)
         if pid(unit("lift")) != old or not all(map(is_active, map(unit, SERVICES))):
-            raise Wrong(f"the services have not stayed: {told[-300:]}")
+            raise Wrong(f"a service did not keep running: {told[-300:]}")
     was = version()
     _force(BEFORE)
     return f"upgrade fails ({was}), enable and a ride leave all serving; with room dpkg succeeds"
@@ -251,5 +251,5 @@ def purged() -> str:
     left = sh("find", "/etc", "/usr", "/var", "/run", "-xdev", "-name", "*rmf-bridge*").split()
     left = [name for name in left if not name.startswith(NOT_OURS)]
     if left:
-        raise Wrong(f"left: {left}")
+        raise Wrong(f"left after the purge: {left}")
     return "nothing"

@@ -40,7 +40,7 @@ def edited_yaml() -> str:
         YAML.write_text(text)
         sh("systemctl", "restart", SERVICE)
     if new != {25, 26}:
-        raise Wrong(f"of the new pins {new} are written")
+        raise Wrong(f"the service has written the new pins {new}")
     return f"old pins off after {took:.2f} s, back with the new ones"
 
 
@@ -72,7 +72,9 @@ def clock() -> str:
         sh("date", "-s", f"{years:+d} years")
         time.sleep(MEANWHILE_S)
         if header.off_at(relays, when) or pid(SERVICE) != old:
-            raise Wrong(f"{years:+d} years: off went {header.off_at(relays, when)}, {pid(SERVICE)}")
+            raise Wrong(
+                f"{years:+d} years: went off: {header.off_at(relays, when)}, pid {pid(SERVICE)}"
+            )
         waits.append(_goes_to(floor))
     end()
     return f"no restart; at the next floor after {', '.join(f'{s:.1f}' for s in waits)} s"
@@ -85,7 +87,7 @@ def _goes_to(floor: str) -> float:
     send("lift", "Lift1", floor, "--session", "vm/robot", "--direct")
     took = header.now() - began
     if sorted(header.on(LIFT)) != HELD or took > HEARD_S:
-        raise Wrong(f"at {floor} after {took:.1f} s, on are {sorted(header.on(LIFT))}")
+        raise Wrong(f"at {floor} after {took:.1f} s; lines on: {sorted(header.on(LIFT))}")
     return took
 
 
