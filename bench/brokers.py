@@ -39,7 +39,7 @@ def measure(scratch: Path) -> Tables:
             plants[name] = open_ends.enter_context(Caller(scratch / name / "plant.sock"))
             plants[name].order("follow")
             pids[name] = child.pid
-        time.sleep(1.0)  # the daemon's reader may not have matched yet
+        time.sleep(1.0)  # DDS may not have matched the daemon's reader yet
         for _ in range(WARM_UP + ROUNDS):
             for name, plant in plants.items():
                 found[name].append(_held(requests, name, plant))

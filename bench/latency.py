@@ -94,7 +94,7 @@ class Graph:
         transport.subscribe(LIFT_STATES, lambda s: self._states.put((time.monotonic(), s)))
         while not self._requests.matched():
             time.sleep(0.01)
-        time.sleep(0.5)  # the other side may not have matched yet
+        time.sleep(0.5)  # DDS may not have matched the other side yet
 
     def send(self, session: str, request_type: LiftRequestType, floor: str) -> float:
         """Publish a request, and return the time (monotonic s)."""

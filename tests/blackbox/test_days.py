@@ -1,4 +1,4 @@
-"""Each day's counts of this machine's devices: from the rings to the file, the table and the CSV."""
+"""Counts of this machine's devices for each day: from the rings to the file, the table and the CSV."""
 
 from datetime import date
 from pathlib import Path

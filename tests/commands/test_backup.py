@@ -1,4 +1,4 @@
-"""`rmf-bridge backup`: what it saves, what it leaves out, and what a restored machine has."""
+"""`rmf-bridge backup`: the files that it saves and omits, and the content of a restored machine."""
 
 import io
 import os
@@ -20,7 +20,8 @@ WANTS = "etc/systemd/system/rmf-bridges.target.wants"
 
 @pytest.fixture
 def machine(tmp_path: Path) -> Path:
-    """A machine with one enabled and one disabled door, a secret, users and a memory."""
+    """Return the root of a machine with one enabled and one disabled door, a secret, users and a
+    memory."""
     root = tmp_path / "old"
     config, state = root / "etc/rmf-bridges", root / "var/lib/rmf-bridge/door_supervisor"
     for folder in (config, state, root / WANTS):
@@ -39,7 +40,7 @@ def machine(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def calls(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
-    """Return the commands that were run; each command succeeds."""
+    """Return the list of commands that the test ran. Each command succeeds."""
     found: list[list[str]] = []
 
     def run(words: list[str]) -> subprocess.CompletedProcess[str]:

@@ -1,4 +1,4 @@
-"""The daemons' package alone, with the workbench's package, and with a workbench of another version.
+"""The daemons' package alone, with the workbench's package, and with another version of the workbench.
 
 The tree holds our own code and the libraries of the tests' environment. The real dpkg installs the
 tree.

@@ -1,4 +1,4 @@
-"""A signed apt repository: made of packages, and installed from by the real apt."""
+"""A signed apt repository. The test makes it from packages, and the real apt installs from it."""
 
 import os
 import subprocess
@@ -18,7 +18,7 @@ Description: a package for a test
 
 @pytest.fixture
 def key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Make a key that signs, in a keyring of its own."""
+    """Make a signing key in a separate keyring, and return the key."""
     home = tmp_path / "gpg"
     home.mkdir(mode=0o700)
     monkeypatch.setenv("GNUPGHOME", str(home))

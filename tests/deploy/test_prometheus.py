@@ -1,4 +1,4 @@
-"""A real Prometheus scrapes a real site, and its rules tell what is wrong."""
+"""A real Prometheus scrapes a real site, and its alert rules report the troubles."""
 
 import json
 import os
@@ -66,7 +66,7 @@ class Prometheus:
         self._base = f"http://127.0.0.1:{port}/api/v1"
 
     def value(self, query: str) -> float | None:
-        """Return the query's only value; None without a series or an answer."""
+        """Return the query's only value, or None without a series or an answer."""
         try:
             found = self._get(f"query?{urllib.parse.urlencode({'query': query})}")["result"]
         except OSError:
@@ -74,7 +74,7 @@ class Prometheus:
         return float(found[0]["value"][1]) if found else None
 
     def alerts(self) -> dict[str, str]:
-        """Return the present alerts: name -> pending or firing."""
+        """Return each present alert with its state, pending or firing."""
         found = self._get("alerts")["alerts"]
         return {one["labels"]["alertname"]: one["state"] for one in found}
 
@@ -133,7 +133,7 @@ def test_a_killed_door_daemon_is_an_alert_in_a_real_prometheus(
 
 
 def named(text: str) -> set[str]:
-    """Return the metrics that a text names, without the endings of a histogram's series."""
+    """Return the metrics that a text names. A histogram's series come without their endings."""
     found = re.findall(r"rmf_bridge_[a-z_]+", text)
     return {re.sub(r"_(bucket|count|sum|total)$", "", one) for one in found}
 

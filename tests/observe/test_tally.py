@@ -1,4 +1,4 @@
-"""Counts of rides, waits, door cycles, charges and availability, from what was heard."""
+"""Counts of rides, waits, door cycles, charges and availability, from messages on the graph."""
 
 from msgspec.structs import replace
 
@@ -19,7 +19,7 @@ def durations(histogram: DurationHistogram) -> tuple[int, float]:
 
 
 def asks_for(story: Story, floor: str, seconds: int, shown: tuple[str, str]) -> Story:
-    """Let a robot repeat its request for so long, and the lift show this session and floor."""
+    """Let a robot repeat its request for this time (s). The lift shows this session and floor."""
     for _ in range(seconds):
         story.asks(RED, floor).lift(*shown).passes(1)
     return story.asks(RED, floor)
@@ -29,7 +29,7 @@ FREE, HELD = ("", "L2"), (RED, "L1")
 
 
 def ride(story: Story) -> Story:
-    """A robot asks at L1, boards after 20 s, asks for L2, and may leave the car 8 s later."""
+    """Let a robot ask at L1, board after 20 s, and ask for L2. It may leave the car 8 s later."""
     asks_for(story.lift(*FREE), "L1", 20, FREE).lift(RED, "L1", OPEN)
     asks_for(story, "L2", 8, HELD).lift(RED, "L2", OPEN)
     return story.ends(RED).ends(RED, passed=True).lift()

@@ -1,4 +1,4 @@
-"""A promised name stays for a whole major version, or the reader still knows the old name."""
+"""A promised name stays for a whole major version. A renamed name stays readable."""
 
 import re
 from fnmatch import fnmatch

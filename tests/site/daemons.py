@@ -161,7 +161,7 @@ class DeviceDaemon:
         return [fault["code"] for fault in self.status()["faults"]] if self.alive else []
 
     def _edge(self, edge: Edge) -> None:
-        """Handle an edge of the plant. The plant's own record is not needed."""
+        """Handle an edge of the plant. The plant's own record of this edge is not needed."""
         self.device.plant.edges.clear()
         if edge.what == "relay":
             self.relayed(edge)

@@ -104,7 +104,7 @@ class Site:
         return [lifts, rmfs_door_supervisor(self.timeline, self.air)]
 
     def run(self, hours: float, told: Callable[[Look], None] = lambda look: None) -> None:
-        """Run the whole day. `told` gets the look of each hour."""
+        """Run the whole day. `told` gets the resources in use after each hour."""
         end = hours * HOUR_S
         the_random.seed(self.seed)  # a supervisor that meets a rival waits for a random time
         self._open()

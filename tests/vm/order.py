@@ -74,7 +74,7 @@ PARTS: Final = {
 """The checks of each part. A part runs on one machine from its first boot; a check may need earlier
 checks."""
 WHOLE: Final = ("lift", "site", "upgrade")
-"""The parts that together have every check. All run at once."""
+"""The parts that together have every check. All parts run at the same time."""
 ALSO: Final = {("arm64", "lift"): ("inside.demo", "inside.transport")}
 """More checks on arm64, because arm64 differs from CI's own amd64 machine."""
 NOT_ON: Final = {"arm64": ("network.late",)}

@@ -1,4 +1,5 @@
-"""The simulated robot: it drives, turns, drains, charges, rides, and fails as its table says."""
+"""The simulated robot drives, turns, drains its battery, charges, rides, and fails as its table
+says."""
 
 import msgspec
 import pytest

@@ -120,7 +120,7 @@ def _answers() -> bool:
 
 
 def security() -> str:
-    """`systemd-analyze security` gives each live unit of ours at most 2.0. The unit of these checks has
+    """`systemd-analyze security` gives each live unit of ours at most 2.0, and this test's own unit
     more."""
     scores = _scores()
     units = sh("systemctl", "list-units", "--plain", "--no-legend", "rmf-bridge*.service")

@@ -12,8 +12,8 @@ MOVES: Final = (("10.7.0", "open"), ("10.8.0", "close"))
 
 
 def late() -> str:
-    """The service starts without a network. One network comes, then another. It fulfils requests on
-    both."""
+    """The service starts without a network. When two networks come in turn, it fulfils requests on
+    each."""
     sh("ip", "netns", "add", "site")
     sh("ip", "link", "add", "eth0", "type", "veth", "peer", "name", "eth1", "netns", "site")
     sh(*SITE, "link", "set", "lo", "up")

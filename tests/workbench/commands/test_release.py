@@ -1,4 +1,5 @@
-"""`release` asks first the supervisor, then the lift's daemon. It refuses if a robot may be inside."""
+"""`release` asks first the supervisor, then the lift's daemon. If a robot may be inside, `release`
+refuses."""
 
 import dataclasses
 import io

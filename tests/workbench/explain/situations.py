@@ -69,7 +69,7 @@ def fire() -> Case:
 
 
 def fire_with_a_robot_inside() -> Case:
-    """The lift goes into fire mode while the robot is in the car."""
+    """The lift goes into fire mode when the robot is in the car."""
     scene, red, _ = _two("Lift1")
     scene.until(red)
     red.asks("Lift1", "L4", inside=True)

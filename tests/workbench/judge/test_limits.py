@@ -1,4 +1,4 @@
-"""Every limit of a law, tested from just inside and from just outside. The verdicts differ."""
+"""Every limit of a law. Values just inside and just outside the limit get different verdicts."""
 
 from collections.abc import Callable, Iterator
 

@@ -1,4 +1,4 @@
-"""Metrics of the graph and of this machine, as Prometheus reads them."""
+"""Metrics of the graph and of this machine in the form that Prometheus reads."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,7 +18,7 @@ from workbench.metrics.machine import of_machine, of_recordings
 
 
 class Once(Collector):
-    """A collector of ready families."""
+    """A collector of given metric families."""
 
     def __init__(self, families: Iterable[Metric]) -> None:
         self._families = [*families]
@@ -28,7 +28,7 @@ class Once(Collector):
 
 
 def samples(families: Iterable[Metric]) -> dict[str, float]:
-    """Return the samples as a scrape gives them: `name{label="value",…}` -> value."""
+    """Return the value of each sample by its name in a scrape, `name{label="value",…}`."""
     registry = CollectorRegistry()
     registry.register(Once(families))
     text = generate_latest(registry).decode()

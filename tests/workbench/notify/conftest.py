@@ -1,4 +1,4 @@
-"""The server that takes notices."""
+"""A fixture for the server that receives notices."""
 
 import threading
 from collections.abc import Iterator

@@ -1,10 +1,10 @@
-"""A web server that takes notices."""
+"""A web server that receives notices."""
 
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 
 class Sink(ThreadingHTTPServer):
-    """An HTTP server that keeps what it gets, and answers with `status`."""
+    """An HTTP server that keeps each request, and answers with `status`."""
 
     daemon_threads = True
 

@@ -1,4 +1,4 @@
-"""The ways to people, over real HTTP and a real mail server."""
+"""The channels to people, over real HTTP and a real mail server."""
 
 import json
 import ssl

@@ -1,4 +1,4 @@
-"""`rmf-bridge notify` beside a real daemon: what people get when the daemon is killed and is back."""
+"""`rmf-bridge notify` beside a real daemon. People get notices when the daemon dies and returns."""
 
 import json
 import os

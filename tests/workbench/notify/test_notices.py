@@ -1,4 +1,4 @@
-"""When people are told of a trouble, in virtual time."""
+"""The times at which `notify` reports a trouble to people, in virtual time."""
 
 from dataclasses import dataclass, field
 from datetime import time
@@ -22,7 +22,7 @@ ALL = {("lift", "Lift1"), ("door", "ward")}
 
 @dataclass
 class Desk:
-    """Turns each 10 s; `told` has a line for each notice."""
+    """A desk with a turn every 10 s. `told` holds a line for each notice."""
 
     notices: Notices = field(default_factory=lambda: Notices(SETTINGS))
     now: float = 0.0

@@ -25,8 +25,8 @@ Stage = Callable[[Any], Any]
 class Real:
     """One trouble.
 
-    The trouble needs the daemons in `serves`. `daemon` owns the file. `then` happens after the live
-    question, and before the recorder writes the file. With `dead` the question waits until DDS has
+    The trouble needs the daemons in `serves`. `daemon` owns the file. The step `then` runs after the
+    live question, and before the recorder writes the file. With `dead` the question waits until DDS has
     noticed a killed node. `slow` names a part of the device that is slow all the time.
     """
 

@@ -59,7 +59,7 @@ def test_a_unit_that_is_slow_at_another_pace_is_explained_as_expected(
     seed: int, tmp_path: Path
 ) -> None:
     """On a busy machine the lift is OFFLINE for seconds, so a listener of 10 s may hear one recovery
-    only. With seed 7 the only outage has already ended. That is another story."""
+    only. Seed 7 is left out, because there the only outage has already ended."""
 
     def slower(site: Site) -> None:
         site.latest_s, site.slow_s, site.random = 1.7, 0.7, Random(seed)

@@ -83,7 +83,7 @@ class RightAdapter(Party):
         return [(topic, out) for topic, one in said for out in self.says(one, now)]
 
     def says(self, message: d.Message, now: float) -> list[d.Message]:
-        """Return the messages to send for this one. Wrong adapters override this method."""
+        """Return the messages to send in place of this message. Wrong adapters override this method."""
         return [message]
 
 
@@ -145,7 +145,8 @@ class EndsForEver(RightAdapter):
 
 
 class ChangesItsMind(RightAdapter):
-    """During a ride the adapter asks once for a floor between, and then for the right floor again."""
+    """During a ride the adapter asks once for the floor on the way, and then for its own floor
+    again."""
 
     other = "L2"
     rides = 0
@@ -160,7 +161,7 @@ class ChangesItsMind(RightAdapter):
 
 
 class CallsItBack(ChangesItsMind):
-    """During a ride the adapter asks once for the first floor, as RMF's own adapter does
+    """During a ride the adapter asks once for the floor where the ride began, as RMF's adapter does
     (rmf_ros2#555)."""
 
     other = "L1"

@@ -1,4 +1,5 @@
-"""A charger's node that keeps the contract in its own way. It accepts each request at once if idle."""
+"""A charger's node that keeps the contract in its own way. An idle charger accepts each request at
+once."""
 
 from collections.abc import Sequence
 

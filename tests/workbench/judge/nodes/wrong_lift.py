@@ -16,7 +16,7 @@ class AnyEndEnds(RightLift):
 
 
 class EndNeedsAFloor(RightLift):
-    """The lift refuses END_SESSION for a floor it does not serve. "" is such a floor
+    """The lift refuses an END_SESSION for a floor it does not serve, and so refuses the empty floor ""
     (lift_adapter_template)."""
 
     def ended(self, end: d.LiftRequest) -> None:
@@ -59,8 +59,8 @@ ALARM = replace(topics.FIRE_ALARM_TRIGGER, publish=topics.VOLATILE)
 
 
 class FireIsVolatile(RightLift):
-    """The lift publishes the fire alarm once and volatile, so no fleet adapter gets it
-    (low_level_lift)."""
+    """The lift publishes the fire alarm once and as a volatile sample, so no fleet adapter gets the
+    alarm (low_level_lift)."""
 
     told = False
 

@@ -45,7 +45,8 @@ VIOLATIONS = {"resultTypes": ["violations"]}
 
 
 class Graph:
-    """The daemons of a site, as the page hears them. Each state comes once a second in `turn`."""
+    """The daemons of a site, as the page hears them. Each call of `turn` publishes at most once a
+    second."""
 
     def __init__(self, domain: int, transport: Transport | None = None) -> None:
         self.options = on_graph(domain)
