@@ -2,10 +2,11 @@
 
 RMF's callbacks put events into the inbox. A GPIO edge, or a change of an input on a device's other bus,
 wakes the loop. A round scans each device that is due, has events, or may have changed. First come the
-devices that answered last time, then the other devices, the longest overdue first. A round ends after one silent device. So a live device's reading is
-never older than its period plus one silent device's timeout, even in the first rounds. When a device
-falls silent, the loop also loses the time of the device's retries, once. When the loop ends, for any
-cause, it switches every output off, beginning with the devices that answer.
+devices that answered last time, then the other devices, the longest overdue first. A round ends after
+one silent device. So a live device's reading is never older than its period plus one silent device's
+timeout, even in the first rounds. When a device falls silent, the loop also loses the time of the
+device's retries, once. When the loop ends, for any cause, it switches every output off, beginning with
+the devices that answer.
 """
 
 import logging

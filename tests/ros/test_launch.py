@@ -60,7 +60,7 @@ def test_a_launch_file_starts_the_daemon_with_nothing_but_ross_own_modules() -> 
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("kind: door", "{} is for a door: ros2 launch rmf_bridges door.launch.py"),
+        ("kind: door", "{} is for a door: use ros2 launch rmf_bridges door.launch.py"),
         ("doors: {}", "{} does not say for which kind it is"),
         ("kind: [", "{}: while parsing"),
     ],
