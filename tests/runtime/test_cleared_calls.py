@@ -7,8 +7,9 @@ own connection. On RS-485 the rival uses the module's network port.
 """
 
 import logging
+import re
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from itertools import groupby
 from pathlib import Path
@@ -156,6 +157,25 @@ def is_told(point: Point, caplog: pytest.LogCaptureFixture) -> bool:
     return any("another master writes" in text and str(point) in text for text in lost)
 
 
+SPOILED: Final = re.compile(r"is not a frame|no reply within")
+"""In the log: a busy machine has torn a frame of the serial line, or has made a reply late."""
+
+
+def ridden(
+    make: Callable[[], Site], held: ExitStack, caplog: pytest.LogCaptureFixture, *floors: str
+) -> Site:
+    """Ride to these floors. Ride again with a new site if a busy machine has spoiled a frame."""
+    for _ in range(10):
+        site = make()
+        for floor in floors:
+            site.rides(floor)
+        if not any(SPOILED.search(text) for text in spoken(caplog)):
+            break
+        held.pop_all().close()
+        caplog.clear()
+    return site
+
+
 PLACES: Final = {
     GATEWAY: ["unit 1 holding register 11"],
     CONTACTS: ["unit 1 coil 4", "unit 1 coil 2"],
@@ -180,9 +200,8 @@ def test_a_lift_that_clears_its_calls_is_ridden_without_a_fault_and_the_place_is
     held: ExitStack,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    site = Site(configured(example, tmp_path), clears_s, rtu, held)
-    site.rides("L3")
-    site.rides("L1")
+    config = configured(example, tmp_path)
+    site = ridden(lambda: Site(config, clears_s, rtu, held), held, caplog, "L3", "L1")
     assert site.modes() == [LiftMode.MODE_HUMAN, LiftMode.MODE_AGV]
     assert site.relay("agv_mode_request") == [True]
     told = spoken(caplog)
@@ -205,8 +224,8 @@ def test_with_the_key_or_with_pulses_a_lift_that_clears_its_calls_logs_nothing(
 ) -> None:
     pulse = ("    floors: [L1", "    limits: {call_pulse_s: 0.5}\n    floors: [L1")
     change = READ_BACK[example] if by == "read_back" else pulse
-    site = Site(configured(example, tmp_path, change), 0.05, rtu, held)
-    site.rides("L3")
+    config = configured(example, tmp_path, change)
+    site = ridden(lambda: Site(config, 0.05, rtu, held), held, caplog, "L3")
     assert site.modes() == [LiftMode.MODE_HUMAN, LiftMode.MODE_AGV]
     assert spoken(caplog) == []
 
