@@ -78,7 +78,8 @@ class FakeHttpLift:
         self._last: dict[Asked, bytes] = {}
 
     def obey(self, signal: str, asserted: bool) -> None:
-        """Switch this command, and restart its timer. A call ends every other call."""
+        """Switch this command's output, and restart its timer. A new car call replaces every other car
+        call."""
         now = time.monotonic()
         if signal.startswith("call"):
             for level in self._levels:

@@ -13,7 +13,8 @@ from bridges.runtime.device import AnyNode
 def accepted(
     node: AnyNode, kind: AnyDeviceKind, settings: Any, *heard: tuple[Topic[Any], Message]
 ) -> list[Any]:
-    """Return the events of requests, each heard on its topic. The node learns of refused requests."""
+    """Return the events that the kind makes of these requests. `heard`: each request with its topic. A
+    refused request makes no event; the node counts the refusal."""
     events = []
     for topic, request in heard:
         try:

@@ -70,8 +70,8 @@ def _node_of(wanted: Type) -> type[Node]:
 
 
 class _Around(NamedTuple):
-    """A section that is being read. It has its fields, in the form that `known` takes, and the column
-    of its keys."""
+    """A section of the YAML that is being read: its fields, as `known` lists them, and the column at
+    which its keys begin."""
 
     spot: Spot
     fields: Mapping[str, str | None]

@@ -49,7 +49,7 @@ class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             yield ("low_first",), "is for two registers: words: 2"
 
     def places(self) -> list[str]:
-        """Return the places of the number's registers. The high word's register comes first."""
+        """Return the addresses of the registers that hold this number, the high word first."""
         table, address = place(self.at)
         found = [f"{table} {address + n}" for n in range(self.words)]
         return found[::-1] if self.low_first else found

@@ -19,7 +19,7 @@ UNIT: Final = tells("the unit with this place, if it is another than the device'
 
 
 class AtUnit(Protocol):
-    """A part that may be at another unit than the device's."""
+    """A field of the map that may name its own Modbus unit. Without a name the device's unit counts."""
 
     @property
     def at(self) -> str:

@@ -84,7 +84,8 @@ def _row(row: UnsafeAction) -> str:
 
 
 def fails_without(row: UnsafeAction, tree: Path) -> bool:
-    """Return whether the row's test passes in this tree, and fails in the tree without the guard."""
+    """Return whether the row's test passes with the row's guard, and fails if the guard is removed.
+    `tree`: a copy of the repository."""
     whole = {tree / one.file: (tree / one.file).read_text() for one in row.cuts}
     passes = _exit_code(row.test, tree) == 0
     for one in row.cuts:

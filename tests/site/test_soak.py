@@ -1,4 +1,4 @@
-"""A short day at the site for a few seeds. `make soak` plays whole days."""
+"""A short day at the site, played for a few random seeds. `make soak` plays whole days."""
 
 import pytest
 

@@ -35,7 +35,8 @@ def wires(directory: Path, rng: random.Random, each_s: float, times: int, table:
 
 
 class Almost(TcpLiar):
-    """A module whose door is open. One part of each reply about the door is wrong."""
+    """A fake I/O module at which the building door stands open. The fake spoils one part of each reply
+    about that door."""
 
     def _forged(self, heard: bytes) -> bytes:
         if len(heard) < 12:  # too short for a request: hang up

@@ -58,7 +58,7 @@ def one_node(history: AnyScene) -> Finding:
         both = history.seen.publishers(Moment(history.now, 0.0))
         return f"two publishers take turns: {', '.join(one.node or '?' for one in both)}"
     if len(history.senders) > 1 and history.two_rhythms:
-        return f"states come in two rhythms; their publishers: {', '.join(history.senders[:4])}"
+        return f"states come at two paces; publishers: {', '.join(history.senders[:4])}"
     return KEPT if len(history.senders) == 1 and history.has_rhythm else None
 
 

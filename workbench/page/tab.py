@@ -15,8 +15,8 @@ from nicegui.events import GenericEventArguments
 from workbench.page.zone import zone_of
 
 PIECE: Final = re.compile(r"(?=<(?:rect|text|line|path|tr|p|li)\b)|(?<=\n)")
-"""Pattern of the places where a part of a view is cut into pieces. A small change concerns few
-pieces."""
+"""Places at which the HTML of a view is cut into pieces. Only the pieces that have changed are sent to
+the browser."""
 WHOLE: Final = 1_000_000
 """A number larger than the pieces of any part."""
 

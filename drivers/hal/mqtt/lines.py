@@ -58,8 +58,8 @@ class MqttLines:
                 self._state(point)
 
     def read(self) -> dict[str, bool]:
-        """Read every contact. Raises HalError for a state that is no fact, and for a relay that
-        contradicts its command."""
+        """Read every contact. Raises HalError if a contact's topic has no live state, or if a relay's
+        state contradicts its last command."""
         self._bus.ask(self._asks)
         found = {name: self._state(point) for name, point in self._inputs.items()}
         for name, level in self._set.items():

@@ -165,10 +165,8 @@ def _is_its_end(step: Step, event: object) -> bool:
 
 
 def open_is_the_truth(step: Step) -> None:
-    """Require an open door of a standing car at a known floor whenever OPEN is shown.
-
-    A robot may board only a healthy lift.
-    """
+    """Require that the car stands at a known floor with its door open whenever OPEN is shown. OPEN must
+    not be shown to a robot outside while the lift has a fault."""
     shown: LiftReport = step.decision.report
     if shown.door is not LiftDoor.DOOR_OPEN:
         return

@@ -1,4 +1,5 @@
-"""The occasions of each law of workcells: not seen, kept and broken."""
+"""Three stories for each law of workcells: the law is kept, the law is broken, and the law has no
+occasion."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Every driver offers a way to read its device before it opens the device. The doctor uses that way."""
+"""The doctor reads a device without opening its driver. Every driver offers such a reading."""
 
 import re
 from contextlib import closing
