@@ -13,7 +13,8 @@ import os
 import sys
 import tarfile
 import time
-from collections.abc import Iterator
+import zlib
+from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath
 from typing import Final
 
@@ -44,36 +45,52 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Return 0; 66 if FILE is no backup; 73 if a file cannot be written; 78 for an invalid YAML."""
     if not args.restore:
-        return _save(args.file, args.root)
+        return _save(args.file, args.root, dry_run=args.dry_run)
     try:
         saved = dict(_read(args.file))
-    except (OSError, tarfile.TarError, ValueError) as error:
-        print(f"{args.file} cannot be restored: {error}", file=sys.stderr)
+    except (OSError, EOFError, tarfile.TarError, ValueError, zlib.error) as error:
+        reason = (str(error) or type(error).__name__).splitlines()[0]
+        print(f"{args.file} cannot be restored: {reason}", file=sys.stderr)
         return os.EX_NOINPUT
     return _restore(saved, args)
 
 
-def _save(file: Path, root: Path) -> int:
-    try:
-        opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
-        with open(opened, "wb") as out, tarfile.open(fileobj=out, mode="w:gz") as archive:
-            for path in _found(root):
-                name = path.relative_to(root)
-                if path.parent == root / WANTS:
-                    archive.addfile(tarfile.TarInfo(str(name)))
-                elif _is_secret(path):
-                    print(f"left out, as a secret: /{name}; copy this file by hand")
-                else:
-                    archive.add(path, str(name), recursive=False)
-    except OSError as error:
-        print(f"{file} cannot be written: {error.strerror}", file=sys.stderr)
-        return os.EX_CANTCREAT
-    print(f"saved: {file}")
+def _save(file: Path, root: Path, *, dry_run: bool) -> int:
+    found = [*_found(root)]
+    if not found:
+        print(f"nothing to save: there is no {root / CONFIG}", file=sys.stderr)
+        return os.EX_NOINPUT
+    secrets = [path for path in found if _is_secret(path)]
+    for path in secrets:
+        print(f"left out, as a secret: /{path.relative_to(root)}; copy this file by hand")
+    kept = [path for path in found if path not in secrets]
+    if not dry_run:
+        try:
+            _write_archive(file, root, kept)
+        except OSError as error:
+            print(f"{file} cannot be written: {error.strerror}", file=sys.stderr)
+            return os.EX_CANTCREAT
+    for path in kept:
+        print(f"{'to save' if dry_run else 'saved'}: /{path.relative_to(root)}")
     return 0
 
 
+def _write_archive(file: Path, root: Path, kept: Iterable[Path]) -> None:
+    """Write a new archive. Raises OSError, also if the file exists: another backup may be in it."""
+    opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    with open(opened, "wb") as out, tarfile.open(fileobj=out, mode="w:gz") as archive:
+        for path in kept:
+            name = str(path.relative_to(root))
+            if path.parent == root / WANTS:
+                archive.addfile(tarfile.TarInfo(name))
+            else:
+                archive.add(path, name, recursive=False)
+
+
 def _is_secret(path: Path) -> bool:
-    """May only the owner read this file, and is it neither the page's users nor a memory?"""
+    """Return whether only the owner may read this file, and it holds neither users nor a memory."""
+    if path.parent.name.endswith(".wants"):
+        return False
     return not path.stat().st_mode & SECRET and USERS not in path.name and path.name != KEPT
 
 
@@ -112,6 +129,8 @@ def _restore(saved: dict[PurePosixPath, tuple[bytes, float]], args: argparse.Nam
             print(f"write /{path}")
         elif code := _write(args.root / path, content):
             return code
+        else:
+            print(f"written: /{path}")
     for config in configs:
         steps = enable.steps(config, args.root, enable.groups(args.root))
         if code := carry_out(steps, args, keeps=unit(config.path.stem)):

@@ -29,9 +29,12 @@ IN_USE: Final[Mapping[str, tuple[str, ...]]] = {
     "lift_supervisor": ("session", "holder", "ending", "waiting"),
     "door_supervisor": ("held_by",),
     "charger_coordinator": ("queue",),
+    "dispenser": ("mode", "queue"),
+    "ingestor": ("mode", "queue"),
+    "alarm": (),
 }
 """Kind -> the keys of a device's status that name its user. A kind that is not listed is never idle."""
-FREE: Final = ("-", "off", "")
+FREE: Final = ("-", "off", "", "IDLE")
 IDLE, BUSY = 0, 4
 NOT_TOLD: Final = ("contacts", "counts", "faults", "input_age_s", "outputs", "refused")
 
@@ -82,7 +85,7 @@ def users(one: DaemonStatus) -> Iterator[str]:
         return
     kind = str(one.status.get("kind"))
     if kind not in IN_USE:
-        yield f"{one.name}: whether a {kind} is in use is not known"
+        yield f"{one.name}: of kind {kind} it is not known whether a device is in use"
     for name, device in one.devices.items():
         for key in IN_USE.get(kind, ()):
             if (value := str(device.get(key, ""))) not in FREE:

@@ -14,6 +14,9 @@ SIMULATED: Final = "SIMULATED"
 PASSIVE: Final = "PASSIVE"
 COORDINATOR: Final = "charger_coordinator"
 PANEL: Final = "alarm"
+FLEET: Final = "fleet"
+STATELESS: Final = (COORDINATOR, PANEL, FLEET)
+"""Kinds whose subjects publish no state of RMF's that `ObservedGraph` knows."""
 """The kind of alarm panels, which publish no state: their diagnostics are all that is heard."""
 REFUSED: Final = "refused "
 
@@ -38,11 +41,11 @@ def about(status: DiagnosticStatus) -> tuple[Kind, str] | None:
 
 
 def of_node(status: DiagnosticStatus) -> bool:
-    """Return whether the status is about one of our daemons itself, a coordinator's whole site, or an
-    alarm panel."""
+    """Return whether the status is about one of our daemons itself, or about a subject of a kind in
+    STATELESS: a coordinator's whole site, an alarm panel, or a robot."""
     kind = kind_in(status)
     of_daemon = bool(kind) and status.name == f"{status.hardware_id}: daemon"
-    return kind in (COORDINATOR, PANEL) or of_daemon
+    return kind in STATELESS or of_daemon
 
 
 @dataclass(slots=True)

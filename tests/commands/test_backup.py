@@ -142,3 +142,33 @@ def test_a_dry_run_only_prints_the_steps(
     assert restored(new, file, "--dry-run") == 0
     assert "write /etc/rmf-bridges/ward.yaml" in capsys.readouterr().out
     assert (content(new), calls) == ({}, [])
+
+
+def test_a_second_backup_does_not_overwrite_the_first_and_a_dry_run_writes_nothing(
+    machine: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "backup.tar.gz"
+    line = ["backup", str(file), "--root", str(machine)]
+    assert cli.main([*line, "--dry-run"]) == 0
+    assert "to save: /etc/rmf-bridges/ward.yaml" in capsys.readouterr().out
+    assert not file.exists()
+    file.write_text("another file")
+    assert cli.main(line) == os.EX_CANTCREAT
+    assert file.read_text() == "another file"
+
+
+def test_a_machine_without_files_has_nothing_to_save(tmp_path: Path) -> None:
+    assert saved(tmp_path, tmp_path / "backup.tar.gz") == os.EX_NOINPUT
+    assert not (tmp_path / "backup.tar.gz").exists()
+
+
+@pytest.mark.parametrize("bytes_left", [0, 40, 200])
+def test_a_backup_that_was_cut_is_refused_in_one_line(
+    machine: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], bytes_left: int
+) -> None:
+    file, new = tmp_path / "backup.tar.gz", tmp_path / "new"
+    saved(machine, file)
+    file.write_bytes(file.read_bytes()[:bytes_left])
+    assert restored(new, file) == os.EX_NOINPUT
+    assert len(capsys.readouterr().err.splitlines()) == 1
+    assert content(new) == {}

@@ -255,7 +255,13 @@ def test_an_unknown_name_is_answered_with_the_known_ones(
         ("door", {"hold": "on"}, ["one: X is in use (hold on)"]),
         ("charger", {"request": "-", "robot": "fleet/a"}, ["one: X is in use (robot fleet/a)"]),
         ("door_supervisor", {"held_by": "-"}, []),
-        ("new_kind", {"session": "-"}, ["one: whether a new_kind is in use is not known"]),
+        ("dispenser", {"mode": "IDLE", "queue": "-"}, []),
+        ("dispenser", {"mode": "BUSY", "queue": "-"}, ["one: X is in use (mode BUSY)"]),
+        (
+            "new_kind",
+            {"session": "-"},
+            ["one: of kind new_kind it is not known whether a device is in use"],
+        ),
     ],
 )
 def test_a_device_with_a_user_is_not_idle_and_an_unknown_kind_neither(

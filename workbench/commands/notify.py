@@ -18,7 +18,7 @@ from typing import Final
 
 import msgspec
 
-from bridges.messages.words import printable
+from bridges.messages.words import KINDS, printable
 from bridges.runtime import faults
 from bridges.system import directories, files, log
 from bridges.system.log import pairs
@@ -202,12 +202,21 @@ class Desk:
         """Look at the site once."""
         self._take_acknowledgement()
         present = [*troubles(site, site.now, self._settings)]
-        ids = {(one.kind, printable(one.id)): one.id for one in site.stated()}
+        ids: dict[tuple[str, str], str] = {
+            (one.kind, printable(one.id)): one.id for one in site.stated()
+        }
+        for name, report in site.nodes.items():
+            node, _, subject = name.partition(": ")
+            own = subject == "daemon"
+            ids["daemon" if own else report.kind, printable(node if own else subject)] = ""
         for notice in self._notices.turn(present, ids, site.now.at, datetime.now().time()):
             one = notice.trouble
-            name = ids.get((one.kind, one.device))
-            explained = site.explain(one.kind, name, None, self._remedies) if name else None
-            text = worded(notice, explained, self._settings.page)
+            device = ids.get((one.kind, one.device))
+            kind = next((known for known in KINDS if known == one.kind), None)
+            explained = (
+                site.explain(kind, device, None, self._remedies) if kind and device else None
+            )
+            text = worded(notice, explained, self._settings.page, self._remedies)
             for courier in self._couriers:
                 courier.take(text)
         self._keep()

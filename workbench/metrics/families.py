@@ -26,6 +26,7 @@ from bridges.observe.door import ObservedDoor
 from bridges.observe.lift import NOBODY, ObservedLift
 from bridges.observe.requesters import Moment
 from bridges.observe.tally import BOUNDS_S, DeviceTally, DurationHistogram, SiteTally
+from bridges.observe.workcell import ObservedWorkcell
 
 PREFIX: Final = "rmf_bridge_"
 DEVICE: Final = ("kind", "device")
@@ -35,6 +36,8 @@ MODES: Final[dict[str, type[IntEnum]]] = {
     "lift": d.LiftMode,
     "door": d.DoorModeValue,
     "charger": d.ChargerStateValue,
+    "dispenser": d.WorkcellMode,
+    "ingestor": d.WorkcellMode,
 }
 
 
@@ -47,7 +50,7 @@ def of_graph(graph: ObservedGraph[Any], tally: SiteTally, now: Moment) -> Iterat
     """Yield the families of all devices that have published a state, and of our nodes."""
     devices = graph.stated()
     yield from _states(graph, devices, now)
-    yield from _trouble(devices, now)
+    yield from _trouble(graph, devices, now)
     yield from _waits(devices, now)
     yield from _counts(devices, tally)
     yield from _nodes(graph, now)
@@ -78,8 +81,20 @@ def _states(
     yield from (up, age, mode, simulated)
 
 
-def _trouble(devices: Iterable[AnyDevice], now: Moment) -> Iterator[Metric]:
-    fault = _gauge("device_fault", "1 while a daemon reports this fault.", (*DEVICE, "code"))
+def _trouble(
+    graph: ObservedGraph[Any], devices: Iterable[AnyDevice], now: Moment
+) -> Iterator[Metric]:
+    fault = _gauge(
+        "device_fault",
+        "1 while a daemon reports this fault of a device, an alarm panel, a robot or itself.",
+        (*DEVICE, "code"),
+    )
+    for name, report in graph.nodes.items():
+        node, _, subject = name.partition(": ")
+        own = subject == "daemon"
+        names = ("daemon" if own else label(report.kind), label(node if own else subject))
+        for code in report.faults if report.is_current(now.at) else ():
+            fault.add_metric((*names, label(code)), 1)
     publishers = _gauge(
         "device_publishers",
         "Nodes that publish states under this name; 0 if the transport does not tell.",
@@ -155,9 +170,6 @@ def _counts(devices: Iterable[AnyDevice], tally: SiteTally) -> Iterator[Metric]:
 def _nodes(graph: ObservedGraph[Any], now: Moment) -> Iterator[Metric]:
     info = InfoMetricFamily(f"{PREFIX}node", "Our daemons on the graph.", labels=("node",))
     up = _gauge("node_up", "1 while the daemon reports on /diagnostics.", ("node",))
-    fault = _gauge(
-        "node_fault", "1 while the daemon reports this fault of its own.", ("node", "code")
-    )
     for name, report in graph.nodes.items():
         node = label(name.partition(": ")[0])
         if not name.endswith(": daemon"):
@@ -165,12 +177,10 @@ def _nodes(graph: ObservedGraph[Any], now: Moment) -> Iterator[Metric]:
         facts = {key: label(report.value(key)) for key in ("version", "transport", "release")}
         info.add_metric((node,), {"kind": label(report.kind), **facts})
         up.add_metric((node,), report.is_current(now.at))
-        for code in report.faults if report.is_current(now.at) else ():
-            fault.add_metric((node, label(code)), 1)
     left_out = _gauge("devices_left_out", "1 if more devices were heard than are kept.", ("kind",))
     for kind in words.KINDS:
         left_out.add_metric((kind,), kind in graph.crowded)
-    yield from (info, up, fault, left_out)
+    yield from (info, up, left_out)
 
 
 def _names(device: AnyDevice) -> tuple[str, str]:
@@ -178,13 +188,18 @@ def _names(device: AnyDevice) -> tuple[str, str]:
 
 
 def _mode(device: AnyDevice) -> int:
-    match device:
-        case ObservedLift():
-            return device.state.current_mode if device.state else -1
-        case ObservedDoor():
-            return device.state.current_mode.value if device.state else -1
-        case _:
-            return device.state.state if device.state else -1
+    """Return the number of the present mode or state, as RMF's message has it."""
+    state = device.state
+    match state:
+        case d.LiftState():
+            return state.current_mode
+        case d.DoorState():
+            return state.current_mode.value
+        case d.ChargerState():
+            return state.state
+        case d.DispenserState() | d.IngestorState():
+            return state.mode
+    return -1
 
 
 def _held(device: AnyDevice) -> bool:
@@ -195,6 +210,8 @@ def _held(device: AnyDevice) -> bool:
             return bool(device.holders)
         case ObservedCharger():
             return device.robot.value != NOBODY
+        case ObservedWorkcell():
+            return bool(device.queue.value)
     return False
 
 

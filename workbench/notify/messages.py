@@ -1,10 +1,13 @@
 """A notice as text for people: a headline, the sentences of `explain`, and who must act."""
 
+from collections.abc import Iterator
 from typing import Final
 from urllib.parse import quote
 
 from msgspec import Struct
 
+from bridges.messages.words import KINDS
+from workbench.explain.answer import Remedies
 from workbench.explain.explanation import Explanation
 from workbench.notify.notices import Notice
 
@@ -23,21 +26,38 @@ class NoticeText(Struct, frozen=True):
     link: str = ""
 
 
-def worded(notice: Notice, explained: Explanation | None, page: str | None) -> NoticeText:
+def worded(
+    notice: Notice, explained: Explanation | None, page: str | None, remedies: Remedies
+) -> NoticeText:
     """Word a notice. `explained`: the device's explanation now; None if it is no longer known."""
     trouble = notice.trouble
     lines = [f"It has lasted {_lasted(notice.for_s)}."]
     if notice.event == "over":
         lines = [f"It lasted {_lasted(notice.for_s)}."]
-    elif explained is not None:
-        lines += explained.now[:MOST_SENTENCES]
-        lines += [f"Next, {step.who}: {step.what}." for step in explained.next]
-        lines += [f"{one.code}: {one.cause}. {one.do}" for one in explained.faults if one.do]
+    else:
+        lines += _explained(explained, trouble.what, remedies)
     if trouble.severity == "critical" and notice.event != "over":
         lines.append(f"To stop the repeats: rmf-bridge notify FILE --ack '{trouble.key}'")
-    link = f"{page.rstrip('/')}/{trouble.kind}/{quote(trouble.device, safe='')}" if page else ""
+    link = ""
+    if page and trouble.kind in KINDS:
+        link = f"{page.rstrip('/')}/{trouble.kind}/{quote(trouble.device, safe='')}"
     title = SAYS[notice.event] + trouble.headline
     return NoticeText(notice.event, trouble.severity, trouble.key, title, "\n".join(lines), link)
+
+
+def _explained(explained: Explanation | None, code: str, remedies: Remedies) -> Iterator[str]:
+    """Yield the sentences of `explain`, and what to do.
+
+    The trouble's own remedy counts more than "nobody has to act", which speaks of robots' requests.
+    """
+    known = {code: remedies[code]} if code in remedies else {}
+    if explained is not None:
+        yield from explained.now[:MOST_SENTENCES]
+        for step in explained.next:
+            if step.who != "nobody" or not known:
+                yield f"Next, {step.who}: {step.what}."
+        known = {one.code: (one.cause, one.do) for one in explained.faults if one.do} | known
+    yield from (f"{code}: {cause}. {do}" for code, (cause, do) in known.items())
 
 
 def _lasted(seconds: float) -> str:

@@ -1,21 +1,24 @@
 """A site's present troubles, from its devices' memory. Pure."""
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Final
 
 from msgspec import Struct
 
-from bridges.messages.words import Kind, printable
+from bridges.messages.words import printable
 from bridges.observe.all_devices import AnyDevice, ObservedGraph
 from bridges.observe.lift import NOBODY, ObservedLift
 from bridges.observe.requesters import Moment
 from workbench.notify.settings import NotifySettings, Severity
 
+RAISED: Final = "ALARM_RAISED"
+"""The fault of a daemon whose alarm lets robots stand."""
+
 
 class Trouble(Struct, frozen=True):
     """One trouble of one device. `what`: the same for as long as it is the same trouble."""
 
-    kind: Kind
+    kind: str
     device: str
     what: str
     severity: Severity
@@ -45,6 +48,26 @@ def troubles(graph: ObservedGraph[Any], now: Moment, settings: NotifySettings) -
         if any(now.at - wait.since.at > settings.waits_s for wait in one.waits(now)):
             headline = f"a robot waits for {one.kind} {name}"
             yield Trouble(one.kind, name, "WAITING", "warning", headline)
+    yield from _of_nodes(graph, now)
+
+
+def _of_nodes(graph: ObservedGraph[Any], now: Moment) -> Iterator[Trouble]:
+    """Yield the troubles of alarm panels, robots, coordinators, and of our daemons themselves.
+
+    The silence of a lift's, door's or charger's daemon is already its device's trouble.
+    """
+    for name, report in graph.nodes.items():
+        node, _, subject = name.partition(": ")
+        kind, named = report.kind, printable(subject)
+        if subject == "daemon":
+            kind, named = "daemon", printable(node)
+        elif not report.is_current(now.at):
+            headline = f"{kind} {named} is silent"
+            yield Trouble(kind, named, "SILENT", "critical", headline)
+        for code in sorted(report.faults) if report.is_current(now.at) else ():
+            severity: Severity = "critical" if code == RAISED else "warning"
+            shown = printable(code)
+            yield Trouble(kind, named, shown, severity, f"{kind} {named}: {shown}")
 
 
 def _of_lift(one: AnyDevice, name: str, now: Moment, settings: NotifySettings) -> Iterator[Trouble]:

@@ -12,8 +12,8 @@ from tests.kinds.lift.story import Story
 from tests.kinds.lift.wired import GatewayBuilding, WiredStory
 
 CONFIG = Path(__file__).parents[3] / "config"
-ELSEWHERE = {"lift_supervisor.yaml", "lift_http.yaml"}
-"""No lift; and a lift whose ride over real HTTP is in tests/runtime/test_http_lift.py."""
+ELSEWHERE = {"lift_supervisor.yaml", "lift_http.yaml", "lift_two_buses.yaml"}
+"""No lift; and lifts that ride in tests/runtime/test_http_lift.py and test_other_bus.py."""
 EXAMPLES = sorted({path.name for path in CONFIG.glob("lift_*.yaml")} - ELSEWHERE)
 A = "fleet/a"
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
+import pytest
 from msgspec.structs import replace
 from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import Metric
@@ -10,9 +11,10 @@ from prometheus_client.parser import text_string_to_metric_families
 from prometheus_client.registry import Collector
 
 from bridges.messages import definitions as d
+from bridges.messages.words import KINDS, Kind
 from bridges.observe.requesters import Moment
 from bridges.runtime.daemons import DaemonStatus
-from tests.observe.story import LIFT, OPEN, RED, WALL, Story
+from tests.observe.story import CHARGER, LIFT, OPEN, RED, WALL, Story
 from workbench.metrics.families import LONGEST, of_graph
 from workbench.metrics.machine import of_machine, of_recordings
 
@@ -78,6 +80,44 @@ def test_a_waiting_robot_and_a_still_car_with_a_robot_show_their_seconds() -> No
     assert found['rmf_bridge_lift_session_still_seconds{device="Lift1"}'] == 200.0
     assert found[f"rmf_bridge_device_held{LIFT1}"] == 1.0
     assert found['rmf_bridge_wait_seconds_bucket{device="Lift1",kind="lift",le="2.0"}'] == 1.0
+
+
+WORKCELLS: dict[str, type[d.DispenserState | d.IngestorState]] = {
+    "dispenser": d.DispenserState,
+    "ingestor": d.IngestorState,
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_device_of_each_kind_has_its_modes_with_exactly_one_present(kind: Kind) -> None:
+    story = Story()
+    if kind in WORKCELLS:
+        story.hear(f"{kind}_states", WORKCELLS[kind](guid="X", mode=1, request_guid_queue=("1",)))
+    else:
+        {"lift": story.lift, "door": lambda: story.door(OPEN)}.get(
+            kind, lambda: story.hear("charger_states", CHARGER)
+        )()
+    found = scraped(story)
+    assert sum(value for name, value in found.items() if "device_mode" in name) == 1.0
+
+
+def test_the_faults_of_panels_robots_and_daemons_are_series_of_their_own() -> None:
+    said = [
+        _status("node: Main panel", "alarm", "Main panel", "ALARM_RAISED"),
+        _status("fleet: AMR1", "fleet", "AMR1", "ROBOT_SILENT"),
+        _status("node: daemon", "lift", "node", "NOT_KEPT"),
+    ]
+    found = scraped(Story().hear("/diagnostics", d.DiagnosticArray(status=tuple(said))))
+    assert {name for name in found if "device_fault" in name} == {
+        'rmf_bridge_device_fault{code="ALARM_RAISED",device="Main panel",kind="alarm"}',
+        'rmf_bridge_device_fault{code="ROBOT_SILENT",device="AMR1",kind="fleet"}',
+        'rmf_bridge_device_fault{code="NOT_KEPT",device="node",kind="daemon"}',
+    }
+
+
+def _status(name: str, kind: str, subject: str, code: str) -> d.DiagnosticStatus:
+    values = (d.KeyValue("kind", kind), d.KeyValue(code, "since 3 s"))
+    return d.DiagnosticStatus(2, name, code, subject, values)
 
 
 def test_faults_and_refusals_of_the_daemon_are_series_and_end_with_its_silence() -> None:

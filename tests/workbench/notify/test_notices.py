@@ -6,9 +6,12 @@ from datetime import time
 import msgspec
 import pytest
 
+from bridges.messages import definitions as d
 from bridges.observe.requesters import Moment
 from tests.observe.story import OPEN, RED, WALL, Story
-from workbench.notify.notices import KeptTrouble, Notices
+from workbench.explain.explanation import Explanation, NextStep
+from workbench.notify.messages import worded
+from workbench.notify.notices import KeptTrouble, Notice, Notices
 from workbench.notify.settings import NotifySettings, QuietHours, Recipient
 from workbench.notify.troubles import Trouble, troubles
 
@@ -125,3 +128,31 @@ def test_a_robot_in_a_still_lift_is_critical_and_a_waiting_robot_is_a_warning() 
     for _ in range(400):
         story.passes(1).asks("fleet/blue").asks(RED, "L1").lift(RED, "L1", OPEN)
     assert found(story) == ["critical lift Lift1: STUCK", "warning lift Lift1: WAITING"]
+
+
+def test_the_faults_of_panels_and_robots_are_troubles_and_so_is_the_silence_of_a_panel() -> None:
+    values = (d.KeyValue("kind", "alarm"), d.KeyValue("ALARM_RAISED", "fire"))
+    panel = d.DiagnosticStatus(2, "node: Main panel", "ALARM_RAISED", "Main panel", values)
+    values = (d.KeyValue("kind", "fleet"), d.KeyValue("ROBOT_SILENT", "5 s"))
+    robot = d.DiagnosticStatus(2, "fleet: AMR1", "ROBOT_SILENT", "AMR1", values)
+    story = Story().hear("/diagnostics", d.DiagnosticArray(status=(panel, robot)))
+    assert found(story) == [
+        "critical alarm Main panel: ALARM_RAISED",
+        "warning fleet AMR1: ROBOT_SILENT",
+    ]
+    assert found(story.passes(30)) == [
+        "critical alarm Main panel: SILENT",
+        "critical fleet AMR1: SILENT",
+    ]
+
+
+def test_a_remedy_counts_more_than_that_nobody_has_to_act() -> None:
+    idle = Explanation("dispenser", "X", "", ("It is idle.",), (NextStep("nobody", "wait"),))
+    trouble = Trouble("dispenser", "X", "OUTCOME_UNKNOWN", "warning", "dispenser X")
+    remedies = {"OUTCOME_UNKNOWN": ("nobody knows", "look at the robot")}
+    text = worded(Notice("new", trouble, 30.0), idle, None, remedies).text
+    assert text.splitlines() == [
+        "It has lasted 30 s.",
+        "It is idle.",
+        "OUTCOME_UNKNOWN: nobody knows. look at the robot",
+    ]
