@@ -1,0 +1,106 @@
+"""The rules of the rollout: pure functions of files, texts and `rmf-bridge status --json`."""
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path, PurePath
+from typing import Any, Final
+
+import yaml
+
+DEVICES: Final = frozenset({"lift", "door", "charger", "dispenser", "ingestor"})
+"""Kinds with outputs: each needs the record of a kill test."""
+NO_OUTPUTS: Final = frozenset({"alarm", "fleet"})
+SUPERVISORS: Final = frozenset({"lift_supervisor", "door_supervisor", "charger_coordinator"})
+SERVED: Final = DEVICES | NO_OUTPUTS | SUPERVISORS
+ROLES: Final = {"daemon": DEVICES | NO_OUTPUTS, "supervisors": SUPERVISORS, "outputs": DEVICES}
+
+
+def rmf_kind(text: str) -> str:
+    """Return the kind of a YAML; "" for a profile, a map or another file that no service runs."""
+    try:
+        content = yaml.safe_load(text)
+    except yaml.YAMLError:
+        return ""
+    kind = content.get("kind", "") if isinstance(content, dict) else ""
+    return kind if kind in SERVED else ""
+
+
+def rmf_files(folder: str, role: str = "") -> list[str]:
+    """Return the YAMLs in this folder whose service this role makes; without a role, each YAML that
+    has a service."""
+    kinds = ROLES.get(role, SERVED)
+    return [str(file) for file in _yamls(folder) if rmf_kind(file.read_text("utf-8")) in kinds]
+
+
+def rmf_beside(folder: str) -> list[str]:
+    """Return the YAMLs in this folder that have no service: profiles and maps."""
+    return [str(file) for file in _yamls(folder) if not rmf_kind(file.read_text("utf-8"))]
+
+
+def _yamls(folder: str) -> list[Path]:
+    return sorted(Path(folder).glob("*.yaml"))
+
+
+def rmf_untested(form: str, file: str) -> str:
+    """Return why this form is no record of a kill test that went well for this YAML; "" if it is.
+
+    `form`: the text that `rmf-bridge doctor FILE --kill-test --form FORM` writes.
+    """
+    name = PurePath(file).name
+    if not form.strip():
+        return f"{name}: there is no form"
+    if not form.startswith(f"# {name} on "):
+        return f"{name}: the form is about another file: {form.splitlines()[0]}"
+    rows = [row.split("|") for row in form.splitlines() if row.startswith("| kill test |")]
+    levels = [row[2].strip() for row in rows]
+    if "wrong" in levels:
+        return f"{name}: the kill test failed"
+    if not any("verified" in row[3] for row in rows if row[2].strip() == "ok"):
+        return f"{name}: the form has no kill test"
+    return ""
+
+
+def rmf_not_back(
+    after: Iterable[Mapping[str, Any]], before: Iterable[Mapping[str, Any]], wanted: Iterable[str]
+) -> list[str]:
+    """Return why a machine has not come back; empty if every wanted daemon serves.
+
+    `after`, `before`: what `rmf-bridge status --json` printed. `wanted`: names of services. A fault
+    that a daemon had before does not count, because the change is not its cause.
+    """
+    now = {one["name"]: one for one in after}
+    levels = {one["name"]: one["level"] for one in before}
+    return [why for name in sorted(set(wanted)) if (why := _why(name, now.get(name), levels))]
+
+
+def rmf_untested_file(file: str) -> str:
+    """Return why the form beside this YAML (NAME.md) is no record of a kill test; "" if it is."""
+    form = Path(file).with_suffix(".md")
+    return rmf_untested(form.read_text("utf-8") if form.exists() else "", file)
+
+
+def _why(name: str, now: Mapping[str, Any] | None, levels: Mapping[str, int]) -> str:
+    if now is None:
+        return f"{name}: there is no such daemon"
+    if now["state"] != "serving":
+        return f"{name}: {now['state']}"
+    if now["level"] > levels.get(name, 0):
+        faults = [
+            fault["code"]
+            for part in (now["status"], *now["devices"].values())
+            for fault in part.get("faults", ())
+        ]
+        return f"{name}: a fault that was not there before: {', '.join(faults)}"
+    return ""
+
+
+class FilterModule:
+    """The filters that Ansible finds."""
+
+    def filters(self) -> dict[str, Callable[..., Any]]:
+        """Return the filters by name."""
+        return {
+            "rmf_files": rmf_files,
+            "rmf_beside": rmf_beside,
+            "rmf_untested_file": rmf_untested_file,
+            "rmf_not_back": rmf_not_back,
+        }
