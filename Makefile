@@ -6,7 +6,7 @@ BIN := .venv/bin
 # compiles every file again.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help servers demo demo-charging demo-page test test-page suite deep test-ros lint style types docs reference man deb lock reproducible release repo format bench flood soak torture test-vm mutate clean
+.PHONY: help servers demo demo-charging demo-page test test-page suite deep test-ros lint style types docs reference man deb lock reproducible release repo format bench flood soak torture test-vm test-rollout mutate clean
 help:
 	@echo "make demo    a robot goes through a door, rides a lift and charges, on fake hardware"
 	@echo "             (TRANSPORT=zenoh make demo: on zenoh, the default on a Raspberry Pi)"
@@ -23,6 +23,7 @@ help:
 	@echo "make torture  kill, starve and lie to real daemons for ten minutes, and print docs/explanation/reliability.md's table"
 	@echo "make test-vm  boot Debian 13 in QEMU, install our packages, and kill and hang it there (ARCH=arm64)"
 	@echo "             (one of its machines: ONLY=lift, site or upgrade)"
+	@echo "make test-rollout  roll versions out to two Debian machines in containers, one version that cannot start; as root"
 	@echo "make mutate  break the cores in every small way, and list breaks that no test noticed (docs/explanation/mutation.md)"
 	@echo "make docs    the documentation as a site, build/site/index.html; a broken link is an error"
 	@echo "make reference  write the generated pages of docs/"
@@ -171,6 +172,11 @@ ARCH ?= amd64
 test-vm: .venv/ready
 	@ls dist/*+deb13_$(ARCH).deb >/dev/null 2>&1 || $(MAKE) --no-print-directory deb ARCHS=$(ARCH) PYTHONS=3.13
 	@$(BIN)/python -m tests.vm --arch $(ARCH) $(if $(ONLY),--only $(ONLY))
+
+# Tests the packages built last for Debian 12, or builds them if there are none. The Debian is made once, in build/rollout.
+test-rollout: .venv/ready
+	@ls dist/*+deb12_amd64.deb >/dev/null 2>&1 || $(MAKE) --no-print-directory deb ARCHS=amd64 PYTHONS=3.11
+	@$(BIN)/python -m tests.rollout
 
 # Mutants live in a copy. After an interruption only the missing results are computed. For a part:
 # make mutate ONLY='bridges.kinds.door.*' CHILDREN=1. To start again from nothing: rm -rf the directory first.

@@ -1,0 +1,130 @@
+"""The collection: its rules, the order of its steps, and its syntax as Ansible reads it. `make
+test-rollout` rolls out to machines.
+"""
+
+import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+import yaml
+
+from bridges.kinds import kind_called, kind_names
+
+COLLECTION: Final = Path(__file__).parents[2] / "deploy/ansible"
+_spec = importlib.util.spec_from_file_location("rollout", COLLECTION / "plugins/filter/rollout.py")
+assert _spec
+assert _spec.loader
+rollout: Any = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(rollout)
+
+FORM: Final = """\
+# lift.yaml on Raspberry Pi 4
+2026-11-24 08:10, rmf-bridges 0.1.0, kernel 6.12, Python 3.13.5, buses: gpio
+
+| subject | | found by `doctor` |
+|---|---|---|
+| file | ok | lift.yaml is a valid file of a lift |
+| kill test | ok | Lift1 door_open was on, and the guard switched the output off, verified after 0.2 s |
+"""
+
+
+def test_a_kill_test_that_went_well_is_accepted() -> None:
+    assert rollout.rmf_untested(FORM, "machines/pi-lift1/lift.yaml") == ""
+
+
+@pytest.mark.parametrize(
+    ("form", "why"),
+    [
+        ("", "there is no form"),
+        (FORM.replace("# lift.yaml", "# door.yaml"), "about another file"),
+        (FORM.replace("kill test | ok", "kill test | wrong"), "the kill test failed"),
+        ("".join(FORM.splitlines(True)[:-1]), "has no kill test"),
+        (
+            FORM
+            + "| kill test | wrong | Lift1 door_open is not verified off 15 s after kill -9 |\n",
+            "the kill test failed",
+        ),
+        (
+            FORM[: FORM.index("Lift1 door")] + "the kernel released the line at once |\n",
+            "no kill test",
+        ),
+    ],
+)
+def test_another_form_is_refused(form: str, why: str) -> None:
+    assert why in rollout.rmf_untested(form, "machines/pi-lift1/lift.yaml")
+
+
+def status(name: str = "lift", state: str = "serving", level: int = 0) -> dict[str, Any]:
+    faults = [{"code": "stale", "detail": ""}] if level else []
+    devices = {"Lift1": {"faults": faults}}
+    return {"name": name, "state": state, "level": level, "status": {}, "devices": devices}
+
+
+@pytest.mark.parametrize(
+    ("after", "before", "why"),
+    [
+        ([status()], [status()], []),
+        ([status(level=1)], [status(level=1)], []),
+        ([status()], [], []),
+        ([], [status()], ["lift: there is no such daemon"]),
+        ([status(state="failed", level=2)], [status(state="failed", level=2)], ["lift: failed"]),
+        ([status(level=1)], [status()], ["lift: a fault that was not there before: stale"]),
+        ([status(level=1)], [], ["lift: a fault that was not there before: stale"]),
+    ],
+)
+def test_a_machine_is_back_if_each_wanted_daemon_serves_as_before(
+    after: list[Any], before: list[Any], why: list[str]
+) -> None:
+    assert rollout.rmf_not_back(after, before, ["lift"]) == why
+
+
+def test_every_kind_has_a_role_and_needs_a_kill_test_if_it_has_outputs() -> None:
+    assert set(kind_names()) == rollout.SERVED
+
+
+def test_a_folder_is_sorted_by_kind(tmp_path: Path) -> None:
+    for kind in ("lift", "alarm", "door_supervisor"):
+        (tmp_path / f"{kind}.yaml").write_text(f"kind: {kind}\n")
+    (tmp_path / "profile.yaml").write_text("registers: {}\n")
+
+    def names(files: list[str]) -> list[str]:
+        return [Path(file).stem for file in files]
+
+    assert names(rollout.rmf_files(str(tmp_path))) == ["alarm", "door_supervisor", "lift"]
+    assert names(rollout.rmf_files(str(tmp_path), "daemon")) == ["alarm", "lift"]
+    assert names(rollout.rmf_files(str(tmp_path), "supervisors")) == ["door_supervisor"]
+    assert names(rollout.rmf_files(str(tmp_path), "outputs")) == ["lift"]
+    assert names(rollout.rmf_beside(str(tmp_path))) == ["profile"]
+    assert "there is no form" in rollout.rmf_untested_file(str(tmp_path / "lift.yaml"))
+
+
+def test_one_machine_is_changed_at_a_time_after_all_were_looked_at() -> None:
+    look, change = yaml.safe_load((COLLECTION / "playbooks/rollout.yml").read_text())
+    assert (look["any_errors_fatal"], change["any_errors_fatal"]) == (True, True)
+    assert ("serial" in look, change["serial"]) == (False, 1)
+    assert change["tasks"][0]["when"] == "not ansible_check_mode"
+
+
+def test_nothing_is_changed_before_the_devices_are_idle_and_the_old_version_is_kept() -> None:
+    tasks = yaml.safe_load((COLLECTION / "playbooks/tasks/change.yml").read_text())
+    keep, idle, change = tasks[-3:]
+    assert "apt-get download" in keep["ansible.builtin.shell"]
+    assert idle["ansible.builtin.command"]["argv"] == ["rmf-bridge", "status", "--idle"]
+    assert "rescue" not in idle  # after the last try the machine's turn ends, and the rollout
+    assert "ansible.builtin.fail" in change["rescue"][-1]
+    assert any("put_back.yml" in str(task) for task in change["rescue"])
+
+
+def test_ansible_reads_the_playbook(tmp_path: Path) -> None:
+    home = tmp_path / "ansible_collections/rmf_bridges"
+    home.mkdir(parents=True)
+    (home / "site").symlink_to(COLLECTION)
+    program = Path(sys.executable).with_name("ansible-playbook")
+    env = {"ANSIBLE_COLLECTIONS_PATH": str(tmp_path), "ANSIBLE_HOME": str(tmp_path / "home")}
+    words = [program, "--syntax-check", "-i", "pi-lift1,", "rmf_bridges.site.rollout"]
+    done = subprocess.run(words, env=os.environ | env, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,3 @@
+"""The rollout on two machines: Debian in containers, each with systemd as process 1. `make
+test-rollout`.
+"""

@@ -1,0 +1,282 @@
+"""`make test-rollout` rolls versions out to two booted machines, and prints a line for each check. As
+root. Exit code 1: a check failed; 69: none ran.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Final
+
+from tests.rollout.machines import PORTS, booted, debian, missing
+from tests.rollout.versions import another
+
+ROOT: Final = Path(__file__).parents[2]
+WORK: Final = ROOT / "build/rollout"
+BIN: Final = ROOT / ".venv/bin"
+INSIDE: Final = "RMF_ROLLOUT_INSIDE"
+"""Set in the process that has a network of its own, with the loopback interface only."""
+ENV: Final = os.environ | {
+    "PATH": f"{BIN}:{os.environ['PATH']}",
+    "GNUPGHOME": str(WORK / "gpg"),
+    "URI": "file:/srv/repository",
+    "ANSIBLE_COLLECTIONS_PATH": str(WORK / "collections"),
+    "ANSIBLE_LOCALHOST_WARNING": "false",
+    "ANSIBLE_HOST_KEY_CHECKING": "false",
+    "ANSIBLE_DEPRECATION_WARNINGS": "false",
+    "ANSIBLE_NOCOLOR": "true",
+}
+FIRST, SECOND = PORTS
+
+
+def main() -> int:
+    """Build what needs the network, then run in a network of its own."""
+    if os.geteuid() != 0:
+        print("containers need root: sudo make test-rollout", file=sys.stderr)
+        return os.EX_UNAVAILABLE
+    if packages := missing():
+        print(f"missing here: sudo apt install {' '.join(packages)}", file=sys.stderr)
+        return os.EX_UNAVAILABLE
+    WORK.mkdir(parents=True, exist_ok=True)
+    if INSIDE not in os.environ:
+        debian(WORK / "tree")
+        words = ["unshare", "--net", "--mount", sys.executable, "-m", "tests.rollout"]
+        return subprocess.run(words, env=os.environ | {INSIDE: "1"}).returncode
+    sh("ip", "link", "set", "lo", "up")
+    return Rollouts().run()
+
+
+def sh(*words: object, check: bool = True) -> subprocess.CompletedProcess[str]:
+    """Run a command, and return its output."""
+    done = subprocess.run([str(word) for word in words], env=ENV, capture_output=True, text=True)
+    if check and done.returncode:
+        raise RuntimeError(f"{words}: {done.stdout}{done.stderr}")
+    return done
+
+
+def repository() -> tuple[str, str, str]:
+    """Make the repository; return the old version, a newer that serves, and the newest, which does not."""
+    packages = sorted((ROOT / "dist").glob("*+deb12_amd64.deb"))
+    old = packages[0].name.split("_")[1]
+    good, bad = old.replace("+deb12", ".1+deb12"), old.replace("+deb12", ".2+deb12")
+    debs = WORK / "debs"
+    if not (debs / f"rmf-bridges_{bad}_amd64.deb").exists():
+        sh("rm", "-rf", debs)
+        debs.mkdir()
+        for each in packages:
+            sh("cp", each, debs)
+            another(each, debs, old, good, broken=False)
+            another(each, debs, old, bad, broken=True)
+    sh("rm", "-rf", WORK / "gpg", WORK / "apt")
+    (WORK / "gpg").mkdir(mode=0o700)
+    sh("gpg", "--batch", "--passphrase", "", "--quick-gen-key", "test@localhost", "ed25519", "sign")
+    sh(ROOT / "deploy/apt-repository.sh", debs, WORK / "apt", "test@localhost")
+    sources = WORK / "apt/rmf-bridges.sources"
+    sources.write_text(sources.read_text().replace("deb13", "deb12"))
+    return old, good, bad
+
+
+def door(name: str, api_base: str) -> str:
+    """Return the YAML of a door behind an HTTP relay."""
+    text = (ROOT / "config/door_http.yaml").read_text().replace("side_door", name)
+    text = text.replace("transport: auto", "transport: dds\n  network: localhost")
+    return text.replace("192.168.1.70", api_base)
+
+
+@contextmanager
+def relays() -> Iterator[dict[str, str]]:
+    """Serve a simulated relay with its door for each machine, and write the inventory's folder."""
+    sh("rm", "-rf", WORK / "site")
+    bases = {}
+    with ExitStack() as stack:
+        for number, machine in enumerate(PORTS, 1):
+            folder = WORK / "site/machines" / machine
+            folder.mkdir(parents=True)
+            file = folder / f"door{number}.yaml"
+            file.write_text(door(f"door{number}", "http://127.0.0.1:1"))
+            words = [
+                BIN / "python",
+                "-m",
+                "hal_fakes",
+                file,
+                "relay",
+                "--socket",
+                WORK / machine[3:],
+            ]
+            fake = subprocess.Popen(words, stdin=-1, stdout=-1, text=True)
+            stack.callback(fake.wait)
+            assert fake.stdin
+            assert fake.stdout
+            stack.callback(fake.stdin.close)
+            bases[machine] = json.loads(fake.stdout.readline())["api_base"]
+            file.write_text(door(f"door{number}", bases[machine]))
+        supervisor = (ROOT / "config/door_supervisor.yaml").read_text()
+        supervisor = supervisor.replace("transport: auto", "transport: dds\n  network: localhost")
+        (WORK / f"site/machines/{SECOND}/door_supervisor.yaml").write_text(supervisor)
+        hosts = "".join(
+            f"    {name}: {{ansible_host: 127.0.0.1, ansible_port: {port}, ansible_user: root,\n"
+            f"      ansible_ssh_private_key_file: {WORK}/key}}\n"
+            for name, port in PORTS.items()
+        )
+        (WORK / "site/inventory.yml").write_text(
+            f"rmf_bridges:\n  hosts:\n{hosts}  vars:\n"
+            f"    rmf_bridges_repository: {WORK}/apt\n    rmf_bridges_watched_s: 10\n"
+            "    rmf_bridges_idle_tries: 2\n    rmf_bridges_idle_pause_s: 1\n"
+            f"recorders: {{hosts: {{{FIRST}: }}}}\nexporters: {{hosts: {{{SECOND}: }}}}\n"
+        )
+        yield bases
+
+
+class Rollouts:
+    """The rollouts, in turn, and their checks."""
+
+    def __init__(self) -> None:
+        self.failed = 0
+        self.old, self.good, self.bad = repository()
+
+    def run(self) -> int:
+        """Run all; return 1 if a check failed."""
+        sh(BIN / "ansible-galaxy", "collection", "install", "--force", "-p", WORK / "collections",
+           ROOT / "deploy/ansible")  # fmt: skip
+        with relays() as bases, booted(WORK, WORK / "tree", WORK / "apt"):
+            self._reachable()
+            for step in (self._kill_tests, self._names, self._install, self._in_use, self._broken):
+                step(bases)
+            self._new_file_refused(bases)
+            self._upgrade(bases)
+        print(f"{self.failed} failed; the logs are in {WORK}")
+        return 1 if self.failed else 0
+
+    def _kill_tests(self, bases: dict[str, str]) -> None:
+        done = self._roll("no-kill-test", self.old)
+        self._expect("without forms nothing is installed", done != 0, self._versions() == ["", ""])
+        self._expect("the missing form is named", "door1.yaml: there is no form" in self.said)
+        for number, machine in enumerate(PORTS, 1):
+            yaml = WORK / f"site/machines/{machine}/door{number}.yaml"
+            form = yaml.with_suffix(".md")
+            sh(BIN / "rmf-bridge", "doctor", yaml, "--kill-test", "--yes", "--form", form,
+               "--runtime-dir", WORK / "run", check=False)  # fmt: skip
+
+    def _names(self, bases: dict[str, str]) -> None:
+        yaml = WORK / f"site/machines/{SECOND}/door2.yaml"
+        kept = yaml.read_text()
+        yaml.write_text(kept.replace("door2:", "door1:"))
+        done = self._roll("same-name", self.old)
+        self._expect(
+            "one name on two machines stops it", done != 0, "'door1' is used in" in self.said
+        )
+        yaml.write_text(kept)
+
+    def _install(self, bases: dict[str, str]) -> None:
+        done = self._roll("preview", self.old, "--check")
+        self._expect("a preview changes nothing", done == 0, self._versions() == ["", ""])
+        done = self._roll("install", self.old)
+        self._expect("the first installation", done == 0, self._versions() == [self.old] * 2)
+        self._expect("every daemon serves", *self._serving())
+
+    def _in_use(self, bases: dict[str, str]) -> None:
+        self._send("open")
+        done = self._roll("in-use", self.good)
+        self._expect("a held door stops it", done != 0, "door1 is in use" in self.said)
+        self._expect("no machine was changed", self._versions() == [self.old] * 2)
+        self._send("close")
+
+    def _broken(self, bases: dict[str, str]) -> None:
+        yaml = WORK / f"site/machines/{FIRST}/door1.yaml"
+        kept = yaml.read_text()
+        yaml.write_text(kept.replace("scan_s: 1", "scan_s: 0.9"))
+        done = self._roll("broken", self.bad)
+        self._expect(
+            "a version that cannot start stops it", done != 0, "did not come back" in self.said
+        )
+        self._expect("the old version is back", self._versions() == [self.old] * 2)
+        self._expect(
+            "the old file is back", self._on(FIRST, "cat /etc/rmf-bridges/door1.yaml") == kept
+        )
+        self._expect("the second machine was never asked", f"[{SECOND}]" not in self._changed())
+        self._expect("every daemon serves again", *self._serving())
+        yaml.write_text(kept)
+
+    def _new_file_refused(self, bases: dict[str, str]) -> None:
+        """A file that no daemon can serve comes with a good version: both are put back."""
+        folder = WORK / f"site/machines/{FIRST}"
+        new = door("door3", "http://127.0.0.1:1")
+        (folder / "door3.yaml").write_text(new)
+        form = (folder / "door1.md").read_text().replace("door1.yaml", "door3.yaml")
+        (folder / "door3.md").write_text(form)
+        done = self._roll("dead-device", self.good)
+        self._expect("a device that does not answer stops it", done != 0, "door3" in self.said)
+        self._expect("the old version is back", self._versions() == [self.old] * 2)
+        left = self._on(FIRST, "ls /etc/rmf-bridges /etc/systemd/system/rmf-bridges.target.wants")
+        self._expect("the new service is gone", "door3" not in left, "door1" in left)
+        self._expect("every daemon serves again", *self._serving())
+        for each in folder.glob("door3.*"):
+            each.unlink()
+
+    def _upgrade(self, bases: dict[str, str]) -> None:
+        yaml = WORK / f"site/machines/{FIRST}/door1.yaml"
+        yaml.write_text(yaml.read_text().replace("scan_s: 1", "scan_s: 0.9"))
+        done = self._roll("upgrade", self.good)
+        self._expect("an upgrade", done == 0, self._versions() == [self.good] * 2)
+        there = self._on(FIRST, "cat /etc/rmf-bridges/door1.yaml")
+        self._expect("the new file is there", "scan_s: 0.9" in there)
+        self._expect("every daemon serves", *self._serving())
+        pids = self._pids()
+        done = self._roll("again", self.good)
+        self._expect("a second time restarts nothing", done == 0, self._pids() == pids)
+
+    def _roll(self, name: str, version: str, *more: str) -> int:
+        began = time.monotonic()
+        done = sh(BIN / "ansible-playbook", "-i", WORK / "site/inventory.yml",
+                  "rmf_bridges.site.rollout", "-e", f"rmf_bridges_version={version}", *more,
+                  check=False)  # fmt: skip
+        self.said = done.stdout + done.stderr
+        (WORK / f"{name}.log").write_text(self.said)
+        print(
+            f"      {time.monotonic() - began:6.1f} s  {name}: exit code {done.returncode}",
+            flush=True,
+        )
+        return done.returncode
+
+    def _changed(self) -> str:
+        return self.said.partition("Change one machine after the other")[2]
+
+    def _expect(self, says: str, *true: bool) -> None:
+        self.failed += not all(true)
+        print(f"{'ok' if all(true) else 'FAIL':4}  {says}", flush=True)
+
+    def _on(self, machine: str, command: str) -> str:
+        words = ["-q", "-i", WORK / "key", "-p", PORTS[machine], "-o", "StrictHostKeyChecking=no"]
+        return sh("ssh", *words, "root@127.0.0.1", command, check=False).stdout
+
+    def _reachable(self) -> None:
+        for machine in PORTS:
+            deadline = time.monotonic() + 60
+            while self._on(machine, "systemctl is-system-running --wait") != "running\n":
+                if time.monotonic() > deadline:
+                    raise RuntimeError(f"{machine} does not boot: {WORK / machine}.log")
+                time.sleep(0.5)
+
+    def _versions(self) -> list[str]:
+        ask = "dpkg-query -W -f '${db:Status-Abbrev}${Version}' rmf-bridges"
+        return [self._on(machine, ask).removeprefix("ii ") for machine in PORTS]
+
+    def _pids(self) -> list[str]:
+        return [self._on(each, "systemctl show -p MainPID 'rmf-bridge@*'") for each in PORTS]
+
+    def _serving(self) -> list[bool]:
+        told = [json.loads(self._on(each, "rmf-bridge status --json") or "[]") for each in PORTS]
+        return [len(told[0]) == 1, len(told[1]) == 2,
+                *(one["state"] == "serving" and not one["level"] for each in told for one in each)]  # fmt: skip
+
+    def _send(self, what: str) -> None:
+        sh(BIN / "rmf-bridge", "send", "door", "door1", what, "--direct", "--localhost",
+           "--transport", "dds")  # fmt: skip
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,90 @@
+"""Two machines in containers: Debian 12 with systemd as process 1, reached by ssh on 127.0.0.1."""
+
+import shutil
+import subprocess
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Final
+
+PACKAGES: Final = (
+    *("dbus", "iproute2", "openssh-server", "procps", "python3", "python3-apt"),
+    *("systemd", "systemd-sysv", "udev"),
+)
+PROGRAMS: Final = {
+    "apt-ftparchive": "apt-utils",
+    "gpg": "gnupg",
+    "mmdebstrap": "mmdebstrap",
+    "ssh": "openssh-client",
+    "systemd-nspawn": "systemd-container",
+}
+PORTS: Final = {"pi-door1": 2201, "pi-door2": 2202}
+CGROUPS: Final = Path("/sys/fs/cgroup")
+
+
+def missing() -> list[str]:
+    """Return the packages of the missing programs."""
+    return sorted({deb for program, deb in PROGRAMS.items() if not shutil.which(program)})
+
+
+def debian(tree: Path) -> None:
+    """Make the tree of the machines, once."""
+    if tree.exists():
+        return
+    fresh = tree.with_name("tree.new")
+    shutil.rmtree(fresh, ignore_errors=True)
+    left_out = (f"--dpkgopt=path-exclude=/usr/share/{each}/*" for each in ("doc", "man", "locale"))
+    include = f"--include={','.join(PACKAGES)}"
+    no_more = '--aptopt=Apt::Install-Recommends "false"'
+    words = ["mmdebstrap", "--variant=apt", include, no_more, *left_out, "bookworm", fresh]
+    subprocess.run(words, check=True)
+    fresh.rename(tree)
+
+
+@contextmanager
+def booted(folder: Path, tree: Path, repository: Path) -> Iterator[None]:
+    """Boot the machines. What they write is lost at the end of the block."""
+    key = folder / "key"
+    key.unlink(missing_ok=True)
+    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", key], check=True)
+    (tree / "root/.ssh").mkdir(mode=0o700, exist_ok=True)
+    with ExitStack() as stack:
+        for name, port in PORTS.items():
+            (folder / f"{name}.conf").write_text(f"Port {port}\nListenAddress 127.0.0.1\n")
+            stack.enter_context(_machine(name, folder, tree, repository))
+        yield
+
+
+@contextmanager
+def _machine(name: str, folder: Path, tree: Path, repository: Path) -> Iterator[None]:
+    root = folder / name
+    shutil.rmtree(root, ignore_errors=True)
+    subprocess.run(["cp", "-a", "--reflink=auto", tree, root], check=True)
+    binds = {
+        folder / "key.pub": "/root/.ssh/authorized_keys",
+        folder / f"{name}.conf": "/etc/ssh/sshd_config.d/port.conf",
+        repository: "/srv/repository",
+    }
+    words = [
+        *("systemd-nspawn", "--boot", f"--directory={root}", f"--machine={name}", "--quiet"),
+        *("--register=no", "--keep-unit", "--console=passive", "--kill-signal=SIGRTMIN+4"),
+        *(f"--bind-ro={here}:{there}" for here, there in binds.items()),
+    ]
+    # Each container needs a control group of its own, because systemd inside makes its groups there.
+    into = " ".join(
+        f"mkdir -p {each.parent}/rmf-{name}; echo $$ > {each.parent}/rmf-{name}/cgroup.procs;"
+        for each in (*CGROUPS.glob("cgroup.procs"), *CGROUPS.glob("*/cgroup.procs"))
+    )
+    with (folder / f"{name}.log").open("w") as log:
+        nspawn = subprocess.Popen(
+            ["sh", "-c", f'{into} exec "$@"', "sh", *words],
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+        )
+        try:
+            yield
+        finally:
+            nspawn.terminate()  # nspawn shuts the container down in order
+            nspawn.wait()
+            shutil.rmtree(root, ignore_errors=True)
