@@ -12,7 +12,7 @@ from typing import Any, Final
 import pytest
 import yaml
 
-from bridges.kinds import kind_called, kind_names
+from bridges.kinds import kind_names
 
 COLLECTION: Final = Path(__file__).parents[2] / "deploy/ansible"
 _spec = importlib.util.spec_from_file_location("rollout", COLLECTION / "plugins/filter/rollout.py")

@@ -59,7 +59,7 @@ def sh(*words: object, check: bool = True) -> subprocess.CompletedProcess[str]:
 
 
 def repository() -> tuple[str, str, str]:
-    """Make the repository; return the old version, a newer that serves, and the newest, which does not."""
+    """Make the repository; return the versions: old, newer, and one that cannot start."""
     packages = sorted((ROOT / "dist").glob("*+deb12_amd64.deb"))
     old = packages[0].name.split("_")[1]
     good, bad = old.replace("+deb12", ".1+deb12"), old.replace("+deb12", ".2+deb12")
@@ -184,6 +184,10 @@ class Rollouts:
         self._expect("a held door stops it", done != 0, "door1 is in use" in self.said)
         self._expect("no machine was changed", self._versions() == [self.old] * 2)
         self._send("close")
+        self._on(FIRST, "systemctl stop rmf-bridge@door1")
+        done = self._roll("stopped", self.good)
+        self._expect("a stopped service stops it", done != 0, "machine: door1" in self.said)
+        self._on(FIRST, "systemctl start rmf-bridge@door1")
 
     def _broken(self, bases: dict[str, str]) -> None:
         yaml = WORK / f"site/machines/{FIRST}/door1.yaml"
@@ -270,8 +274,9 @@ class Rollouts:
 
     def _serving(self) -> list[bool]:
         told = [json.loads(self._on(each, "rmf-bridge status --json") or "[]") for each in PORTS]
-        return [len(told[0]) == 1, len(told[1]) == 2,
-                *(one["state"] == "serving" and not one["level"] for each in told for one in each)]  # fmt: skip
+        daemons = [one for each in told for one in each]
+        well = all(one["state"] == "serving" and not one["level"] for one in daemons)
+        return [[len(each) for each in told] == [1, 2], well]
 
     def _send(self, what: str) -> None:
         sh(BIN / "rmf-bridge", "send", "door", "door1", what, "--direct", "--localhost",
