@@ -4,6 +4,7 @@ root. Exit code 1: a check failed; 69: none ran.
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -46,8 +47,12 @@ def main() -> int:
         debian(WORK / "tree")
         words = ["unshare", "--net", "--mount", sys.executable, "-m", "tests.rollout"]
         return subprocess.run(words, env=os.environ | {INSIDE: "1"}).returncode
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # the containers are shut down then too
     sh("ip", "link", "set", "lo", "up")
-    return Rollouts().run()
+    try:
+        return Rollouts().run()
+    finally:
+        sh("gpgconf", "--kill", "all")
 
 
 def sh(*words: object, check: bool = True) -> subprocess.CompletedProcess[str]:
@@ -279,7 +284,7 @@ class Rollouts:
         return [[len(each) for each in told] == [1, 2], well]
 
     def _send(self, what: str) -> None:
-        sh(BIN / "rmf-bridge", "send", "door", "door1", what, "--direct", "--localhost",
+        sh(BIN / "rmf-bridge", "send", "door", "door1", what, "--localhost",
            "--transport", "dds")  # fmt: skip
 
 
