@@ -126,6 +126,6 @@ def test_ansible_reads_the_playbook(tmp_path: Path) -> None:
     (home / "site").symlink_to(COLLECTION)
     program = Path(sys.executable).with_name("ansible-playbook")
     env = {"ANSIBLE_COLLECTIONS_PATH": str(tmp_path), "ANSIBLE_HOME": str(tmp_path / "home")}
-    words = [program, "--syntax-check", "-i", "pi-lift1,", "rmf_bridges.site.rollout"]
+    words = [str(program), "--syntax-check", "-i", "pi-lift1,", "rmf_bridges.site.rollout"]
     done = subprocess.run(words, env=os.environ | env, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

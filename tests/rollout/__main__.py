@@ -103,16 +103,8 @@ def relays() -> Iterator[dict[str, str]]:
             folder.mkdir(parents=True)
             file = folder / f"door{number}.yaml"
             file.write_text(door(f"door{number}", "http://127.0.0.1:1"))
-            words = [
-                BIN / "python",
-                "-m",
-                "hal_fakes",
-                file,
-                "relay",
-                "--socket",
-                WORK / machine[3:],
-            ]
-            fake = subprocess.Popen(words, stdin=-1, stdout=-1, text=True)
+            words = ["-m", "hal_fakes", str(file), "relay", "--socket", str(WORK / machine[3:])]
+            fake = subprocess.Popen([sys.executable, *words], stdin=-1, stdout=-1, text=True)
             stack.callback(fake.wait)
             assert fake.stdin
             assert fake.stdout

@@ -36,7 +36,7 @@ def debian(tree: Path) -> None:
     left_out = (f"--dpkgopt=path-exclude=/usr/share/{each}/*" for each in ("doc", "man", "locale"))
     include = f"--include={','.join(PACKAGES)}"
     no_more = '--aptopt=Apt::Install-Recommends "false"'
-    words = ["mmdebstrap", "--variant=apt", include, no_more, *left_out, "bookworm", fresh]
+    words = ["mmdebstrap", "--variant=apt", include, no_more, *left_out, "bookworm", str(fresh)]
     subprocess.run(words, check=True)
     fresh.rename(tree)
 

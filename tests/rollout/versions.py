@@ -13,7 +13,7 @@ BROKEN: Final = 'raise SystemExit("this version cannot start")\n'
 def another(package: Path, out: Path, old: str, new: str, broken: bool) -> None:
     """Build this package again in the folder `out` with the version `new`."""
     tree = out / "tree"
-    subprocess.run(["dpkg-deb", "--raw-extract", package, tree], check=True)
+    subprocess.run(["dpkg-deb", "--raw-extract", str(package), str(tree)], check=True)
     for file in (tree / "DEBIAN").iterdir():
         file.write_text(file.read_text().replace(old, new))
     name = package.name.split("_")[0]
@@ -23,7 +23,7 @@ def another(package: Path, out: Path, old: str, new: str, broken: bool) -> None:
     else:
         (tree / "usr/lib" / name / old).rename(tree / "usr/lib" / name / new)
     deb = out / package.name.replace(old, new)
-    words = ["dpkg-deb", "--root-owner-group", "-Znone", "--build", tree, deb]
+    words = ["dpkg-deb", "--root-owner-group", "-Znone", "--build", str(tree), str(deb)]
     subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
     shutil.rmtree(tree)
 
@@ -36,6 +36,17 @@ def _break(archive: Path, folder: Path) -> None:
     start = text.index("def run(")
     body = text.index("\n    ", start) + 1
     command.write_text(text[:body] + "    " + BROKEN + text[body:])
-    words = ["tar", "-C", folder, "--owner=0", "--group=0", "-cf", archive, "-I", "xz -0", "."]
+    words = [
+        "tar",
+        "-C",
+        str(folder),
+        "--owner=0",
+        "--group=0",
+        "-cf",
+        str(archive),
+        "-I",
+        "xz -0",
+        ".",
+    ]
     subprocess.run(words, check=True)
     shutil.rmtree(folder)
