@@ -122,7 +122,8 @@ def relays() -> Iterator[dict[str, str]]:
         (WORK / "site/inventory.yml").write_text(
             f"rmf_bridges:\n  hosts:\n{hosts}  vars:\n"
             f"    rmf_bridges_repository: {WORK}/apt\n    rmf_bridges_watched_s: 10\n"
-            "    rmf_bridges_serves_tries: 5\n    rmf_bridges_idle_tries: 2\n    rmf_bridges_idle_pause_s: 1\n"
+            "    rmf_bridges_serves_tries: 5\n    rmf_bridges_idle_tries: 2\n"
+            "    rmf_bridges_idle_pause_s: 1\n"
             f"recorders: {{hosts: {{{FIRST}: }}}}\nexporters: {{hosts: {{{SECOND}: }}}}\n"
         )
         yield bases
