@@ -61,7 +61,7 @@ def test_another_form_is_refused(form: str, why: str) -> None:
 def status(name: str = "lift", state: str = "serving", level: int = 0) -> dict[str, Any]:
     faults = [{"code": "stale", "detail": ""}] if level else []
     devices = {"Lift1": {"faults": faults}}
-    return {"name": name, "state": state, "level": level, "status": {}, "devices": devices}
+    return {"name": name, "state": state, "level": level, "status": {"devices": devices}}
 
 
 @pytest.mark.parametrize(

@@ -211,9 +211,12 @@ class Rollouts:
         form = (folder / "door1.md").read_text().replace("door1.yaml", "door3.yaml")
         (folder / "door3.md").write_text(form)
         done = self._roll("dead-device", self.good)
-        self._expect("a device that does not answer stops it", done != 0, "door3" in self.said)
+        self._expect("a dead device stops it", done != 0, "door3: a fault that" in self.said)
+        self._expect("its outputs are named", "door3: NOT VERIFIED OFF" in self.said)
+        self._on(FIRST, "rm -r /var/lib/rmf-bridge/door3 /run/rmf-bridge/door3")  # cut off
+        self._on(FIRST, "rm /etc/rmf-bridges/door3.yaml")
         self._expect("the old version is back", self._versions() == [self.old] * 2)
-        left = self._on(FIRST, "ls /etc/rmf-bridges /etc/systemd/system/rmf-bridges.target.wants")
+        left = self._on(FIRST, "ls /etc/systemd/system/rmf-bridges.target.wants")
         self._expect("the new service is gone", "door3" not in left, "door1" in left)
         self._expect("every daemon serves again", *self._serving())
         for each in folder.glob("door3.*"):

@@ -84,11 +84,8 @@ def _why(name: str, now: Mapping[str, Any] | None, levels: Mapping[str, int]) ->
     if now["state"] != "serving":
         return f"{name}: {now['state']}"
     if now["level"] > levels.get(name, 0):
-        faults = [
-            fault["code"]
-            for part in (now["status"], *now["devices"].values())
-            for fault in part.get("faults", ())
-        ]
+        parts = (now["status"], *now["status"].get("devices", {}).values())
+        faults = [fault["code"] for part in parts for fault in part.get("faults", ())]
         return f"{name}: a fault that was not there before: {', '.join(faults)}"
     return ""
 
