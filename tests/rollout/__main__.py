@@ -214,7 +214,7 @@ class Rollouts:
         self._expect("a dead device stops it", done != 0, "door3: a fault that" in self.said)
         self._expect("its outputs are named", "door3: NOT VERIFIED OFF" in self.said)
         self._on(FIRST, "rm -r /var/lib/rmf-bridge/door3 /run/rmf-bridge/door3")  # cut off
-        self._on(FIRST, "rm /etc/rmf-bridges/door3.yaml")
+        self._on(FIRST, "rm /etc/rmf-bridges/door3.yaml; systemctl reset-failed")
         self._expect("the old version is back", self._versions() == [self.old] * 2)
         left = self._on(FIRST, "ls /etc/systemd/system/rmf-bridges.target.wants")
         self._expect("the new service is gone", "door3" not in left, "door1" in left)
