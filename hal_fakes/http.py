@@ -223,13 +223,16 @@ class _Call(BaseHTTPRequestHandler):
 
     def _push(self) -> None:
         """Serve a WebSocket. At each change of a state, send a message without content."""
-        from websockets.datastructures import Headers
         from websockets.http11 import Request
         from websockets.protocol import OPEN
         from websockets.server import ServerProtocol
 
         protocol = ServerProtocol()
-        protocol.send_response(protocol.accept(Request(self.path, Headers(self.headers.items()))))
+        head = "".join(f"{name}: {value}\r\n" for name, value in self.headers.items())
+        protocol.receive_data(f"{self.requestline}\r\n{head}\r\n".encode())
+        (request,) = protocol.events_received()
+        assert isinstance(request, Request)
+        protocol.send_response(protocol.accept(request))
         self.wfile.write(b"".join(protocol.data_to_send()))
         before: list[bytes] = []
         while all(s.plant.failures.get("server") is None for s in self.server.stations):

@@ -25,7 +25,7 @@ class Gateway:
 
     def __init__(self, folder: Path, domain: int) -> None:
         text = EXAMPLE.read_text().replace("switches_off_after_s: 10", "switches_off_after_s: 900")
-        text = text.replace("stale_after_s: 3", "stale_after_s: 3, floor_travel_min_s: 0.05")
+        text = text.replace("stale_after_s: 3", "stale_after_s: 3, floor_travel_min_s: 0.001")
         text = text.replace("    ca_file: /etc/rmf-bridges/gateway.pem\n", "")
         text = text.replace("# push_path: /events ", "push_path: /events  # ")
         text = "\n".join(line for line in text.splitlines() if "login:" not in line)

@@ -11,6 +11,7 @@ from typing import Any
 
 import msgspec
 import pytest
+from websockets.sync.client import connect
 from websockets.sync.server import ServerConnection, serve
 
 from drivers.hal import http
@@ -22,7 +23,7 @@ from hal_fakes.realtime import RealTime
 from tests.drivers.hal.http.far_end import FarEnd, always, answer, once
 from tests.drivers.lift.contract import QUICK
 from tests.drivers.lift.test_http import settings_of
-from tests.waiting import wait_until
+from tests.waiting import PATIENCE_S, wait_until
 
 
 class Wakes:
@@ -90,6 +91,13 @@ def test_a_message_wakes_the_daemon_and_the_state_is_read_by_a_request() -> None
         assert lift.read().hazards == {"fire_alarm"}
     server.close()
     world.close()
+
+
+def test_the_simulated_gateway_answers_a_ping() -> None:
+    server = HttpServer([], "", 0.5, "/ws")
+    with connect(f"ws://{server.replace['api_base']}/ws", proxy=None) as connection:
+        assert connection.ping().wait(PATIENCE_S)
+    server.close()
 
 
 def test_without_a_push_path_there_is_no_thread() -> None:
