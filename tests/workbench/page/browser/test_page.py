@@ -181,7 +181,7 @@ def test_everything_can_be_reached_by_keyboard_and_the_focus_is_seen(
         tab.keyboard.press("Tab")
         reached.append(tab.evaluate(FOCUSED))
     names = [name for name, _ in reached]
-    assert names[:4] == ["To the content", "Site", "Incidents", "Log in"]
+    assert names[:5] == ["To the content", "Site", "Incidents", "Day and week", "Log in"]
     assert all(outline >= 2 for _, outline in reached)
     tab.get_by_role("link", name="Lift1").focus()
     graph.lift("Lift1", "L2", 0, "fleet/robot")
