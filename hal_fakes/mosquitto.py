@@ -20,13 +20,23 @@ ENDS_WITH_US: Final = ("setpriv", "--pdeathsig", "KILL")
 
 
 class Mosquitto:
-    """A broker at `port`. `lines` are further lines of its configuration, such as those for TLS."""
+    """A broker at `port`. `lines` are further lines of its configuration, such as those for TLS.
+
+    `replace`: replacements for a bus's settings, to reach this broker by its default `lines`.
+    """
 
     def __init__(self, lines: Sequence[str] = ("allow_anonymous true",)) -> None:
         program = shutil.which("mosquitto", path=PATH)
         if program is None:
             raise HalError("an MQTT broker is missing: sudo apt install mosquitto")
         self.port = _free_port()
+        self.replace: dict[str, object] = {
+            "host": "127.0.0.1",
+            "port": self.port,
+            "tls": None,
+            "user": None,
+            "password_file": None,
+        }
         self._folder = tempfile.TemporaryDirectory(prefix="mosquitto-")
         file = Path(self._folder.name) / "mosquitto.conf"
         always = (

@@ -150,13 +150,7 @@ class MqttSite:
         self._closed = threading.Event()
         self._broker = Mosquitto()
         self._client = self._attached()
-        self.replace: dict[str, object] = {
-            "host": "127.0.0.1",
-            "port": self._broker.port,
-            "tls": None,
-            "user": None,
-            "password_file": None,
-        }
+        self.replace = self._broker.replace
         self._thread = threading.Thread(target=self._run, name="mqtt-site", daemon=True)
         self._thread.start()
 

@@ -281,13 +281,7 @@ class VdaSite:
         self._joined: set[str] = set()
         self._broken = ""
         self._closed = threading.Event()
-        self.replace: dict[str, object] = {
-            "host": "127.0.0.1",
-            "port": self._broker.port,
-            "tls": None,
-            "user": None,
-            "password_file": None,
-        }
+        self.replace = self._broker.replace
         self._thread = threading.Thread(target=self._run, name="vda-site", daemon=True)
         self._thread.start()
 
