@@ -6,8 +6,6 @@ import sys
 from pathlib import Path
 
 from bridges.runtime import order
-from bridges.runtime.runtime_directory import find
-from bridges.system.directories import act_as_owner
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,11 +18,9 @@ def run(args: argparse.Namespace) -> int:
     """Return 0 if the reset was sent, 1 if no daemon runs, and 69 if this user may not see or signal
     the daemon."""
     try:
-        if not args.runtime_dir and not args.file.exists():
-            print(f"{args.file} does not exist", file=sys.stderr)
+        places = order.places_of(args.file, args.runtime_dir)
+        if places is None:
             return 1
-        places = find(args.file.absolute(), args.runtime_dir)
-        act_as_owner(places)
         code = order.send(args.file, places, None)
         if code == 0:
             print("reset sent; for remaining faults see rmf-bridge status, or the log")

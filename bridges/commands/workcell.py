@@ -11,9 +11,8 @@ from typing import Any, Final
 from bridges.kinds.shared.decision import DecidedByPerson
 from bridges.runtime import holder, order
 from bridges.runtime.holder import STATUS, STATUS_MAX
-from bridges.runtime.runtime_directory import find
 from bridges.system import files
-from bridges.system.directories import Directories, act_as_owner, opened
+from bridges.system.directories import Directories, opened
 
 IN_DOUBT: Final = ("MEMORY_LOST", "OUTCOME_UNKNOWN")
 
@@ -41,11 +40,9 @@ def run(args: argparse.Namespace) -> int:
     """Return 0 if the decision was sent, 1 if no daemon runs or nothing is in doubt, and 69 if this
     user may not see or signal the daemon."""
     try:
-        if not args.runtime_dir and not args.file.exists():
-            print(f"{args.file} does not exist", file=sys.stderr)
+        places = order.places_of(args.file, args.runtime_dir)
+        if places is None:
             return 1
-        places = find(args.file.absolute(), args.runtime_dir)
-        act_as_owner(places)
         status = _status(places)
         if status is None:
             print(f"no daemon of {args.file} has shown its state yet", file=sys.stderr)

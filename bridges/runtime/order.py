@@ -15,9 +15,10 @@ import msgspec
 
 from bridges.kinds.shared.decision import DecidedByPerson
 from bridges.runtime import holder
+from bridges.runtime.runtime_directory import find
 from bridges.runtime.signals import RESET
 from bridges.system import files
-from bridges.system.directories import Directories, opened
+from bridges.system.directories import Directories, act_as_owner, opened
 from bridges.system.log import pairs
 
 log = logging.getLogger(__name__)
@@ -33,6 +34,17 @@ class PersonsOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     device: str
     pid: int
     started: int
+
+
+def places_of(file: Path, given: str | None) -> Directories | None:
+    """Find the directories of this file's daemon and act as their owner from now on. Return None, after
+    a message, if there is no such file. Raises PermissionError."""
+    if not given and not file.exists():
+        print(f"{file} does not exist", file=sys.stderr)
+        return None
+    places = find(file.absolute(), given)
+    act_as_owner(places)
+    return places
 
 
 def send(file: Path, places: Directories, verdict: DecidedByPerson | None, device: str = "") -> int:
