@@ -95,8 +95,8 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield f"call_{level}", ("calls", level), command
 
     def places(self) -> Iterator[tuple[tuple[str, ...], str, int]]:
-        """Yield (path, place, bits) of each command: the bits are those that the command uses at the
-        place."""
+        """Yield (path, place, bits) of each command. `bits`: the bits of the place that the command
+        uses."""
         for _, path, command in self.singles():
             yield path, place_of(command), command.ask | command.release
         if self.call:

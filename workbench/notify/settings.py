@@ -101,7 +101,7 @@ class Recipient(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class NotifySettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Who is told, and when."""
+    """The recipients of notices, and the times at which they receive them."""
 
     to: Annotated[list[Recipient], Meta(min_length=1, max_length=20), tells("the recipients.")]
     page: Annotated[Url | None, tells("the page of `rmf-bridge page`, for links.")] = None

@@ -67,8 +67,8 @@ class MqttLines:
         return found
 
     def write(self, levels: Mapping[str, bool]) -> None:
-        """Switch these relays; those that go off come first. Raises HalError; after an error their
-        states are unknown."""
+        """Switch these relays, off before on. Raises HalError; the states of these relays are then
+        unknown."""
         self._touched = self._touched or bool(levels)
         every = Every()
         for name in sorted(levels, key=lambda name: levels[name]):
