@@ -17,7 +17,7 @@ from bridges.messages import topics
 from bridges.runtime import faults
 from bridges.runtime.daemons import DaemonStatus
 from bridges.settings.sheets.findings import Findings
-from workbench.commissioning import reference
+from workbench.commissioning import json_schema
 from workbench.commissioning.doctor.finding import Finding
 from workbench.explain.explanation import Explanation
 from workbench.graph.board import BoardRow
@@ -40,7 +40,7 @@ def promised() -> list[str]:
 
 def present() -> set[str]:
     """Return the names of this version, as lines."""
-    schema = reference.schema()
+    schema = json_schema.schema()
     keys = {f"key {path}" for path in _keys(schema, schema, ())}
     codes = {f"exit {name} {code}" for name, codes in EXIT_CODES.items() for code in codes}
     told = {f"json {name} {path}" for name, shape in JSON.items() for path in _fields(shape)}

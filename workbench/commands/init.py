@@ -337,7 +337,7 @@ def write(path: Path, text: str) -> None:
 def _schema_line() -> str:
     """Store this version's schema in the user's data directory. Return the line that names the schema
     for editors; "" if it cannot be stored."""
-    from workbench.commissioning.reference import schema
+    from workbench.commissioning.json_schema import schema
 
     base = os.environ.get("XDG_DATA_HOME") or os.path.expanduser("~/.local/share")
     path = Path(base) / "rmf-bridges" / f"schema-{__version__}.json"

@@ -3,7 +3,7 @@
 import argparse
 import json
 
-from workbench.commissioning import reference
+from workbench.commissioning import json_schema, reference
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,5 +17,5 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the schema."""
-    print(reference.page() if args.markdown else json.dumps(reference.schema(), indent=2), end="")
+    print(reference.page() if args.markdown else json.dumps(json_schema.schema(), indent=2), end="")
     return 0

@@ -1,183 +1,29 @@
-"""Generate the configuration reference from the structs of the YAML, as JSON Schema and as a page.
+"""Generate the page of the configuration reference from the structs of the YAML.
 
 Keys, types, bounds, units, defaults and meanings come from the structs' fields. Purposes come from the
 structs' docstrings.
 """
 
-import inspect
 import re
 from collections import Counter
 from collections.abc import Container, Iterator
-from typing import Any
 
 import msgspec
 from msgspec import inspect as mi
 
-from bridges import __version__
-from bridges.kinds import kind_called, kind_names
-from bridges.kinds.shared.graph_kind import AnyGraphKind, GraphKind
 from bridges.kinds.shared.recording_section import RecordingSettings
 from bridges.kinds.shared.rmf_section import Rmf
 from bridges.settings import names as named
 from bridges.yaml.scalar_types import Extra, choices, wanted_text
-from drivers.driver_type import AnyDriver
 from workbench.commissioning.examples import example, field_names, flow
-
-Schema = dict[str, object]
-"""A JSON Schema."""
-
-FILE: dict[str, str] = {
-    "kind": "the kind of devices in the file: lifts, doors, chargers, or a node without hardware.",
-    "driver": "the driver of the devices; a device may name another driver.",
-    "rmf": "the way to Open-RMF.",
-    "recording": "the recording of the daemon's work.",
-    "buses": "name -> a bus, by its `type`.",
-    "type": "the sort of a bus, which decides its other keys.",
-}
-"""Meanings of the keys that no struct has."""
-
-
-class Shape(msgspec.Struct, frozen=True):
-    """One `kind:` with one `driver:`, and the sections of such a file."""
-
-    kind: str
-    devices_key: str
-    driver: str
-    type: AnyDriver
-
-
-def shapes() -> Iterator[Shape]:
-    """Return every combination of kind and driver."""
-    for kind in kind_names():
-        key = kind_called(kind).devices_key
-        for driver in named.driver_names(kind):
-            yield Shape(kind, key, driver, named.driver_called(kind, driver))
-
-
-def shared_sections() -> Iterator[tuple[str, str, type]]:
-    """Yield each section that the devices of a kind share: the kind, the section's key, its struct."""
-    for name in kind_names():
-        kind = kind_called(name)
-        if not isinstance(kind, GraphKind) and kind.section:
-            yield name, *kind.section
-
-
-def graph_kinds() -> list[AnyGraphKind]:
-    """Return every kind without devices."""
-    kinds = (kind_called(name) for name in kind_names())
-    return [kind for kind in kinds if isinstance(kind, GraphKind)]
-
-
-def schema() -> Schema:
-    """Return the JSON Schema (2020-12) of a device YAML, for editors."""
-    buses = {name: named.bus_called(name).settings for name in named.bus_types()}
-    graph = [kind.settings for kind in graph_kinds()]
-    types: list[type] = [
-        Rmf,
-        RecordingSettings,
-        *buses.values(),
-        *(shape.type.settings for shape in shapes()),
-        *(struct for _, _, struct in shared_sections()),
-        *graph,
-    ]
-    refs, components = msgspec.json.schema_components(types, ref_template="#/$defs/{name}")
-    for component in components.values():
-        _for_editors(component)
-    by_type = dict(zip(types, refs, strict=True))
-    for bus in buses.values():
-        _allow_type(components, by_type[bus])
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "$id": f"urn:rmf-bridges:device:{__version__}",
-        "title": "rmf-bridges device",
-        "oneOf": [
-            *(_file(shape, buses, by_type) for shape in shapes()),
-            *(_graph_file(kind, by_type) for kind in graph_kinds()),
-        ],
-        "$defs": components,
-    }
-
-
-def _for_editors(component: dict[str, Any]) -> None:
-    """Remove titles, and give each nullable key its own description.
-
-    An editor would show the titles, which are class names. It would also show the struct's description
-    at such a key.
-    """
-    component.pop("title")
-    for told in component.get("properties", {}).values():
-        for part in told.get("anyOf", ()):
-            if "$ref" in part:
-                part["description"] = told["description"]
-
-
-def _allow_type(components: dict[str, dict[str, dict[str, Schema]]], ref: Schema) -> None:
-    """Add `type:` to a bus. The program reads this key before the struct, so the key is not a field."""
-    component = components[str(ref["$ref"]).rsplit("/", 1)[1]]
-    component["properties"].setdefault("type", {"type": "string"})
-    component["properties"]["type"]["description"] = FILE["type"]
-
-
-def _key(name: str, schema: Schema) -> Schema:
-    """Return the schema of a key that no struct has."""
-    return {name: {"description": FILE[name], **schema}}
-
-
-def _file(shape: Shape, buses: dict[str, type], by_type: dict[type, Schema]) -> Schema:
-    """Return the schema of a file with this driver; a device may name another driver of the kind."""
-    of_kind = [other for other in shapes() if other.kind == shape.kind]
-    kinds_of_bus = [
-        {"allOf": [by_type[buses[name]], {"properties": _key("type", {"const": name})}]}
-        for name in buses
-        if any(name in other.type.buses for other in of_kind)
-    ]
-    devices = [
-        {"allOf": [by_type[other.type.settings], _named_by_device(other, shape)]}
-        for other in of_kind
-    ]
-    shared = {
-        key: {"description": _purpose(struct), **by_type[struct]}
-        for kind, key, struct in shared_sections()
-        if kind == shape.kind
-    }
-    return {
-        "type": "object",
-        "additionalProperties": False,
-        "required": ["kind", "driver", "buses", *shared, shape.devices_key],
-        "properties": {
-            **_key("kind", {"const": shape.kind}),
-            **_key("driver", {"const": shape.driver}),
-            **_key("rmf", by_type[Rmf]),
-            **_key("recording", by_type[RecordingSettings]),
-            **_key("buses", {"type": "object", "additionalProperties": {"oneOf": kinds_of_bus}}),
-            **shared,
-            shape.devices_key: {
-                "description": f"a {shape.kind}'s name on RMF's graph -> its settings.",
-                "type": "object",
-                "additionalProperties": {"oneOf": devices},
-            },
-        },
-    }
-
-
-def _named_by_device(driver: Shape, of_file: Shape) -> Schema:
-    """Require each device to name its driver, except a device that uses the file's driver."""
-    required = [] if driver == of_file else ["driver"]
-    return {"required": required, "properties": _key("driver", {"const": driver.driver})}
-
-
-def _graph_file(kind: AnyGraphKind, by_type: dict[type, Schema]) -> Schema:
-    return {
-        "type": "object",
-        "additionalProperties": False,
-        "required": ["kind"],
-        "properties": {
-            **_key("kind", {"const": kind.name}),
-            **_key("rmf", by_type[Rmf]),
-            **_key("recording", by_type[RecordingSettings]),
-            kind.devices_key: {"description": _purpose(kind.settings), **by_type[kind.settings]},
-        },
-    }
+from workbench.commissioning.json_schema import (
+    FILE,
+    Shape,
+    graph_kinds,
+    purpose,
+    shapes,
+    shared_sections,
+)
 
 
 def page() -> str:
@@ -264,7 +110,7 @@ def _headings(tops: Headings) -> Headings:
         for struct, path in inside[top]:
             if tops_of[struct] == 1:
                 ordered.setdefault(struct, f"#{heading}: `{path}`")
-    rest = sorted((_purpose(s).partition(".")[0], s) for s in printed if s not in ordered)
+    rest = sorted((purpose(s).partition(".")[0], s) for s in printed if s not in ordered)
     return ordered | {struct: f"### {title}" for title, struct in rest}
 
 
@@ -305,13 +151,13 @@ def _printed_base(struct: type, printed: Container[type]) -> type | None:
 
 
 def _section(struct: type, headings: Headings) -> Iterator[str]:
-    heading, purpose = headings[struct], _purpose(struct)
+    heading, told = headings[struct], purpose(struct)
     yield heading
     if not _is_of_one(heading):
-        purpose = purpose.partition(".")[2].strip()
+        told = told.partition(".")[2].strip()
     base = _printed_base(struct, headings)
     besides = f"The keys of {_link(headings[base])} belong here too." if base else ""
-    if lead := f"{purpose} {besides}".strip():
+    if lead := f"{told} {besides}".strip():
         yield lead
     rows = [
         _row(
@@ -348,10 +194,6 @@ def meaning(struct: type, key: str) -> str:
     (wanted,) = (field.type for field in _fields(struct) if field.encode_name == key)
     told = wanted.extra_json_schema if isinstance(wanted, mi.Metadata) else None
     return str((told or {}).get("description", ""))
-
-
-def _purpose(struct: type) -> str:
-    return " ".join(inspect.cleandoc(struct.__doc__ or "").split())
 
 
 def parts(info: mi.Type) -> list[type]:

@@ -43,7 +43,7 @@ from bridges.messages.heard import FREE_TEXTS
 from bridges.messages.releases import RELEASES
 from bridges.messages.rihs01 import MESSAGES
 from bridges.settings.config import Config
-from workbench.commissioning.reference import schema
+from workbench.commissioning.json_schema import schema
 from workbench.replay.replayed import of_head
 from workbench.replay.sources import TOPICS
 

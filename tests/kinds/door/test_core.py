@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from bridges.kinds.door.memory import DoorLimits
 from bridges.kinds.door.report import DoorReport
 from bridges.kinds.door.settings import DoorDurations, Pulse
-from bridges.kinds.door.signals import CloseRequested, DoorOutputs, DoorSample, Event, OpenRequested
+from bridges.kinds.door.signals import DoorOutputs, DoorSample, Event
 from bridges.kinds.shared.decision import (
     Fault,
     IoFailed,
@@ -20,15 +20,19 @@ from bridges.kinds.shared.decision import (
 )
 from bridges.kinds.shared.durations import RIVAL_QUIET_S
 from bridges.messages.definitions import DoorModeValue
-from tests.kinds.door.virtual import BETWEEN, BOTH, CLOSED, DEBOUNCED, OPEN, CoreAlone
+from tests.kinds.door.virtual import (
+    BETWEEN,
+    BOTH,
+    CLOSED,
+    CLOSES,
+    DEBOUNCED,
+    OPEN,
+    OPENS,
+    CoreAlone,
+    limits,
+)
 
 ESTIMATED = DoorLimits(t=DoorDurations(open_delay_s=4.0, travel_s=6.0), estimated=True)
-STALE_S = DoorDurations().stale_after_s
-OPENS, CLOSES = OpenRequested("door_supervisor"), CloseRequested("door_supervisor")
-
-
-def limits(**durations: float) -> DoorLimits:
-    return DoorLimits(t=DoorDurations(**durations), debounce=DEBOUNCED)
 
 
 # ---- DOOR-5: without a fresh reading
@@ -251,156 +255,6 @@ def test_a_door_that_does_not_open_is_a_fault_and_stays_held() -> None:
     assert core.faults() == ("DOOR_OPENING_FAULT: held, but not open after 4.0 s",)
     core.sees(OPEN, until=7.0)
     assert core.faults() == ()
-
-
-# ---- DOOR-5, DOOR-SENSING-1, DOOR-SENSING-2: gaps
-
-
-def test_a_door_whose_reading_is_too_old_is_offline_with_the_hold_off_and_remembers_the_request() -> (
-    None
-):
-    core = CoreAlone()
-    core.hears(OPENS)
-    core.sees(OPEN, until=1.0)
-    decided = core.sees(IoFailed("no reply"), until=5.0)
-    assert decided.report == DoorReport(
-        mode=DoorModeValue.MODE_OFFLINE,
-        read_at=1.0,
-        faults=(Fault("COMMUNICATION_LOST", "no reply"),),
-        waits="for a reading",
-    )
-    core.sees(CLOSED, until=6.0)
-    assert core.told[2:] == [
-        (0.0625, "OPEN", True),
-        (2.0, "OFFLINE", False),
-        (5.0, "UNKNOWN", True),
-        (5.0625, "CLOSED", True),
-    ]
-
-
-def test_a_short_gap_in_the_readings_changes_nothing() -> None:
-    core = CoreAlone()
-    core.hears(OPENS)
-    core.sees(OPEN, until=1.0)
-    core.sees(IoFailed("no reply"), until=1.875)
-    core.sees(OPEN, until=2.5)
-    assert core.told[2:] == [(0.0625, "OPEN", True)]
-    assert core.faults() == ()
-
-
-def test_a_contact_half_seen_before_a_gap_must_be_seen_again() -> None:
-    core = CoreAlone(DoorLimits(debounce={"opened": 0.5}))
-    core.sees(BETWEEN, until=2.0)
-    core.sees(OPEN, until=2.375)
-    core.hears(IoFailed("no reply"))
-    core.sees(OPEN, until=3.5)
-    assert core.told == [
-        (0.0, "UNKNOWN", False),
-        (0.5, "MOVING", False),
-        (2.875, "OPEN", False),
-    ]
-
-
-@pytest.mark.parametrize(
-    ("contact", "before", "after"),
-    [
-        ("closed", BETWEEN, CLOSED),
-        ("obstruction", replace(OPEN, obstruction=False), replace(OPEN, obstruction=True)),
-        ("fire", replace(OPEN, fire=False), replace(OPEN, fire=True)),
-    ],
-)
-def test_every_contact_half_seen_before_a_gap_must_be_seen_again(
-    contact: str, before: DoorSample, after: DoorSample
-) -> None:
-    core = CoreAlone(DoorLimits(debounce={contact: 0.5}))
-    core.sees(before, until=2.0)
-    core.sees(after, until=2.375)
-    core.hears(IoFailed("no reply"))
-    seen = []
-    for at in (2.5, 2.75, 2.875):
-        core.sees(after, until=at)
-        value = getattr(core.memory.senses, contact).value
-        seen.append(value == getattr(after, contact))
-    assert seen == [False, False, True]
-
-
-def test_the_position_of_a_door_that_was_read_once_before_a_gap_is_still_unknown() -> None:
-    core = CoreAlone()
-    core.hears(IoFailed("no reply"))
-    core.sees(OPEN, until=0.0)
-    core.hears(IoFailed("no reply"))
-    core.now = 0.9
-    core.hears(IoFailed("no reply"))
-    assert core.told == [(0.0, "OFFLINE", False), (0.0, "UNKNOWN", False)]
-
-
-def test_a_missing_scan_is_a_lost_connection() -> None:
-    core = CoreAlone()
-    core.sees(OPEN, until=1.0)
-    core.now = 3.0
-    core.hears(OPENS)
-    assert core.told[-1] == (3.0, "OFFLINE", False)
-    assert core.faults() == ("COMMUNICATION_LOST: no reading for 1.0 s",)
-
-
-def test_after_a_sleep_nothing_is_believed_of_the_inputs() -> None:
-    core = CoreAlone()
-    core.hears(OPENS)
-    core.sees(OPEN, until=0.5)
-    core.hears(Suspended("the machine slept"))
-    assert core.faults() == ("COMMUNICATION_LOST: the machine slept",)
-    core.sees(OPEN, until=1.0)
-    assert core.told == [
-        (0.0, "OFFLINE", False),
-        (0.0, "UNKNOWN", True),
-        (0.0625, "OPEN", True),
-        (0.5, "OFFLINE", False),
-        (0.5, "UNKNOWN", True),
-        (0.5625, "OPEN", True),
-    ]
-
-
-def test_a_failed_write_does_not_start_the_debounce_of_a_contact_again() -> None:
-    core = CoreAlone()
-    core.sees(CLOSED, until=1.0)
-    for now, event in (
-        (1.0, Sampled(OPEN)),
-        (1.03125, WriteFailed("no reply")),
-        (1.0625, Sampled(OPEN)),
-    ):
-        core.now = now
-        core.hears(event)
-    assert core.told[-1] == (1.0625, "OPEN", False)
-
-
-def test_a_silence_has_its_own_reason_and_not_that_of_an_earlier_failure() -> None:
-    def silence_after(failure: Event) -> tuple[str, ...]:
-        core = CoreAlone()
-        core.sees(OPEN, until=1.0)
-        core.hears(failure)
-        core.now = 10.0
-        core.hears(OPENS)
-        return core.faults()
-
-    assert silence_after(WriteFailed("no reply")) == ("COMMUNICATION_LOST: no reply",)
-    core = CoreAlone()
-    core.hears(IoFailed("no reply"))
-    core.hears(Sampled(OPEN))
-    core.now = 10.0
-    core.hears(OPENS)
-    assert core.faults() == (f"COMMUNICATION_LOST: no reading for {STALE_S} s",)
-
-
-def test_a_hazard_half_seen_before_a_gap_is_not_a_hazard() -> None:
-    core = CoreAlone(replace(limits(), on_fire="open"))
-    core.hears(Sampled(replace(OPEN, fire=False, obstruction=False)))
-    decided = core.hears(IoFailed("no reply"))
-    assert (core.faults(), decided.outputs.hold_open) == ((), False)
-
-
-def test_the_core_wakes_when_its_reading_is_too_old() -> None:
-    core = CoreAlone(DoorLimits())
-    assert core.hears(Sampled(CLOSED)).wake_at == STALE_S
 
 
 # ---- DOOR-7: a rival

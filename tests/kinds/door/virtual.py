@@ -10,6 +10,7 @@ import msgspec
 from bridges.kinds.door.core import decide, initial
 from bridges.kinds.door.memory import DoorLimits, DoorMemory
 from bridges.kinds.door.report import DoorReport
+from bridges.kinds.door.settings import DoorDurations
 from bridges.kinds.door.signals import CloseRequested, DoorOutputs, DoorSample, Event, OpenRequested
 from bridges.kinds.shared.decision import Decision, IoFailed, Sampled, WriteFailed
 from bridges.messages.definitions import DoorModeValue
@@ -29,7 +30,14 @@ BOTH = DoorSample(opened=True, closed=True)
 
 DEBOUNCED = dict.fromkeys(("opened", "closed", "obstruction", "fire"), DEBOUNCE_S)
 
+STALE_S = DoorDurations().stale_after_s
+OPENS, CLOSES = OpenRequested("door_supervisor"), CloseRequested("door_supervisor")
+
 Decided = Decision[DoorMemory, DoorOutputs, DoorReport]
+
+
+def limits(**durations: float) -> DoorLimits:
+    return DoorLimits(t=DoorDurations(**durations), debounce=DEBOUNCED)
 
 
 def word(mode: DoorModeValue) -> str:

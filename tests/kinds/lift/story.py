@@ -350,3 +350,15 @@ class Story:
         self.told.append((self.now, message))
         self.hear(message)
         return True
+
+
+OPEN_AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
+
+
+def boarding(**inputs: object) -> Story:
+    """Return a story in which A waits at L1 and the lift stands open. `inputs` changes the reading."""
+    story = Story(Building(replace(OPEN_AT_L1, **inputs)))
+    story.run(1.0)
+    story.asks("A", "L1")
+    story.run(2.0)
+    return story

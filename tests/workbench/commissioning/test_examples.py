@@ -13,15 +13,15 @@ from bridges.settings import names as named
 from bridges.yaml.parsing import YamlFile
 from bridges.yaml.positions import Spot
 from bridges.yaml.values import Values
-from workbench.commissioning import reference
+from workbench.commissioning import json_schema, reference
 from workbench.commissioning.examples import example
 
 
 def structs() -> list[type]:
     """Return every struct of the reference, and the structs inside them."""
     tops: list[type] = [Rmf, *(named.bus_called(name).settings for name in named.bus_types())]
-    tops += [shape.type.settings for shape in reference.shapes()]
-    tops += [kind.settings for kind in reference.graph_kinds()]
+    tops += [shape.type.settings for shape in json_schema.shapes()]
+    tops += [kind.settings for kind in json_schema.graph_kinds()]
     found = list(tops)
     for struct in found:
         for field in fields(struct):

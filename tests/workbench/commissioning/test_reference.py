@@ -9,7 +9,7 @@ import yaml
 from jsonschema import Draft202012Validator
 
 from bridges.settings import names as named
-from workbench.commissioning import reference
+from workbench.commissioning import json_schema, reference
 from workbench.commissioning.examples import device_yamls
 
 ROOT = Path(__file__).parents[3]
@@ -17,17 +17,17 @@ SHIPPED = device_yamls()
 
 
 @pytest.fixture(scope="module")
-def schema() -> reference.Schema:
-    return reference.schema()
+def schema() -> json_schema.Schema:
+    return json_schema.schema()
 
 
 @pytest.fixture(scope="module")
-def validator(schema: reference.Schema) -> Draft202012Validator:
+def validator(schema: json_schema.Schema) -> Draft202012Validator:
     Draft202012Validator.check_schema(schema)
     return Draft202012Validator(schema)
 
 
-def properties(part: object) -> Iterator[tuple[str, reference.Schema]]:
+def properties(part: object) -> Iterator[tuple[str, json_schema.Schema]]:
     """Yield every property of a schema, at any depth. An editor shows the property's text beside its
     key."""
     if isinstance(part, dict):
@@ -38,7 +38,7 @@ def properties(part: object) -> Iterator[tuple[str, reference.Schema]]:
         yield from properties(below)
 
 
-def test_an_editor_shows_at_every_key_what_it_means(schema: reference.Schema) -> None:
+def test_an_editor_shows_at_every_key_what_it_means(schema: json_schema.Schema) -> None:
     every = list(properties(schema))
     assert [name for name, shown in every if not shown.get("description")] == []
     assert len(every) > 500
@@ -90,6 +90,6 @@ def test_the_page_has_every_kind_driver_and_bus() -> None:
     page = reference.page()
     for bus in named.bus_types():
         assert f"## Bus of `type: {bus}`" in page
-    for shape in reference.shapes():
+    for shape in json_schema.shapes():
         heading = rf"^## .*`{shape.devices_key}`.* with `driver: {shape.driver}`$"
         assert re.search(heading, page, re.M), heading
