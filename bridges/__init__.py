@@ -2,6 +2,6 @@
 
 __version__ = "0.1.0"
 BUILD = ""
-"""The commit, written by setup.py into the installed package; `release` for the version itself; "" if
-unknown."""
+"""The commit of this build, which setup.py writes into the installed package. The value is `release`
+for a released version, and "" if the commit is unknown."""
 VERSION = __version__ if BUILD in ("", "release") else f"{__version__}+{BUILD}"

@@ -16,7 +16,8 @@ from bridges import VERSION, exit_codes
 from bridges.system.installed import NotInstalled, is_there, of_workbench
 
 EX_PIPE = 141
-"""The exit code if the reader of our output has gone. A shell shows the same code after SIGPIPE."""
+"""The exit code after the reader of our output has gone. A shell reports the same code after
+SIGPIPE."""
 
 COMMANDS = {
     "init": (
@@ -143,15 +144,15 @@ WORKBENCH = frozenset(
     }
     | {"judge", "release", "walk", "press", "fail", "replay"}
 )
-"""The workbench's subcommands, which no daemon needs."""
+"""The subcommands that are in the workbench. No daemon needs these subcommands."""
 
 
 def main(argv: list[str] | None = None) -> int:
     """Run one subcommand and return its exit code."""
-    # This avoids Python's garbage collection at exit, which takes a fifth of a short process's CPU
+    # Without this line Python collects garbage at exit. That takes a fifth of a short process's CPU
     # time.
     atexit.register(gc.freeze)
-    if "_ARGCOMPLETE" in os.environ:  # the shell set it; autocomplete ends the process
+    if "_ARGCOMPLETE" in os.environ:  # set by the shell; autocomplete ends the process
         import argcomplete
 
         argcomplete.autocomplete(whole_parser())
@@ -161,7 +162,7 @@ def main(argv: list[str] | None = None) -> int:
         if any("\ud800" <= one <= "\udfff" for one in argument):
             sys.stderr.write(f"rmf-bridge: {os.fsencode(argument)!r} is not UTF-8: rename it\n")
             return 2
-    # A character that the terminal cannot show is printed as an escape.
+    # Print a character that the terminal cannot show as an escape.
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
     typed = argparse.Namespace(ros_args=ros_args, typed=arguments)
@@ -173,14 +174,14 @@ def main(argv: list[str] | None = None) -> int:
     except NotInstalled as error:
         sys.stderr.write(f"rmf-bridge {arguments[0]}: {error}\n")
         return os.EX_UNAVAILABLE
-    except BrokenPipeError:  # the reader of a pipe, such as `head`, has closed it
+    except BrokenPipeError:  # the reader of our output, such as `head`, has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EX_PIPE
 
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        """Report the error; after an invalid choice, suggest the nearest choice."""
+        """Report the error and exit. After an invalid choice, suggest the nearest valid choice."""
         wrong = re.search(r"invalid choice: '(.*)' \(choose from (.*)\)", message)
         if wrong and (near := _nearest(wrong[1], wrong[2])):
             message = f"{message[: wrong.start()]}there is no '{wrong[1]}'; did you mean '{near}'?"
@@ -195,10 +196,10 @@ def _nearest(typed: str, listed: str) -> str:
 
 
 def parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
-    """Return the parser of the subcommand in the arguments. Without a subcommand, return the parser of
-    all subcommands, without their options.
+    """Return the parser of the first argument's subcommand.
 
-    The other subcommands are neither imported nor described, because `outputs-off` has little time.
+    Leave out all other subcommands, because `outputs-off` has no time to import them. If the first
+    argument is no subcommand, return the parser of all subcommands, without their options.
     """
     if arguments and arguments[0] in COMMANDS:
         return _parser(arguments[:1], whole=True)
@@ -206,8 +207,8 @@ def parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
 
 
 def whole_parser() -> argparse.ArgumentParser:
-    """Return the parser with the options of every installed subcommand. The manual page (`make man`)
-    and the completion need it."""
+    """Return the parser of every installed subcommand with its options. The manual page (`make man`)
+    and the shell completion use this parser."""
     lacks = frozenset() if is_there("workbench") else WORKBENCH
     return _parser((name for name in COMMANDS if name not in lacks), whole=True)
 
@@ -231,8 +232,8 @@ def _parser(names: Iterable[str], whole: bool) -> argparse.ArgumentParser:
 
 
 def split_ros_args(argv: list[str]) -> tuple[list[str], list[str]]:
-    """Split the command line into our arguments and ROS's arguments. ROS's arguments reach from each
-    `--ros-args` to the next `--` or to the end."""
+    """Split the command line into our arguments and ROS's arguments. `--ros-args` begins ROS's
+    arguments, and the next `--` ends them."""
     ours, ros = list[str](), list[str]()
     into = ours
     for argument in argv:

@@ -183,5 +183,5 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
 
 
 def told(command: str) -> str:
-    """Return a subcommand's exit codes in one line, for `--help`."""
+    """Return a subcommand's exit codes as one line, for `--help`."""
     return "; ".join(f"{code} {text}" for code, text in EXIT_CODES[command].items())

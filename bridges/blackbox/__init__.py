@@ -1,2 +1,2 @@
-"""Recordings of a daemon's messages, events and decisions: the rings in memory, and the recorder's
-files."""
+"""Recordings of a daemon's messages, events and decisions. A ring in memory keeps the last minutes, and
+the recorder writes files from the rings."""

@@ -1,7 +1,7 @@
-"""Each day's rides, waits, availability, door cycles and energy of this machine's devices.
+"""Daily counts of this machine's devices: rides, waits, availability, door cycles and energy.
 
-The recorder adds them up from the rings and keeps them in one small file, `days.json` in the folder of
-recordings. A lift, door or charger is counted from its own daemon's ring only, so nothing counts twice.
+The recorder reads the counts from the rings. It keeps them in one small file, `days.json` in the folder
+of recordings. Each device is counted only from the ring of its own daemon, so nothing counts twice.
 """
 
 import csv
@@ -36,25 +36,28 @@ HEADINGS: Final = (
 )
 
 Days = dict[str, dict[str, DeviceCounts]]
-"""Day (2026-11-24) -> `<kind> <device>` -> counts."""
+"""Counts by day (`2026-11-24`), and within a day by `<kind> <device>`."""
 
 
 class DayRow(msgspec.Struct, frozen=True):
-    """One device over one or more days. `cells`: in the order of HEADINGS; "" for what does not apply
-    or is not known."""
+    """A table row for one device over one or more days.
+
+    `cells` has the order of HEADINGS. A cell is "" if its value is unknown or the device's kind has no
+    such value.
+    """
 
     cells: tuple[str, ...]
 
 
 def read(folder: Path) -> Days:
-    """Read the file; empty if it is missing or unreadable."""
+    """Read the file. Return no days if the file is missing or unreadable."""
     with suppress(OSError, msgspec.MsgspecError):
         return msgspec.json.decode(files.read(folder / FILE, MOST_BYTES), type=Days)
     return {}
 
 
 def add(folder: Path, day: date, counts: Mapping[Key, DeviceCounts]) -> None:
-    """Add counts to a day, and remove the days before the last MOST_DAYS. Raises OSError."""
+    """Add counts to a day, and keep only the last MOST_DAYS days. Raises OSError."""
     counted = {key: one for key, one in counts.items() if one.watched_s}
     if not counted:
         return
@@ -67,7 +70,8 @@ def add(folder: Path, day: date, counts: Mapping[Key, DeviceCounts]) -> None:
 
 
 def rows(days: Days, last: date, count: int) -> list[DayRow]:
-    """Return each device's counts of `count` days up to `last`, by kind and name."""
+    """Return a row for each device. A row sums up the `count` days that end with `last`. Rows are
+    sorted by kind and name."""
     wanted = {(last - timedelta(back)).isoformat() for back in range(count)}
     found: dict[str, DeviceCounts] = {}
     for day in wanted & days.keys():
@@ -77,7 +81,7 @@ def rows(days: Days, last: date, count: int) -> list[DayRow]:
 
 
 def as_csv(days: Days) -> str:
-    """Return every day of every device as CSV (RFC 4180), the first line with headings."""
+    """Return every day of every device as CSV (RFC 4180). The first line holds the headings."""
     out = io.StringIO()
     writer = csv.writer(out)
     writer.writerow(("day", *HEADINGS))
@@ -111,5 +115,5 @@ def _row(name: str, one: DeviceCounts) -> DayRow:
 
 
 def _at_most(bound_s: float | None) -> str:
-    """Write a bucket's bound: a wait of 12 s is in the bucket up to 20 s."""
+    """Return the upper bound of a wait's bucket as text. A wait of 12 s gives `≤ 20`."""
     return "" if bound_s is None else ("> 600" if bound_s == float("inf") else f"≤ {bound_s:g}")

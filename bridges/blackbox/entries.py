@@ -1,8 +1,12 @@
-"""The contents of a ring: a head that describes one run of a daemon, and the run's entries.
+"""The contents of a ring. A head describes one run of a daemon, and entries tell the events of that
+run.
 
-All times are by the daemon's monotonic clock (s); `Clocks` has the matching times of the wall clock. A
-subject is a lift, a door, a charger, or a coordinator's site. Its core is a pure function. So the
-subject's memory at one time and the events after that time are enough to repeat every decision.
+All times come from the daemon's monotonic clock (s). A `Clocks` entry pairs such a time with the wall
+clock's time.
+
+A subject is a lift, a door, a charger, or a coordinator's site. The core that decides for a subject is
+a pure function. So a replay can repeat every decision from the subject's memory at one time and the
+later events.
 """
 
 from collections.abc import Callable
@@ -17,23 +21,24 @@ from bridges.messages.releases import RELEASES
 from bridges.messages.rihs01 import MESSAGES
 
 LATEST_S: Final = 4e9
-"""The greatest time (s), before or after zero. The sum of three such times is still a date, and fits
-into an MCAP file."""
+"""The greatest time (s), before or after zero. The sum of three such times can still be written as a
+date and into an MCAP file."""
 Seconds = Annotated[float, Meta(ge=-LATEST_S, le=LATEST_S)]
 DEEPEST: Final = 60
-"""The greatest depth of a tree of values. A core's memory has a tenth of this depth."""
+"""The maximum depth of a tree of values. The memory of a core is about a tenth as deep."""
 E = TypeVar("E")
 
 
 class Invalid(ValueError):
-    """The bytes are not an entry or head of this version. The error's text gives the reason."""
+    """The error of bytes that are no entry or head of this version. The error's text gives the
+    reason."""
 
 
 class Head(msgspec.Struct, frozen=True):
-    """The description of one run of a daemon: its software, and the file that it serves.
+    """The description of one run of a daemon: its software, and the device YAML that it serves.
 
-    `file`: the YAML's path. `yaml`: the YAML's text. `texts`: the profiles and DBC files that the YAML
-    uses.
+    `file` is the YAML's path, and `yaml` is its text. `texts` holds the profiles and DBC files that the
+    YAML uses.
     """
 
     run: Annotated[str, Meta(pattern=r"^[\w-]{1,64}$")]
@@ -49,21 +54,23 @@ class Head(msgspec.Struct, frozen=True):
 
 
 class RingEntry(msgspec.Struct, frozen=True, array_like=True, tag_field="is"):
-    """The base of all entries."""
+    """The base class of all entries."""
 
     at: Seconds
 
 
 class Clocks(RingEntry, frozen=True, tag_field="is", tag=0):
-    """The wall clock's time (s since the epoch) at the entry's time."""
+    """The wall clock's time at the entry's time. `wall`: seconds since the epoch."""
 
     wall: Seconds
 
 
 class Spoken(RingEntry, frozen=True, tag_field="is", tag=1):
-    """A message that was heard on RMF's graph, or sent. `cdr`: its bytes on the wire, in the form of
-    `release`. `node`: the publisher's node, `/namespace/name`; "" if the wire does not name the
-    node."""
+    """A message of RMF's graph. The daemon heard the message, or sent it if `sent`.
+
+    `cdr`: the message's bytes on the wire, as `release` encodes them. `node`: the publisher's node,
+    `/namespace/name`, or "" if the wire does not name the node.
+    """
 
     sent: bool
     topic: str
@@ -74,8 +81,12 @@ class Spoken(RingEntry, frozen=True, tag_field="is", tag=1):
 
 
 class Known(RingEntry, frozen=True, tag_field="is", tag=2):
-    """The data from which a replay can start: a subject's memory, its last reading and its last
-    decision (None before the first decision). `anew`: the memory does not come from that decision."""
+    """A state of a subject from which a replay can start: memory, last reading, last outputs and last
+    report.
+
+    Reading, outputs and report are None before the first decision. `anew`: the memory is not the one
+    that the last recorded decision left.
+    """
 
     subject: str
     memory: Tree
@@ -86,8 +97,8 @@ class Known(RingEntry, frozen=True, tag_field="is", tag=2):
 
 
 class Decided(RingEntry, frozen=True, tag_field="is", tag=3):
-    """An event, and the core's decision on it. `outputs`, `news` and `faults` are empty if they have
-    not changed."""
+    """An event, and the core's decision on the event. The lists `outputs`, `news` and `faults` are
+    empty if the decision has not changed them."""
 
     subject: str
     event: Tree
@@ -100,14 +111,15 @@ class Decided(RingEntry, frozen=True, tag_field="is", tag=3):
 
 
 class Same(RingEntry, frozen=True, tag_field="is", tag=4):
-    """The times (doubles) at which the last reading was repeated without changing a decision."""
+    """The repeats of the last reading that changed no decision. `times`: the time of each repeat, as
+    doubles."""
 
     subject: str
     times: bytes
 
 
 class Published(RingEntry, frozen=True, tag_field="is", tag=5):
-    """The subject's report was published, and the subject's memory has noted this."""
+    """The daemon has published the subject's report. The subject's memory has noted the publication."""
 
     subject: str
 
@@ -119,19 +131,19 @@ class SubjectForgotten(RingEntry, frozen=True, tag_field="is", tag=6):
 
 
 class DaemonDied(RingEntry, frozen=True, tag_field="is", tag=7):
-    """A defect ends the daemon."""
+    """The daemon ends because of a defect in its program."""
 
     reason: str
 
 
 class EntriesLost(RingEntry, frozen=True, tag_field="is", tag=8):
-    """This many entries could not be stored."""
+    """The ring could not store `number` entries."""
 
     number: int
 
 
 class DaemonEnded(RingEntry, frozen=True, tag_field="is", tag=9):
-    """The daemon shut down cleanly. `safe`: every output was verified off."""
+    """The daemon shut down cleanly. `safe`: the daemon verified that every output is off."""
 
     safe: bool
 
@@ -194,7 +206,8 @@ def _decoded(decode: Callable[..., E], content: bytes | str) -> E:
 
 
 def _known(entry: AnyEntry) -> AnyEntry:
-    """Return the entry. Raises Invalid if this version does not know a name in it."""
+    """Return the entry. Raises Invalid if this version does not know the entry's message type, or if a
+    value is too deep."""
     if isinstance(entry, Spoken):
         kind, release = MESSAGES.get(entry.type), RELEASES.get(entry.release)
         if kind is None or release is None or not release.has(kind):

@@ -1,4 +1,4 @@
-"""One incident: a daemon's entries around that time, and the reasons for the recording. The module is
+"""One incident: the reasons for a recording, and a daemon's entries around that time. The module is
 pure."""
 
 from collections.abc import Iterator, Sequence
@@ -18,7 +18,8 @@ ERRORS: Final = (name_of(IoFailed), name_of(WriteFailed), name_of(Suspended))
 
 
 class Note(msgspec.Struct, frozen=True):
-    """A reason for a recording: a fixed name, and a text. `at`: its time (monotonic s)."""
+    """A reason for a recording. `at`: the reason's time (monotonic s). `code`: one of a few fixed
+    words."""
 
     at: float
     code: str
@@ -27,7 +28,7 @@ class Note(msgspec.Struct, frozen=True):
 
 
 class Incident(msgspec.Struct, frozen=True):
-    """The content of one recording's file. `entries` begins with everything that a replay needs."""
+    """The content of one recording's file. The first entries contain everything that a replay needs."""
 
     head: Head
     entries: Sequence[AnyEntry]
@@ -35,8 +36,8 @@ class Incident(msgspec.Struct, frozen=True):
 
 
 def part(entries: Sequence[AnyEntry], begin_at: float, end_at: float) -> Sequence[AnyEntry]:
-    """Return the entries from `begin_at` to `end_at` (monotonic s), and the earlier entries that a
-    replay needs."""
+    """Return the entries from `begin_at` to `end_at` (monotonic s). Before them, return the earlier
+    entries from which a replay can start."""
     first = 0
     for place, (entry, following) in enumerate(pairwise(entries)):
         if entry.at > begin_at:
@@ -47,8 +48,8 @@ def part(entries: Sequence[AnyEntry], begin_at: float, end_at: float) -> Sequenc
 
 
 def timed(entries: Sequence[AnyEntry]) -> Iterator[tuple[AnyEntry, float, float]]:
-    """Yield each entry with two times (s since the epoch): one by a steady clock, one by the wall
-    clock."""
+    """Yield each entry with two times (s since the epoch). A steady clock gives the first time, and the
+    wall clock gives the second."""
     clocks = [entry for entry in entries if isinstance(entry, Clocks)]
     steady = wall = clocks[0].wall - clocks[0].at if clocks else 0.0
     for entry in entries:
@@ -58,7 +59,7 @@ def timed(entries: Sequence[AnyEntry]) -> Iterator[tuple[AnyEntry, float, float]
 
 
 def readable(step: Decided) -> Iterator[tuple[str, Tree]]:
-    """Yield a decision as pairs of a topic and JSON. Foxglove and `ros2 bag` can show them."""
+    """Yield a decision as pairs of a topic and JSON, which Foxglove and `ros2 bag` can show."""
     event = step.event if isinstance(step.event, dict) else {}
     kind = str(event.get("", ""))
     if kind == READING:
@@ -84,4 +85,4 @@ INSTALL: Final = "in the clone, .venv/bin/pip install '.[recording,sqlite]'"
 
 
 LIBRARY: Final = "rmf-bridges"
-"""The beginning of the field `library` in the header of files that we wrote."""
+"""The first word of the header field `library` in our own recordings."""

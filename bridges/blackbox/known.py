@@ -1,4 +1,4 @@
-"""The state of each subject that a ring already has, and the entries that record a state."""
+"""The subjects' states that a ring already has, and the entries that add a state to the ring."""
 
 from typing import Any
 
@@ -10,8 +10,8 @@ AnyDecision = Decision[Any, Any, Any]
 
 
 class KnownSubject:
-    """A subject's recorded state. `times`: when the last reading was repeated, as far as the ring does
-    not have these times yet."""
+    """The recorded state of a subject. `times`: the repeats of the last reading that are not yet in the
+    ring."""
 
     def __init__(self, memory: object) -> None:
         self.memory = memory
@@ -22,7 +22,7 @@ class KnownSubject:
         self.times: list[float] = []
 
     def is_as_before(self, event: object, decision: AnyDecision, news: object) -> bool:
-        """Return whether the event only repeats the last reading, without any change."""
+        """Return whether the event repeats the last reading and nothing has changed."""
         return (
             event == self.reading
             and decision.outputs == self.outputs
@@ -34,8 +34,8 @@ class KnownSubject:
 
 
 def known(name: str, subject: KnownSubject, now: float, *, anew: bool = False) -> Known:
-    """Return the entry from which a replay of a subject can start. `anew`: the subject's memory does
-    not come from the last decision."""
+    """Return an entry from which a replay of the subject can start. `anew`: the memory is not the one
+    that the last recorded decision left."""
     return Known(
         now,
         name,
@@ -55,7 +55,7 @@ def step(
     decision: AnyDecision,
     news: object,
 ) -> Decided:
-    """Return the entry of a decision. Values that have not changed are left out."""
+    """Return the entry of a decision, without the values that have not changed."""
     faults, before = decision.report.faults, subject.report
     return Decided(
         now,

@@ -1,9 +1,10 @@
 """Writes an incident as an MCAP file for Foxglove, PlotJuggler and `ros2 bag`.
 
 rosbag2 refuses a file whose topics have more than one encoding (rosbag2_cpp, sequential_reader.cpp,
-`check_topics_serialization_formats`). So our own data is JSON in `std_msgs/msg/String`. It is under
-`/rmf_bridge/`, in topics for people and in the topic `entries`, from which `rmf-bridge replay` repeats
-decisions.
+`check_topics_serialization_formats`). So our own data is JSON text in `std_msgs/msg/String`.
+
+Our topics begin with `/rmf_bridge/`. `rmf-bridge replay` repeats decisions from the topic `entries`.
+The other topics are for people.
 """
 
 import os
@@ -29,7 +30,8 @@ NOTES: Final = f"{OWN_TOPICS}notes"
 HEAD: Final = "rmf_bridge"
 CHUNK: Final = 256 * 1024
 MOST_CHANNELS: Final = 500
-"""The number of channels above which the file names no further publishers."""
+"""The maximum number of channels. A file with so many channels does not name the publishers of further
+channels."""
 QOS: Final = """\
 - history: 1
   depth: {depth}
@@ -41,7 +43,8 @@ QOS: Final = """\
   liveliness_lease_duration: {{sec: 9223372036, nsec: 854775807}}
   avoid_ros_namespace_conventions: false
 """
-"""The form of a QoS in rosbag2's metadata up to version 8. Every later release reads this form too."""
+"""The QoS of a topic in the form of rosbag2's metadata up to version 8. Later releases of rosbag2 read
+this form too."""
 BAG: Final = """\
 version: 8
 storage_identifier: mcap
@@ -56,8 +59,7 @@ files: []
 custom_data: ~
 ros_distro: {distro}
 """
-"""The metadata for rosbag2. Only the version counts, because rosbag2 reads the rest from the file's
-index."""
+"""The metadata for rosbag2. rosbag2 uses only the version, and reads the rest from the file's index."""
 KNOWN_QOS: Final = {topic.name: topic.publish for topic in topics.every()}
 
 
@@ -69,7 +71,8 @@ class String:
 
 
 def write(path: Path, incident: Incident) -> None:
-    """Write a file. The file has a temporary name until it is complete. Raises OSError."""
+    """Write an incident to a file. The file has a temporary name until it is complete. Raises
+    OSError."""
     new = path.with_name(f".{path.name}.part")
     try:
         with new.open("wb") as out:
@@ -114,7 +117,8 @@ def _entry(channels: "_Channels", entry: AnyEntry, steady: float, wall: float) -
 
 
 class _Channels:
-    """The schemas and channels of one file. Each is declared when it is first needed."""
+    """The schemas and channels of one file. A schema or channel is declared when a message first needs
+    it."""
 
     def __init__(self, writer: Writer) -> None:
         self._writer = writer
@@ -122,11 +126,11 @@ class _Channels:
         self._channels: dict[tuple[str, ...], int] = {}
 
     def spoken(self, spoken: Spoken, steady: float, wall: float) -> None:
-        """Write a message of RMF, with the bytes that it had on the wire."""
+        """Write a message of RMF with its bytes from the wire."""
         way = "sent" if spoken.sent else "heard"
         key = (spoken.topic, spoken.type, spoken.release, way, spoken.node)
         if key not in self._channels and len(self._channels) >= MOST_CHANNELS:
-            key = (*key[:-1], "")  # the nodes are made up
+            key = (*key[:-1], "")  # so many nodes can only be invented
         if key not in self._channels:
             self._channels[key] = self._declare(spoken, way, key[-1])
         self._add(self._channels[key], spoken.cdr, steady, wall)

@@ -1,9 +1,11 @@
-"""The recorder: one process beside all daemons of a machine, which turns their rings into files.
+"""The recorder: one process that writes recordings, which are files, from the rings of all daemons of a
+machine.
 
 The recorder has no devices, and no daemon waits for it. Each second it reads the new entries of each
-ring. If an entry triggers a recording (`triggers.py`), the recorder waits until the ring also has the
-entries of the time after that entry. Then it writes a file. If all is well, nothing is written, unless
-a YAML asks for `keep: continuous`.
+ring. An entry may trigger a recording (`triggers.py`). The recorder then waits until the ring has the
+next AFTER_S seconds too, and writes a file.
+
+Without a trigger the recorder writes nothing, except for a daemon whose YAML has `keep: continuous`.
 """
 
 import logging
@@ -28,19 +30,23 @@ from bridges.system.log import pairs
 log = logging.getLogger(__name__)
 
 LATE_S: Final = 60.0
-"""The age (s) of entries that are left out at the first look at a ring. The recorder that ran before
-has recorded older entries."""
+"""The maximum age (s) of a trigger when the recorder opens a ring. An earlier run of the recorder has
+recorded the older triggers."""
 GRACE_S: Final = 2.0
-"""The extra wait (s) after which the ring certainly has all entries of a recording."""
+"""The time (s) between the end of a recording and its writing. By then the ring has every entry of the
+recording."""
 COUNTED_S: Final = 3600.0
-"""The day's counts are written so often (s), because each write wears an SD card."""
+"""The interval (s) at which the day's counts are written. The interval is long because each write wears
+the SD card."""
 PART_S: Final = 300.0
-"""The length (s) of one file of `keep: continuous`."""
+"""The length (s) of one file for `keep: continuous`."""
 
 
 class Recorder:
-    """Follows the rings of all daemons. `folders`: their runtime directories. `now`: returns the
-    machine's time (s)."""
+    """The reader of all daemons' rings, which writes the recordings.
+
+    `folders` returns the daemons' runtime directories. `now` returns the machine's time (s).
+    """
 
     def __init__(
         self,
@@ -58,8 +64,8 @@ class Recorder:
         self._counted_at = now()
 
     def look(self) -> None:
-        """Read new entries, and write the recordings that are due. Called each second; does not
-        raise."""
+        """Read new entries, and write the recordings that are due. The caller calls this each second.
+        Raises nothing."""
         folders = list(self._folders())
         for folder in folders:
             self._look_at(folder)
@@ -71,7 +77,8 @@ class Recorder:
                 self._count(followed)
 
     def close(self) -> None:
-        """Write the unfinished recordings as they are, and the day's counts."""
+        """Write the recordings that have begun, although they are incomplete. Write the day's counts
+        too."""
         for followed in self._followed.values():
             self._finish(followed)
         self._followed.clear()
@@ -106,15 +113,15 @@ class Recorder:
         self._count(followed)
 
     def _count(self, followed: "_Followed") -> None:
-        """Add the counts of a ring's own devices to the day."""
+        """Add the counts of the daemon's own devices to the day."""
         try:
             days.add(self._recordings.folder, date.today(), followed.counts())
         except OSError as error:
             log.warning(pairs("not_counted", folder=self._recordings.folder, reason=error))
 
     def _take_died(self, path: Path) -> None:
-        """Record, once, the ring of a run that did not shut down cleanly. If the run never served,
-        nothing is recorded, because the log explains a failed start."""
+        """Record the ring of a run that did not shut down cleanly, once. Record nothing if the run
+        never served, because the log explains a failed start."""
         try:
             identity = _identity(path)
             if identity in self._seen_dead:
@@ -131,8 +138,8 @@ class Recorder:
             self._put(Incident(read.head, part(entries, at - BEFORE_S, at), (note,)), DEATH)
 
     def _is_first(self, head: Head) -> bool:
-        """Return whether this death is still unrecorded, and no other death was recorded in the last
-        AGAIN_S."""
+        """Return whether this death is not yet recorded. Return False if another death of this daemon
+        was recorded in the last AGAIN_S."""
         last = self._died_at.get(head.file, AGES_AGO)
         if self._recordings.has_death(head) or self._now() < last + AGAIN_S:
             return False
@@ -140,8 +147,8 @@ class Recorder:
         return True
 
     def _put(self, incident: Incident, why: str) -> None:
-        """Write a file. If writing fails, the recording is lost. Of several failures in a row only the
-        first is logged."""
+        """Write a recording. If writing fails, the recording is lost. Log only the first of several
+        failures in a row."""
         others = [followed.head.recording for followed in self._followed.values()]
         try:
             path = self._recordings.put(incident, wall_of(incident.entries), why, others)
@@ -157,7 +164,7 @@ class Recorder:
 
 
 class _Followed:
-    """One ring, and its recordings that have begun."""
+    """One ring that the recorder follows, and the recordings that have begun from the ring."""
 
     def __init__(self, path: Path, now: float) -> None:
         """Open the ring. Raises RingError."""
@@ -192,8 +199,8 @@ class _Followed:
         return {key: one for key, one in found.items() if key[0] == self.head.kind}
 
     def due(self, now: float) -> list[tuple[Incident, str]]:
-        """Return the recordings that are complete at `now`. If `now` is infinite, return all recordings
-        that have begun."""
+        """Return the recordings that are complete at `now`. Return every recording that has begun if
+        `now` is infinite."""
         found = []
         if self._notes and now >= self._notes[0].at + AFTER_S + GRACE_S:
             found.append(self._incident())
@@ -211,8 +218,8 @@ class _Followed:
         return Incident(read.head, entries, notes), reason(first.code, first.text)
 
     def _read(self) -> RingContent:
-        """Read the ring again. If the ring is gone, return its content from the recording's
-        beginning."""
+        """Read the ring again. If the ring is gone, return the content that was read when the recording
+        began."""
         try:
             read = RingContent(self._tail.path)
             if read.head.run == self.head.run:
@@ -223,8 +230,8 @@ class _Followed:
         return self._kept
 
     def _continuous(self, *, whole: bool) -> list[tuple[Incident, str]]:
-        """Return the entries since the last file, up to a place where a replay can start. So a replay
-        of the next file needs no other file."""
+        """Return the entries since the last file, up to the last place from which a replay can start.
+        The next file then begins at that place, so a replay of that file needs no other file."""
         known = [at for at in range(1, len(self._part)) if begins(self._part, at)]
         end = len(self._part) if whole or not known else known[-1]
         entries, self._part = self._part[:end], self._part[end:]
@@ -232,7 +239,7 @@ class _Followed:
 
 
 def _last_words(entries: Sequence[AnyEntry]) -> str:
-    """Return the cause of a run's death, as its last entries show."""
+    """Return the cause of a run's death, according to the run's last entries."""
     for entry in entries:
         if isinstance(entry, DaemonDied):
             return entry.reason
@@ -259,7 +266,7 @@ def begins(entries: Sequence[AnyEntry], at: int) -> bool:
 
 
 def wall_of(entries: Sequence[AnyEntry]) -> float:
-    """Return the wall clock at the end of these entries (s since the epoch)."""
+    """Return the wall clock's time (s since the epoch) of the last entry."""
     clocks = [entry for entry in entries if isinstance(entry, Clocks)]
     return clocks[-1].wall - clocks[-1].at + entries[-1].at if clocks else 0.0
 

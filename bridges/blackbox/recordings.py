@@ -1,9 +1,16 @@
-"""The store of recordings: the names of the files, and the limits that spare an SD card.
+"""The store of recordings: the names of the files, and the limits that spare the SD card.
 
-All daemons of a machine share one store and one bound. Files are removed in this order: files of `keep:
-continuous`, repeats of a fault, repeated deaths, the first file of each cause, and last the first death
-of a daemon. Among equals the oldest file goes first, by the time in its name. A file with another form
-of name is a person's: it is neither counted nor removed.
+All daemons of a machine share one store and one limit. Above the limit, files are removed in this
+order:
+
+1. files of `keep: continuous`
+2. repeats of a fault
+3. repeats of a death
+4. the first file of each cause
+5. the first death of each daemon
+
+Within a group the oldest file is removed first. The time in a file's name tells its age. If a file's
+name has another form, a person has named the file. Such a file is never counted or removed.
 """
 
 import os
@@ -20,21 +27,22 @@ from bridges.blackbox.incident import Incident
 from bridges.kinds.shared.recording_section import RecordingSettings
 
 LEAST_FREE: Final = 100_000_000
-"""The least free room (bytes) on a disk. If there is less, no recording is written."""
+"""The free space (bytes) that a disk must have. With less free space, no recording is written."""
 SUFFIX: Final = ".mcap"
 CONTINUOUS: Final = "all"
-"""The word in the names of `keep: continuous` files. Other files have their cause at that place."""
+"""The word that stands for the cause in the names of `keep: continuous` files."""
 DEATH: Final = "died"
 _NAME: Final = re.compile(r"(.+)_(\d+-\d+-\d+_\d+-\d+-\d+)_([^_]+)_[^_]+")
 _TIME: Final = "%Y-%m-%d_%H-%M-%S"
 
 
 class DiskFull(OSError):
-    """The disk has too little room for a recording."""
+    """The error of a disk that has too little room for a recording."""
 
 
 class Named(NamedTuple):
-    """The parts of a file's name: its time (s since the epoch), the daemon's YAML, and the reason."""
+    """The parts of a recording's name. `at`: the time (s since the epoch). `daemon`: the name of the
+    YAML. `why`: the reason."""
 
     at: float
     daemon: str
@@ -42,13 +50,12 @@ class Named(NamedTuple):
 
     @property
     def cause(self) -> tuple[str, str]:
-        """Return daemon and reason. A file with the same daemon and reason as an earlier file is a
-        repeat."""
+        """Return the daemon and the reason. A later file with the same pair is a repeat."""
         return self.daemon, self.why
 
 
 class Stored(NamedTuple):
-    """A file of the store. `size`: bytes."""
+    """A recording in the store. `size`: bytes."""
 
     path: Path
     name: Named
@@ -80,8 +87,10 @@ class Recordings:
     def put(
         self, incident: Incident, wall: float, why: str, others: Iterable[RecordingSettings] = ()
     ) -> Path:
-        """Write a recording. If the store then exceeds the machine's bound, remove files of little
-        value. The bound is the largest bound of this daemon and of the `others`. Raises OSError."""
+        """Write a recording, and then remove files until the store is within its limit.
+
+        The limit is the largest limit in the settings of this daemon and in `others`. Raises OSError.
+        """
         from bridges.blackbox import mcap_write
 
         self.folder.mkdir(mode=0o750, parents=True, exist_ok=True)
@@ -98,7 +107,7 @@ class Recordings:
             raise DiskFull(f"less than {LEAST_FREE // 1_000_000} MB are free on {self.folder}")
 
     def _prune(self, newest: Path, most_files: int, most_bytes: float) -> None:
-        """Remove files until these limits hold, but never the newest file."""
+        """Remove files until the store is within both limits. Never remove the newest file."""
         stored = [
             Stored(path, found, path.stat().st_size)
             for path in self.folder.glob(f"*{SUFFIX}")
@@ -114,8 +123,11 @@ class Recordings:
 
 
 def least_valuable_first(stored: Sequence[Stored], now: float) -> list[Stored]:
-    """Return the files in the order of their removal. `now`: s since the epoch. A file from the future
-    was written before the clock was set back, so it counts as the oldest."""
+    """Return the files in the order of their removal. `now`: seconds since the epoch.
+
+    A file with a future time was written before somebody set the clock back. So that file counts as the
+    oldest.
+    """
     by_age = sorted(stored, key=lambda one: (one.name.at <= now, one.name.at))
     first = {one.name.cause: one for one in reversed(by_age)}
 
@@ -128,13 +140,13 @@ def least_valuable_first(stored: Sequence[Stored], now: float) -> list[Stored]:
 
 
 def reason(code: str, text: str = "") -> str:
-    """Return a note's reason in the form for a file's name, such as `fault-lift-door-stuck`."""
+    """Return the reason of a note as a part of a file's name, such as `fault-lift-door-stuck`."""
     cause = text.partition(":")[0] if code in ("FAULT", "REFUSED") else ""
     return re.sub(r"[^a-z0-9]+", "-", f"{code} {cause}".lower()).strip("-")[:60]
 
 
 def named(path: Path) -> Named | None:
-    """Return the parts of a file's name; None for a file that a person has named."""
+    """Return the parts of a file's name. Return None for a file that a person has named."""
     parts = _NAME.fullmatch(path.stem)
     with suppress(ValueError, OverflowError):
         if parts:

@@ -1,11 +1,15 @@
-"""The ring: a file of fixed size on tmpfs with the last minutes of a daemon. The file outlives a kill
-of the daemon.
+"""The ring: a file of fixed size on tmpfs that holds the last minutes of a daemon. The file is still
+there after a kill of the daemon.
 
-The file has a head, and then SEGMENTS of equal size, which are used in turn. Each segment begins with
-its number and the state of every subject. Entries follow, each with its length and a checksum. The
-checksum also covers the segment's number. So an entry from an earlier turn, or an entry that a kill has
-cut short, is never valid. The file is written with `pwrite` and not mapped, because a signal would kill
-the daemon if somebody truncated a mapped file.
+The file has a head and then SEGMENTS of equal size. The daemon fills the segments in turn. Each segment
+begins with its number and the state of every subject. The entries follow. Each entry has its length, a
+checksum and its content.
+
+The checksum also covers the segment's number. So an entry from an earlier turn is never valid. An entry
+that a kill has cut short is not valid either.
+
+The daemon writes the file with `pwrite` and does not map it. If somebody truncated a mapped file, a
+signal would kill the daemon.
 """
 
 import os
@@ -22,13 +26,13 @@ from bridges.system import user_files
 MAGIC: Final = b"RMFRING1"
 SEGMENTS: Final = 8
 TOP: Final = struct.Struct("<8sBxxxII")
-"""The beginning of the file: magic, the flag of a clean shutdown, the size of a segment, the length of
-the head."""
+"""The first bytes of the file: magic, flag of a clean shutdown, size of a segment, length of the
+head."""
 ENDED_AT: Final = 8
 MARK: Final = struct.Struct("<QI")
-"""The beginning of a segment: its number, and the checksum of that number."""
+"""The first bytes of a segment: its number, and the checksum of that number."""
 FRAME: Final = struct.Struct("<II")
-"""The beginning of an entry: its length and its checksum."""
+"""The first bytes of an entry: its length and its checksum."""
 PAGE: Final = 4096
 LARGEST: Final = 72 << 20
 LONGEST_TOP: Final = 4 << 20
@@ -37,16 +41,16 @@ DIED: Final = "ring.died"
 
 
 class RingError(Exception):
-    """The file is not a ring, or it cannot be read."""
+    """The error of a file that is no ring, or that cannot be read."""
 
 
 class Ring:
-    """The end of a ring at which the daemon writes. If a method raises OSError, the caller must make a
-    new ring."""
+    """A ring that the daemon writes. After an OSError from a method, the caller must make a new
+    ring."""
 
     def __init__(self, folder: Path, head: Head, size: int) -> None:
-        """Make the file and reserve all its space. If an earlier run died, its ring is kept beside the
-        new one."""
+        """Make the file and reserve all its space. If an earlier run died, keep the ring of that run
+        under the name DIED."""
         self.path = folder / NAME
         self._segment_size = max(size // SEGMENTS, PAGE)
         told = entries.encode(head)
@@ -70,7 +74,7 @@ class Ring:
 
     @property
     def lives(self) -> bool:
-        """Return whether the file is still at its path."""
+        """Return whether the file at the path is still this ring."""
         try:
             return os.path.samestat(os.fstat(self._file), self.path.lstat())
         except OSError:
@@ -78,15 +82,15 @@ class Ring:
 
     @property
     def room(self) -> int:
-        """The greatest size of an entry (bytes)."""
+        """The maximum size of an entry (bytes)."""
         return self._segment_size - MARK.size - 2 * FRAME.size
 
     def fits(self, length: int) -> bool:
-        """Return whether this many bytes of framed entries still fit into the present segment."""
+        """Return whether the present segment has room for this many bytes of framed entries."""
         return self._offset + length + FRAME.size <= self._segment_size
 
     def begin_segment(self) -> None:
-        """Continue in the next segment, and discard its old content."""
+        """Begin the next segment, and discard the segment's old content."""
         self._number += 1
         number = self._number.to_bytes(8, "little")
         start = MARK.pack(self._number, zlib.crc32(number)) + bytes(FRAME.size)
@@ -94,16 +98,16 @@ class Ring:
         self._offset = MARK.size
 
     def frame(self, content: bytes) -> bytes:
-        """Return an entry framed for this segment: its length, its checksum, its content."""
+        """Return an entry with its frame for this segment: length, checksum, content."""
         return FRAME.pack(len(content), zlib.crc32(content, self._number)) + content
 
     def write(self, frames: bytes) -> None:
-        """Append entries that are framed for this segment and fit into it."""
+        """Append framed entries to the present segment. The entries must fit."""
         os.pwrite(self._file, frames + bytes(FRAME.size), self._place + self._offset)
         self._offset += len(frames)
 
     def close(self, *, ended: bool) -> None:
-        """Close the ring. `ended`: the run shut down cleanly, so nobody needs its ring."""
+        """Close the ring. `ended`: the run shut down cleanly, so nobody needs the ring."""
         try:
             if ended:
                 os.pwrite(self._file, b"\1", ENDED_AT)
@@ -125,10 +129,10 @@ def _died(path: Path) -> bool:
 
 
 class RingContent:
-    """The content of a ring at one time. `head`: the head of the run. `ended`: the run shut down
-    cleanly.
+    """The content of a ring at one time. `head` describes the run. `ended`: the run shut down cleanly.
 
-    `segments`: the number and the entries of each segment, in order. Incomplete entries are left out.
+    `segments` holds the entries of each segment by the segment's number, in order. It has no incomplete
+    entries.
     """
 
     def __init__(self, path: Path) -> None:
@@ -159,9 +163,9 @@ class RingContent:
 
 
 class Tail:
-    """A reader that follows a ring during writing, and returns its new entries.
+    """A reader that returns new entries while the daemon writes the ring.
 
-    `head`: the head of the run. The constructor and `new` raise RingError if the file cannot be read.
+    `head` describes the run. The constructor and `new` raise RingError if the file cannot be read.
     """
 
     def __init__(self, path: Path) -> None:
@@ -171,8 +175,8 @@ class Tail:
         self._offset = MARK.size
 
     def new(self) -> list[AnyEntry]:
-        """Return the entries written since the last call; at the first call return all entries. Entries
-        that the ring has overwritten since the last call are missing."""
+        """Return the entries since the last call. The first call returns all entries. Entries that the
+        daemon has already overwritten are missing."""
         try:
             with self.path.open("rb") as ring:
                 return self._new(ring)
@@ -196,7 +200,8 @@ class Tail:
         return found
 
     def _start(self, ring: IO[bytes], turn: int) -> int:
-        """Return the number of the segment at this place; 0 if no valid segment is there."""
+        """Return the number of the segment at this place. Return 0 if the place has no valid
+        segment."""
         ring.seek(self._first + turn * self._size)
         start = ring.read(MARK.size)
         if len(start) < MARK.size:
@@ -207,7 +212,7 @@ class Tail:
 
 
 def _top(path: Path) -> tuple[Head, int, int]:
-    """Return a ring's head, the offset of its first segment, and the size of its segments. Raises
+    """Return a ring's head, the offset of the first segment, and the size of a segment. Raises
     RingError."""
     try:
         content = user_files.read(path, LONGEST_TOP).content
@@ -228,8 +233,8 @@ def _entries(segment: bytes, number: int) -> list[AnyEntry]:
 
 
 def frames(segment: bytes, number: int, at: int) -> Iterator[tuple[bytes, int]]:
-    """Yield each entry of a segment with the offset of its end. Begin at offset `at`, and stop at the
-    first torn entry."""
+    """Yield each entry of a segment, and the offset at which the entry ends. Begin at offset `at`. Stop
+    at the first incomplete entry."""
     while at + FRAME.size <= len(segment):
         length, checksum = FRAME.unpack_from(segment, at)
         content = segment[at + FRAME.size : at + FRAME.size + length]

@@ -1,11 +1,11 @@
 """Finds the reasons for a recording in a daemon's entries. The module is pure. The reasons are:
 
-- a fault appears (a hazard is a fault too, because it keeps the device from RMF);
-- a request is refused, unless every normal handover or start causes such a refusal;
-- a request has waited longer than `waiting_s`;
-- the daemon reports a defect that ends it.
+- A fault appears. A hazard is a fault too, because it takes the device away from RMF.
+- The daemon refuses a request, and the refusal is not one that every normal handover or start causes.
+- A request has waited longer than `waiting_s`.
+- The daemon reports that a defect in its program ends it.
 
-If the same reason for the same subject comes again within AGAIN_S, it does not count.
+A reason does not count if the same reason came for the same subject within the last AGAIN_S.
 """
 
 from collections.abc import Iterator
@@ -30,8 +30,11 @@ FAULT, REFUSED, WAITING, DIED = "FAULT", "REFUSED", "WAITING", "DIED"
 
 
 class Triggers:
-    """The finder of reasons to record one run of a daemon. `waiting_s`: the wait (s) that is a reason.
-    `tally`: the counts of what the devices in the messages did."""
+    """The finder of reasons to record one run of a daemon.
+
+    `waiting_s`: the length of a wait that is a reason. `tally` counts the actions of the devices, which
+    the messages show.
+    """
 
     def __init__(self, waiting_s: float) -> None:
         self._faults: dict[str, set[str]] = {}
@@ -41,7 +44,7 @@ class Triggers:
         self.tally = SiteTally()
 
     def take(self, entry: AnyEntry) -> list[Note]:
-        """Return the new reasons for a recording that this entry gives."""
+        """Return the new reasons for a recording in this entry."""
         return [note for note in self._all(entry) if self._is_new(note)]
 
     def _all(self, entry: AnyEntry) -> Iterator[Note]:
@@ -70,7 +73,7 @@ class Triggers:
             yield Note(step.at, REFUSED, step.refused, step.subject)
 
     def _spoken(self, spoken: Spoken) -> Iterator[Note]:
-        """Yield a note for each wait that is too long. The messages alone show such a wait."""
+        """Yield a note for each wait that is too long. Only the messages show a wait."""
         kind, release = MESSAGES.get(spoken.type), RELEASES.get(spoken.release)
         if kind is None or release is None:
             return

@@ -1,10 +1,11 @@
 """Converts a core's values (events, memories, outputs, reports) to trees of plain values, and back.
 
 A tree holds None, bool, int, float, str, lists, and mappings with text as keys. A tuple becomes a list.
-Any other value becomes a mapping whose key `""` names its type (`lift.memory.Session`). The mapping
-also has the value's fields, or the value's content under `=`. Only types that have a name are written
-and created; `bridges/kinds/shared/recorded.py` and `RECORDED` of each kind have these names. So no
-recording can call any other code.
+Any other value becomes a mapping. Its key `""` has the name of the type, such as `lift.memory.Session`.
+The other keys are the value's fields, or the key `=` has the value's content.
+
+Only types with a name are written and created. `bridges/kinds/shared/recorded.py` and `RECORDED` of
+each kind list the names. So a recording cannot make this program call any other code.
 """
 
 import math
@@ -21,31 +22,34 @@ from bridges.kinds.shared.recorded import SHARED
 
 if TYPE_CHECKING:
     Tree = None | bool | int | float | str | list["Tree"] | dict[str, "Tree"]
-else:  # msgspec has no recursive types; an untyped decoder makes plain values only
+else:  # msgspec has no recursive types; an untyped decoder makes only plain values
     Tree = Any
 
 TYPE: Final = ""
 HOLDS: Final = "="
 MAP, SET, NUMBER = "map", "set", "number"
 ENDLESS: Final = (math.inf, -math.inf)
-"""The floats that JSON cannot express."""
+"""The floats that JSON cannot hold."""
 PLAIN: Final = frozenset({type(None), bool, int, float, str})
 
 
 class UnknownValue(ValueError):
-    """A tree names a type, a field or a member that this version does not have."""
+    """The error of a tree that names a type, field or member that this version does not have."""
 
 
 class Struct(NamedTuple):
-    """A type with fields. `name`: its name in a tree. `fields`: pairs of a name in the code and a name
-    in trees. The two differ if the field was renamed (`msgspec.field(name=…)`)."""
+    """A type with fields. `name`: the type's name in a tree.
+
+    `fields`: for each field, its name in the code and its name in trees. The names differ if the field
+    was renamed (`msgspec.field(name=…)`).
+    """
 
     name: str
     fields: tuple[tuple[str, str], ...]
 
 
 def tree(value: object) -> Tree:
-    """Return the tree of a value. Raises TypeError for types that no core has."""
+    """Return a value as a tree. Raises TypeError for a type that no core uses."""
     kind: type[Any] = type(value)
     if kind is float and value in ENDLESS:
         return {TYPE: NUMBER, HOLDS: str(value)}
@@ -68,13 +72,13 @@ def _other(value: object) -> Tree:
         return {TYPE: SET, HOLDS: sorted(map(tree, value), key=repr)}
     if isinstance(value, Mapping):
         return {TYPE: MAP, HOLDS: [[tree(key), tree(part)] for key, part in value.items()]}
-    if isinstance(value, tuple):  # with names
+    if isinstance(value, tuple):  # a named tuple
         return {TYPE: name_of(type(value)), HOLDS: [tree(part) for part in value]}
     raise TypeError(f"{type(value).__name__} is not a value of a core")
 
 
 def value(found: Tree) -> Any:
-    """Return the value of a tree. Raises UnknownValue."""
+    """Return the value that a tree describes. Raises UnknownValue."""
     try:
         return _value(found)
     except (TypeError, KeyError, AttributeError, ValueError, RecursionError) as error:
@@ -117,9 +121,11 @@ _structs: dict[type[Any], Struct | None] = {}
 
 
 def first_difference(one: Tree, other: Tree, path: str = "") -> tuple[str, Tree, Tree] | None:
-    """Return the first difference as its path and both values; None for equal trees. A field that only
-    one tree has does not count, because another version of the program may have more or fewer
-    fields."""
+    """Return the first difference as a path and both values. Return None for equal trees.
+
+    A field that only one tree has is no difference, because another version of the program may have
+    more or fewer fields.
+    """
     if isinstance(one, dict) and isinstance(other, dict) and one.get(TYPE) == other.get(TYPE):
         names = [name for name in one if name in other]
         below = ((f"{path}.{name}".strip("."), one[name], other[name]) for name in names)
@@ -133,7 +139,7 @@ def first_difference(one: Tree, other: Tree, path: str = "") -> tuple[str, Tree,
 
 
 def _struct(kind: type[Any]) -> Struct | None:
-    """Return a type's name and fields; None for a type without fields."""
+    """Return a type's name and fields. Return None for a type without fields."""
     if kind not in _structs:
         _structs[kind] = _found(kind)
     return _structs[kind]
@@ -158,7 +164,7 @@ def name_of(kind: type) -> str:
 
 @cache
 def _type(name: str) -> type[Any]:
-    """Return the type with this name. Only the kind that begins the name is loaded. Raises
+    """Return the type with this name. Load only the kind with which the name begins. Raises
     UnknownValue."""
     kind = name.partition(".")[0]
     known = recorded(kind) if kind in kind_names() else SHARED

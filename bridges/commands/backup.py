@@ -1,11 +1,16 @@
-"""`rmf-bridge backup FILE`: saves a machine's configuration in one file; `--restore` brings it back.
+"""`rmf-bridge backup FILE` saves a machine's configuration in one file. `--restore` brings it back.
 
-The backup has the device YAMLs, the profiles and maps beside them, the options of page, exporter and
-notify, the page's users with their password hashes, and what supervisors and coordinator keep. A secret
-is left out and named: any other file that only its owner may read.
+The backup contains:
 
-What supervisors keep is restored only for FRESH_S: afterwards nobody knows whether a door held then is
-still to be held, and a restored hold would open it.
+- the device YAMLs, with the profiles and maps beside them
+- the options of page, exporter and notify
+- the page's users with the hashes of their passwords
+- the memories that supervisors and coordinators keep on disk
+
+Any other file that only its owner may read is a secret. The command leaves secrets out and names them.
+
+A memory is restored only if it is at most FRESH_S old. An older memory may say that a door is held, and
+nobody knows whether that is still true. A restored hold would open the door.
 """
 
 import argparse
@@ -43,7 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0; 66 if FILE is no backup; 73 if a file cannot be written; 78 for an invalid YAML."""
+    """Return 0 if all went well. Return 66 if FILE is no backup, 73 if a file cannot be written, and 78
+    for an invalid YAML."""
     if not args.restore:
         return _save(args.file, args.root, dry_run=args.dry_run)
     try:
@@ -76,7 +82,8 @@ def _save(file: Path, root: Path, *, dry_run: bool) -> int:
 
 
 def _write_archive(file: Path, root: Path, kept: Iterable[Path]) -> None:
-    """Write a new archive. Raises OSError, also if the file exists: another backup may be in it."""
+    """Write a new archive. Raises OSError. An existing file is such an error, because it may be another
+    backup."""
     opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     with open(opened, "wb") as out, tarfile.open(fileobj=out, mode="w:gz") as archive:
         for path in kept:
@@ -88,7 +95,8 @@ def _write_archive(file: Path, root: Path, kept: Iterable[Path]) -> None:
 
 
 def _is_secret(path: Path) -> bool:
-    """Return whether only the owner may read this file, and it holds neither users nor a memory."""
+    """Return whether only the owner may read the file. Return False for a file of users and for a
+    memory."""
     if path.parent.name.endswith(".wants"):
         return False
     return not path.stat().st_mode & SECRET and USERS not in path.name and path.name != KEPT
@@ -102,7 +110,8 @@ def _found(root: Path) -> Iterator[Path]:
 
 
 def _read(file: Path) -> Iterator[tuple[PurePosixPath, tuple[bytes, float]]]:
-    """Yield each file's path, content and time. Raises ValueError for a path outside these folders."""
+    """Yield each file's path, content and time. Raises ValueError for a path outside the folders of a
+    backup."""
     with tarfile.open(file) as archive:
         for member in archive:
             path = PurePosixPath(member.name)
@@ -144,7 +153,7 @@ def _restore(saved: dict[PurePosixPath, tuple[bytes, float]], args: argparse.Nam
 def _configs(
     saved: dict[PurePosixPath, tuple[bytes, float]], units: list[str], root: Path
 ) -> Iterator[Config]:
-    """Yield the files of the enabled services. Raises SettingsError before anything is written."""
+    """Yield the YAMLs of the enabled services. Raises SettingsError before anything is written."""
     for name in units:
         path = PurePosixPath(CONFIG) / f"{name.removeprefix(UNIT).removesuffix('.service')}.yaml"
         if name.startswith(UNIT) and path in saved:
@@ -152,7 +161,7 @@ def _configs(
 
 
 def _is_fresh(path: PurePosixPath, mtime: float) -> bool:
-    """Is a memory recent enough to be true still? Otherwise say that it is left out."""
+    """Return whether a memory is at most FRESH_S old. Otherwise print that the memory is left out."""
     fresh = time.time() - mtime <= FRESH_S
     if not fresh:
         print(f"left out, because it is older than {FRESH_S / 3600:g} h: /{path}")
@@ -160,7 +169,7 @@ def _is_fresh(path: PurePosixPath, mtime: float) -> bool:
 
 
 def _write(path: Path, content: bytes) -> int:
-    """Write a file; passwords and memories only for their owner, which is that of their folder."""
+    """Write a file. Only the owner of the folder may read users' passwords and memories."""
     private = USERS in path.name or path.name == KEPT
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,9 +1,9 @@
-"""`rmf-bridge check FILE...`: prints the errors of device YAMLs, or a wiring table that a person can
-sign.
+"""`rmf-bridge check FILE...` prints the errors of device YAMLs. For a valid YAML it prints a wiring
+table that a person can sign.
 
-Each file is checked alone, and then all files together (`bridges/settings/cross_file_checks.py`). The
-findings about a file (`bridges/settings/sheets/findings.py`) are printed as text or JSON, or written as
-a sheet.
+The command checks each file alone, and then all files together
+(`bridges/settings/cross_file_checks.py`). It prints the findings
+(`bridges/settings/sheets/findings.py`) as text or JSON, or writes them as a sheet.
 """
 
 import argparse
@@ -94,7 +94,7 @@ def _building(file: str | None) -> "BuildingMap | None":
 def _read(
     files: Sequence[str], building: "BuildingMap | None"
 ) -> tuple[dict[str, tuple[Config, Findings]], dict[str, Findings]]:
-    """Read each file once. Return the valid files, and the findings of all files."""
+    """Read each file once. Return the valid files, and the findings on all files."""
     right: dict[str, tuple[Config, Findings]] = {}
     found: dict[str, Findings] = {}
     for file in dict.fromkeys(files):
@@ -109,7 +109,7 @@ def _read(
 
 
 def _against(config: Config, building: "BuildingMap | None") -> tuple[list[Problem], list[str]]:
-    """Compare a file's names with the names on the map. Return problems and notes."""
+    """Compare a file's names with the names on the map. Return the problems and the notes."""
     if building is None:
         return [], []
     from bridges.settings.map_names import mismatches, places
@@ -126,8 +126,11 @@ def _against(config: Config, building: "BuildingMap | None") -> tuple[list[Probl
 def _of_fleet(
     file: str, right: Mapping[str, tuple[Config, Findings]], found: Mapping[str, Findings]
 ) -> dict[str, Findings]:
-    """Return the findings on a fleet's YAML, with those on RMF's files that it names; and the
-    findings on the coordinator and the lifts, compared with these files."""
+    """Return the findings after a fleet's YAML was compared with RMF's files.
+
+    The fleet's YAML names these files. The findings are on that YAML, and on the YAMLs of the
+    coordinator and the lifts, whose names must match RMF's files.
+    """
     from bridges.settings.building_map import load_map
     from bridges.settings.fleet_site import read_site
 
@@ -154,8 +157,8 @@ def _beside_fleet(
     found: Mapping[str, Findings],
     building: "BuildingMap | None",
 ) -> dict[str, Findings]:
-    """Compare each coordinator and lift with this fleet's file, and return their findings with the
-    results."""
+    """Compare each coordinator and lift with a fleet adapter's file. Return their findings, with the
+    results added."""
     from bridges.settings.fleet_config import load_fleet
     from bridges.settings.fleet_names import compared, emergency_levels
 
@@ -191,7 +194,7 @@ def _more(
 
 
 def _with(file: Findings, together: Found) -> Findings:
-    """Return a file's findings, together with the results of its comparison with the other files."""
+    """Return a file's findings, and add the results of the comparison with the other files."""
     return _more(
         file,
         [p for p in together.errors if p.file == file.file],
@@ -200,7 +203,7 @@ def _with(file: Findings, together: Found) -> Findings:
 
 
 def _tell(files: Sequence[Findings], args: argparse.Namespace) -> int:
-    """Print the findings and write the sheet. Return the exit code."""
+    """Print the findings, and write the sheet if `--sheet` asks for it. Return the exit code."""
     errors = sum(len(file.errors) for file in files)
     code = os.EX_CONFIG if errors else 0
     if args.json:
@@ -229,7 +232,7 @@ def _print(file: Findings, quiet: bool) -> None:
 
 
 def _verdict(files: Sequence[Findings], quiet: bool) -> None:
-    """Print the last line: `OK`, or the number of errors."""
+    """Print the last line, which is `OK` or the number of errors."""
     errors, warnings = _counts(files)
     also = f", {_many(warnings, 'warning')}" if warnings else ""
     if errors:
@@ -243,8 +246,10 @@ def _many(number: int, what: str) -> str:
 
 
 def _complain(lines: Iterable[str]) -> None:
-    """Write to stderr; for a program, write each problem in one line. Flush stdout first, because both
-    often go to one log."""
+    """Write lines to stderr. Wrap long lines only if stderr is a terminal.
+
+    Flush stdout first. Both streams often go to one log, whose lines must be in order.
+    """
     sys.stdout.flush()
     columns = columns_of(sys.stderr)
     for line in lines:

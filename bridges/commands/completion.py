@@ -1,5 +1,8 @@
-"""`rmf-bridge completion SHELL`: prints a script for a shell. With the script the shell completes our
-commands and options, the names of a file's devices, and the names of this machine's services."""
+"""`rmf-bridge completion SHELL` prints a completion script for a shell.
+
+With this script the shell completes our commands and options. It also completes the names of a file's
+devices and of this machine's services.
+"""
 
 import argparse
 from typing import Final

@@ -1,4 +1,4 @@
-"""`rmf-bridge disable NAME`: stops a service, switches its outputs off, and disables it. Its YAML
+"""`rmf-bridge disable NAME` stops a service, switches its outputs off, and disables it. The YAML
 stays."""
 
 import argparse
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the service has stopped with its outputs off; 77 without root."""
+    """Return 0 if the service has stopped and its outputs are off. Return 77 without root."""
     name = Path(args.name).name.removesuffix(".yaml")
     if not INSTANCE.fullmatch(name):
         print(NO_INSTANCE.format(name), file=sys.stderr)
@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def steps(name: str, root: Path) -> Iterator[Step]:
-    """Yield the steps in order."""
+    """Yield the steps that disable the service, in order."""
     yield Run(("systemctl", "stop", unit(name)), running_only=True)
     yield Run(("systemctl", "disable", unit(name)))
     yield switch_off(name)

@@ -1,10 +1,16 @@
-"""`rmf-bridge enable FILE`: makes a running service of a YAML.
+"""`rmf-bridge enable FILE` makes a YAML a running service.
 
-The command takes these steps. It validates the file together with the files of this machine's other
-services. It stops an instance that runs; this switches the instance's outputs off before the new
-drop-in can take away its access to the old relay. It copies the file to /etc/rmf-bridges, writes the
-instance's drop-in (`bridges/runtime/drop_in.py`), and starts the instance. If a step fails, an instance
-that ran before is started again; the earlier steps stay.
+The command takes these steps:
+
+1. It validates the file together with the files of this machine's other services.
+2. It stops a running instance, which switches the instance's outputs off. This comes first, because the
+   new drop-in may forbid access to the old relay.
+3. It copies the file to /etc/rmf-bridges.
+4. It writes the instance's drop-in (`bridges/runtime/drop_in.py`).
+5. It starts the instance.
+
+If a step fails, the results of the earlier steps stay. The command then starts an instance again that
+ran before.
 """
 
 import argparse
@@ -66,7 +72,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def steps(config: Config, root: Path, present: Collection[str]) -> Iterator[Step]:
-    """Yield the steps for a service of this file, in order. `present`: the machine's groups."""
+    """Yield the steps that make a service of this file, in order. `present`: the groups that this
+    machine has."""
     name = config.path.stem
     target = root / CONFIG / f"{name}.yaml"
     yield Run(("systemctl", "stop", unit(name)), running_only=True)
@@ -80,7 +87,7 @@ def steps(config: Config, root: Path, present: Collection[str]) -> Iterator[Step
 
 
 def groups(root: Path) -> set[str]:
-    """Return the groups of this system that a service may be given."""
+    """Return the groups of this machine that a service may join."""
     with suppress(OSError):
         lines = (root / "etc/group").read_text("utf-8", "replace").splitlines()
         return {line.partition(":")[0] for line in lines} & set(GROUPS)
@@ -88,7 +95,7 @@ def groups(root: Path) -> set[str]:
 
 
 def _taken(config: Config, root: Path) -> Iterator[Problem]:
-    """Yield a problem for each resource of this file that another service's file uses too."""
+    """Yield a problem for each resource that this file shares with another service's file."""
     others = list(_neighbours(root, config.path.stem))
     return (p for p in taken([*others, config]) if p.file == str(config.path))
 

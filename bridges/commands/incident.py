@@ -1,4 +1,4 @@
-"""`rmf-bridge incident FILE`: records a daemon's last minutes when a person asks for it."""
+"""`rmf-bridge incident FILE` records a daemon's last minutes when a person asks for the recording."""
 
 import argparse
 import os
@@ -41,16 +41,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the recording is written, 65 if its YAML cannot be made anonymous, 69 without a
-    readable ring, and 73 if the recording cannot be written. Raises NotInstalled if `--anonymous`
-    needs the workbench and it is not installed."""
+    """Return 0 if the recording is written.
+
+    Return 65 if the recording's YAML cannot be made anonymous, 69 without a readable ring, and 73 if
+    the recording cannot be written. Raises NotInstalled if `--anonymous` needs the workbench, which is
+    not installed.
+    """
     try:
         from bridges.blackbox import mcap_write
     except ImportError as error:
         print(f"to write a recording, {error.name} is needed: {INSTALL}", file=sys.stderr)
         return os.EX_UNAVAILABLE
     if args.anonymous:
-        of_workbench("workbench.replay.anonymous")  # if missing, fails before the wait
+        of_workbench("workbench.replay.anonymous")  # a missing workbench must fail before the wait
     path = args.output or Path(f"{args.file.stem}_{datetime.now():%Y-%m-%d_%H-%M-%S}.mcap")
     if why := no_folder(path):
         return not_written(path, why)
@@ -77,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _anonymous(incident: Incident) -> Incident:
-    """Return the incident without the names of the site. Raises SettingsError."""
+    """Return the incident without the site's names. Raises SettingsError."""
     hidden: Incident = of_workbench("workbench.replay.anonymous").anonymous(incident)
     return hidden
 
@@ -89,8 +92,11 @@ def _hint(*, died: bool) -> str:
 
 
 def _incident(ring: Path, args: argparse.Namespace, follows: bool) -> Incident:
-    """Return the last 120 s. If `follows`, also wait for later events of the running daemon. With
-    `--died`, return the last 120 s of the dead run. Raises RingError."""
+    """Return the last 120 s of the daemon.
+
+    If `follows`, the daemon runs, so wait and add the later events. With `--died`, return the last 120
+    s of the dead run. Raises RingError.
+    """
     before = RingContent(ring)
     if args.died:
         entries = list(before.entries())
@@ -114,7 +120,7 @@ def _notes(at: float, text: str) -> tuple[Note, ...]:
 
 
 def _wait(seconds: float) -> None:
-    """Wait. Ctrl-C ends only the wait; the command continues."""
+    """Wait. Ctrl-C ends the wait, and the command continues."""
     try:
         if seconds > 0:
             print(f"waiting {seconds:g} s for later events; Ctrl-C ends the wait")

@@ -1,4 +1,4 @@
-"""`rmf-bridge log FILE`: prints the log of a device's service from systemd's journal."""
+"""`rmf-bridge log FILE` prints the log of a device's service from systemd's journal."""
 
 import argparse
 import os
@@ -37,7 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Become journalctl. Return 69 if there is no journal, or if the daemon does not log to it."""
+    """Run journalctl in place of this process. Return 69 without a journal, or if the daemon does not
+    log to the journal."""
     name = args.file.stem
     known = services()
     if name not in known and _runs_by_hand(name):
@@ -63,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def services() -> set[str]:
-    """Return this machine's services: each has a YAML in /etc/rmf-bridges or a unit."""
+    """Return this machine's services. A service has a YAML in /etc/rmf-bridges or a unit."""
     return {file.stem for file in ETC.glob("*.yaml")} | set(units())
 
 
@@ -73,7 +74,7 @@ def _runs_by_hand(name: str) -> bool:
 
 
 def _become(words: list[str]) -> NoReturn:
-    """Replace this process by journalctl, so that signals sent to us reach journalctl."""
+    """Replace this process by journalctl, which then receives all signals to this process."""
     os.execvp(words[0], words)
 
 
@@ -89,7 +90,7 @@ def command(args: argparse.Namespace) -> list[str]:
 
 
 def _pattern(event: str | None, device: str | None) -> str:
-    """Return a regular expression for our log lines `event key=value …`."""
+    """Return a regular expression that finds our log lines, which have the form `event key=value …`."""
     parts = [f"^{_literal(event)}\\b"] if event else []
     if device:
         _, written = pairs("", device=device).split(" ", 1)

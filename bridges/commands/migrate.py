@@ -1,5 +1,4 @@
-"""`rmf-bridge migrate FILE`: replaces the old names of renamed keys in a device YAML by their new
-names."""
+"""`rmf-bridge migrate FILE` replaces old names of keys in a device YAML by the present names."""
 
 import argparse
 import os
@@ -22,8 +21,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the file has no old key any more, 65 if a person must change it, 73 if it cannot be
-    written, and 78 if it is invalid."""
+    """Return 0 if the file has no old key any more. Return 65 if a person must change the file, 73 if
+    it cannot be written, and 78 if it is invalid."""
     try:
         config = load(args.file)
         text = rewritten(config)
@@ -41,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _written(config: Config, text: str) -> int:
-    """Replace the file if anything has changed. Its mode and owner stay."""
+    """Replace the file if the text has changed. Keep the file's mode and owner."""
     if text.encode() == config.text:
         print(f"{config.path} has no old key")
         return 0

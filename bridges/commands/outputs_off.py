@@ -1,8 +1,9 @@
-"""`rmf-bridge outputs-off FILE`: switches every output off, from a new process, after a daemon's death.
+"""`rmf-bridge outputs-off FILE` switches every output off after a daemon's death, from a new process.
 
-systemd runs this command as ExecStopPost. For a daemon started by hand, the guard runs it. If a service
-stops cleanly, it leaves the mark that all outputs are off. Then this command ends without loading a
-driver.
+systemd runs this command as ExecStopPost. The guard runs it for a daemon that a person started by hand.
+
+A service that stops cleanly leaves a mark that all outputs are off. If the command finds this mark, it
+ends without loading a driver.
 """
 
 import argparse
@@ -27,8 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if every output is verified off, 1 if an output is not, and 69 if the daemon may still
-    live."""
+    """Return 0 if every output is verified off, 1 if an output is not off, and 69 if the daemon may
+    still live."""
     if last_mark.says_off(os.environ):
         print('nothing_to_switch_off reason="the daemon verified it"', file=sys.stderr)
         return 0

@@ -1,5 +1,4 @@
-"""`rmf-bridge recorder`: makes recordings, which are files, from the rings of this machine's
-daemons."""
+"""`rmf-bridge recorder` makes recordings, which are files, from the rings of this machine's daemons."""
 
 import argparse
 import os
@@ -42,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 after SIGTERM or SIGINT, and 69 if the library is missing."""
+    """Return 0 after SIGTERM or SIGINT, and 69 if the library for recordings is missing."""
     if args.csv or args.days is not None:
         return _tell_days(args)
     log.start()
@@ -76,8 +75,8 @@ def _tell_days(args: argparse.Namespace) -> int:
 
 
 def _folder() -> Path:
-    """Return the folder of recordings. This is the unit's state directory or, without a unit, a folder
-    in the user's state directory."""
+    """Return the folder of recordings. Under systemd this is the unit's state directory. Without
+    systemd it is a folder in the user's state directory."""
     given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
     return Path(given) if given else directories.state_base() / "recordings"
 

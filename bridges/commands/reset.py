@@ -1,4 +1,4 @@
-"""`rmf-bridge reset FILE`: lets an operator clear latched faults whose cause is gone."""
+"""`rmf-bridge reset FILE` clears latched faults for an operator, if their cause is gone."""
 
 import argparse
 import os
@@ -15,8 +15,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the reset was sent, 1 if no daemon runs, and 69 if this user may not see or signal
-    the daemon."""
+    """Return 0 if the reset is sent, 1 if no daemon runs, and 69 if this user may not see or signal the
+    daemon."""
     try:
         places = order.places_of(args.file, args.runtime_dir)
         if places is None:

@@ -1,4 +1,4 @@
-"""`rmf-bridge run FILE`: runs the daemon on real hardware, or with `--simulate` on fake hardware."""
+"""`rmf-bridge run FILE` runs the daemon on real hardware, or with `--simulate` on fake hardware."""
 
 import argparse
 import logging
@@ -51,7 +51,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Validate the file, claim the outputs and serve. Return the exit code, which is 78 for an invalid
-    configuration. Raises NotInstalled if `--simulate` needs the fakes and they are not installed."""
+    file.
+
+    Raises NotInstalled if `--simulate` needs the fakes, which are not installed.
+    """
     log.start(args.log_level.upper(), json=args.log_format == "json")
     if args.simulate and os.environ.get("RMF_BRIDGE_SERVICE") == "1":
         logging.error("a service never simulates: RMF_BRIDGE_SERVICE=1 forbids --simulate")
@@ -64,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
         config = replace(config, rmf=overridden(config.rmf, args))
         if (
             config.kind == "fleet"
-        ):  # RMF's files: refused before anything starts, kept for recordings
+        ):  # refuse RMF's bad files before anything starts; keep them for recordings
             from bridges.settings.fleet_site import read_site
 
             read_site(config)
@@ -77,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
     if wrong := drop_in.misfit(config, os.environ) or too_slow(config, watchdog_s()):
         logging.error(wrong)
         return os.EX_CONFIG
-    end = signals.End()  # before other processes can find our pid at the lock and signal it
+    end = signals.End()  # needed before other processes find our pid at the lock and signal it
     signals.ignore_reset()
     try:
         held = runtime.held(args.file, args.runtime_dir, serves=True, simulated=args.simulate)
@@ -94,8 +97,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def too_slow(config: Config, watchdog: float | None) -> str:
-    """Return the error for a bus on which one call may take more than half of systemd's watchdog time;
-    "" without an error."""
+    """Return an error if one call on a bus may take more than half of systemd's watchdog time. Return
+    "" without such a bus."""
     for name, bus in config.buses.items():
         timeout_s: float = getattr(bus, "timeout_s", 0.0)
         if watchdog is not None and timeout_s > watchdog / 2:
@@ -120,7 +123,7 @@ def _serve(
     simulate = of_workbench("hal_fakes.simulate")
     logging.warning("SIMULATED: no hardware moves, and RMF is told simulated states")
     simulation = simulate.Simulation(config, held.path, log_format=args.log_format)
-    from bridges.runtime.daemon import Daemon  # the import takes place as the fakes start
+    from bridges.runtime.daemon import Daemon  # imported while the fakes start
 
     try:
         return Daemon(

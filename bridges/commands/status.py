@@ -1,5 +1,5 @@
-"""`rmf-bridge status`: prints the state of each daemon on this machine, as RMF sees it, with faults and
-remedies.
+"""`rmf-bridge status` prints the state of each daemon on this machine, with faults and remedies. A
+state is shown as RMF sees it.
 
 The command reads the daemons' status files and asks systemd. It opens no bus and joins no graph.
 """
@@ -33,7 +33,8 @@ IN_USE: Final[Mapping[str, tuple[str, ...]]] = {
     "ingestor": ("mode", "queue"),
     "alarm": (),
 }
-"""Kind -> the keys of a device's status that name its user. A kind that is not listed is never idle."""
+"""The status keys that name a device's user, by kind. A kind that is not listed always counts as in
+use."""
 FREE: Final = ("-", "off", "", "IDLE")
 IDLE, BUSY = 0, 4
 NOT_TOLD: Final = ("contacts", "counts", "faults", "input_age_s", "outputs", "refused")
@@ -55,7 +56,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Return 0 if all daemons serve, 1 for faults, 2 if a daemon died or is silent, and 3 if this user
-    can see no daemon. With --idle return 0 if no device is in use, else 4."""
+    sees no daemon.
+
+    With `--idle`, return 0 if no device is in use, and 4 if a device is in use.
+    """
     folders = [Path(args.runtime_dir)] if args.runtime_dir else list(runtimes())
     found = list(daemons(folders, {} if args.runtime_dir else units(), time.time()))
     if args.name:
@@ -65,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
             print(f"no daemon {Path(args.name).stem}; there is {', '.join(there)}", file=sys.stderr)
             if not args.json:
                 return NONE
-    else:  # leave out stopped daemons that somebody started by hand
+    else:  # leave out stopped daemons that a person started by hand
         found = [one for one in found if one.state != "stopped" or one.unit]
     if args.idle:
         return _tell_use(found)
@@ -77,7 +81,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def users(one: DaemonStatus) -> Iterator[str]:
-    """Yield why a daemon must not be restarted now: each device in use, or what is not known."""
+    """Yield each reason why a daemon must not be restarted now. A device is in use, or its use is
+    unknown."""
     if one.state == "stopped":
         return
     if one.state != "serving":
@@ -174,8 +179,8 @@ def _told(device: Status) -> str:
 
 
 def _age(device: Status, snapshot_s: float) -> str:
-    """Return the present age of the input. The status file itself is up to a second old, so its age is
-    added."""
+    """Return the present age of the device's input. Add the age of the status file, which is up to 1
+    s."""
     age_s = device.get("input_age_s")
     return "never read" if age_s is None else f"read {age_s + snapshot_s:.1f} s ago"
 

@@ -1,4 +1,5 @@
-"""`rmf-bridge workcell done|again|failed FILE`: a person decides the outcome of a request in doubt."""
+"""`rmf-bridge workcell done|again|failed FILE` lets a person decide the outcome of a request in
+doubt."""
 
 import argparse
 import json
@@ -37,8 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the decision was sent, 1 if no daemon runs or nothing is in doubt, and 69 if this
-    user may not see or signal the daemon."""
+    """Return 0 if the decision is sent. Return 1 if no daemon runs or nothing is in doubt, and 69 if
+    this user may not see or signal the daemon."""
     try:
         places = order.places_of(args.file, args.runtime_dir)
         if places is None:
@@ -63,7 +64,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _status(places: Directories) -> Mapping[str, Any] | None:
-    """Return the status of the living daemon; None if it has not written one yet."""
+    """Return the status of the running daemon. Return None if the daemon has not written a status
+    yet."""
     daemon = holder.look(places)
     try:
         with opened(places.runtime):
@@ -74,8 +76,8 @@ def _status(places: Directories) -> Mapping[str, Any] | None:
 
 
 def _doubts(status: Mapping[str, Any], device: str) -> Iterator[str]:
-    """Yield the requests that are in doubt by the daemon's status: of this device, or of every device
-    ("")."""
+    """Yield the requests in doubt that the status lists. `device` is a device's name, or "" for every
+    device."""
     found: dict[str, Any] = status.get("devices", {})
     for name, state in found.items():
         for fault in state.get("faults", []):

@@ -1,1 +1,2 @@
-"""RMF's messages: definitions, bytes, topic names, QoS, and the messages that each release lacks."""
+"""RMF's messages: definitions, bytes, topics and QoS, and substitutes for messages that a release
+lacks."""

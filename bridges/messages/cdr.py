@@ -1,13 +1,18 @@
-"""Messages as bytes: plain CDR (XCDR1), the encoding that ROS 2 uses on the wire.
+"""Converts messages to bytes and back. The encoding is plain CDR (XCDR1), which ROS 2 uses on the wire.
 
-A sample has four bytes of header (`00 01 00 00` little endian, `00 00 00 00` big endian). The fields
-follow in their order. A number is aligned to its own size, counted from the end of the header. A string
-is its length with the closing NUL (as uint32), then the UTF-8 bytes and the NUL. A sequence is its
-length (as uint32), then its elements. Source: OMG DDS-XTypes 1.3, 7.4.3, and samples of rmw_cyclonedds
-and rmw_fastrtps.
+A sample is the bytes of one message:
 
-The encoder and decoder of each type and release are built once, from the annotations in
-`definitions.py`. Fields that a release lacks are not sent, and are read as their defaults.
+- The header has four bytes: `00 01 00 00` for little endian, `00 00 00 00` for big endian.
+- The fields follow in their order.
+- A number is aligned to its own size, counted from the end of the header.
+- A string is its length as uint32, its UTF-8 bytes, and a NUL. The length includes the NUL.
+- A sequence is its length as uint32, and then its elements.
+
+Source: OMG DDS-XTypes 1.3, 7.4.3, and samples of rmw_cyclonedds and rmw_fastrtps.
+
+For each type and release, an encoder and a decoder are built once from the annotations in
+`definitions.py`. If a release lacks a field, the encoder leaves the field out. The decoder then gives
+the field its default value.
 """
 
 import struct
@@ -30,25 +35,25 @@ LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 BIG_ENDIAN = b"\x00\x00\x00\x00"
 HEADER = 4
 LONGEST: Final = 1 << 20
-"""The maximum length (bytes) of a sample from the network. A FleetState of 200 robots takes 46 kB. It
-takes 0.7 MB if the path of each robot has 50 places."""
+"""The maximum length (bytes) of a sample from the network. A FleetState of 200 robots takes 46 kB, or
+0.7 MB if the path of each robot has 50 places."""
 LONGEST_FLAT: Final = 1 << 16
-"""The maximum length (bytes) of a sample whose type has no lists of messages. It is shorter, because a
-hundred samples may wait in a queue."""
+"""The maximum length (bytes) of a sample whose type has no lists of messages. This limit is lower than
+LONGEST because a hundred such samples may wait in a queue."""
 CODES = {"int32": "i", "uint32": "I", "uint64": "Q", "float32": "f"}
 BYTES = ("uint8", "byte")
 
 
 class CdrError(ValueError):
-    """The error of bytes that are not a message of the type, or of a message that cannot be encoded."""
+    """The error of bytes that are no message of the type, or of a message that cannot be encoded."""
 
 
 def encode(message_type: type, message: object, release: Release = NEWEST) -> bytes:
     """Encode the message as little endian CDR with its header.
 
-    Characters that are impossible on the wire (a NUL, half a surrogate pair) become `?`. Otherwise a
-    strange text from a device would block the device's state message. Raises CdrError for a number out
-    of range, and for a value of another type.
+    A NUL or half a surrogate pair cannot go on the wire and becomes `?`. Otherwise a strange text from
+    a device would block the device's state message. Raises CdrError for a number out of range, and for
+    a value of another type.
     """
     out = bytearray(LITTLE_ENDIAN)
     try:
@@ -66,9 +71,9 @@ def longest(message_type: type) -> int:
 
 
 def decode(message_type: type[T], sample: bytes, release: Release = NEWEST) -> T:
-    """Decode the message in a sample of either byte order. Raises CdrError for any other sample.
+    """Decode the message in a sample of either byte order. Raises CdrError if the sample is invalid.
 
-    Up to three bytes may follow the last field, because RTPS pads payloads to a multiple of four.
+    Up to three bytes may follow the last field, because RTPS pads payloads to a multiple of four bytes.
     """
     if len(sample) > longest(typing.cast(type, message_type)):
         raise CdrError(f"{len(sample)} bytes long")
@@ -100,7 +105,7 @@ _ORDERS = {LITTLE_ENDIAN[:2]: "<", BIG_ENDIAN[:2]: ">"}
 
 @cache
 def _put(kind: type, release: Release) -> Put:
-    """Make the function that appends a value of this type."""
+    """Return a function that appends a value of this type to a sample."""
     if typing.get_origin(kind) is typing.Annotated:
         name = typing.get_args(kind)[1]
         return _put_byte if name in BYTES else _putting_number(CODES[name])
@@ -164,8 +169,8 @@ def _putting_struct(members: list[tuple[str, Put]]) -> Put:
 
 @cache
 def _get(kind: type, order: str, release: Release) -> Get:
-    """Make the function that reads a value of this type at a position. It returns (value, end
-    position)."""
+    """Return a function that reads a value of this type at a position. The function returns the value
+    and the position after the value."""
     if typing.get_origin(kind) is typing.Annotated:
         name = typing.get_args(kind)[1]
         return _get_byte if name in BYTES else _getting_number(order + CODES[name])
@@ -218,7 +223,7 @@ def _getting_sequence(get_element: Get, order: str) -> Get:
 
     def get(sample: bytes, at: int) -> tuple[tuple[Value, ...], int]:
         length, at = get_length(sample, at)
-        if length > len(sample) - at:  # each element takes at least one byte
+        if length > len(sample) - at:  # each element takes at least 1 byte
             raise CdrError(f"a sequence of {length} elements in {len(sample)} bytes")
         elements = []
         for _ in range(length):
@@ -231,7 +236,7 @@ def _getting_sequence(get_element: Get, order: str) -> Get:
 
 def _getting_struct(kind: type, members: dict[str, Get]) -> Get:
     gets, names = tuple(members.values()), tuple(members)
-    whole = names == tuple(field_types(kind))  # otherwise the release lacks some fields
+    whole = names == tuple(field_types(kind))  # False if the release lacks a field
 
     def get(sample: bytes, at: int) -> tuple[object, int]:
         values = []

@@ -1,14 +1,16 @@
-"""The constants of RMF's messages, as the `.msg` files number them. Type hashes do not cover constants.
+"""The constants of RMF's messages, with the numbers of the `.msg` files. Type hashes do not cover
+constants.
 
-The source is that of `definitions.py`. All releases have the same numbers. Jazzy's RobotMode ends with
-MODE_CLEANING.
+The constants come from the same source as `definitions.py`. All releases have the same numbers. In
+Jazzy, MODE_CLEANING is the last constant of RobotMode.
 """
 
 from enum import IntEnum
 
 
 class LiftRequestType(IntEnum):
-    """LiftRequest.request_type. LiftState has other numbers for modes: HUMAN is 1 and AGV is 2."""
+    """The values of LiftRequest.request_type. LiftState has other numbers for modes: HUMAN is 1, AGV is
+    2."""
 
     REQUEST_END_SESSION = 0
     REQUEST_AGV_MODE = 1
@@ -16,14 +18,14 @@ class LiftRequestType(IntEnum):
 
 
 class LiftRequestDoor(IntEnum):
-    """LiftRequest.door_state."""
+    """The values of LiftRequest.door_state."""
 
     DOOR_CLOSED = 0
     DOOR_OPEN = 2
 
 
 class LiftDoor(IntEnum):
-    """LiftState.door_state."""
+    """The values of LiftState.door_state."""
 
     DOOR_CLOSED = 0
     DOOR_MOVING = 1
@@ -31,7 +33,7 @@ class LiftDoor(IntEnum):
 
 
 class LiftMotion(IntEnum):
-    """LiftState.motion_state."""
+    """The values of LiftState.motion_state."""
 
     MOTION_STOPPED = 0
     MOTION_UP = 1
@@ -40,7 +42,7 @@ class LiftMotion(IntEnum):
 
 
 class LiftMode(IntEnum):
-    """LiftState.current_mode and available_modes."""
+    """The values of LiftState.current_mode and available_modes."""
 
     MODE_UNKNOWN = 0
     MODE_HUMAN = 1
@@ -51,7 +53,7 @@ class LiftMode(IntEnum):
 
 
 class DoorModeValue(IntEnum):
-    """DoorMode.value."""
+    """The values of DoorMode.value."""
 
     MODE_CLOSED = 0
     MODE_MOVING = 1
@@ -61,7 +63,8 @@ class DoorModeValue(IntEnum):
 
 
 class ChargerStateValue(IntEnum):
-    """ChargerState.state. The number 0 is undefined, so a default-constructed message is invalid."""
+    """The values of ChargerState.state. The number 0 has no meaning, so a message with default values
+    is invalid."""
 
     CHARGER_IDLE = 1
     CHARGER_ASSIGNED = 2
@@ -71,7 +74,7 @@ class ChargerStateValue(IntEnum):
 
 
 class WorkcellMode(IntEnum):
-    """DispenserState.mode and IngestorState.mode."""
+    """The values of DispenserState.mode and IngestorState.mode."""
 
     IDLE = 0
     BUSY = 1
@@ -79,7 +82,7 @@ class WorkcellMode(IntEnum):
 
 
 class WorkcellStatus(IntEnum):
-    """DispenserResult.status and IngestorResult.status."""
+    """The values of DispenserResult.status and IngestorResult.status."""
 
     ACKNOWLEDGED = 0
     SUCCESS = 1
@@ -87,7 +90,7 @@ class WorkcellStatus(IntEnum):
 
 
 class RobotModeValue(IntEnum):
-    """RobotMode.mode."""
+    """The values of RobotMode.mode."""
 
     MODE_IDLE = 0
     MODE_CHARGING = 1
@@ -104,14 +107,15 @@ class RobotModeValue(IntEnum):
 
 
 class ChargingMode(IntEnum):
-    """ChargingAssignment.mode: charge at the waypoint, or wait there for a charger."""
+    """The values of ChargingAssignment.mode. A robot charges at the waypoint, or waits there for a
+    charger."""
 
     MODE_CHARGE = 0
     MODE_WAIT = 1
 
 
 class AlertTier(IntEnum):
-    """Alert.tier."""
+    """The values of Alert.tier."""
 
     TIER_INFO = 0
     TIER_WARNING = 1
@@ -119,7 +123,7 @@ class AlertTier(IntEnum):
 
 
 class DiagnosticLevel(IntEnum):
-    """DiagnosticStatus.level."""
+    """The values of DiagnosticStatus.level."""
 
     OK = 0
     WARN = 1

@@ -1,14 +1,17 @@
-"""RMF's messages, as the `.msg` files define them: fields in their order, and their types.
+"""RMF's messages as the `.msg` files define them. Each message has its fields in their order, with
+their types.
 
-This file and `constants.py` are the only table of messages. The transports make their own types from
-this table (field by field, from the annotations). The RIHS01 type hashes are computed from it. The
-table holds the messages of all releases of RMF. `releases.py` lists the messages and fields that a
+The program has no other table of messages than this file and `constants.py`. The transports make their
+own types from this table, field by field, from the annotations. The RIHS01 type hashes are computed
+from this table too.
+
+The table holds the messages of all releases of RMF. `releases.py` lists the messages and fields that a
 release lacks.
 
 Source: rmf_internal_msgs 3d4df02 (4.1.0), builtin_interfaces, std_msgs and diagnostic_msgs of ROS 2
 Jazzy.
 
-A `T[]` of ROS is a tuple in this table, so that a message is a value: hashable, comparable, immutable.
+A `T[]` of ROS is a tuple here. So a message is hashable, comparable and immutable.
 """
 
 from typing import Annotated, Final
@@ -38,14 +41,15 @@ float32 = Annotated[float, "float32"]
 
 
 class Time(Struct, frozen=True, gc=False):
-    """builtin_interfaces/Time: seconds and nanoseconds since the epoch; 0.0 means never."""
+    """builtin_interfaces/Time: seconds and nanoseconds since the epoch. Zero means never."""
 
     sec: int32 = 0
     nanosec: uint32 = 0
 
 
 class Duration(Struct, frozen=True, gc=False):
-    """builtin_interfaces/Duration. `sec` may be negative. `nanosec` is always added to `sec`."""
+    """builtin_interfaces/Duration: the sum of `sec` (s) and `nanosec` (ns). Only `sec` may be
+    negative."""
 
     sec: int32 = 0
     nanosec: uint32 = 0
@@ -137,7 +141,7 @@ class ChargerState(Struct, frozen=True, gc=False):
     time_to_fully_charged: Duration = Duration()
 
 
-# --- rmf_dispenser_msgs, rmf_ingestor_msgs: the same fields under other names -------------------
+# --- rmf_dispenser_msgs, rmf_ingestor_msgs: equal fields, different names -----------------------
 
 
 class DispenserRequestItem(Struct, frozen=True, gc=False):
@@ -219,7 +223,7 @@ class Location(Struct, frozen=True, gc=False):
 
 
 class RobotState(Struct, frozen=True, gc=False):
-    """State of one robot. `battery_percent` is 0 to 100."""
+    """The state of one robot. `battery_percent` is from 0 to 100."""
 
     name: str = ""
     model: str = ""
@@ -261,7 +265,7 @@ class AlertParameter(Struct, frozen=True, gc=False):
 
 
 class Alert(Struct, frozen=True, gc=False):
-    """A notice to a person on RMF's dashboard. Each notice needs a new `id`."""
+    """A notice for people on RMF's dashboard. Each notice needs a new `id`."""
 
     id: str = ""
     title: str = ""
@@ -329,7 +333,7 @@ Message = (
 )
 
 OF_WORKCELLS: Final = frozenset({"rmf_dispenser_msgs", "rmf_ingestor_msgs"})
-"""Packages that a ROS machine needs only for workcells."""
+"""The packages that a machine with ROS needs only for workcells."""
 PACKAGES: Final[dict[type, str]] = {
     Time: "builtin_interfaces",
     Duration: "builtin_interfaces",
@@ -367,10 +371,10 @@ PACKAGES: Final[dict[type, str]] = {
     DiagnosticStatus: "diagnostic_msgs",
     DiagnosticArray: "diagnostic_msgs",
 }
-"""Type -> the ROS package that defines it."""
+"""The ROS package that defines each type."""
 
 
 def field_types(message_type: type) -> dict[str, type]:
-    """Return field -> annotation, in the message's order. The annotation of a number is an
+    """Return the annotation of each field, in the message's order. A number's annotation is an
     `Annotated`."""
     return dict(message_type.__annotations__)

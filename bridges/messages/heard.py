@@ -1,8 +1,8 @@
-"""One message of RMF's graph. It has the same form whether it comes from a live graph or from any kind
-of recording.
+"""One message of RMF's graph. A message has the same form in a live graph and in every kind of
+recording.
 
-A graph and a recording yield the same values in the same order. So code that judges, explains or draws
-messages need not know their source.
+A graph and its recording yield the same values in the same order. So the code that judges, explains or
+draws messages does not depend on their source.
 """
 
 from collections.abc import Callable
@@ -18,18 +18,18 @@ from bridges.messages.words import LONGEST_NAME
 FREE_TEXTS: Final = frozenset(
     {"error_message", "message", "title", "subtitle", "value", "performing_action", "model"}
 )
-"""The message fields that hold sentences instead of names."""
+"""The message fields that hold sentences, not names."""
 LONGEST_SENTENCE: Final = 1000
 MOST_PARTS: Final = 500
-"""The maximum number of kept elements of a sequence. A legal FleetState has 200 robots."""
+"""The maximum number of elements that are kept of a sequence. A legal FleetState has 200 robots."""
 
 
 class Sender(Struct, eq=False):
-    """One publisher on the graph. All messages of a publisher share one object.
+    """One publisher on the graph. All messages of a publisher share one `Sender`.
 
-    `node`: the publisher's node, `/namespace/name`, which can be forged; "" until discovery finds the
-    node. `look`: a function that looks the node up again, from any thread; None if there is nothing to
-    look up.
+    `node`: the publisher's node, `/namespace/name`, or "" until discovery finds the node. Anybody can
+    forge this name. `look`: a function that asks discovery for the node again. Any thread may call it.
+    None means that discovery cannot find the node.
     """
 
     node: str = ""
@@ -39,9 +39,9 @@ class Sender(Struct, eq=False):
 class Heard(Struct, frozen=True):
     """A message with its topic's ROS name and the time of its arrival.
 
-    `at`: seconds on a clock that never steps; its zero is arbitrary. `wall`: seconds since the epoch,
-    by the clock of the listening machine, for comparison with stamps. `sender`: None if the wire or the
-    recording does not name the publisher.
+    `at`: seconds on a clock that never steps. Zero on that clock means nothing. `wall`: seconds since
+    the epoch on the listening machine's clock, for comparison with stamps. `sender`: None if neither
+    the wire nor the recording names the publisher.
     """
 
     at: float
@@ -52,9 +52,9 @@ class Heard(Struct, frozen=True):
 
 
 class Own(Struct, frozen=True):
-    """A text that our recorder stores beside the messages. It is a daemon's note in JSON.
+    """A note of a daemon as JSON text. Our recorder stores notes beside the messages.
 
-    `topic`: the note's topic, such as `rmf_bridge/outputs`. The times are as in `Heard`.
+    `topic`: the note's topic, such as `rmf_bridge/outputs`. `at` and `wall` are as in `Heard`.
     """
 
     at: float
@@ -64,11 +64,11 @@ class Own(Struct, frozen=True):
 
 
 def bounded(part: Any, longest: int = LONGEST_NAME) -> Any:
-    """Shorten a message, or a part of one, for memory and display. Anybody can send a name of
-    megabytes.
+    """Shorten a message, or a part of a message, for memory and display. A name from the network may
+    have megabytes.
 
-    A name of more than LONGEST_NAME characters is cut and ends with its length. So is a sentence of
-    more than LONGEST_SENTENCE. A sequence is cut to MOST_PARTS elements. Parts within these limits are
+    A name is cut after LONGEST_NAME characters, and a sentence after LONGEST_SENTENCE. A cut text ends
+    with its former length. A sequence is cut after MOST_PARTS elements. Parts within these limits are
     not copied.
     """
     if isinstance(part, str):

@@ -1,15 +1,15 @@
 """The releases of RMF's message packages, and the parts of `definitions.py` that each release lacks.
 
-The sources are in open-rmf/rmf_internal_msgs. Every line of the messages was compared.
+The source is open-rmf/rmf_internal_msgs. Every line of the messages in these releases was compared.
 
 - jazzy: 3.3.1 (a351d51602383eb09a8138d302827a76241630a5), branch jazzy at
   04585f0e2b0da9f11327fb403d38bc547d648fa6. Humble's 3.0.4 and Iron's 3.1.3 are the same.
 - kilted: 3.5.0 (branch kilted at c0f72ce5e2129411d2868414b25f6fab1460fcdb). Lyrical's 4.1.0
   (3d4df023bacaf7a091564e98f4aff0776f72a612) is the same.
 
-If a type differs between two releases, nodes of these releases do not hear each other's messages of
-this type. Each node announces the type hash of every endpoint. So the hashes on a graph show RMF's
-release.
+If a message type differs between two releases, nodes of these releases do not hear each other on topics
+of that type. Each node announces a type hash with every endpoint. So these hashes show the release of
+RMF on a graph.
 """
 
 from typing import Final
@@ -27,19 +27,20 @@ from bridges.messages.definitions import (
 
 
 class Release(Struct, frozen=True, eq=False):
-    """One release. `lacks`: the missing messages. `without`: the missing fields, as (message,
-    field)."""
+    """One release. `lacks`: the messages that the release does not have. `without`: pairs of a message
+    and a field that it does not have in this release."""
 
     name: str
     lacks: frozenset[type] = frozenset()
     without: frozenset[tuple[type, str]] = frozenset()
 
     def has(self, message_type: type) -> bool:
-        """Does the release have this message?"""
+        """Return whether the release has this message."""
         return message_type not in self.lacks
 
     def fields(self, message_type: type) -> dict[str, type]:
-        """Return field -> type, in the message's order in this release."""
+        """Return the annotation of each field, in the message's order. Leave out the fields that this
+        release lacks."""
         return {
             name: kind
             for name, kind in field_types(message_type).items()
@@ -59,10 +60,10 @@ JAZZY: Final = Release(
 KILTED: Final = Release("kilted")
 RELEASES: Final = {release.name: release for release in (JAZZY, KILTED)}
 DEFAULT: Final = JAZZY
-"""The release of most sites. It is used until a fleet adapter shows another release."""
+"""The release of most sites. The daemon uses it until a fleet adapter shows another release."""
 DIFFERING: Final = frozenset[type]().union(
     *(release.lacks | {message for message, _ in release.without} for release in RELEASES.values())
 )
-"""The messages that differ between releases."""
+"""The messages that are not the same in all releases."""
 NEWEST: Final = KILTED
-"""The release that has all messages and fields."""
+"""The only release that has all messages and all fields."""

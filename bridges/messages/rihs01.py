@@ -1,9 +1,10 @@
 """The RIHS01 type hash (ROS REP-2016) of each message, computed from `definitions.py`.
 
-A ROS 2 node announces the hash of its message definition with each endpoint. It warns about a peer
-without a hash or with another hash. The hash is the SHA-256 of the type's description as JSON: its
-fields, then the descriptions of all nested types, sorted by name. The hash covers the names and types
-of fields, but not constants and comments.
+A ROS 2 node announces the hash of its message definition with each endpoint. The node warns about a
+peer that has no hash or another hash.
+
+The hash is the SHA-256 of a JSON text. The text describes the type's fields, and then all nested types,
+sorted by name. The hash covers the names and types of fields. It does not cover constants and comments.
 
 Source: ros2/rosidl, rosidl_generator_type_description, and type_description_interfaces/FieldType.
 """
@@ -63,14 +64,14 @@ def _by_hash() -> dict[str, list[Release]]:
 
 
 def type_name(message_type: type) -> str:
-    """Return the type's name in ROS: package/msg/Name."""
+    """Return the type's name in ROS, which has the form `package/msg/Name`."""
     return f"{PACKAGES[message_type]}/msg/{message_type.__name__}"
 
 
 MESSAGES: Final[dict[str, type[Message]]] = {
     type_name(message_type): message_type for message_type in typing.get_args(Message)
 }
-"""Type's name in ROS (`rmf_lift_msgs/msg/LiftState`) -> type."""
+"""The message types by their names in ROS, such as `rmf_lift_msgs/msg/LiftState`."""
 
 
 def _description(message_type: type, release: Release) -> dict[str, object]:
@@ -96,8 +97,8 @@ def _field_type(kind: type) -> dict[str, object]:
 
 
 def _element(kind: type) -> type:
-    """Return the type of a sequence's elements. For any other type, return the type itself; for a
-    number, its ROS name."""
+    """Return the type of a sequence's elements, or a type that is no sequence. Return a number's ROS
+    name instead of its type."""
     if typing.get_origin(kind) is tuple:
         kind = typing.get_args(kind)[0]
     return typing.get_args(kind)[1] if typing.get_origin(kind) is typing.Annotated else kind

@@ -6,16 +6,17 @@ from typing import Final
 from bridges.messages.definitions import Duration, Time
 
 ENDS: Final = 2**31
-"""The first second after RMF's Time. Its seconds have 31 bits, and the last one is on 2038-01-19."""
+"""The first second (since the epoch) that does not fit into RMF's Time. Time counts seconds in 31 bits,
+and ends on 2038-01-19."""
 
 
 class ClockError(Exception):
-    """The error of a wall clock that is beyond the range of stamps."""
+    """The error of a wall clock that shows a time after the end of RMF's Time."""
 
 
 def stamp(wall: float) -> Time:
-    """Convert seconds since the epoch to RMF's Time. A time before the epoch becomes 0 (never). Raises
-    ClockError."""
+    """Convert seconds since the epoch to RMF's Time. A time before the epoch becomes 0, which means
+    never. Raises ClockError."""
     if not wall < ENDS:
         raise ClockError(
             "the clock is past 2038-01-19, the last day that RMF's stamps can hold: set the clock"
@@ -25,7 +26,7 @@ def stamp(wall: float) -> Time:
 
 
 def duration(seconds: float) -> Duration:
-    """Convert seconds, which may be negative, to RMF's Duration."""
+    """Convert seconds to RMF's Duration. The seconds may be negative."""
     whole = math.floor(seconds)
     return Duration(sec=whole, nanosec=int((seconds - whole) * 1e9))
 

@@ -1,9 +1,9 @@
-"""Message definitions as texts, as ROS recordings hold them. This file writes them from our table, and
-compares recorded ones with the table.
+"""Message definitions as texts, which ROS recordings contain. This file writes such texts from our
+table, and compares recorded texts with the table.
 
-A text has a line for each field of the message. For each nested type follow a line of `=`, a line `MSG:
-package/Name`, and the type's fields. (This is the `ros2msg` schema of MCAP, as rosbag2 concatenates
-it.)
+A text has one line for each field of the message. For each nested type, three parts follow: a line of
+`=`, a line `MSG: package/Name`, and the lines of the type's fields. MCAP calls this form `ros2msg`, and
+rosbag2 writes it.
 """
 
 import re
@@ -18,16 +18,15 @@ from bridges.messages.rihs01 import type_name
 RULE: Final = "=" * 80
 LONGEST: Final = 1 << 20
 DEEPEST: Final = 8
-"""The maximum depth of nested types. Without this limit, a definition that contains itself would never
-end."""
+"""The maximum depth of nested types. A definition that contains itself would otherwise never end."""
 
 Shape = tuple[tuple[str, object], ...]
-"""Pairs (field, its type). A type is a type's name, or the Shape of a nested type. A sequence is a
-type's name with `[]`, or a tuple of one Shape."""
+"""Pairs of a field and its type. A type is a name, or the Shape of a nested type. A sequence is a name
+with `[]`, or a tuple of one Shape."""
 
 
 class UnknownDefinition(ValueError):
-    """The error of a text that is no definition, or that matches none of our releases."""
+    """The error of a text that is no definition of a message."""
 
 
 def text(message_type: type, release: Release) -> str:
@@ -39,7 +38,7 @@ def text(message_type: type, release: Release) -> str:
 
 
 def releases_of(message_type: type, definition: str) -> list[Release]:
-    """Return the releases that define the message so, the newest first."""
+    """Return the releases in which the message has this definition, the newest first."""
     try:
         found = _read(_short(message_type), definition)
     except UnknownDefinition:
@@ -59,7 +58,7 @@ def _fields(message_type: type, release: Release) -> str:
 
 
 def _ros_type(kind: type) -> str:
-    """Return the name that a field's type has in a definition."""
+    """Return the name of a field's type in a definition."""
     if typing.get_origin(kind) is tuple:
         return _ros_type(typing.get_args(kind)[0]) + "[]"
     if kind in PACKAGES:
@@ -74,7 +73,8 @@ def _element(kind: type) -> type:
 
 
 def _below(message_type: type, release: Release) -> list[type]:
-    """Return the nested types of a message, each once, in the order of their first mention."""
+    """Return each nested type of a message once, in the order in which the message first mentions
+    it."""
     found: dict[type, None] = {}
     for kind in map(_element, release.fields(message_type).values()):
         if kind in PACKAGES:
@@ -98,8 +98,8 @@ def _shape_of(kind: type, release: Release) -> object:
 
 
 FIELD: Final = re.compile(r"([A-Za-z][\w/]*)(?:<=\d+)?(\[(?:<=)?\d*\])?\s+([a-z]\w*)\b(?!\s*=)")
-"""A pattern for a field: type, `[]`, name. A `=` after the name marks a constant. A field's default
-follows the name without `=`."""
+"""A pattern for a line with a field: type, `[]`, name. A `=` after the name makes the line a constant.
+A default value follows the name without `=`."""
 
 
 def _read(name: str, definition: str) -> Shape:

@@ -1,8 +1,8 @@
 """The topics that we publish or subscribe to, with their types and QoS.
 
-The QoS matches RMF's own endpoints (rmf_ros2 9dedd0f; agv/Node.cpp, lift_supervisor/Node.cpp,
-door_supervisor/Node.cpp). All endpoints are RELIABLE with KEEP_LAST history. They differ only in
-durability and depth.
+The QoS fits the endpoints of RMF's own nodes (rmf_ros2 9dedd0f; agv/Node.cpp, lift_supervisor/Node.cpp,
+door_supervisor/Node.cpp). All endpoints are RELIABLE with KEEP_LAST history. Only durability and depth
+differ.
 """
 
 from typing import Generic, Literal, TypeVar
@@ -16,7 +16,7 @@ M_co = TypeVar("M_co", bound=d.Message, covariant=True)
 
 
 class Qos(Struct, frozen=True):
-    """The QoS of an endpoint: RELIABLE, KEEP_LAST(depth), with this durability."""
+    """The QoS of a RELIABLE endpoint with KEEP_LAST(`depth`)."""
 
     durability: Literal["volatile", "transient_local"]
     depth: int
@@ -27,8 +27,8 @@ RETAINED = Qos("transient_local", 100)
 
 
 class Topic(Struct, Generic[M_co], frozen=True):
-    """A topic under its ROS name (without `rt/`). It has the QoS of our publisher and of our
-    subscription."""
+    """A topic under its ROS name (without `rt/`). `publish`: the QoS of our publisher. `subscribe`: the
+    QoS of our subscription."""
 
     name: str
     type: type[M_co]
@@ -40,7 +40,7 @@ class Topic(Struct, Generic[M_co], frozen=True):
         return replace(self, name=name)
 
     def live(self) -> "Topic[M_co]":
-        """Return the same topic for a subscription without retained messages."""
+        """Return the same topic for a subscription that receives no retained messages."""
         return replace(self, subscribe=VOLATILE)
 
 
@@ -61,16 +61,16 @@ DOOR_SUPERVISOR_HEARTBEAT = Topic("door_supervisor_heartbeat", d.SupervisorHeart
 CHARGER_STATES = Topic("charger_states", d.ChargerState)
 CHARGER_REQUESTS = Topic("charger_requests", d.ChargerRequest)
 CHARGER_CANCELS = Topic("charger_cancels", d.ChargerCancel)
-# This topic is our own, because RMF has no message to answer a request.
+# Our own topic, because RMF has no message for the answer to a request.
 CHARGER_REFUSALS = Topic("charger_refusals", d.DiagnosticStatus)
-# These topics are our own. They carry requests to the charger coordinator, for which RMF has no topics.
+# Our own topics for requests to the charger coordinator. RMF has no such topics.
 ADAPTER_CHARGER_REQUESTS = Topic("adapter_charger_requests", d.ChargerRequest)
 ADAPTER_CHARGER_CANCELS = Topic("adapter_charger_cancels", d.ChargerCancel)
-# A topic without messages. Its publisher shows that a coordinator serves the graph. A second
-# coordinator then waits.
+# A topic without messages. Its publisher tells other coordinators that one serves the graph. A second
+# coordinator waits.
 CHARGER_COORDINATOR = Topic("charger_coordinator", d.Bool)
-# These topics are the same from Humble to Lyrical. The fleet adapter has SystemDefaults keep_last(100)
-# at its ends.
+# Humble to Lyrical have the same topics of workcells. The fleet adapter's endpoints have SystemDefaults
+# keep_last(100).
 DISPENSER_REQUESTS = Topic("dispenser_requests", d.DispenserRequest)
 DISPENSER_STATES = Topic("dispenser_states", d.DispenserState)
 DISPENSER_RESULTS = Topic("dispenser_results", d.DispenserResult)
@@ -78,7 +78,7 @@ INGESTOR_REQUESTS = Topic("ingestor_requests", d.IngestorRequest)
 INGESTOR_STATES = Topic("ingestor_states", d.IngestorState)
 INGESTOR_RESULTS = Topic("ingestor_results", d.IngestorResult)
 FLEET_STATES = Topic("fleet_states", d.FleetState)
-# Retained for fleet adapters that start later, as rmf_charging_schedule does.
+# Retained for a fleet adapter that starts later. rmf_charging_schedule also retains the messages.
 CHARGING_ASSIGNMENTS = Topic(
     "charging_assignments", d.ChargingAssignments, publish=RETAINED, subscribe=RETAINED
 )
@@ -93,5 +93,5 @@ DIAGNOSTICS = Topic("diagnostics", d.DiagnosticArray)
 
 
 def every() -> list[AnyTopic]:
-    """List all topics, in the order above."""
+    """List all topics of this file in order."""
     return [topic for topic in globals().values() if isinstance(topic, Topic)]

@@ -1,8 +1,8 @@
 """RMF's messages as one line of text, for `watch`, `send` and the demo.
 
-The words are RMF's constants without their prefix, in lower case except for a lift's mode. So DOOR_OPEN
-is `open`, and MODE_AGV is `AGV`. A number without a constant is shown as a number. Names come from the
-network, so control characters are escaped.
+A word is the name of RMF's constant without its prefix, in lower case. So DOOR_OPEN is `open`. Only the
+modes of a lift are in upper case, such as `AGV` for MODE_AGV. A number without a constant stays a
+number. Control characters are escaped, because names come from the network.
 """
 
 from enum import IntEnum
@@ -17,22 +17,23 @@ WorkcellResulted = d.DispenserResult | d.IngestorResult
 Stated = d.LiftState | d.DoorState | d.ChargerState | WorkcellStated
 Requested = d.LiftRequest | d.DoorRequest | d.ChargerRequest | d.ChargerCancel | WorkcellRequested
 LONGEST_NAME: Final = 256
-"""The maximum length (characters) of a name that is kept and shown. Anybody can send a name of 1 MB."""
+"""The maximum length (characters) of a name in memory and on a display. Anybody can send a name of 1
+MB."""
 Kind = Literal["lift", "door", "charger", "dispenser", "ingestor"]
 KINDS: Final[tuple[Kind, ...]] = ("lift", "door", "charger", "dispenser", "ingestor")
 
 
 def printable(text: str) -> str:
-    """Return the text on one line, with control characters escaped. So no name from the network moves
-    the cursor."""
+    """Return the text on one line. Escape control characters, because a name from the network must not
+    move the cursor."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def word(enum: type[IntEnum], value: int) -> str:
-    """Return `OPEN` for `DOOR_OPEN`, a name without a prefix unchanged, and `7?` for a number without a
-    constant."""
+    """Return the constant's name without its prefix, such as `OPEN` for `DOOR_OPEN`. Return `7?` for a
+    number without a constant."""
     try:
         return enum(value).name.split("_", 1)[-1]
     except ValueError:
@@ -85,8 +86,8 @@ def stamped_at(state: Stated) -> float:
 
 
 def condition(state: Stated) -> str:
-    """Describe the state without the device's holder: `car at L1, door open, mode AGV`, `error: too
-    hot`."""
+    """Describe the state without the device's holder, such as `car at L1, door open, mode AGV` or
+    `error: too hot`."""
     match state:
         case d.LiftState():
             return _lift_condition(state)
@@ -99,7 +100,8 @@ def condition(state: Stated) -> str:
 
 
 def plain(enum: type[IntEnum], value: int) -> str:
-    """Return `open` for `DOOR_OPEN`, and `7?` for a number without a constant."""
+    """Return the constant's name in lower case without its prefix, such as `open` for `DOOR_OPEN`.
+    Return `7?` for a number without a constant."""
     return word(enum, value).lower()
 
 
@@ -128,8 +130,8 @@ def _charger_condition(state: d.ChargerState) -> str:
 
 
 def holder(state: Stated) -> str:
-    """Return the device's holder: a lift's session, or a charger's robot and request. Return "" if
-    there is none."""
+    """Return the device's holder. This is a lift's session, a charger's robot and request, or a
+    workcell's queue. Return "" without a holder."""
     match state:
         case d.LiftState():
             return printable(state.session_id)
@@ -145,7 +147,7 @@ def holder(state: Stated) -> str:
 
 
 def described(state: Stated) -> str:
-    """Describe a state with the device's holder: `car at L1, door open, mode AGV, held by
+    """Describe a state with the device's holder, such as `car at L1, door open, mode AGV, held by
     fleet/robot`."""
     who = holder(state)
     has = {"charger": "for", "lift": "held by"}.get(kind(state), "queue")
@@ -153,7 +155,7 @@ def described(state: Stated) -> str:
 
 
 def request(message: Requested) -> str:
-    """Describe the request: `mode AGV, car to L3, door open, for fleet/robot`."""
+    """Describe a request, such as `mode AGV, car to L3, door open, for fleet/robot`."""
     match message:
         case d.LiftRequest():
             return _lift_request(message)
@@ -171,7 +173,7 @@ def request(message: Requested) -> str:
 
 
 def items(message: WorkcellRequested) -> str:
-    """Describe the items of a request: `2 sheets in left`."""
+    """Describe the items of a request, such as `2 sheets in left`."""
     places = [(one, f" in {one.compartment_name}") for one in message.items]
     each = (
         f"{one.quantity} {one.type_guid}{where if one.compartment_name else ''}"
@@ -181,7 +183,7 @@ def items(message: WorkcellRequested) -> str:
 
 
 def result(message: WorkcellResulted) -> str:
-    """Return RMF's word for a result: `acknowledged`, `success` or `failed`."""
+    """Return RMF's word for a result, which is `acknowledged`, `success` or `failed`."""
     return plain(d.WorkcellStatus, message.status)
 
 

@@ -1,4 +1,4 @@
-"""The alarms of the fleets, as our daemons state them on `/diagnostics`."""
+"""The alarms for fleets, as our daemons state them on `/diagnostics`."""
 
 from collections.abc import Iterator, Mapping
 from typing import Final
@@ -13,9 +13,12 @@ STANDS: Final = frozenset((*RAISED, "reset"))
 
 
 class ObservedAlarm(Struct, frozen=True):
-    """A daemon's statement of its alarm. `state`: `quiet`, `alarm`, `drill` or `reset`. `fleets`: their
-    names, "" for all. `current`: the daemon still makes statements. The alarm of a daemon that falls
-    silent goes on standing."""
+    """The alarm of a daemon, as the daemon states it.
+
+    `state`: `quiet`, `alarm`, `drill` or `reset`. `fleets`: the names of the fleets, or "" for all
+    fleets. `current`: False if the daemon has fallen silent. An alarm does not end when its daemon
+    falls silent.
+    """
 
     node: str
     state: str
@@ -30,7 +33,7 @@ class ObservedAlarm(Struct, frozen=True):
 
     @property
     def condition(self) -> str:
-        """The alarm in a few words, such as `ALARM: fire_panel of Main panel; every fleet is to
+        """A few words on the alarm, such as `ALARM: fire_panel of Main panel; every fleet is to
         stand`."""
         if not self.stands:
             return "no alarm"
@@ -39,7 +42,7 @@ class ObservedAlarm(Struct, frozen=True):
 
     @property
     def because(self) -> str:
-        """One sentence that says why the robots stand."""
+        """A sentence that says why the robots stand."""
         robots = f"Every robot of {self.fleets}" if self.fleets else "Every robot"
         silent = "" if self.current else ", whose daemon has been silent since then"
         why = {
@@ -50,7 +53,7 @@ class ObservedAlarm(Struct, frozen=True):
 
 
 def alarms(nodes: Mapping[str, Diagnosis], now: float) -> Iterator[ObservedAlarm]:
-    """Yield the statement of each daemon that may raise an alarm. `nodes`: the report of each daemon,
+    """Yield the alarm of each daemon that may raise an alarm. `nodes`: each daemon's report on itself,
     by `<node>: daemon`."""
     for name, said in sorted(nodes.items()):
         if STATE in said.values:

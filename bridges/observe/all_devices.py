@@ -1,4 +1,5 @@
-"""All devices that were heard. Their number is bounded, even if the network invents names."""
+"""All observed devices of a graph. The number of devices is bounded, even if somebody on the network
+invents names."""
 
 from collections import OrderedDict, deque
 from collections.abc import Callable, Iterator, Mapping
@@ -31,15 +32,17 @@ Key = tuple[words.Kind, str]
 
 
 class ObservedGraph(Generic[D]):
-    """All observed devices of a graph. `known`: every device, by kind and name; at most `most` of each
-    kind.
+    """All observed devices of a graph.
 
-    In a full table a device with states replaces a device without states. A new device also replaces a
-    device whose states stopped FORGOTTEN_S ago. Otherwise the devices heard first stay. `crowded`: the
-    kinds of which devices were left out. `steps`: the times of steps of the listener's clock, and their
-    size (s). `nodes`: the reports of our daemons and coordinators on themselves, by `<node>: <device>`.
-    `spoke`: the time when each fleet adapter last spoke. The key is `FLEET/ROBOT` for a request of a
-    robot, `FLEET` for an END of a robot, and `FLEET/` for the fleet's own state.
+    `known` has every device, by kind and name. It has at most `most` devices of a kind. If a kind has
+    no place left, only a device with states gets a place. It replaces a device that has no states, or
+    whose states stopped FORGOTTEN_S ago.
+
+    - `crowded`: the kinds with a device that got no place
+    - `steps`: the times at which the listener's clock stepped, and the size (s) of each step
+    - `nodes`: the reports of our daemons and coordinators on themselves, by `<node>: <device>`
+    - `spoke`: the time when each fleet adapter last spoke. The key is `FLEET/ROBOT` for a robot's
+      request, `FLEET` for a robot's END, and `FLEET/` for a state of the fleet.
     """
 
     makes: ClassVar[Mapping[words.Kind, Callable[[str, Moment], Any]]]
@@ -58,7 +61,8 @@ class ObservedGraph(Generic[D]):
         self._full_until: dict[tuple[words.Kind, bool], float] = {}
 
     def hear(self, heard: Heard) -> list[tuple[D, list[News]]]:
-        """Take a message. Return the devices that it concerns, and the news of each."""
+        """Take a message. Return the devices that the message is about, with the news of each
+        device."""
         moment, message = self.moment(heard), heard.message
         topic = heard.topic.rpartition("/")[2]
         if isinstance(message, d.SupervisorHeartbeat):
@@ -91,8 +95,7 @@ class ObservedGraph(Generic[D]):
             self.spoke.popitem(last=False)
 
     def moment(self, heard: Heard | Own) -> Moment:
-        """Return the message's time. If a recording has the message out of order, return the present
-        time."""
+        """Return the message's time. If a recording has a message too late, return the present time."""
         at = heard.at if self.began is None else max(heard.at, self.now.at)
         offset = heard.wall - heard.at
         if self.began is None:
@@ -105,17 +108,18 @@ class ObservedGraph(Generic[D]):
         return self.now
 
     def pass_time(self, at: float, wall: float) -> None:
-        """Let time pass without a message."""
+        """Set the present time when no message has arrived."""
         self.now = Moment(max(at, self.now.at), wall)
         self.began = self.began or Moment(at, wall, seen=False)
 
     def stated(self, kind: words.Kind | None = None) -> list[D]:
-        """List the devices of this kind that have published a state, in the order of arrival."""
+        """List the devices of this kind that have published a state. The order is that of their first
+        messages."""
         every = self.known.values()
         return [one for one in every if kind in (None, one.kind) and one.state is not None]
 
     def make(self, kind: words.Kind, name: str) -> D:
-        """Make a device that has not heard any message yet."""
+        """Make a device that has not yet heard a message."""
         made: D = self.makes[kind](name, self.began or self.now)
         return made
 
@@ -141,7 +145,8 @@ class ObservedGraph(Generic[D]):
     def device(
         self, kind: words.Kind, name: str, moment: Moment, *, stated: bool = False
     ) -> D | None:
-        """Find the device of this name, or make it if there is room."""
+        """Return the device of this name. Make a new device if none is known and there is a place.
+        Otherwise return None."""
         found = self.known.get((kind, name))
         if found is not None or not name:
             return found
@@ -149,7 +154,7 @@ class ObservedGraph(Generic[D]):
             self.crowded |= {kind} if stated else set()
             return None
         made = self.known[kind, name] = self.make(kind, name)
-        if self._heartbeat is not None:  # RMF's supervisor sends it only after requests
+        if self._heartbeat is not None:  # RMF's supervisor sends a heartbeat only after requests
             at, wall = self._heartbeat.at, self._heartbeat.wall
             made.hear(Moment(at, wall, seen=False), "", self._heartbeat.message)
         return made
@@ -175,7 +180,7 @@ def _heard_at(device: AnyDevice) -> float:
 
 
 class PlainGraph(ObservedGraph[AnyDevice]):
-    """Every device, with nothing but the observed facts."""
+    """Every device, with only the facts that this package observes."""
 
     makes: ClassVar = {
         "lift": ObservedLift,

@@ -15,9 +15,13 @@ CHARGING: Final = "charging"
 
 
 class ObservedCharger(ObservedDevice[d.ChargerState]):
-    """A charger as observed. `condition`: RMF's word for its state. `robot`: the robot that has the
-    charger; unknown before the first state and in a silence. `request`: the id of the present
-    request. A requester of a charger is known by the id of its request, and wants a robot charged."""
+    """A charger as observed. A requester's name is the id of its request, and its wish is a robot's
+    charge.
+
+    `condition`: RMF's word for the charger's state. `robot`: the robot that has the charger. Nobody
+    knows this robot before the first state and during a silence. `request`: the id of the present
+    request.
+    """
 
     kind = "charger"
 
@@ -39,8 +43,8 @@ class ObservedCharger(ObservedDevice[d.ChargerState]):
         }
 
     def waits(self, now: Moment) -> Iterator[Wait]:
-        """Yield the wait for an assigned charger. Its request is sent only once, so no repeats show the
-        wait."""
+        """Yield the wait of the robot to which the charger is assigned. RMF sends a charger's request
+        only once, so repeats cannot show this wait."""
         if self.condition.value == "assigned":
             since = max(self.condition.since, self.request.since, key=lambda one: one.at)
             yield Wait(self.request.value, "CHARGING", since)

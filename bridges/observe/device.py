@@ -1,4 +1,4 @@
-"""Observation of any kind of device: its states, their pace and age, its requesters and waits."""
+"""Observation of a device of any kind: its states, their pace and age, its requesters and waits."""
 
 from abc import ABC, abstractmethod
 from collections import deque
@@ -18,7 +18,8 @@ T = TypeVar("T", d.LiftState, d.DoorState, d.ChargerState, d.DispenserState)
 
 
 class Check(NamedTuple):
-    """One condition of an RMF phase: the value that is shown, and the value that RMF wants."""
+    """One condition of an RMF phase. `shown`: the present value. `wanted`: the value for which RMF
+    waits."""
 
     name: str
     shown: str
@@ -27,7 +28,7 @@ class Check(NamedTuple):
 
 
 class Wait(NamedTuple):
-    """A requester's wait for a floor, for OPEN or for CHARGING."""
+    """A wait of a requester. `wants`: a floor, OPEN or CHARGING."""
 
     who: str
     wants: str
@@ -35,7 +36,7 @@ class Wait(NamedTuple):
 
 
 def reading_age(stamped_at: float, wall: float) -> str:
-    """Return the fault in a reading's age, such as `is old`; "" if there is none."""
+    """Return the defect of a reading's age, such as `is old`. Return "" if the age is right."""
     if stamped_at <= 0.0:
         return "was never read"
     if wall - stamped_at > OLD_S:
@@ -44,12 +45,12 @@ def reading_age(stamped_at: float, wall: float) -> str:
 
 
 class ObservedDevice(ABC, Generic[T]):
-    """One device, as we heard it. `id`: its name on the graph. `began`: the time of its first message.
+    """One device as observed. `id`: its name on the graph. `began`: the time when observation began.
 
-    `state`, `before`: the two latest states; `gap_s` is the time between them. `first_state`,
-    `last_state`: the times of the first and the latest state. `changed`: the facts that the latest
-    state changed, with their earlier values. `diagnoses`: the reports of our nodes on the device, by
-    `<node>: <device>`.
+    - `state`, `before`: the latest state, and the state before it. `gap_s`: the time between the two.
+    - `first_state`, `last_state`: the time of the first state, and the time of the latest state
+    - `changed`: the earlier values of the facts that the latest state changed
+    - `diagnoses`: the reports of our nodes on the device, by `<node>: <device>`
     """
 
     kind: ClassVar[words.Kind]
@@ -76,19 +77,23 @@ class ObservedDevice(ABC, Generic[T]):
         self._publishers.hear(sender, now.at)
 
     def publishers(self, now: Moment) -> tuple[Sender, ...]:
-        """Return the publishers of the device's states in the last 5 s. There are several only if they
-        take turns, which two nodes under one name do. The result is empty if the publisher is
-        unknown, as in recordings and on `ros2`; then use `steps_back`."""
+        """Return the publishers of the device's states in the last SLOWEST_S.
+
+        Several publishers are returned only if they take turns, because then two nodes have one name.
+        The result is empty if the publisher is unknown, as in recordings and on `ros2`. In that case
+        use `steps_back`.
+        """
         return self._publishers.at(now.at)
 
     def hear(self, moment: Moment, topic: str, message: d.Message) -> list[News]:
-        """Take a message about the device. `topic`: the last part of the topic's name."""
+        """Take a message about the device. Return the news. `topic`: the last part of the topic's
+        name."""
         if isinstance(message, words.Stated):
             return [*self._hear_state(moment, message)]  # type: ignore[arg-type]
         return [*self._hear_other(moment, topic, message)]
 
     def diagnose(self, moment: Moment, status: d.DiagnosticStatus) -> list[News]:
-        """Take a diagnostic status about the device from one of our nodes."""
+        """Take a diagnostic status from one of our nodes about the device. Return the news."""
         seen = status.name in self.diagnoses or moment.at - self.began.at > SILENT_S
         moment = Moment(moment.at, moment.wall, seen)
         said = report(self.diagnoses, MOST_NODES, status, moment)
@@ -97,59 +102,59 @@ class ObservedDevice(ABC, Generic[T]):
         return list(said.take(moment, status, self.text, self.sentence))
 
     def text(self, name: str) -> str:
-        """Return a name from the network in the form in which we remember it. `explain` remembers a
-        printable form."""
+        """Return a name from the network in the form that we remember. `explain` overrides this method
+        and makes the name printable."""
         return name
 
     def sentence(self, text: str) -> str:
-        """Return a sentence from the network in the form in which we remember it. `explain` remembers a
-        bounded form."""
+        """Return a sentence from the network in the form that we remember. `explain` overrides this
+        method and shortens the sentence."""
         return text
 
     def is_silent(self, now: Moment, after_s: float = SILENT_S) -> bool:
-        """Return whether the device's states have stopped. Before the first state the answer is
-        False."""
+        """Return whether the device's states have stopped. Return False before the first state."""
         return self.silent_s(now) > after_s
 
     def silent_s(self, now: Moment) -> float:
-        """Return the age (s) of the device's last state."""
+        """Return the age (s) of the device's last state. Return 0 before the first state."""
         return 0.0 if self.last_state is None else now.at - self.last_state.at
 
     def steps_back(self, now: float, by_s: float, within_s: float) -> int:
-        """Count how often the stamps lately stepped back by more than `by_s`. Two nodes under one name
-        cause such steps."""
+        """Count the stamps of the last `within_s` that were older than the stamp before them by more
+        than `by_s`. Two nodes under one name cause such stamps."""
         return sum(by > by_s and now - at < within_s for at, by in self._back)
 
     def flaps(self, now: Moment) -> list[float]:
-        """Return, for each recent change to OFFLINE or back, the age (s) of the reading at that
-        time."""
+        """Return one age (s) for each recent change to OFFLINE or from OFFLINE. It is the age of the
+        reading at the change."""
         return [age_s for at, age_s in self._flips if now.at - at < FLAPS_WITHIN_S]
 
     def checks(self, one: DeviceRequester) -> tuple[Check, ...]:
-        """List the conditions of the RMF phase in which this requester is; empty if RMF has no such
-        phase."""
+        """List the conditions of the requester's present RMF phase. Return nothing for a device without
+        such a phase."""
         return ()
 
     def matches(self, one: DeviceRequester) -> bool:
-        """Return whether RMF sees this requester's wish fulfilled."""
+        """Return whether RMF sees the requester's wish as fulfilled."""
         return all(check.met for check in self.checks(one))
 
     @abstractmethod
     def waits(self, now: Moment) -> Iterator[Wait]:
-        """Yield each requester that waits, with its wish and the start of its wait."""
+        """Yield a `Wait` for each requester that waits."""
 
     @abstractmethod
     def facts(self, state: T) -> dict[str, str]:
-        """Return the facts in a state, by the names of this object's `Fact`s."""
+        """Return the facts in a state by name. Each name is an attribute of this object that holds a
+        `Fact`."""
 
     @abstractmethod
     def _settle(self, moment: Moment) -> Iterator[News]:
-        """Yield the news of a new state. `changed` is already up to date. At the first state `before`
-        is None."""
+        """Yield the news of a new state. The caller has already updated `changed`. At the first state
+        `before` is None."""
 
     @abstractmethod
     def _hear_other(self, moment: Moment, topic: str, message: d.Message) -> Iterator[News]:
-        """Take a message that is not a state."""
+        """Take a message that is not a state. Yield the news."""
 
     def _hear_state(self, moment: Moment, state: T) -> Iterator[News]:
         last, stamped_at = self.last_state, words.stamped_at(state)

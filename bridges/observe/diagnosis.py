@@ -16,8 +16,8 @@ COORDINATOR: Final = "charger_coordinator"
 PANEL: Final = "alarm"
 FLEET: Final = "fleet"
 STATELESS: Final = (COORDINATOR, PANEL, FLEET)
-"""Kinds whose subjects publish no state of RMF's that `ObservedGraph` knows."""
-"""The kind of alarm panels, which publish no state: their diagnostics are all that is heard."""
+"""The kinds whose subjects publish no state that `ObservedGraph` knows. Only diagnostics tell of these
+subjects."""
 REFUSED: Final = "refused "
 
 
@@ -28,21 +28,21 @@ def faults(status: DiagnosticStatus) -> tuple[str, ...]:
 
 
 def kind_in(status: DiagnosticStatus) -> str:
-    """Return the kind of our daemon that sent the status; "" for every other sender."""
+    """Return the kind of our daemon that sent the status. Return "" for any other sender."""
     return next((pair.value for pair in status.values if pair.key == "kind"), "")
 
 
 def about(status: DiagnosticStatus) -> tuple[Kind, str] | None:
-    """Return the device that a status of our daemons is about. For a supervisor this is its lift or
-    door."""
+    """Return the device that a status of our daemons is about. A supervisor's status is about its lift
+    or door."""
     kind = kind_in(status).removesuffix("_supervisor")
     found = next((known for known in KINDS if known == kind), None)
     return (found, status.hardware_id) if found else None
 
 
 def of_node(status: DiagnosticStatus) -> bool:
-    """Return whether the status is about one of our daemons itself, or about a subject of a kind in
-    STATELESS: a coordinator's whole site, an alarm panel, or a robot."""
+    """Return whether the status is about a daemon of ours itself. Also return True for a subject of a
+    kind in STATELESS: a coordinator's site, an alarm panel, or a robot."""
     kind = kind_in(status)
     of_daemon = bool(kind) and status.name == f"{status.hardware_id}: daemon"
     return kind in STATELESS or of_daemon
@@ -50,9 +50,14 @@ def of_node(status: DiagnosticStatus) -> bool:
 
 @dataclass(slots=True)
 class Diagnosis:
-    """One node's report. `kind`: the kind of its daemon. `name`: `<node>: <device>`. `last`: the time
-    of its last status. `faults`: the detail and the start of each fault, by code. `refused`: the
-    count and the last time of each refusal, by reason."""
+    """The latest report of one node on one device, or on the node itself.
+
+    - `kind`: the kind of the node's daemon
+    - `name`: `<node>: <device>`
+    - `last`: the time of the last status
+    - `faults`: the detail and the beginning of each fault, by code
+    - `refused`: the count and the last time of refusals, by reason
+    """
 
     kind: str
     last: Moment
@@ -67,7 +72,7 @@ class Diagnosis:
         return now - self.last.at <= SILENT_S
 
     def value(self, key: str) -> str:
-        """Return the value of this key; "" if it is missing or "-"."""
+        """Return the value of this key. Return "" if the value is missing or "-"."""
         found = self.values.get(key, "")
         return "" if found == "-" else found
 
@@ -78,8 +83,8 @@ class Diagnosis:
         text: Callable[[str], str] = str,
         sentence: Callable[[str], str] = str,
     ) -> Iterator[News]:
-        """Take the next status. `text` converts a name from the network, and `sentence` a fault's
-        detail, to the form in which we remember them."""
+        """Take the next status, and yield the news. `text` converts a name from the network to the form
+        that we remember. `sentence` converts the detail of a fault."""
         self.kind, self.last, self.message = kind_in(status), moment, status.message
         self.values = {pair.key: pair.value for pair in status.values[:MOST_VALUES]}
         codes = faults(status)[:MOST_CODES]
@@ -89,7 +94,7 @@ class Diagnosis:
                 yield from self.refuses(moment, text(key.removeprefix(REFUSED)), int(value))
 
     def has(self, moment: Moment, codes: Mapping[str, str]) -> Iterator[News]:
-        """Take the faults that are present now, with their details."""
+        """Take all faults that are present now, with their details. Yield the news."""
         over, new = self.faults.keys() - codes.keys(), codes.keys() - self.faults.keys()
         gone = [code for code in self.faults if code in over]
         self.faults = {
@@ -100,7 +105,8 @@ class Diagnosis:
         yield from (News("fault", moment, self.name, code) for code in codes if code in new)
 
     def refuses(self, moment: Moment, reason: str, count: int | None = None) -> Iterator[News]:
-        """Note refusals for this reason. `count`: their number in all; None for one more refusal."""
+        """Note refusals for this reason, and yield the news. `count`: the total number of refusals, or
+        None for one more refusal."""
         before, last = self.refused.get(reason, (0, None))
         if (last is None and len(self.refused) >= MOST_CODES) or (last and before == count):
             return
@@ -112,8 +118,8 @@ class Diagnosis:
 def report(
     known: dict[str, Diagnosis], most: int, status: DiagnosticStatus, moment: Moment
 ) -> Diagnosis | None:
-    """Find the diagnosis of this status, or make it. In a full table a new diagnosis replaces a silent
-    one; if none is silent, return None."""
+    """Return the diagnosis to which this status belongs, or make a new diagnosis. In a full table a new
+    diagnosis replaces a silent one. Return None if no diagnosis is silent."""
     if status.name not in known:
         silent = (name for name, one in known.items() if not one.is_current(moment.at))
         if len(known) >= most and known.pop(next(silent, ""), None) is None:

@@ -1,5 +1,5 @@
-"""Observation of a door: its requesters, its last request, its holders in the supervisor's heartbeat,
-and the conditions of RMF's DoorOpen and DoorClose that are not met."""
+"""Observation of a door: its requesters, its last request, and its holders in the supervisor's
+heartbeat. It also lists the unmet conditions of RMF's DoorOpen and DoorClose."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -16,11 +16,12 @@ CLOSED: Final = "closed"
 LISTS: Final = "lists it"
 LISTS_NOT: Final = "does not list it"
 SUPERVISOR: Final = "door_supervisor"
-"""The requester_id of RMF's supervisor (door_supervisor/Node.hpp) and of ours on `door_requests`."""
+"""The requester_id that supervisors use on `door_requests`, both RMF's (door_supervisor/Node.hpp) and
+ours."""
 
 
 def listed(heartbeat: d.SupervisorHeartbeat, door: str) -> list[str]:
-    """List the door's holders in the supervisor's heartbeat (rmf_ros2, SupervisorHasSession.cpp)."""
+    """List the door's holders in a supervisor's heartbeat (rmf_ros2, SupervisorHasSession.cpp)."""
     return [
         session.requester_id
         for sessions in heartbeat.all_sessions
@@ -30,7 +31,8 @@ def listed(heartbeat: d.SupervisorHeartbeat, door: str) -> list[str]:
 
 
 def door_open(mode: str, heartbeat: str) -> tuple[Check, ...]:
-    """List the conditions of DoorOpen (rmf_ros2, DoorOpen.cpp). `heartbeat`: LISTS, or another text."""
+    """List the conditions of DoorOpen (rmf_ros2, DoorOpen.cpp). `heartbeat`: LISTS if the heartbeat
+    lists the requester, otherwise another text."""
     return (
         Check("door", mode, OPEN, mode == OPEN),
         Check("heartbeat", heartbeat, LISTS, heartbeat == LISTS),
@@ -38,15 +40,17 @@ def door_open(mode: str, heartbeat: str) -> tuple[Check, ...]:
 
 
 def door_close(heartbeat: str) -> tuple[Check, ...]:
-    """List the conditions of DoorClose (rmf_ros2, DoorClose.cpp). None of them concerns the door
+    """List the conditions of DoorClose (rmf_ros2, DoorClose.cpp). DoorClose does not look at the door
     itself."""
     return (Check("heartbeat", heartbeat, LISTS_NOT, heartbeat != LISTS),)
 
 
 class ObservedDoor(ObservedDevice[d.DoorState]):
-    """A door as observed. `holders`: the requesters in the heartbeat, and the start of each hold.
-    `asked`: the mode last requested on `door_requests`, by `sender`. `asked_last`: the time of the
-    latest repeat of that request."""
+    """A door as observed.
+
+    `holders`: the requesters in the heartbeat, with the start of each hold. `asked`: the mode in the
+    last request on `door_requests`. `sender` sent that request, and last repeated it at `asked_last`.
+    """
 
     kind = "door"
 
@@ -60,7 +64,7 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
         self.sender = ""
 
     def facts(self, state: d.DoorState) -> dict[str, str]:
-        """Return the mode."""
+        """Return the mode that the state shows."""
         return {"mode": words.plain(d.DoorModeValue, state.current_mode.value)}
 
     def checks(self, one: DeviceRequester) -> tuple[Check, ...]:
@@ -71,17 +75,17 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
         return door_open(self.mode.value, heartbeat) if one.wants == OPEN else door_close(heartbeat)
 
     def asking(self, now: Moment) -> list[DeviceRequester]:
-        """List the requesters that now repeat their request and still wait, the earliest first."""
+        """List the requesters that still repeat an unfulfilled request, the earliest first."""
         asks = [one for one in self.requesters if one.asks(now) and not self.matches(one)]
         return sorted(asks, key=lambda one: one.since.at)
 
     def asks_now(self, now: Moment) -> bool:
-        """Return whether somebody still sends requests on `door_requests`."""
+        """Return whether a node still sends requests on `door_requests`."""
         return self.asked is not None and now.at - self.asked_last.at <= REQUESTER_SILENT_S
 
     def waits(self, now: Moment) -> Iterator[Wait]:
-        """Yield each wait for OPEN, also the supervisor's own. If no heartbeat was heard, only the
-        door's state counts."""
+        """Yield each wait for OPEN. A supervisor may wait too. Without a heartbeat, an open door ends a
+        requester's wait."""
         opened = self.mode.value == OPEN
         for one in self.asking(now):
             if one.wants == OPEN and not (opened and self.last_heartbeat is None):

@@ -1,5 +1,5 @@
-"""Observation of a lift: its requesters, its session, the supervisor's request, and the conditions of
-RMF's RequestLift that are not met."""
+"""Observation of a lift: its requesters, its session, and the supervisor's request. It also lists the
+unmet conditions of RMF's RequestLift."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -16,22 +16,27 @@ NOBODY: Final = "nobody"
 NO_FLOOR: Final = "no known floor"
 OPEN: Final = "open"
 HAZARDS: Final = (d.LiftMode.MODE_FIRE, d.LiftMode.MODE_OFFLINE, d.LiftMode.MODE_EMERGENCY)
-"""The modes of a lift in which no robot is let in."""
+"""The lift's modes in which no robot may enter."""
 
 
 def request_lift(session: str, floor: str, door: str, who: str, wants: str) -> tuple[Check, ...]:
-    """List all conditions under which RequestLift lets `who` drive at the floor `wants` (rmf_ros2,
-    RequestLift.cpp:322-326). The lift's name is left out, because it always matches here."""
+    """List the conditions under which RequestLift lets `who` drive into or out of the lift at the floor
+    `wants` (rmf_ros2, RequestLift.cpp:322-326). The condition on the lift's name is left out,
+    because it is always met."""
     fields = (("session", session, who), ("floor", floor, wants), ("door", door, OPEN))
     return tuple(Check(*field, field[1] == field[2]) for field in fields)
 
 
 class ObservedLift(ObservedDevice[d.LiftState]):
-    """A lift as observed. `adapters_heard`: a fleet adapter was heard. `supervisor`: the session in the
-    supervisor's last request on `lift_requests` ("" after an END), last heard at `supervisor_last`.
-    `idle_ends`: the number of ENDs in a row for a session that the lift did not show, that session,
-    and the time of the last such END. `taken_from`: the last session that the lift replaced by
-    another session without an END."""
+    """A lift as observed.
+
+    - `adapters_heard`: a fleet adapter was heard.
+    - `supervisor`: the session in the supervisor's last request on `lift_requests`, or "" after an END
+    - `supervisor_last`: the time of that request
+    - `idle_ends`: a count of successive ENDs for one session while the lift did not show that session.
+      The session and the time of the last such END follow the count.
+    - `taken_from`: the last session that lost the lift to another session without an END
+    """
 
     kind = "lift"
 
@@ -50,7 +55,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         self.idle_ends: tuple[int, str, Moment] = (0, "", began)
 
     def facts(self, state: d.LiftState) -> dict[str, str]:
-        """Return session, mode, floor, motion, destination and door."""
+        """Return the session, mode, floor, motion, destination and door that the state shows."""
         return {
             "session": self.text(state.session_id) or NOBODY,
             "mode": words.word(d.LiftMode, state.current_mode),
@@ -61,13 +66,13 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         }
 
     def checks(self, one: DeviceRequester) -> tuple[Check, ...]:
-        """List the conditions of this requester's RequestLift."""
+        """List the conditions of the requester's RequestLift."""
         wants = one.wants or "no floor"
         return request_lift(self.session.value, self.floor.value, self.door.value, one.who, wants)
 
     def asking(self, now: Moment) -> list[DeviceRequester]:
-        """List the requesters that ask now, the earliest first. If no states come, nobody repeats a
-        request, so all requesters wait."""
+        """List the requesters that ask now, the earliest first. During a silence of the lift nobody
+        repeats a request. So every requester without an END then counts as asking."""
         stands = self.last_state is None or self.is_silent(now)
         asks = [
             one
@@ -77,18 +82,19 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         return sorted(asks, key=lambda one: one.first.at)
 
     def waits(self, now: Moment) -> Iterator[Wait]:
-        """Yield each requester whose wish the lift's states do not show as fulfilled."""
+        """Yield a `Wait` for each requester whose wish is unfulfilled in the lift's states."""
         for one in self.asking(now):
             if self.is_silent(now) or not self.matches(one):
                 yield Wait(one.who, one.wants, one.lacks)
 
     def not_passed_on(self, now: Moment) -> DeviceRequester | None:
-        """Return a robot that repeats a request or END although nothing comes on `lift_requests`.
+        """Return a robot that repeats a request or END although no message comes on `lift_requests`.
 
         If a robot has the lift, only this robot counts, because RMF's supervisor drops the requests of
-        all others (lift_supervisor/Node.cpp). If the lift is free, any robot counts. If a robot was
-        given the lift although no message ever came on `lift_requests`, that topic was not recorded,
-        and no robot is returned.
+        all other robots (lift_supervisor/Node.cpp). If the lift is free, any robot counts.
+
+        Return None if a robot got the lift and no message ever came on `lift_requests`. In that case
+        the recording does not contain that topic.
         """
         silent_at, holder = now.at - REQUESTER_SILENT_S, self.session.value
         last = self.supervisor_last
@@ -144,7 +150,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         if not holds and not passed_on and self.state is not None:
             count = self.idle_ends[0] if self.idle_ends[1] == who else 0
             self.idle_ends = count + 1, who, moment
-        if one is None and who and (holds or self.state is None):  # its own request was not heard
+        if one is None and who and (holds or self.state is None):  # nobody heard its request
             one, _ = self.requesters.ask(who, "", moment)
             one.granted, one.ended, one.own = self.session.since, moment, not passed_on
             one.end_last, one.end_passed_on = None if passed_on else moment, passed_on
@@ -158,7 +164,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
             return
         yield News("ends", moment, who, requester=one, passed_on=passed_on)
         if passed_on and one.own and not holds:
-            return  # only the robot's fleet adapter knows whether it still waits
+            return  # only its fleet adapter knows whether the robot still waits
         one.ended = moment
         if not holds:
             yield self._over(moment, one)

@@ -6,30 +6,32 @@ from typing import Literal
 from bridges.observe.requesters import DeviceRequester, Moment
 
 What = Literal[
-    "first state",  # the device had no states before
-    "states again",  # the first state after a gap of `gap_s`
-    "read",  # the readings' age is now judged as `text`
-    "changed",  # this state changes the facts in `changed`
-    "asks",  # a requester has a new wish; for a lift in the mode `text`
-    "passed on",  # the supervisor has a new wish
-    "ends",  # a requester sends END; with `passed_on` the supervisor sends it
-    "has",  # a requester has the device now
-    "lost",  # `text` had the device until now
-    "result",  # a workcell gives the requester's request another result: `text`
-    "met",  # RMF sees a requester's wish fulfilled
+    "first state",  # the device's first state has come
+    "states again",  # a state has come after a silence of `gap_s`
+    "read",  # the age of the readings is now as `text` says
+    "changed",  # the state changes the facts in `changed`
+    "asks",  # a requester has a new wish; `text`: the mode it asks of a lift
+    "passed on",  # the supervisor sends a new request to the device
+    "ends",  # a requester sends END, or the supervisor if `passed_on`
+    "has",  # a requester got the device
+    "lost",  # `who` lost the device
+    "result",  # a workcell gives a request another result, `text`
+    "met",  # RMF sees a requester's wish as fulfilled
     "gone",  # a requester has stopped asking, without END
     "over",  # a requester's visit has ended
-    "fault",  # the diagnosis `who` reports a new fault with the code `text`
+    "fault",  # the diagnosis `who` has a new fault; `text`: its code
     "fault over",
-    "refused",  # the node of the diagnosis `who` has refused a request, for the reason `text`
+    "refused",  # the node of the diagnosis `who` refused a request; `text`: the reason
 ]
 
 
 @dataclass(frozen=True, slots=True)
 class News:
-    """One change that a message makes. `who`: the requester, as a text. `requester`: its memory, if it
-    has sent a request. `text`: its meaning depends on `what` (see `What`). `gap_s`: the length (s)
-    of the silence or hold that has ended."""
+    """One change that a message makes.
+
+    `who`: the requester's name. `requester`: what we know of the requester, or None if it sent no
+    request. `text`: see `What`. `gap_s`: the length (s) of the silence or hold that has ended.
+    """
 
     what: What
     at: Moment

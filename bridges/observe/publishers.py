@@ -1,14 +1,16 @@
-"""The publishers of one device's states. If two publish at the same time, two nodes have one name."""
+"""The publishers of one device's states. Two nodes have one name if two publishers take turns."""
 
 from bridges.messages.heard import Sender
 from bridges.observe.limits import MOST_SENDERS, SLOWEST_S
 
 
 class StatePublishers:
-    """The publishers of the states in the last SLOWEST_S, the latest last; at most MOST_SENDERS.
+    """The publishers of the states in the last SLOWEST_S, the latest last. At most MOST_SENDERS are
+    kept.
 
-    A restarted node is a new publisher, and a listener that joins again may see new publishers. In both
-    cases only one publishes at a time, because the old publisher never comes back after the new one.
+    A node that restarts is a new publisher. A listener that joins the graph again may see new
+    publishers too. In both cases the old publisher never comes back after the new publisher, so only
+    one of the two publishes at a time.
     """
 
     def __init__(self) -> None:
@@ -16,7 +18,7 @@ class StatePublishers:
         self._back_at = float("-inf")
 
     def hear(self, sender: Sender | None, now: float) -> None:
-        """Note that this publisher sent a state."""
+        """Note that this publisher has sent a state."""
         if sender is None:
             return
         newest = next(reversed(self._last), sender)
@@ -26,11 +28,12 @@ class StatePublishers:
         if len(self._last) == MOST_SENDERS:
             oldest = next(iter(self._last))
             if now - self._last[oldest] <= SLOWEST_S:
-                return  # made-up publishers do not displace a real one
+                return  # invented publishers must not displace a real one
             del self._last[oldest]
         self._last[sender] = now
 
     def at(self, now: float) -> tuple[Sender, ...]:
-        """Return the publishers at this time: one, several if two nodes publish, or none if unknown."""
+        """Return the publishers at this time. Return several only if two nodes publish, and none if the
+        publisher is unknown."""
         lately = tuple(one for one, last in self._last.items() if now - last <= SLOWEST_S)
         return lately if now - self._back_at <= SLOWEST_S else lately[-1:]

@@ -1,5 +1,4 @@
-"""The requesters of a device: their wishes, the start of each wish, and what each requester does
-now."""
+"""The requesters of a device: their wishes, the start of each wish, and their present actions."""
 
 from collections import OrderedDict
 from collections.abc import Iterator
@@ -12,8 +11,8 @@ from bridges.observe.limits import GIVEN_UP_S, MOST_REQUESTERS, REPEATS_S, REQUE
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """The time at which something begins. `at`: s on `Heard.at`'s clock. `wall`: s since the epoch.
-    `seen`: False if it began before the first message."""
+    """The time at which something begins. `at`: seconds on the clock of `Heard.at`. `wall`: seconds
+    since the epoch. `seen`: False if it began before we listened."""
 
     at: float
     wall: float
@@ -22,7 +21,7 @@ class Moment:
 
 @dataclass(slots=True)
 class Fact:
-    """A present value, and the time since which it has been present."""
+    """A present value. `since`: the time when this value began."""
 
     value: str
     since: Moment
@@ -37,21 +36,35 @@ class Fact:
 
 @dataclass(slots=True)
 class DeviceRequester:
-    """One requester and its wish. `wants`: a floor, a door's mode, and the like.
+    """One requester of a device, and its wish. `wants`: a floor, a door's mode, or the like. A
+    requester's visit lasts from its first request to its END.
 
-    Times of its requests: `first`: the start of its visit. `since`: its first request for this wish.
-    `last`: its last request. `passed_on`: the supervisor's last request for it. `ended`: its first END.
-    `end_last`: its latest END.
+    The times of requests:
 
-    Times of their effects: `lacks`: the start of its wait. `met`: RMF saw the wish fulfilled.
-    `boarded`: RMF first saw a wish of this visit fulfilled; that wish was `boarded_at`. `granted`: the
-    requester got the device.
+    - `first`: the first request of the visit
+    - `since`: the first request for the present wish
+    - `last`: the requester's last request
+    - `passed_on`: the supervisor's last request for this requester
+    - `ended`: the first END
+    - `end_last`: the latest END
 
-    `reached`: the last wish that was fulfilled. `given_up`: the wish before this one, if it was not
-    fulfilled. `end_passed_on`: the supervisor has passed on END. `gone`: the requester has stopped
-    without END. `times`: the number of its requests. `own`: the requester itself was heard, not only
-    the supervisor. `stamp_age_s`: the age (s) of its last request by our clock, if that request was
-    `stamped`.
+    The times of effects:
+
+    - `lacks`: the time since which the wish is unfulfilled
+    - `met`: the time when RMF saw the wish fulfilled
+    - `boarded`: the time when RMF first saw a wish of this visit fulfilled. `boarded_at` is that wish.
+    - `granted`: the time when the requester got the device
+
+    Other facts:
+
+    - `reached`: the last fulfilled wish
+    - `given_up`: the wish before the present wish, if it was not fulfilled
+    - `end_passed_on`: the supervisor has sent END to the device.
+    - `gone`: the requester has stopped without END.
+    - `times`: the number of requests
+    - `own`: a message of the requester itself was heard, and not only the supervisor's messages.
+    - `stamp_age_s`: the age (s) of the last request by our clock. It is valid if that request was
+      `stamped`.
     """
 
     who: str
@@ -77,7 +90,7 @@ class DeviceRequester:
     stamp_age_s: float = 0.0
 
     def asks(self, now: Moment) -> bool:
-        """Return whether the requester still asks."""
+        """Return whether the requester still repeats its request."""
         return self.ended is None and now.at - self.last.at <= REQUESTER_SILENT_S
 
     def ends(self, now: Moment) -> bool:
@@ -85,14 +98,14 @@ class DeviceRequester:
         return self.end_last is not None and now.at - self.end_last.at <= REQUESTER_SILENT_S
 
     def stamp(self, moment: Moment, stamp: Time) -> None:
-        """Note the age of the requester's last request, by our clock."""
+        """Note the age of the requester's last request by our clock."""
         self.stamped = stamp != Time()
         self.stamp_age_s = moment.wall - in_seconds(stamp)
 
 
 class DeviceRequesters:
-    """All requesters of one device. If names flood in, the requester that has been silent for the
-    longest time is dropped.
+    """All requesters of one device. If too many names come, the requester with the longest silence is
+    dropped.
 
     `began`: the time when we began to listen.
     """
@@ -105,14 +118,17 @@ class DeviceRequesters:
         return iter([*self._all.values()])
 
     def get(self, who: str) -> DeviceRequester | None:
-        """Find this requester; None if its visit is over."""
+        """Return this requester. Return None if its visit is over."""
         return self._all.get(who)
 
     def ask(
         self, who: str, wants: str, moment: Moment, keep: str = "", *, stands: bool = False
     ) -> tuple[DeviceRequester, bool]:
-        """Take a request. Return the requester, and True for a new wish. `keep`: a requester that must
-        not be dropped. `stands`: no states arrive, so nobody repeats a request."""
+        """Take a request. Return the requester, and whether the wish is new.
+
+        `keep`: a requester that must not be dropped. `stands`: no states arrive, so nobody repeats a
+        request.
+        """
         found = self._all.get(who)
         if found is not None and not stands and moment.at - found.last.at > GIVEN_UP_S:
             found.ended = found.ended or found.last
@@ -132,5 +148,5 @@ class DeviceRequesters:
         return found, new
 
     def drop(self, who: str) -> None:
-        """Forget a requester."""
+        """Forget this requester."""
         self._all.pop(who, None)

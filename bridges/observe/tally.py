@@ -1,7 +1,7 @@
-"""Counts of what each device did: rides, waits, door cycles, charges, and its availability.
+"""Counts of each device's rides, waits, door cycles and charges, and of its time in service.
 
-The exporter and the recorder's daily figures add up the same news. A wait or ride whose beginning was
-not heard is not counted, because its length is unknown.
+The exporter and the recorder's daily figures count the same news. A wait or ride does not count if its
+beginning was not heard, because its length is unknown.
 """
 
 from bisect import bisect_left
@@ -21,12 +21,13 @@ BOUNDS_S: Final = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
 NO_SERVICE: Final = frozenset(
     {"OFFLINE", "UNKNOWN", "EMERGENCY", "FIRE", "offline", "unknown", "error"}
 )
-"""Lift modes, door modes and charger states in which RMF's robots are not served."""
+"""The lift modes, door modes and charger states in which a device does not serve RMF's robots."""
 
 
 @dataclass(slots=True)
 class DurationHistogram:
-    """Durations, counted by bucket: one for each of BOUNDS_S, and one for longer durations."""
+    """Counts of durations by bucket. Each of BOUNDS_S has a bucket, and the last bucket has longer
+    durations."""
 
     counts: list[int] = field(default_factory=lambda: [0] * (len(BOUNDS_S) + 1))
     sum_s: float = 0.0
@@ -47,8 +48,8 @@ class DurationHistogram:
         return sum(self.counts)
 
     def quantile(self, share: float) -> float | None:
-        """Return the upper bound (s) of the bucket with this share of the durations, infinity for the
-        last bucket; None without durations."""
+        """Return the upper bound (s) of the bucket in which this share of the durations is reached. The
+        bound of the last bucket is infinite. Return None without durations."""
         rest = share * self.total
         for bound, count in zip((*BOUNDS_S, float("inf")), self.counts, strict=True):
             rest -= count
@@ -61,10 +62,12 @@ class DurationHistogram:
 class DeviceCounts:
     """The counts of one device.
 
-    `waits`: from a robot's first request until RMF lets it board, pass or charge. `rides`: of a lift,
-    from the request for the next floor until the robot may leave. `cycles`: a door's openings, a
-    charger's charges, or a lift's stops with an open door. `energy_j`: the energy of a charger that
-    reports volts and amps. `watched_s`, `served_s`: the time with states, and the time in service.
+    - `waits`: the times from a robot's first request until RMF lets the robot board, pass or charge
+    - `rides`: the times from a request for the next floor until the robot may leave the lift
+    - `cycles`: a door's openings, a charger's charges, or a lift's stops with an open door
+    - `energy_j`: the energy (J) of a charger that reports volts and amps
+    - `watched_s`: the time (s) with states
+    - `served_s`: the time (s) in service
     """
 
     waits: DurationHistogram = field(default_factory=DurationHistogram)
@@ -75,7 +78,7 @@ class DeviceCounts:
     served_s: float = 0.0
 
     def add(self, other: "DeviceCounts") -> None:
-        """Add the counts of another time."""
+        """Add the counts of another period."""
         self.waits.merge(other.waits)
         self.rides.merge(other.rides)
         self.cycles += other.cycles
@@ -85,7 +88,8 @@ class DeviceCounts:
 
 
 class DeviceTally:
-    """Counts one device. `counts`: since the beginning, or since another object took them out."""
+    """The counter of one device. `counts`: the counts since the beginning, or since they were last
+    taken out."""
 
     def __init__(self) -> None:
         self.counts = DeviceCounts()
@@ -93,7 +97,7 @@ class DeviceTally:
         self._counted: dict[str, float] = {}
 
     def take(self, device: AnyDevice, news: Iterable[News], at: float) -> None:
-        """Add one message's news. `at`: the message's time (s)."""
+        """Count the news of one message. `at`: the message's time (s)."""
         for one in news:
             if one.what == "met":
                 self._met(device, one)
@@ -125,7 +129,7 @@ class DeviceTally:
         self._at = at
 
     def _charged(self, device: AnyDevice) -> None:
-        """Count the wait of a charger's request, for which no phase of RMF exists."""
+        """Count the wait of a charger's request. RMF has no phase for this wait."""
         if not isinstance(device, ObservedCharger) or device.condition.value != CHARGING:
             return
         asked = device.requesters.get(device.request.value)
@@ -136,7 +140,7 @@ class DeviceTally:
 
 
 class SiteTally:
-    """The counts of every device, in the bounds of an `ObservedGraph`."""
+    """The counts of every device that the `ObservedGraph` knows."""
 
     def __init__(self) -> None:
         self.devices: dict[Key, DeviceTally] = {}
@@ -144,7 +148,7 @@ class SiteTally:
     def take(
         self, graph: ObservedGraph[Any], found: Iterable[tuple[AnyDevice, list[News]]]
     ) -> None:
-        """Add the news of one message, as `ObservedGraph.hear` returns them."""
+        """Count the news of one message, which `ObservedGraph.hear` has returned."""
         for device, news in found:
             key = device.kind, device.id
             if key not in self.devices:
@@ -154,7 +158,7 @@ class SiteTally:
             self.devices.setdefault(key, DeviceTally()).take(device, news, graph.now.at)
 
     def take_out(self) -> dict[Key, DeviceCounts]:
-        """Return the counts since the last call, and begin anew."""
+        """Return the counts since the last call, and set them to zero."""
         found = {key: one.counts for key, one in self.devices.items()}
         for one in self.devices.values():
             one.counts = DeviceCounts()
@@ -162,13 +166,13 @@ class SiteTally:
 
 
 def in_service(device: AnyDevice) -> bool:
-    """Is the device in a mode in which it serves robots?"""
+    """Return whether the device is in a mode in which it serves robots."""
     shown = device.condition if isinstance(device, ObservedCharger) else device.mode  # type: ignore[attr-defined]
     return shown.value not in NO_SERVICE
 
 
 def _cycled(device: AnyDevice) -> bool:
-    """Has a door just opened, a lift's door opened at a floor, or a charge begun?"""
+    """Return whether a door has opened, a lift's door has opened, or a charge has begun."""
     match device:
         case ObservedDoor():
             return "mode" in device.changed and device.mode.value == OPEN
@@ -180,7 +184,8 @@ def _cycled(device: AnyDevice) -> bool:
 
 
 def _watts(device: AnyDevice) -> float:
-    """Return the power (W) that a charger's daemon reports on /diagnostics; 0 if it reports none."""
+    """Return the power (W) that the charger's daemon reports on /diagnostics. Return 0 without such a
+    report."""
     if not isinstance(device, ObservedCharger) or device.condition.value != CHARGING:
         return 0.0
     for said in device.diagnoses.values():

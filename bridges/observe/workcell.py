@@ -1,5 +1,4 @@
-"""Observation of a dispenser or ingestor: the requests for it, its queue, and the ways in which RMF
-ends a request."""
+"""Observation of a dispenser or ingestor: the requests, the queue, and the end of each request."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -11,13 +10,16 @@ from bridges.observe.news import News
 from bridges.observe.requesters import Fact, Moment
 
 SHOWN: Final = 10
-"""The greatest number of a queue's guids that are remembered for people."""
+"""The maximum number of a queue's guids that are kept for display."""
 
 
 class ObservedWorkcell(ObservedDevice[d.DispenserState]):
-    """A dispenser or ingestor as observed. `mode`: RMF's word. `queue`: the listed guids. `results`:
-    RMF's word for the last result of each guid. A requester is known by the guid of its request. An
-    ingestor's messages have the same fields."""
+    """A dispenser or ingestor as observed. A requester's name is the guid of its request.
+
+    `mode`: RMF's word for the mode. `queue`: the guids that the state lists. `results`: RMF's word for
+    the last result of each guid. The messages of an ingestor have the same fields as those of a
+    dispenser.
+    """
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
@@ -26,7 +28,7 @@ class ObservedWorkcell(ObservedDevice[d.DispenserState]):
         self.results: dict[str, str] = {}
 
     def facts(self, state: d.DispenserState) -> dict[str, str]:
-        """Return mode and queue."""
+        """Return the mode and the queue that the state shows."""
         guids = [self.text(guid) for guid in state.request_guid_queue[:SHOWN]]
         return {"mode": words.plain(d.WorkcellMode, state.mode), "queue": ", ".join(guids)}
 
@@ -36,7 +38,7 @@ class ObservedWorkcell(ObservedDevice[d.DispenserState]):
         return guid in map(self.text, queue)
 
     def waits(self, now: Moment) -> Iterator[Wait]:
-        """Yield each request that a fleet adapter still repeats."""
+        """Yield a `Wait` for each request that a fleet adapter still repeats."""
         for one in self.requesters:
             if one.asks(now):
                 yield Wait(one.who, one.wants, one.since)
