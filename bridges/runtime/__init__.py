@@ -1,1 +1,1 @@
-"""The daemon that serves one YAML: its loops, and the devices and subjects on these loops."""
+"""The daemon that serves one YAML. It has loops, and devices or subjects on these loops."""

@@ -1,10 +1,11 @@
-"""`outputs-off --all-records`: switches off all outputs that the services' records name, before daemons
-start.
+"""`outputs-off --all-records` switches off all outputs that the services' records name.
 
-The command runs at boot, after a power cut. One process loads the program and then forks a child for
-each service. So a wire that hangs delays no other service, and each record uses its own profiles. This
-machine's pins come first, because they depend on no other device. The command's time is bounded,
-because every daemon waits for the command. A daemon that starts switches off the outputs that remain.
+The command runs at boot, after a power cut and before the daemons start. One process loads the program,
+and then forks a child for each service. So a wire that hangs delays no other service, and each record
+uses its own profiles.
+
+This machine's pins come first, because they depend on no other device. The command has a time limit,
+because every daemon waits for its end. A daemon that starts switches off the outputs that remain.
 """
 
 import argparse
@@ -26,12 +27,12 @@ from bridges.yaml.problems import SettingsError
 from drivers.profiles import texts
 
 OWN_S, OTHERS_S = 4.0, 2.0
-"""The time limits (s), first for this machine's own pins, then for all other outputs. Every daemon
-waits during these times."""
+"""The time limits (s) for this machine's own pins and for all other outputs. Every daemon waits during
+these times."""
 LOOK_EVERY_S = 0.01
 OWN_PINS = re.compile(rb"\btype: *[\"']?gpio\b")
-"""A pattern that finds a YAML whose outputs are this machine's pins. The pattern decides only the
-order."""
+"""A pattern that finds a YAML whose outputs are this machine's pins. Only the order depends on the
+pattern."""
 
 
 def switch_off_all(
@@ -43,8 +44,8 @@ def switch_off_all(
     for path in sorted(state.glob(f"*/{PATTERN}")):
         if record := read(path):
             file = Path(record.file)
-            with suppress(SettingsError):  # the child that uses the record logs the error
-                record.config()  # each child inherits the modules imported here
+            with suppress(SettingsError):  # the service's child logs the error
+                record.config()  # imports the modules once, for all children
             (own if OWN_PINS.search(record.yaml) else others).append(file)
     texts.give({})
     left = _off(own, own_s) | _off(set(others) - set(own), others_s)
@@ -54,8 +55,8 @@ def switch_off_all(
 
 
 def _off(files: Collection[Path], within_s: float) -> set[Path]:
-    """Switch these services' outputs off in parallel. Return the files whose outputs are not verified
-    off."""
+    """Switch these services' outputs off in parallel. Return the files with outputs that are not
+    verified off."""
     give_up_at = time.monotonic() + within_s
     running = {_forked(file): file for file in dict.fromkeys(files)}
     left = set(running.values())
@@ -72,8 +73,8 @@ def _off(files: Collection[Path], within_s: float) -> set[Path]:
 
 
 def _forked(file: Path) -> int:
-    """Switch a service's outputs off in a child process, which exits with 0 on success. Return the
-    child's pid."""
+    """Start a child process that switches off a service's outputs, and return the child's pid. The
+    child exits with 0 on success."""
     if pid := os.fork():
         return pid
     code = 1

@@ -1,5 +1,5 @@
-"""Refused requests that wait for an answer. Their number is bounded, so a flood of requests causes no
-flood of answers."""
+"""Refused requests that wait for an answer. At most MOST requests wait, so a flood of requests causes
+no flood of answers."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -11,12 +11,12 @@ from bridges.runtime.clock import TELL_GAP_S
 from bridges.runtime.subject import Publish
 
 MOST: Final = 10
-"""The greatest number of requests that are answered every TELL_GAP_S. The latest requests are
+"""The maximum number of requests that are answered every TELL_GAP_S. In a flood the latest requests are
 answered."""
 
 
 class RefusalAnswers:
-    """The refusals of one device or node. `last`: the last answer, for the status file."""
+    """The refused requests of one device or node. `last`: the last answer, for the status file."""
 
     def __init__(self) -> None:
         self.last: Mapping[str, str] = {}
@@ -24,12 +24,13 @@ class RefusalAnswers:
         self._said_at = AGES_AGO
 
     def add(self, request: object, reason: str) -> None:
-        """Note a refused request (its message or event) and the reason. Any thread may call this."""
+        """Note a refused request and the reason. `request`: the request's message or event. Any thread
+        may call this method."""
         self._waiting.append((request, reason))
 
     @property
     def due_at(self) -> float:
-        """The time of the next answers (monotonic s); NEVER if no request waits."""
+        """The time of the next answers (monotonic s), or NEVER if no request waits."""
         return self._said_at + TELL_GAP_S if self._waiting else NEVER
 
     def say(
@@ -46,5 +47,5 @@ class RefusalAnswers:
                 say(found.topic, found.message)
 
     def status(self) -> Mapping[str, Mapping[str, str]]:
-        """Return the last refusal for the status file; empty before the first answer."""
+        """Return the last answer for the status file. Return nothing before the first answer."""
         return {"last_refusal": self.last} if self.last else {}

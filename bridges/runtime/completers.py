@@ -1,4 +1,4 @@
-"""The completion of device names and service names in a shell."""
+"""Functions that complete device names and service names in a shell."""
 
 import argparse
 from collections.abc import Callable
@@ -6,7 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 
 Completer = Callable[..., list[str]]
-"""A function that argcomplete calls with the prefix and the arguments typed so far."""
+"""A function that argcomplete calls with the typed prefix and the typed arguments."""
 
 
 def completed_by(argument: argparse.Action, completer: Completer) -> None:
@@ -15,7 +15,7 @@ def completed_by(argument: argparse.Action, completer: Completer) -> None:
 
 
 def device_names(prefix: str, parsed_args: argparse.Namespace, **_: object) -> list[str]:
-    """Return the names of the devices in FILE; an empty list if FILE is not a valid device YAML."""
+    """Return the names of the devices in FILE. Return no names if FILE is not a valid device YAML."""
     from bridges.settings.load import SettingsError, load
 
     with suppress(SettingsError, OSError, TypeError):
@@ -24,7 +24,8 @@ def device_names(prefix: str, parsed_args: argparse.Namespace, **_: object) -> l
 
 
 def service_names(prefix: str, parsed_args: argparse.Namespace, **_: object) -> list[str]:
-    """Return the services with a YAML in /etc/rmf-bridges, and the files that begin with `prefix`."""
+    """Return the services with a YAML in /etc/rmf-bridges. Also return the files that begin with
+    `prefix`."""
     from argcomplete.completers import FilesCompleter
 
     from bridges.runtime.services import CONFIG

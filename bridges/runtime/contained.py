@@ -1,8 +1,10 @@
 """Contains a driver's unexpected exceptions, so that they affect no other device.
 
 After such an exception the device's outputs are switched off, and the traceback is logged once. After a
-pause the device is opened again; the pause grows from 0.5 to 30 s. If the outputs are not verified off
-within OFF_WITHIN_S, the daemon ends. Then `outputs-off` tries to switch them off from a new process.
+pause the device is opened again. The pause grows from 0.5 s to 30 s.
+
+If the outputs are not verified off within OFF_WITHIN_S, the daemon ends. Then `outputs-off` tries to
+switch the outputs off from a new process.
 """
 
 import logging
@@ -25,18 +27,19 @@ T = TypeVar("T")
 
 
 class LeftOn(Exception):
-    """A device whose driver has a defect could not be switched off. This error ends the daemon."""
+    """The error that ends the daemon. A device could not be switched off after a defect of its
+    driver."""
 
 
 class Contained(Generic[X, O]):
-    """A device (`drivers.Driver`) that raises only DriverError and LeftOn, whatever its driver
-    raises."""
+    """A device whose driver (`drivers.Driver`) may raise any exception. This class raises only
+    DriverError and LeftOn."""
 
     def __init__(self, name: str, driver: Driver[X, O], clock: Clock) -> None:
         self._name = name
         self._driver = driver
         self.contacts: Callable[[], Mapping[str, bool]] = dict
-        """The driver's `OnContacts.contacts`; empty for a driver without contacts."""
+        """The driver's `OnContacts.contacts`. A driver without contacts has no entries."""
         if isinstance(driver, OnContacts):
             self.contacts = driver.contacts
         self._clock = clock
@@ -52,11 +55,12 @@ class Contained(Generic[X, O]):
         self._call(self._driver.open)
 
     def read(self) -> X:
-        """Read every input. After a defect of the driver, claim the device before reading."""
+        """Read every input. After a defect of the driver, first claim the device again."""
         return self._call(self._read)
 
     def write(self, outputs: O) -> None:
-        """Set every output to its level. A success ends the pause after a defect."""
+        """Set every output to its level. After a success, the next defect again begins with the
+        shortest pause."""
         self._call(lambda: self._write(outputs))
         self._pause_s = 0.0
 
@@ -102,8 +106,8 @@ class Contained(Generic[X, O]):
         raise failure
 
     def _broke(self, error: Exception) -> DriverError:
-        """Return a driver's defect as a DriverError. Log a defect only if it is the first since the
-        device last worked."""
+        """Return a driver's defect as a DriverError. Log only the first defect since the device last
+        worked."""
         self._failure = f"a defect of the driver: {type(error).__name__}: {error}"
         if not self._pause_s:
             log.error(pairs("defect", device=self._name, reason=self._failure), exc_info=error)
@@ -118,8 +122,8 @@ class Contained(Generic[X, O]):
             self._unsafe_since = now
 
     def _insist_on_off(self) -> None:
-        """Switch off the outputs that may be on. Raises DriverError if switching off fails, and LeftOn
-        if it still fails after OFF_WITHIN_S."""
+        """Switch off the outputs that may be on. Raises DriverError if this fails. Raises LeftOn if it
+        still fails after OFF_WITHIN_S."""
         if self._unsafe_since is None:
             return
         since = self._unsafe_since

@@ -1,8 +1,8 @@
 """The daemon that serves one YAML. It opens the transport, starts the loops and feeds systemd's
 watchdog.
 
-On SIGTERM, or on any other signal that would end a process, the daemon switches every output off and
-leaves RMF's graph.
+On SIGTERM, the daemon switches every output off and leaves RMF's graph. It does the same on any other
+signal that would end a process.
 """
 
 import logging
@@ -43,13 +43,12 @@ STOP_WITHIN_S = 5.0
 STATUS_EVERY_S = 1.0
 ALIVE = "WATCHDOG=1"
 STARTING = "WATCHDOG=1\nEXTEND_TIMEOUT_USEC=30000000"
-"""A message to systemd that asks for 30 more seconds, because a start with many silent devices takes
+"""A message that asks systemd for 30 more seconds, because a start with many silent devices takes
 long."""
 
 
 class Daemon:
-    """One `rmf-bridge run`. `simulated`: status and diagnostics tell the reader that no hardware
-    moves."""
+    """One run of `rmf-bridge run`. `simulated`: status and diagnostics say that no hardware moves."""
 
     def __init__(
         self,
@@ -64,8 +63,8 @@ class Daemon:
         outputs_off: Sequence[str] = (),
         rmf: Any = None,
     ) -> None:
-        """Prepare the daemon. `outputs_off`: the command that switches the outputs off after the death
-        of this process. `rmf`: the stand-in of RMF's fleet adapter.
+        """Prepare the daemon. `outputs_off`: the command that switches the outputs off after this
+        process has died. `rmf`: an object that stands in for RMF's fleet adapter.
 
         Raises TransportError or HalError if a transport or bus cannot be opened.
         """
@@ -84,7 +83,7 @@ class Daemon:
         self._transport = open_transport(
             config.rmf, node_name, localhost=localhost, ros_args=ros_args
         )
-        # An older memory of devices would be worse than none, so it has no second place.
+        # An old memory of devices would be worse than none. So a memory of devices has no second place.
         instead = None if config.buses else runtime.path / KEPT
         path = runtime.path / KEPT if simulated else state_file(config.path)
         kept = MemoryFile(path, instead)
@@ -94,9 +93,9 @@ class Daemon:
             config, self._transport, open_bus, kept, unsafe, self._writer, new=simulated, rmf=rmf
         )
         self._loops = self._service.loops
-        # The record, which `outputs-off` reads, is written once every bus is open. If a bus cannot be
-        # opened, no record is written. It is written before `serve`, because `serve` claims the
-        # outputs.
+        # The record comes after the buses are open, because a daemon that cannot open a bus needs no
+        # record. The record comes before `serve`, because `serve` claims the outputs. `outputs-off`
+        # reads the record.
         if config.drives and not simulated:
             self._convenience("mark", partial(last_mark.leave, name=last_mark.CLAIMED))
             runtime.claim(ours)
@@ -109,7 +108,7 @@ class Daemon:
             self._diagnostics = self._transport.publisher(self._health_topic)
 
     def _writer_of(self, record: ClaimRecord) -> NoWriter:
-        """Return the writer of the ring recording; NOBODY if the YAML wants no recording."""
+        """Return the writer of the daemon's ring. Return NOBODY if the YAML wants no recording."""
         keep = self._config.recording
         if keep.keep == "nothing":
             return NOBODY
@@ -129,7 +128,8 @@ class Daemon:
         return RingWriter(make, clock_of(self._transport), lambda: self._transport.release)
 
     def serve(self) -> int:
-        """Run until a signal. Return the exit code, which is 0 only if every output is verified off."""
+        """Run until a signal comes. Return the exit code, which is 0 only if every output is verified
+        off."""
         signals.on_reset(self._obey)
         self._service.subscribe()
         log.info(pairs("serving", file=self._config.path, kind=self._config.kind, **self._about()))
@@ -145,7 +145,8 @@ class Daemon:
         return 0 if safe else 1
 
     def _obey(self) -> None:
-        """Obey a person: carry out the decision in the runtime directory. If there is none, reset."""
+        """Carry out a person's decision in the runtime directory. If no decision is there, reset the
+        faults."""
         decided = order.take(self._runtime.path, self._config.path)
         if decided is None:
             self._service.reset()
@@ -154,7 +155,7 @@ class Daemon:
             self._service.decided(decided.verdict, decided.device)
 
     def _watch(self) -> None:
-        """Tell systemd when the daemon is ready. Feed systemd's watchdog as long as every loop makes
+        """Tell systemd when the daemon is ready. Feed systemd's watchdog while every loop makes
         progress."""
         period_s = min(STATUS_EVERY_S, (watchdog_s() or 10.0) / 6)
         told_ready, tell_at = False, 0.0
@@ -179,7 +180,7 @@ class Daemon:
                 self._convenience("status", self._tell)
 
     def _require_life(self) -> None:
-        """Raise SystemExit if the transport or a loop has died, so that systemd restarts the daemon."""
+        """Raise SystemExit if the transport or a loop has died. Then systemd restarts the daemon."""
         if not self._transport.lives:
             log.critical(pairs("died", transport=self._transport.name))
             self._writer.died(f"transport {self._transport.name}")
@@ -206,11 +207,11 @@ class Daemon:
         return safe
 
     def _left(self) -> list[str]:
-        """Return the names of dead daemons' records whose outputs are not verified off."""
+        """Return the names of dead daemons' records that have outputs which are not verified off."""
         return self._predecessor.left() if self._predecessor else []
 
     def _convenience(self, what: str, do: Callable[[], None]) -> None:
-        """Call `do`. Log a failure once and continue; the next call of this method tries again."""
+        """Call `do`. Log a failure once and continue, because the caller will try again."""
         try:
             do()
         except Exception as error:  # noqa: BLE001 - logged by Once
@@ -223,17 +224,19 @@ class Daemon:
         return about | ({"SIMULATED": "no hardware moves"} if self._simulated else {})
 
     def _apart(self) -> list[dict[str, str]]:
-        """Return the faults that keep this node and other nodes from hearing each other."""
+        """Return the transport's faults, which keep this node and other nodes from hearing each
+        other."""
         return [{"code": code, "detail": detail} for code, detail in self._transport.faults()]
 
     def _slack(self) -> dict[str, float]:
-        """Return the least time that was left before systemd's watchdog since the last call (s)."""
+        """Return the least time (s) that was left before systemd's watchdog, since the last call of
+        this method."""
         unfed_s, self._longest_unfed_s = self._longest_unfed_s, 0.0
         allowed_s = watchdog_s()
         return {"watchdog_slack_s": round(allowed_s - unfed_s, 3)} if allowed_s else {}
 
     def _tell(self) -> None:
-        """Write the status file and publish diagnostics."""
+        """Write the status file, and publish diagnostics."""
         service = self._service.status()
         daemon = {
             "simulated": self._simulated,
@@ -258,10 +261,10 @@ class Daemon:
             found = diagnosis(self._transport.name, self._config.kind, daemon, devices, at)
             self._diagnostics.publish(found)
             self._told += 1
-            if self._told % max(1, len(devices)) == 0:  # each device makes the message longer
+            if self._told % max(1, len(devices)) == 0:  # recorded more seldom with more devices
                 self._writer.spoken(self._health_topic.name, found, sent=True)
         except (
             TransportError,
             ClockError,
-        ) as error:  # only debug: the outlet already logs unpublished states as errors
+        ) as error:  # only debug, because the outlet logs unpublished states as errors
             log.debug(pairs("not_published", topic=DIAGNOSTICS.name, reason=error))

@@ -1,5 +1,5 @@
-"""The daemons on this machine, found by their folders and their systemd units, with their status
-files."""
+"""The daemons on this machine, with their status files. They are found by their folders and their
+systemd units."""
 
 import json
 import shutil
@@ -20,12 +20,12 @@ from bridges.system.directories import SERVICE_RUN, SERVICE_STATE, Directories, 
 UNIT: Final = "rmf-bridge@"
 
 RUNS: Final = ("active (running)", "activating (start)", "deactivating (stop-sigterm)")
-"""The states in which systemd shows a unit whose process runs."""
+"""The states of a systemd unit whose process runs."""
 
 ASK_SYSTEMD_S: Final = 3.0
 
 WELL, FAULTY, DOWN, NONE = 0, 1, 2, 3
-"""The exit codes of monitoring plugins: OK, WARNING, CRITICAL, UNKNOWN."""
+"""The exit codes of a monitoring plugin: OK, WARNING, CRITICAL, UNKNOWN."""
 
 LEVEL_OF: Final = {
     "serving": WELL,
@@ -46,7 +46,7 @@ class FaultStatus(msgspec.Struct):
 
 
 class DeviceStatus(msgspec.Struct):
-    """The keys that every device's status has. Further keys depend on the kind."""
+    """The keys in every device's status. Each kind has further keys."""
 
     faults: list[FaultStatus] = []
     input_age_s: float | None = None
@@ -62,12 +62,17 @@ class StatusFile(msgspec.Struct):
 
 
 class DaemonStatus(msgspec.Struct, kw_only=True):
-    """One daemon, or a systemd unit whose daemon does not run.
+    """One daemon, or a systemd unit whose daemon does not run. `unit`: the unit's state in systemd.
 
-    `state`: `serving`; `old` if the daemon runs but its status is not fresh; `died` if it left a status
-    file behind; `left on` if it died and its outputs are not verified off; `failed` if systemd has
-    given up; `stopped`; `unknown` if this user may not see the daemon. `unit`: the unit's state in
-    systemd.
+    The values of `state`:
+
+    - `serving`: The daemon runs and writes its status.
+    - `old`: The daemon runs, but its status is not fresh.
+    - `died`: The daemon has died, because it left a status file behind.
+    - `left on`: The daemon has died, and its outputs are not verified off.
+    - `failed`: systemd does not start the daemon any more.
+    - `stopped`: The daemon does not run.
+    - `unknown`: This user may not see the daemon.
     """
 
     name: str
@@ -80,12 +85,12 @@ class DaemonStatus(msgspec.Struct, kw_only=True):
 
     @property
     def devices(self) -> Mapping[str, Status]:
-        """The devices' part of the status file."""
+        """The devices' statuses in the status file."""
         return cast(Mapping[str, Status], self.status.get("devices", {}))
 
     @property
     def level(self) -> int:
-        """The exit code of a monitoring plugin for this daemon."""
+        """The exit code that a monitoring plugin gives for this daemon."""
         level = LEVEL_OF[self.state]
         parts = (self.status, *self.devices.values())
         return max(level, FAULTY) if any(part.get("faults") for part in parts) else level
@@ -94,8 +99,8 @@ class DaemonStatus(msgspec.Struct, kw_only=True):
 def daemons(
     folders: Iterable[Path], found_units: Mapping[str, str], wall: float
 ) -> Iterator[DaemonStatus]:
-    """Yield the daemon of each runtime directory, then the systemd units without a directory. `wall`:
-    the present time."""
+    """Yield the daemon of each runtime directory, and then the systemd units without such a directory.
+    `wall`: the present time."""
     rest = dict(found_units)
     for folder in folders:
         service = folder.parent == SERVICE_RUN
@@ -129,7 +134,7 @@ def _daemon(folder: Path, by: str, unit: str, wall: float) -> DaemonStatus:
 
 
 def _unreleased(folder: Path) -> str:
-    """Return the remedy for outputs that a dead daemon may have left on; "" if it left no record."""
+    """Return a remedy if a dead daemon may have left outputs on. Return "" if it left no record."""
     state = SERVICE_STATE if folder.parent == SERVICE_RUN else state_base()
     for path in paths(Directories(folder, state / folder.name)):
         if record := read(path):
@@ -145,7 +150,8 @@ def _without_directory(unit: str) -> str:
 
 
 def _read(path: Path, wall: float) -> tuple[dict[str, Any], float | None]:
-    """Return the status and its age (s); an empty status and None if the file is missing or invalid."""
+    """Return the status and its age (s). Return an empty status and None if the file is missing or
+    invalid."""
     try:
         written_at = path.lstat().st_mtime
         text = files.read(path, holder.STATUS_MAX)
@@ -159,7 +165,8 @@ def _read(path: Path, wall: float) -> tuple[dict[str, Any], float | None]:
 
 
 def units() -> dict[str, str]:
-    """Return our units' states, such as `active (running)`, by instance; empty without systemd."""
+    """Return the states of our units, such as `active (running)`, by instance. Return nothing without
+    systemd."""
     if shutil.which("systemctl") is None:
         return {}
     ask = ("systemctl", "list-units", "--all", "--plain", "--output=json", f"{UNIT}*")

@@ -1,8 +1,8 @@
 """Switches off a dead daemon's outputs from a new process, for `rmf-bridge outputs-off`.
 
-The dead daemon wrote a record before it claimed outputs. The record takes precedence over the YAML,
-because somebody may have edited the YAML since. Switching off does not wait for a directory that is
-full, missing or read-only.
+The dead daemon wrote a record before it claimed outputs. The record counts and not the YAML, because
+somebody may have edited the YAML since. A directory that is full, missing or read-only does not delay
+the switching off.
 """
 
 import argparse
@@ -29,7 +29,8 @@ TIMEOUT_S = 5.0
 
 
 def switch_off(args: argparse.Namespace) -> int:
-    """Return 0 if every output is verified off, 1 if not, and 69 if the daemon lives or may live."""
+    """Return 0 if every output is verified off, and 1 if an output is not. Return 69 if the daemon may
+    be alive."""
     log.start()
     signals.ignore()
     file = args.file.absolute()
@@ -43,7 +44,7 @@ def switch_off(args: argparse.Namespace) -> int:
         return _off_by_yaml(file, {})
     answered = ages(places)
     records = Records(places, file)
-    if args.record:  # the calling daemon holds the lock (`runtime/predecessor.py`)
+    if args.record:  # the calling daemon has the lock (`runtime/predecessor.py`)
         return _off_by_records(records, answered, args.record)
     claimed = last_mark.says_claimed(os.environ) and bool(records.unreleased())
     try:
@@ -68,10 +69,10 @@ def switch_off(args: argparse.Namespace) -> int:
 
 
 def _places(file: Path, given: str | None) -> Directories | None:
-    """Return the daemon's directories. Return None if the directories are not trusted and systemd
-    reports that the daemon is dead.
+    """Return the daemon's directories. Return None if the directories cannot be trusted and systemd
+    reports the daemon's death.
 
-    Raises PermissionError if the directories may hide a running daemon.
+    Raises PermissionError if a running daemon may be in the directories.
     """
     try:
         places = runtime.find(file, given)
@@ -101,12 +102,10 @@ def _off_by_yaml(file: Path, answered: Mapping[str, float]) -> int:
 def _off_by_records(
     records: Records, answered: Mapping[str, float], names: list[str] | None = None
 ) -> int:
-    """Switch off the outputs of the records in `names`. By default switch off the outputs of all
-    records."""
+    """Switch off the outputs of the records in `names`. If `names` is None, switch off the outputs of
+    all records."""
     found = [r for r in records.unreleased() if names is None or r.name in names]
-    each_s = TIMEOUT_S / max(
-        1, len(found)
-    )  # a record with a dead bus must leave time for other records
+    each_s = TIMEOUT_S / max(1, len(found))  # a record with a dead bus leaves time for the others
     return _told(not [r for r in found if not _off_by_record(records, r, answered, each_s)])
 
 
@@ -116,7 +115,7 @@ def _off_by_record(
     try:
         config = record.config()
     except SettingsError as error:
-        _say(error)  # another version wrote the record: only the current YAML can be used
+        _say(error)  # another version wrote the record; only the YAML can help
         _off_by_yaml(Path(record.file), answered)
         return False
     unsafe = _unsafe(config, record.safe, answered, within_s)
@@ -145,8 +144,8 @@ class _StatusFile(msgspec.Struct):
 
 
 def ages(places: Directories) -> Mapping[str, float]:
-    """Return the age (s) of each device's last answer, from the dead daemon's last status. Devices that
-    never answered are left out. Without a status the result is empty."""
+    """Return the age (s) of each device's last answer, from the dead daemon's last status. Leave out
+    devices that never answered. Without a status, return nothing."""
     try:
         shown = msgspec.json.decode(read(places.runtime / STATUS, STATUS_MAX), type=_StatusFile)
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):

@@ -1,7 +1,7 @@
-"""One device in service. Its node scans the driver, and lets the device's subject decide.
+"""One device in service. A node scans the device's driver, and lets the device's subject decide.
 
-A scan is like a PLC's: read the inputs, decide, write every output, publish if a state is due. The loop
-of the device's bus calls `scan`. No function in this file waits or has a thread.
+A scan works as in a PLC: read the inputs, decide, write every output, and publish if a state is due.
+The loop of the device's bus calls `scan`. No function in this file waits or has a thread.
 """
 
 import logging
@@ -47,9 +47,13 @@ log = logging.getLogger(__name__)
 
 
 class Node(Generic[S, L, M, X, E, O, R]):
-    """The node that serves one device. `publish(topic, message)` sends to RMF and does not raise.
-    `not_sent(topic, error)` notes a state that cannot be sent. `tell_alarm(name, causes)` tells the
-    daemon's alarm which causes the device sees; None if this device tells the fleets nothing."""
+    """The node that serves one device.
+
+    - `publish(topic, message)` sends a message to RMF and raises nothing.
+    - `not_sent(topic, error)` notes a state that cannot be sent.
+    - `tell_alarm(name, causes)` gives the daemon's alarm the causes that the device sees. It is None if
+      the device raises no alarm.
+    """
 
     def __init__(
         self,
@@ -103,8 +107,8 @@ class Node(Generic[S, L, M, X, E, O, R]):
 
     @property
     def ready(self) -> bool:
-        """Return whether each input has been read or has timed out once, and the first state is
-        published."""
+        """Return whether the first state is published. Before that, each input was read or has timed
+        out once."""
         return self._pace.told_at > AGES_AGO
 
     @property
@@ -113,16 +117,16 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return self._has_read and not self._io_fault
 
     def refuse(self, message: Message, refusal: RequestRefused) -> None:
-        """Count a refused message, and answer it. Any thread may call this."""
+        """Count a refused message, and answer it. Any thread may call this method."""
         self._refusals.add(refusal.kind, refusal.detail, device=self.name)
         self._answers.add(message, str(refusal))
 
     def was_suspended(self, for_s: float) -> None:
-        """Note that nothing was scanned for `for_s` (s), so that earlier readings may be outdated."""
+        """Note that nothing was scanned for `for_s` (s), so that older readings no longer count."""
         self._decide(Suspended(f"nothing was read for {for_s:.1f} s"))
 
     def scan(self, events: Iterable[DeviceEvent[X, E]] = ()) -> None:
-        """Read, decide with each event, write, publish."""
+        """Read the inputs, decide on each event, write the outputs, and publish."""
         started = self._clock.monotonic()
         self._failing = False
         self._bus_words.clear()
@@ -141,7 +145,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._log()
 
     def make_safe(self) -> bool:
-        """Switch every output off. If the outputs are not verified off, log this and return False."""
+        """Switch every output off. If an output is not verified off, log this and return False."""
         try:
             self._driver.make_safe()
         except DriverError as error:
@@ -159,7 +163,8 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return self._refusals.counts()
 
     def status(self) -> Status:
-        """Return the part of the status file: state, outputs, faults, age of the inputs, contacts."""
+        """Return the device's part of the status file: state, outputs, faults, age of the inputs,
+        contacts."""
         decision = self.subject.decision
         if decision is None:
             return {}
@@ -181,15 +186,15 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return Sampled(sample)
 
     def _keep(self) -> None:
-        """Write the memory to disk. Outputs and messages that follow from the memory come after
-        that."""
+        """Write the memory to disk. Only then switch outputs and publish messages that follow from the
+        memory."""
         if self._keeper is not None:
             kept: Any = self._keeper.keep(self.subject.memory, self._clock.monotonic())
-            if kept is not None:  # an event of every kind with `keeping`
+            if kept is not None:  # every kind with `keeping` has this event
                 self._decide(kept)
 
     def _write(self) -> None:
-        """Write the levels of all outputs in each scan. Before the first reading write nothing."""
+        """Write the levels of all outputs. Write nothing before the first reading."""
         if not self._has_read or self.subject.decision is None:
             return
         try:
@@ -205,7 +210,8 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._logged_outputs = outputs if self._logged_outputs is None else self._logged_outputs
 
     def _alarm(self) -> None:
-        """Tell the daemon's alarm the causes that the device sees, at once and again each second."""
+        """Give the daemon's alarm the causes that the device sees. Do this each second, and at once
+        after a change."""
         if self._tell_alarm is None or self._kind.alarm_inputs is None:
             return
         assert self.subject.decision is not None
@@ -220,8 +226,8 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._counts.scanned(took_s, decision.outputs, failed=self._failing)
 
     def _tell(self) -> None:
-        """Publish the state if it is due, and then the results. A request alone does not make a state
-        due."""
+        """Publish the state and then the results, if the state is due. A request alone does not make
+        the state due."""
         subject, now = self.subject, self._clock.monotonic()
         assert subject.decision is not None
         report = subject.decision.report
@@ -235,7 +241,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self.wake_at = min(subject.wake_at, self._pace.due_at(news, at_once=bool(results)))
 
     def _answer(self) -> None:
-        """Publish the answers to refused requests. An answer gives the reason and names the device's
+        """Publish the answers to refused requests. An answer names the reason and the device's
         holder."""
         self._answers.say(self._clock.monotonic(), self._answered, self._publish)
         self.wake_at = min(self.wake_at, self._answers.due_at)
@@ -249,7 +255,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         try:
             stamp = self._clock.stamp(self._clock.monotonic())
         except ClockError:
-            return None  # _send has noted it
+            return None  # _send notes this error
         return found._replace(message=self._kind.stamped(found.message, stamp))
 
     def _send_results(self, results: Iterable[Said]) -> None:
@@ -258,7 +264,8 @@ class Node(Generic[S, L, M, X, E, O, R]):
             self._publish(topic, self._kind.stamped(message, stamp))
 
     def _send(self, report: R) -> bool:
-        """Publish the state. Return False if it was not sent, or if RMF has no message for it."""
+        """Publish the state. Return False if the state was not sent, or if RMF has no message for such
+        a state."""
         topic = self._kind.states
         if topic is None:
             return False
@@ -271,20 +278,20 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return self._publish(topic, state) is not False
 
     def _log(self) -> None:
-        """Log the changes. This is the last step of a scan, because writing a log line takes as long as
-        a scan."""
+        """Log the changes. This is the last step of a scan, because a log line takes as long as a whole
+        scan."""
         decision = self.subject.decision
         assert decision is not None
         if decision.outputs != self._logged_outputs:
             log.info(pairs("outputs", device=self.name, outputs=decision.outputs))
         self._logged_outputs = decision.outputs
         self.subject.log(decision.report)
-        if self._io_fault and not self._failing:  # both reading and writing succeed again
+        if self._io_fault and not self._failing:  # reading and writing succeed again
             log.info(pairs("device_back", device=self.name))
             self._io_fault = ""
 
     def _failed(self, error: DriverError) -> str:
-        """Note a failed scan, and log the loss of the device once. Return the error's text."""
+        """Note a failed scan, and return the error's text. Log the loss of the device once."""
         if not self._io_fault:
             log.error(pairs("device_lost", device=self.name, reason=error))
         self._failing = True
@@ -293,10 +300,10 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return self._io_fault
 
     def _identity(self, fault: Fault) -> object:
-        """Return the fault. If its detail is a bus's error text, which varies, return only the fault's
-        code."""
+        """Return a value that is equal in all reports of one fault. If the fault's detail is a bus's
+        error text, which varies, this value is the code alone."""
         return fault.code if fault.detail in ("", *self._bus_words) else fault
 
 
 AnyNode = Node[Any, Any, Any, Any, Any, Any, Any]
-"""A node whose kind was found by its name, so its types are unknown."""
+"""A node whose types are unknown here, because its kind was found by name."""

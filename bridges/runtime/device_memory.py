@@ -1,9 +1,9 @@
-"""The memories of a daemon's devices that must survive a restart. One file has an entry for each
-device.
+"""The memories of a daemon's devices that must survive a restart. All devices of a daemon share one
+file.
 
-A device's thread writes the device's entry before it switches an output or publishes a state that
-follows from the entry. If writing fails, the core learns the reason, and the thread tries again each
-second.
+A device's thread first writes the device's memory to the file. Only then does it switch an output or
+publish a state that follows from the memory. If writing fails, the thread gives the core the reason,
+and tries again each second.
 """
 
 import logging
@@ -26,13 +26,14 @@ NO_FILE: Final = "no memory on disk: this is the first start, or the memory was 
 
 
 class KeptDevices(keep.Kept, frozen=True, forbid_unknown_fields=True):
-    """The content of the file. `devices` maps a device to the JSON that its kind has made."""
+    """The content of the file. `devices`: the JSON text of each device's memory, in the form of its
+    kind."""
 
     devices: dict[str, msgspec.Raw]
 
 
 class Unkept:
-    """A store that forgets everything, for a test or for a kind that needs none."""
+    """A store that keeps nothing, for a test or for a kind without a memory on disk."""
 
     def read(self) -> bytes | None:
         """Return None."""
@@ -43,9 +44,9 @@ class Unkept:
 
 
 class DeviceMemories:
-    """The file of one daemon. `lost`: the reason why the file cannot be read; "" if it was read.
+    """The file of one daemon's devices. `lost`: the reason why the file cannot be read, or "".
 
-    `new`: a missing file means that nothing has ever happened. This is true only of a simulation.
+    `new`: nothing has ever happened if the file is missing. This is true only of a simulation.
     """
 
     def __init__(self, store: MemoryStore, *, new: bool = False) -> None:
@@ -65,12 +66,13 @@ class DeviceMemories:
         self.new = new and not self.lost
 
     def read(self, device: str) -> bytes | None:
-        """Return the device's bytes; None if there are none."""
+        """Return the bytes of this device's memory. Return None if the file has no entry for the
+        device."""
         return self._found.get(device)
 
     def write(self, device: str, kept: bytes) -> None:
-        """Replace the device's bytes; they are on disk when this returns. Any thread may call this.
-        Raises OSError."""
+        """Replace the bytes of this device's memory. On return the bytes are on disk. Any thread may
+        call this method. Raises OSError."""
         with self._lock:
             found = {**self._found, device: kept}
             content = KeptDevices(VERSION, {name: msgspec.Raw(raw) for name, raw in found.items()})
@@ -91,8 +93,8 @@ class DeviceKeeper(Generic[M]):
         self._failing = False
 
     def restore(self, initial: M, now: float) -> M:
-        """Return the device's memory from disk. A new simulation gets `initial`. If the past is lost,
-        return the kind's memory for that case, and log the reason."""
+        """Return the device's memory from disk, or `initial` for a new simulation. If the memory is
+        lost, log the reason and return the kind's memory for this case."""
         kept = self._memories.read(self._device)
         if kept is None and self._memories.new:
             return initial
@@ -106,7 +108,8 @@ class DeviceKeeper(Generic[M]):
         return self._keeping.lost(reason)
 
     def keep(self, memory: M, now: float) -> MemoryKept | MemoryNotKept | None:
-        """Write the memory if its kept part has changed. Return None if there was nothing to do."""
+        """Write the memory if the part that must survive has changed. Return None if nothing was
+        written."""
         part = self._keeping.part(memory)
         if now < self._again_at or (part == self._part and not self._failing):
             return None

@@ -1,9 +1,14 @@
 """A daemon's diagnostics for ROS's `/diagnostics`, made from its status file.
 
-There is one status for the daemon and one for each device (for a supervisor: for each lift or door).
-`name` is `<node>: <device>`, as ROS's aggregator expects. `hardware_id` is the device's name. `message`
-names the faults. The values come from the status file; the detail of a fault is under the fault's code.
-Faults go out here because LiftState, DoorState and ChargerState have no fields for them.
+The message has one status for the daemon and one for each device. For a supervisor, the devices are its
+lifts or doors.
+
+- `name` is `<node>: <device>`, as ROS's aggregator expects.
+- `hardware_id` is the device's name.
+- `message` names the faults.
+- `values` come from the status file. The detail of a fault has the fault's code as its key.
+
+LiftState, DoorState and ChargerState have no fields for faults, so diagnostics carry the faults.
 
     OK      the input is read, and there is no fault
     WARN    the daemon is a simulation, or still only listens in its quiet start
@@ -30,16 +35,18 @@ from bridges.runtime.subject import Status
 from bridges.system.log import plain
 
 MOST: Final = 100
-"""The greatest number of devices in a message. The network may flood a supervisor with names."""
+"""The maximum number of devices in a message. Somebody on the network may send a supervisor many
+names."""
 CONTACTS: Final = "contacts"
-"""A key that stays in the status file and is not sent, because contacts would be most of the traffic on
-the graph."""
+"""The key of the contacts in the status file. Contacts are not sent, because they would be most of the
+traffic on the graph."""
 
 
 def diagnosis(
     node: str, kind: str, daemon: Status, devices: Mapping[str, Status], at: Time
 ) -> DiagnosticArray:
-    """Return the message. `daemon` and `devices` (by name): as in the status file. `at`: now."""
+    """Return the message. `daemon` and `devices`: the parts of the status file. `at`: the present
+    time."""
     statuses = [_daemon(node, kind, daemon)]
     statuses += [_device(node, kind, *named) for named in islice(devices.items(), MOST)]
     return DiagnosticArray(Header(at), tuple(statuses))
@@ -73,8 +80,8 @@ def _values(status: Status) -> tuple[KeyValue, ...]:
 
 
 def _pairs(status: Status) -> Iterator[tuple[str, str]]:
-    """Yield the status as pairs of key and value. Each fault gives a pair of code and detail, and each
-    entry of a table gives a pair."""
+    """Yield the status as pairs of key and value. A fault gives its code and detail, and each entry of
+    a table gives one pair."""
     for key, value in status.items():
         if key in (CONTACTS, COUNTS):
             continue

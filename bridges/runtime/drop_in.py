@@ -1,9 +1,9 @@
-"""A service's drop-in. All services share one systemd unit, and the drop-in adds the settings for one
-service's YAML.
+"""The drop-in of a service. All services share one systemd unit, and a drop-in adds the settings for
+one service's YAML.
 
-`rmf-bridge enable` writes the drop-in. The unit alone permits access to no device. `run` refuses to
-start if the drop-in was written for other needs than the YAML's: a daemon that may not open its relay
-could only report this each second.
+`rmf-bridge enable` writes the drop-in. Without a drop-in the unit permits access to no device. If the
+drop-in does not fit the needs of the YAML, `run` refuses to start. Otherwise the daemon could not open
+its relay, and could only report this each second.
 """
 
 import hashlib
@@ -18,7 +18,7 @@ from bridges.transports.zenoh.config import mode
 from drivers.hal import Needs
 
 FITS: Final = "RMF_BRIDGE_FITS"
-"""The environment variable in which the drop-in gives the result of `fits`. The unit itself sets it to
+"""The environment variable in which the drop-in gives the result of `fits`. The unit itself gives
 `nothing`."""
 ROUND_S: Final = 1.25
 LEAST_S: Final = 3.0
@@ -27,8 +27,8 @@ LOCAL: Final = ("localhost", "multicast")
 
 
 def text(config: Config, groups: Collection[str]) -> str:
-    """Return the drop-in's text. `groups`: the machine's groups. The text names no other group, because
-    a unit with an unknown group does not start."""
+    """Return the drop-in's text. `groups`: the groups that this machine has. The text names only these
+    groups, because a unit with an unknown group does not start."""
     head = (
         f"# Written by `rmf-bridge enable` for {config.path.name}. After a change enable it again."
     )
@@ -37,34 +37,36 @@ def text(config: Config, groups: Collection[str]) -> str:
 
 
 def fits(config: Config) -> str:
-    """Return a hash of this file's needs. Equal needs have equal hashes."""
+    """Return a hash of the file's needs. Files with equal needs have equal hashes."""
     needs = "\n".join([*_unit(config), *_service(config, GROUPS)])
     return hashlib.sha256(needs.encode()).hexdigest()[:16]
 
 
 def misfit(config: Config, environ: Mapping[str, str]) -> str:
-    """Return the error if our unit has no drop-in for this file's needs; "" if the drop-in fits."""
+    """Return the error if no drop-in of our unit fits this file's needs. Return "" if the drop-in
+    fits."""
     met = environ.get(FITS, "")
-    if met in ("", fits(config)):  # "": no unit of ours started this process
+    if met in ("", fits(config)):  # "": our unit did not start this process
         return ""
     why = "has no drop-in" if met == "nothing" else "has a drop-in for other buses or durations"
     return f"{config.path}: the unit {why}: run `sudo rmf-bridge enable {config.path}`"
 
 
 def watchdog_s(config: Config) -> float:
-    """Return the longest time (s) for which a daemon that hangs keeps its relays on.
+    """Return systemd's watchdog time (s). A daemon that hangs keeps its relays on for at most this
+    time.
 
-    A loop finishes a step each second, when its states are due, or one bus call later. A bus call may
-    take at most half of this time. For a daemon without outputs the time is longer, because a slow disk
-    may delay a step.
+    A loop finishes a step at least each second, when its states are due. One bus call may delay the
+    step by at most half of the watchdog time. A daemon without outputs gets a longer time, because a
+    slow disk may delay a step.
     """
     slowest = max((getattr(bus, "timeout_s", 0.0) for bus in config.buses.values()), default=0.0)
     return max(LEAST_S, 1.75 * slowest + ROUND_S) if config.buses else WITHOUT_OUTPUTS_S
 
 
 def _unit(config: Config) -> list[str]:
-    """Return the lines that load kernel modules before the unit starts. DeviceAllow permits a device
-    class only after its module is loaded."""
+    """Return the lines that load kernel modules before the unit starts. DeviceAllow works for a class
+    of devices only after the class's module is loaded."""
     units = " ".join(
         f"modprobe@{name}.service" for name in _each(n.modules for n in _needs(config))
     )
@@ -91,7 +93,7 @@ def _needs(config: Config) -> list[Needs]:
 
 
 def _each(found: Iterable[Iterable[str]]) -> list[str]:
-    """Return each word once, without empty words."""
+    """Return each word once. Leave out empty words."""
     return list(dict.fromkeys(word for words in found for word in words if word))
 
 
@@ -99,14 +101,14 @@ def _hosts(rmf: Rmf, needs: Iterable[Needs]) -> list[str] | None:
     """Return the addresses that the daemon talks to. Return None if an address is unknown before the
     daemon runs.
 
-    Unknown are the nodes of a DDS site, the peers of a zenoh peer, and the addresses of host names.
+    The addresses of a DDS site's nodes, of a zenoh peer's peers, and of host names are unknown.
     """
     hosts = [*_graph_hosts(rmf), *_each([n.host] for n in needs)]
     return None if not all(map(_is_address, hosts)) else _each([LOCAL, hosts])
 
 
 def _graph_hosts(rmf: Rmf) -> list[str]:
-    """Return the hosts of the other nodes. A host name or "*" means any address."""
+    """Return the hosts of the other nodes. Return a host name or "*" if a host may have any address."""
     if rmf.network == "localhost":
         return []
     zenoh = rmf.zenoh or Zenoh()

@@ -27,21 +27,21 @@ cause and what to do. `rmf-bridge status` prints the same for the present faults
 
 
 class Remedy(msgspec.Struct, frozen=True):
-    """The likely cause of a fault, and what to do."""
+    """The likely cause of a fault, and the remedy."""
 
     cause: str
     do: str
 
 
 def remedies() -> dict[str, Remedy]:
-    """Return the remedy for each fault code."""
+    """Return the remedy of each fault, by the fault's code."""
     text = Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
     return msgspec.convert(yaml.safe_load(text), dict[str, Remedy])
 
 
 def values(file: str, device: str) -> dict[str, str]:
-    """Return the values of a device's settings, by key, from the daemon's YAML. Return an empty table
-    if the YAML is invalid."""
+    """Return the values of a device's settings, by key, from the daemon's YAML. Return nothing for an
+    invalid YAML."""
     from bridges.settings.load import SettingsError, load
 
     try:
@@ -58,8 +58,8 @@ def values(file: str, device: str) -> dict[str, str]:
 
 
 def here(remedy: Remedy, file: str, device: str, known: Mapping[str, str]) -> Remedy:
-    """Return the remedy with the words FILE and NAME and the names of settings replaced by this
-    device's own file, name and values."""
+    """Return the remedy for this device. In the text, the device's own file, name and values replace
+    FILE, NAME and the names of settings."""
     names = {"FILE": shlex.quote(file)} if file else {}
     names |= (
         dict.fromkeys(("NAME", "LIFT", "DOOR", "CHARGER"), shlex.quote(device)) if device else {}
@@ -74,7 +74,7 @@ def here(remedy: Remedy, file: str, device: str, known: Mapping[str, str]) -> Re
 
 @cache
 def for_explain() -> dict[str, tuple[str, str]]:
-    """Return the cause and the remedy for each fault code, for `workbench/explain/`."""
+    """Return the cause and the remedy of each fault, by the fault's code, for `workbench/explain/`."""
     return {code: (one.cause, one.do) for code, one in remedies().items()}
 
 

@@ -1,7 +1,7 @@
-"""Serves the alarm that the devices of one daemon raise for the fleets, in a thread of its own.
+"""Serves the alarm that a daemon's devices raise for the fleets. The alarm has its own thread.
 
-The devices' threads put their causes into this node's inbox, so a slow disk delays no scan. The memory
-is written to disk before a message is published (`keeper.py`).
+The devices' threads put their causes into this node's inbox. So a slow disk delays no scan. The memory
+is on disk before a message is published (`keeper.py`).
 """
 
 import logging
@@ -38,15 +38,15 @@ from bridges.transports.transport import Transport, any_type
 log = logging.getLogger(__name__)
 
 QUIET_S: Final = 3.0
-"""The silence (s) after which another node of ours is dead. Each node states its alarm each second, so
-three statements are missing."""
+"""The silence (s) after which another node of ours counts as dead. A node states its alarm each second,
+so three statements are missing."""
 ALARM: Final = "alarm"
-"""The name of the only subject."""
+"""The name of the only subject, which is the alarm."""
 
 
 class MessagesOnly(NoWriter):
-    """A writer that records only the published alarms. The daemon's kind has other values than an
-    alarm's decisions."""
+    """A writer that records only messages, and no decisions. An alarm's decisions have values that a
+    recording of the daemon's kind cannot hold."""
 
     def __init__(self, writer: NoWriter) -> None:
         self._writer = writer
@@ -91,8 +91,10 @@ AlarmKind = GraphKind[
 class FleetAlarmNode(
     GraphNode[GraphSettings, FleetAlarmLimits, FleetAlarmMemory, FleetAlarmEvent, FleetAlarmReport]
 ):
-    """The alarm of one daemon. `tells_nobody`: publish nothing under a release of RMF whose alarm
-    cannot name fleets."""
+    """The alarm of one daemon.
+
+    `tells_nobody`: publish nothing if RMF's release has no alarm that names fleets.
+    """
 
     def __init__(
         self,
@@ -118,17 +120,19 @@ class FleetAlarmNode(
             self._add(ALARM, fleet_alarm.initial())
 
     def tell(self, device: str, inputs: AlarmInputs) -> None:
-        """Take the causes that a device sees now. Any thread may call this."""
+        """Take the causes that a device sees now. Any thread may call this method."""
         self.inbox.put(ALARM, (self._limits.topic, DeviceTells(device, inputs)), device)
 
     def subscribe(self) -> None:
-        """Subscribe to other nodes' statements, and to their alarms on each topic of the release."""
+        """Subscribe to other nodes' statements, and to their alarms on each topic that RMF's release
+        has."""
         hear = any_type(self._on_statement)
         self._transport.subscribe(self._named(DIAGNOSTICS), hear, others_only=True)
         self.look()
 
     def look(self) -> None:
-        """Subscribe to a topic that RMF's release has only now. The daemon calls this each second."""
+        """Subscribe to topics that RMF's release has, but the release before did not have. The daemon
+        calls this method each second."""
         self._name_senders()
         for topic in alarming.TOPICS.values():
             if topic.name not in self._hears and self._transport.release.has(topic.type):
@@ -137,7 +141,8 @@ class FleetAlarmNode(
                 self._hears[topic.name] = self._transport.subscribe(name, hear, others_only=True)
 
     def round(self) -> None:
-        """Do a node's round. Withdraw a retained `false` when every node has heard it."""
+        """Do the round of a node. Later withdraw the retained `false` of an ended alarm, when every
+        node has heard it."""
         super().round()
         memory, now = self.subjects[ALARM].memory, self._clock.monotonic()
         if memory.told is not None:
@@ -155,10 +160,10 @@ class FleetAlarmNode(
         return min(super().wake_at, self._renew_at)
 
     def beside(self, status: Status) -> Status:
-        """Add the daemon's statement, faults and connections to its status. Any thread may call
-        this."""
+        """Return this status with the alarm's statement, faults and connections. Any thread may call
+        this method."""
         decision, own = self.subjects[ALARM].decision, self.status()
-        assert decision is not None  # a subject decides when it is made
+        assert decision is not None  # a new subject decides at once
         return {
             **status,
             ALARM: alarming.statement(decision.report, self._limits.fleets),
@@ -189,7 +194,7 @@ class FleetAlarmNode(
             sender = self._transport.sender()
             names = self._names(sender, topic.name) or [self._unknown(sender, topic.name)]
             event = alarming.heard(message, names)
-            if event.senders != {self._transport.name}:  # an earlier process of this daemon
+            if event.senders != {self._transport.name}:  # not of an earlier run
                 name = self._named(topic).name
                 self._writer.spoken(name, message, sent=False, sender=sender)
                 self.inbox.put(ALARM, (topic, event))
@@ -197,8 +202,8 @@ class FleetAlarmNode(
         return put
 
     def _names(self, sender: Sender | None, topic: str) -> list[str]:
-        """Return the nodes that may have sent a message. The result is empty until discovery names
-        them."""
+        """Return the nodes that may have sent a message. Return nothing until discovery knows these
+        nodes."""
         if sender is not None:
             node = sender.node or (sender.look() if sender.look else "")
             return [node] if node else []
@@ -206,7 +211,8 @@ class FleetAlarmNode(
         return hears.senders() if hears else []
 
     def _unknown(self, sender: Sender | None, topic: str) -> str:
-        """Return the provisional name of a sender. `look` asks for the real name each second."""
+        """Return a provisional name for a sender. `look` asks for the sender's real name each
+        second."""
         for name, (known, on) in self._unnamed.items():
             if known is sender and on == topic:
                 return name
@@ -240,7 +246,8 @@ def node_for(
     kept: MemoryStore | None,
     writer: NoWriter,
 ) -> FleetAlarmNode | None:
-    """Return the alarm node of a file; None if no device of the file tells the fleets."""
+    """Return the alarm node of a file. Return None if no device of the file raises an alarm for
+    fleets."""
     alarms = {n: one for n, one in devices.items() if isinstance(one, alarming.AlarmingSettings)}
     limits = alarming.alarm_limits(alarms)
     if limits is None:

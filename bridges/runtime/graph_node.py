@@ -1,9 +1,9 @@
-"""Serves a kind without hardware. The node keeps a core memory for each subject, and publishes on RMF's
+"""Serves a kind without hardware. The node keeps a memory for each subject, and publishes on RMF's
 graph.
 
 A round takes the messages that have arrived, wakes the subjects that are due, and publishes their
-messages. Tests call rounds in virtual time; the daemon calls them in a thread
-(`bridges/runtime/serving.py`).
+messages. The daemon calls rounds in a thread (`bridges/runtime/serving.py`). Tests call rounds in
+virtual time.
 """
 
 import logging
@@ -33,19 +33,17 @@ from bridges.transports.transport import Subscription, Transport
 log = logging.getLogger(__name__)
 
 MAX_SUBJECTS = 1000
-"""The greatest number of subjects. No site has more lifts or doors, so further names must be
-invented."""
+"""The maximum number of subjects. No site has more lifts or doors, so further names are invented."""
 MAX_UNSHOWN = 100
-"""The greatest number of lifts or doors that only requests name and that publish no state."""
+"""The maximum number of lifts or doors that publish no state. Only requests name such devices."""
 MAX_REQUESTERS = 10_000
-"""The greatest number of requesters. Requesters of lifts and doors in the YAML do not count. No site
-has as many robots. The number is bounded because a holder is never forgotten, so invented requesters
-would accumulate."""
+"""The maximum number of requesters, without those of lifts and doors in the YAML. No site has as many
+robots. Without a limit invented requesters would accumulate, because a holder is never forgotten."""
 DEFECT = "a defect"
 
 
 def _core(kind: GraphKind[S, L, M, E, R], limits: L) -> SubjectCore[M, GraphEvent[E], None, R]:
-    """Return the kind's core. Two faults are the same if their code and detail are equal, because the
+    """Return the kind's core. Faults with the same code and detail are the same fault, because the
     detail names the subject."""
 
     def itself(fault: Fault) -> Fault:
@@ -64,7 +62,7 @@ def _same(topic: Topic[Message]) -> Topic[Message]:
 
 
 class GraphNode(Generic[S, L, M, E, R]):
-    """The node that serves one GraphKind. `named(topic)`: the topic under its name in the site's
+    """The node that serves one GraphKind. `named(topic)` returns a topic under its name in the site's
     YAML."""
 
     def __init__(
@@ -118,24 +116,25 @@ class GraphNode(Generic[S, L, M, E, R]):
             )
 
     def reset(self) -> None:
-        """Clear latched faults at an operator's order. Any thread may call this."""
+        """Clear latched faults on an operator's order. Any thread may call this method."""
         self._reset = True
         self.inbox.wake()
 
     @property
     def finished(self) -> int:
-        """The number 0, always, because steps within a round are not counted."""
+        """The number of finished steps within a round. It is always 0, because nobody counts these
+        steps."""
         return 0
 
     @property
     def ready(self) -> bool:
-        """True, always. A node that must not publish is ready too, because another node does its
+        """Return True. A node that must not publish is also ready, because another node does its
         work."""
         return True
 
     @property
     def wake_at(self) -> float:
-        """The time of the next round if no message arrives (monotonic s)."""
+        """The time (monotonic s) of the next round if no message arrives before."""
         due = (subject.wake_at for subject in self.subjects.values())
         looks = [look.look_at for look in (self.presence, self.alone) if look]
         answers_at = self._answers.due_at if self.presence.may_speak else NEVER
@@ -161,7 +160,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._writer.flush()
 
     def end(self) -> bool:
-        """Return True, because there is no output to switch off."""
+        """Return True, because the node has no output to switch off."""
         return True
 
     @property
@@ -170,7 +169,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         return self._refusals.counts()
 
     def status(self) -> Status:
-        """Return the part of the status file: silence, rivals, refusals, faults, connections."""
+        """Return the node's part of the status file: silence, rivals, refusals, faults, connections."""
         return {
             "passive": not self.presence.may_speak,
             "other_publishers": self.presence.rivals,
@@ -185,12 +184,13 @@ class GraphNode(Generic[S, L, M, E, R]):
         return *self.presence.faults, *self._outlet.faults, *self._keeper.faults
 
     def devices(self) -> Mapping[str, Status]:
-        """Return each subject's status by name, for the status file. Any thread may call this."""
+        """Return each subject's status by name, for the status file. Any thread may call this
+        method."""
         return {subject.name: subject.status() for subject in list(self.subjects.values())}
 
     def _to_inbox(self, topic: Topic[Message]) -> Callable[[Message], None]:
-        """Return a callback for the transport's thread. The callback puts accepted messages into the
-        inbox."""
+        """Return a callback that puts accepted messages into the inbox. The transport's thread calls
+        it."""
 
         heard_on = self._named(topic).name
 
@@ -205,8 +205,8 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     @contextmanager
     def _counting(self, about: str, message: object = None) -> Iterator[None]:
-        """Count refusals, and also failures that a defect of ours causes. The memory of a core that
-        fails stays unchanged."""
+        """Count a refusal, or a failure from a defect of ours. After a failure the core's memory is
+        unchanged."""
         try:
             yield
         except RequestRefused as refusal:
@@ -219,7 +219,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._refusals.add(DEFECT, f"{type(error).__name__} about {about}")
 
     def _look_around(self) -> None:
-        """Declare our publishers if we may publish; else withdraw them."""
+        """Declare our publishers if we may publish. Otherwise withdraw the publishers."""
         for look in filter(None, (self.presence, self.alone)):
             look.look(self._clock.monotonic())
         may = self._may_speak()
@@ -241,14 +241,14 @@ class GraphNode(Generic[S, L, M, E, R]):
         return MaySpeak(presence.may_speak, self._must_at_once(), alone, presence.waits)
 
     def _must_at_once(self) -> bool:
-        """Return whether a subject is too urgent to wait for the end of the quiet start, and no rival
-        is present."""
+        """Return whether a subject is too urgent to wait for the end of the quiet start. Return False
+        if a rival is present."""
         if self.presence.may_speak or self.presence.rivals:
             return False
         return any(self._kind.urgent(subject.memory) for subject in self.subjects.values())
 
     def _heard_by(self) -> dict[str, int]:
-        """Return, by the topic's name, the number of subscriptions that receive each topic."""
+        """Return the number of subscriptions to each of our topics, by the topic's name."""
         names = {topic.name for topic in self._kind.publishes}
         return {name: n for name, n in self._outlet.heard_by().items() if name in names}
 
@@ -270,8 +270,8 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._decide(subject, event)
 
     def _subject(self, name: str, shows_itself: bool) -> Subject[M, GraphEvent[E], None, R]:
-        """Return the subject with this name, and make it if it is new. Raises RequestRefused if there
-        are too many names."""
+        """Return the subject with this name. Make a new subject for a new name. Raises RequestRefused
+        if too many names are known."""
         if name not in self.subjects and not self._has_room(name, shows_itself):
             raise RequestRefused("too many names", name)
         if shows_itself:
@@ -280,8 +280,8 @@ class GraphNode(Generic[S, L, M, E, R]):
         return found or self._add(name, self._kind.initial(name, self._started_at))
 
     def _has_room(self, name: str, shows_itself: bool) -> bool:
-        """Return whether there is room for this name. Invented names must not displace names that the
-        YAML lists or that publish states."""
+        """Return whether this name has a place. Invented names must not take the places of names in the
+        YAML, or of names that publish states."""
         if name in self._reserved:
             return True
         if shows_itself:
@@ -289,21 +289,21 @@ class GraphNode(Generic[S, L, M, E, R]):
         return len(self.subjects) - len(self._shown) < MAX_UNSHOWN
 
     def _require_room(self, subject: Subject[M, GraphEvent[E], None, R], who: str) -> None:
-        """Raise RequestRefused for a new requester if MAX_REQUESTERS are already remembered."""
+        """Raise RequestRefused for a new requester if MAX_REQUESTERS are already known."""
         full = who and self._requesters >= MAX_REQUESTERS and subject.name not in self._reserved
         if full and who not in self._kind.requesters(subject.memory):
             raise RequestRefused("too many requesters", f"{who} at {subject.name}")
 
     def _remembered(self, subject: Subject[M, GraphEvent[E], None, R]) -> int:
-        """Return the number of remembered requesters. For a subject in the YAML the number counts as 0,
-        because its core bounds the number."""
+        """Return the number of the subject's requesters. Return 0 for a subject in the YAML, because
+        the core limits that number."""
         if subject.name in self._reserved:
             return 0
         return len(self._kind.requesters(subject.memory))
 
     def _real(self, memories: Mapping[str, M]) -> Mapping[str, M]:
-        """Leave out names without a published state if they are a flood, so that the next start does
-        not restore the flood."""
+        """Return the memories to write. In a flood of names, leave out names without a published state.
+        Otherwise the next start would restore the flood."""
         if len(memories) - len(self._shown) < MAX_UNSHOWN:
             return memories
         real = self._shown | self._reserved
@@ -331,7 +331,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._decide(subject, event)
 
     def _will_say(self, topic: Topic[Message], message: Message) -> None:
-        """Keep the message back until the round has written the memories to disk."""
+        """Keep the message until the round has written the memories to disk."""
         self._unsaid.append((topic, message))
 
     def _say(self) -> None:
@@ -340,7 +340,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._publish(topic, message)
 
     def _publish(self, topic: Topic[Message], message: Message) -> None:
-        """Publish a message with the present time as its stamp."""
+        """Publish a message. Its stamp is the present time."""
         try:
             stamped = self._kind.stamped(message, stamp(self._clock.wall()))
         except ClockError as error:
@@ -350,4 +350,4 @@ class GraphNode(Generic[S, L, M, E, R]):
 
 
 AnyGraphNode = GraphNode[Any, Any, Any, Any, Any]
-"""A node whose kind was found by its name, so its types are unknown."""
+"""A node whose types are unknown here, because its kind was found by name."""

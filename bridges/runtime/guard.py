@@ -1,9 +1,12 @@
-"""The guard of a daemon started by hand. It switches off the outputs that a kill -9 leaves on.
+"""The guard of a daemon that a person started by hand. After a kill -9 the guard switches the outputs
+off.
 
-The guard is a shell, because it only waits. It has a session of its own, which neither Ctrl-C nor a
-closed terminal reaches. It reads a pipe whose other end only the daemon has open. A word from the pipe
-means that the outputs are off. If the pipe ends without a word, the daemon is dead. Under systemd,
-ExecStopPost takes the guard's place.
+The guard is a shell, because it only waits. It has its own session, which neither Ctrl-C nor a closed
+terminal reaches.
+
+The guard reads a pipe, and only the daemon has the other end open. A word from the pipe means that the
+outputs are off. If the pipe ends without a word, the daemon is dead. Under systemd, ExecStopPost does
+the guard's work.
 """
 
 import logging
@@ -33,20 +36,24 @@ while [ $pause -le 60 ]; do
     esac
 done
 """
-"""The shell's program. After exit code 1 (hardware does not answer) it repeats `outputs-off` for
-minutes with growing pauses, because nobody restarts this daemon. After EX_UNAVAILABLE it repeats
-`outputs-off` once: either the dead daemon's lock was not free yet, or another daemon serves now and
-switches the outputs off."""
+"""The shell's program.
+
+After exit code 1, hardware does not answer. The program then repeats `outputs-off` for minutes with
+growing pauses, because nobody restarts this daemon.
+
+After EX_UNAVAILABLE the program repeats `outputs-off` once. Either the dead daemon's lock was not free
+yet, or another daemon now serves and switches the outputs off.
+"""
 
 
 def command(file: Path, runtime_dir: str | None) -> list[str]:
-    """Return the command that switches off the outputs that this process may leave on."""
+    """Return the command that switches off the outputs of this process after its death."""
     given = ["--runtime-dir", os.path.abspath(runtime_dir)] if runtime_dir else []
     return [sys.executable, "-P", "-m", "bridges.cli", "outputs-off", str(file.absolute()), *given]
 
 
 class Guard:
-    """The guard, while it runs. `command`: the command that switches every output off."""
+    """The running guard. `command`: the command that switches every output off."""
 
     def __init__(self, command: Sequence[str]) -> None:
         self._shell: subprocess.Popen[bytes] | None = None
@@ -70,10 +77,11 @@ class Guard:
 
 
 UNIT = ("NOTIFY_SOCKET", "RUNTIME_DIRECTORY", "RMF_BRIDGE_SERVICE")
-"""Variables that only a unit sets. (INVOCATION_ID is left out, because a desktop's terminals have it
-too.)"""
+"""The variables that only a unit sets. INVOCATION_ID is not in the list, because a desktop's terminals
+have it too."""
 
 
 def needed(environ: Mapping[str, str] = os.environ) -> bool:
-    """Return whether this daemon needs a guard. It does if no unit runs `outputs-off` for it."""
+    """Return whether this daemon needs a guard. A daemon in a unit needs none, because the unit runs
+    `outputs-off`."""
     return not any(environ.get(name) for name in UNIT)

@@ -1,7 +1,7 @@
-"""The holder of a daemon's directory: the process that `holder.json` names, if that process lives.
+"""The holder of a daemon's directory. The holder is the living process that `holder.json` names.
 
-Looking for the holder takes no lock and hinders no process, but gives no right to the directory. Only
-the lock gives that right (`runtime_directory.py`).
+A process may look for the holder without a lock, and hinders no other process. But only the lock gives
+a right to the directory (`runtime_directory.py`).
 """
 
 import os
@@ -18,7 +18,7 @@ from bridges.system.files import read
 HOLDER: Final = "holder.json"
 STATUS: Final = "status.json"
 FRESH_S: Final = 5.0
-"""The age (s) up to which a status file is fresh. The file is written each second."""
+"""The maximum age (s) of a fresh status file. A daemon writes the file each second."""
 LONGEST: Final = 65536
 STATUS_MAX: Final = 4 << 20
 BOOT: Final = Path("/proc/sys/kernel/random/boot_id")
@@ -27,8 +27,8 @@ BOOT: Final = Path("/proc/sys/kernel/random/boot_id")
 class LockHolder(msgspec.Struct, frozen=True):
     """A process and the path of its YAML. `serves`: the process is a daemon that serves this YAML.
 
-    `boot`: the id of the boot in which `pid` is valid. `started`: the start of the process, in ticks
-    since boot, 0 if unknown. Both show whether the kernel has given `pid` to another process since.
+    `boot`: the id of the boot in which `pid` is valid. `started`: the start of the process in ticks
+    since boot, or 0 if unknown. `boot` and `started` show whether another process has the `pid` now.
     """
 
     pid: int
@@ -42,16 +42,17 @@ class LockHolder(msgspec.Struct, frozen=True):
 
     @property
     def lives(self) -> bool:
-        """Return whether the process is still alive. A process with another start time is another
-        process. If /proc hides the start time, because the process belongs to another user, it is
-        not compared."""
+        """Return whether the process is alive. A process with another start time is another process.
+
+        /proc may hide the start time from another user. In that case only `boot` and `pid` count.
+        """
         if self.boot != _boot() or not _is_there(self.pid):
             return False
         return _started(self.pid) in (self.started, 0)
 
 
 class _Shown(msgspec.Struct):
-    """The daemon's process in a status file."""
+    """The daemon's process according to a status file."""
 
     pid: int = 0
     file: str = ""
@@ -63,16 +64,18 @@ def ourselves(file: Path, *, serves: bool) -> LockHolder:
 
 
 def look(places: Directories) -> LockHolder | None:
-    """Return the living holder of these directories, or None if there is none. Raises PermissionError.
+    """Return the living holder of these directories. Return None without a holder. Raises
+    PermissionError.
 
-    The runtime directory comes first. On a read-only root the state directory names an old holder.
+    The runtime directory comes first, because on a read-only root the state directory names an old
+    holder.
     """
     found = (written(folder) for folder in reversed(places.folders))
     return next((one for one in found if one and one.lives), None) or shown(places)
 
 
 def written(folder: Path) -> LockHolder | None:
-    """Return the last holder that a directory names, living or not. Raises PermissionError."""
+    """Return the last holder that a directory names, alive or dead. Raises PermissionError."""
     try:
         with opened(folder):
             return msgspec.json.decode(read(folder / HOLDER, LONGEST), type=LockHolder)
@@ -85,8 +88,11 @@ def written(folder: Path) -> LockHolder | None:
 
 
 def shown(places: Directories) -> LockHolder | None:
-    """Return the living daemon that a fresh status file names, or None. This finds a daemon without a
-    `holder.json`: it could not write the file, or is of an older version."""
+    """Return the living daemon that a fresh status file names, or None.
+
+    This also finds a daemon without a `holder.json`. Such a daemon could not write that file, or has an
+    older version.
+    """
     path = places.runtime / STATUS
     with suppress(OSError, msgspec.MsgspecError, UnicodeDecodeError), opened(places.runtime):
         fresh = abs(time.time() - path.lstat().st_mtime) < FRESH_S
@@ -107,8 +113,8 @@ def _is_there(pid: int) -> bool:
 
 
 def _started(pid: int) -> int:
-    """Return a process's start (ticks since boot). Return 0 if this user may not see it, and -1 for a
-    zombie."""
+    """Return a process's start in ticks since boot. Return 0 if this user may not see the start, and -1
+    for a zombie."""
     try:
         told = Path(f"/proc/{pid}/stat").read_text("utf-8", "replace").rpartition(")")[2].split()
     except OSError:

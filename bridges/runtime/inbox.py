@@ -1,5 +1,5 @@
-"""The inbox of one thread. It holds the events that wait for the thread's devices or subjects, and a
-bell that wakes the thread."""
+"""The inbox of one thread. The inbox holds events for the thread's devices or subjects. A bell wakes
+the thread."""
 
 import queue
 import threading
@@ -7,21 +7,22 @@ from collections.abc import Hashable
 from typing import Generic, TypeVar
 
 INBOX_SIZE = 512
-"""The greatest number of events for one device between two scans. In a flood the oldest events are
+"""The maximum number of events for one device between two scans. In a flood the oldest events are
 dropped and counted."""
 
 MOST_NAMES = 2000
-"""The greatest number of names with events. No site has more devices, so further names must be
-invented, and their events are dropped."""
+"""The maximum number of names with events. No site has more devices, so further names are invented.
+Their events are dropped."""
 
 T = TypeVar("T")
 
 
 class Inbox(Generic[T]):
-    """An inbox. Any thread puts events into it, and the serving thread takes them out.
+    """An inbox. Any thread puts events in, and the serving thread takes them out.
 
-    A new event replaces a waiting event with the same `key`, because a request states a level, not a
-    pulse. So a flood of repeats costs a scan no more than one event. Events stay in order of arrival.
+    A new event replaces a waiting event with the same `key`. This is right because a request states a
+    level, not a pulse. So a flood of repeats costs a scan only one event. Events keep the order of
+    their arrival.
     """
 
     def __init__(self) -> None:
@@ -33,7 +34,7 @@ class Inbox(Generic[T]):
         self.closed = False
 
     def put(self, name: str, item: T, key: Hashable = None) -> None:
-        """Add an event for a device and wake the thread. An event without a key replaces no event."""
+        """Add an event for a device, and wake the thread. An event without a key replaces no event."""
         with self._lock:
             if len(self._items) >= MOST_NAMES and name not in self._items:
                 self.dropped += 1
@@ -53,12 +54,12 @@ class Inbox(Generic[T]):
             self._bell.put(None)
 
     def close(self) -> None:
-        """Ask the thread to end. The current round ends early if it can."""
+        """Ask the thread to end. The present round ends early if possible."""
         self.closed = True
         self.wake()
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for the bell; return False after `timeout_s`."""
+        """Wait for the bell. Return False if the bell has not rung within `timeout_s`."""
         try:
             self._bell.get(timeout=max(0.0, timeout_s))
         except queue.Empty:
@@ -72,12 +73,12 @@ class Inbox(Generic[T]):
             return set(self._items)
 
     def take_for(self, name: str) -> list[T]:
-        """Take one device's waiting events, in order."""
+        """Take the waiting events of one device, in order."""
         with self._lock:
             return list(self._items.pop(name, {}).values())
 
     def take(self) -> dict[str, list[T]]:
-        """Take all waiting events, in order, by device."""
+        """Take all waiting events, by device and in order."""
         with self._lock:
             taken, self._items = self._items, {}
         return {name: list(waiting.values()) for name, waiting in taken.items()}

@@ -1,7 +1,7 @@
-"""The memory on disk of a kind without hardware, and the message about all its subjects.
+"""The memory on disk of a kind without hardware, and the message about all subjects of the kind.
 
 The memory is written before messages are published, because other nodes act on these messages. If
-writing fails, the kind goes on serving with the fault NOT_KEPT, and tries to write again each second.
+writing fails, the kind continues to serve with the fault NOT_KEPT. It tries to write again each second.
 """
 
 import logging
@@ -24,7 +24,7 @@ NOT_KEPT: Final = "NOT_KEPT"
 
 class MemoryStore(Protocol):
     """A file that outlives the daemon. `read` returns None before the first `write`. `write` replaces
-    the whole file. Both may raise OSError."""
+    the whole file. Both methods may raise OSError."""
 
     def read(self) -> bytes | None: ...
 
@@ -32,8 +32,8 @@ class MemoryStore(Protocol):
 
 
 class Keeper(Generic[S, L, M, E, R]):
-    """The keeper of one node's memory. `kept`: the store, or None. `tell_at`: the next time to
-    publish."""
+    """The keeper of one node's memory. `kept`: the store, or None. `tell_at`: the time of the next
+    message."""
 
     def __init__(
         self, kind: GraphKind[S, L, M, E, R], kept: MemoryStore | None, publish: Publish
@@ -48,7 +48,7 @@ class Keeper(Generic[S, L, M, E, R]):
         self._pace = PublishPace()
 
     def restore(self, settings: S, now: float) -> Mapping[str, M]:
-        """Return the memory of each subject from disk. An invalid file is logged and ignored."""
+        """Return the memory of each subject from disk. Log and ignore an invalid file."""
         if self._kept is None or self._kind.restore is None:
             return {}
         try:
@@ -62,7 +62,8 @@ class Keeper(Generic[S, L, M, E, R]):
 
     @property
     def wake_at(self) -> float:
-        """The next time to publish or to retry writing (monotonic s)."""
+        """The time (monotonic s) of the next message, or of the next attempt to write after a
+        failure."""
         return min(self.tell_at, self._again_at if self._fault else NEVER)
 
     @property
@@ -71,7 +72,7 @@ class Keeper(Generic[S, L, M, E, R]):
         return (self._fault,) if self._fault else ()
 
     def keep(self, memories: Mapping[str, M], now: float) -> None:
-        """Write the part of the memories that must survive a restart, if this part has changed."""
+        """Write the memories if the part that must survive a restart has changed."""
         if (
             self._kept is None
             or self._kind.persist is None
@@ -102,7 +103,7 @@ class Keeper(Generic[S, L, M, E, R]):
         self._fault = None
 
     def tell(self, memories: Mapping[str, M], now: float, may_speak: bool) -> None:
-        """Publish the message about all subjects, if the message is due."""
+        """Publish the message about all subjects, if it is due."""
         if self._kind.together is None or not may_speak:
             self.tell_at = NEVER
             return

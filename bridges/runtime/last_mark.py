@@ -1,9 +1,12 @@
-"""Two marks that a run of a service leaves for the `outputs-off` that follows the run.
+"""Two marks that a service's run leaves for the `outputs-off` after that run.
 
 The mark `claimed` says that the run was about to claim outputs. `outputs-off` then switches these
-outputs off, whichever process has the lock. The mark `all-off` says that every output was verified off,
-so that `outputs-off` has nothing to do. A mark holds the INVOCATION_ID of its run (systemd.exec(5)).
-Marks of older runs and unreadable marks are ignored.
+outputs off, even if another process has the lock.
+
+The mark `all-off` says that every output was verified off. `outputs-off` then has nothing to do.
+
+A mark holds the INVOCATION_ID of its run (systemd.exec(5)). Marks of older runs and unreadable marks
+are ignored.
 """
 
 import os
@@ -16,7 +19,7 @@ LONGEST: Final = 64
 
 
 def leave(environ: Mapping[str, str] = os.environ, name: str = MARK) -> None:
-    """Leave a mark, if a systemd unit started us. Raises OSError."""
+    """Leave a mark, if a systemd unit started this process. Raises OSError."""
     if path := _path(environ, name):
         mark = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o640)
         try:
@@ -26,7 +29,7 @@ def leave(environ: Mapping[str, str] = os.environ, name: str = MARK) -> None:
 
 
 def says_off(environ: Mapping[str, str]) -> bool:
-    """Return whether the service's last run stopped well and left the mark `all-off`."""
+    """Return whether the service's last run ended well and left the mark `all-off`."""
     return environ.get("SERVICE_RESULT") == "success" and _is_left(environ, MARK)
 
 
@@ -52,6 +55,6 @@ def _is_left(environ: Mapping[str, str], name: str) -> bool:
 
 
 def _path(environ: Mapping[str, str], name: str) -> str:
-    """Return the path of this run's mark; "" outside of a unit."""
+    """Return the path of this run's mark. Return "" outside of a unit."""
     folder = environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
     return os.path.join(folder, name) if folder and environ.get("INVOCATION_ID") else ""

@@ -1,12 +1,16 @@
-"""The loop: one bus and the devices on it.
+"""The loop of one bus and the devices on the bus.
 
-RMF's callbacks put events into the inbox. A GPIO edge, or a change of an input on a device's other bus,
-wakes the loop. A round scans each device that is due, has events, or may have changed. First come the
-devices that answered last time, then the other devices, the longest overdue first. A round ends after
-one silent device. So a live device's reading is never older than its period plus one silent device's
-timeout, even in the first rounds. When a device falls silent, the loop also loses the time of the
-device's retries, once. When the loop ends, for any cause, it switches every output off, beginning with
-the devices that answer.
+RMF's callbacks put events into the loop's inbox. A GPIO edge wakes the loop. A change of an input on a
+device's other bus wakes the loop too.
+
+A round scans each device that is due, has events, or may have changed. The devices that answered last
+time come first. The other devices follow, the longest overdue first.
+
+A round ends after one silent device. So a reading of a live device is at most as old as its period plus
+one silent device's timeout. This holds even in the first rounds. When a device falls silent, the loop
+once loses the time of that device's retries too.
+
+When the loop ends, for any cause, it switches every output off. The devices that answer come first.
 """
 
 import logging
@@ -25,11 +29,12 @@ from drivers.hal import Bus
 log = logging.getLogger(__name__)
 
 SUSPENDED_S = 0.5
-"""The delay (s) after which a loop was suspended, if it woke so late without waiting for its bus."""
+"""The delay (s) that shows a suspension of the process. The loop woke so late although it did not wait
+for its bus."""
 
 
 class Loop:
-    """The loop of one bus. It scans each node every `scan_s` (s), and at the node's `wake_at`."""
+    """The loop of one bus. It scans each node every `scan_s` (s), and also at the node's `wake_at`."""
 
     def __init__(
         self,
@@ -56,17 +61,17 @@ class Loop:
 
     @property
     def wake_at(self) -> float:
-        """The time at which the next device is due (monotonic s)."""
+        """The time (monotonic s) at which the next device is due."""
         return min(self._due.values())
 
     @property
     def finished(self) -> int:
-        """The number of finished scans and bus calls. Failed calls count too."""
+        """The number of finished scans and bus calls, with the failed calls."""
         return self._scans + self._bus.calls
 
     @property
     def ready(self) -> bool:
-        """Return whether every device has been tried once and has published its first state."""
+        """Return whether every device was tried once and has published its first state."""
         return all(node.ready for node in self.nodes)
 
     def round(self) -> None:
@@ -92,8 +97,8 @@ class Loop:
         return all(safe)
 
     def _notice_suspension(self) -> None:
-        """Tell every node if the process was stopped or the machine slept during the loop's idle
-        time."""
+        """Note in every node that the process was stopped, or that the machine slept, during the loop's
+        idle time."""
         late_s = self._clock.monotonic() - max(self.wake_at, self._ran_at)
         if late_s > SUSPENDED_S:
             log.warning(pairs("suspended", bus=self._bus_name, for_s=f"{late_s:.1f}"))
@@ -112,8 +117,8 @@ class Loop:
                     return
 
     def _in_turn(self) -> list[AnyNode | InputReader]:
-        """Return the nodes in their order: first the nodes that answer, in the YAML's order, then the
-        other nodes, the longest overdue first."""
+        """Return the nodes in the order of their scans. Nodes that answer come first, in the YAML's
+        order. The other nodes follow, the longest overdue first."""
         others = [node for node in self.nodes if not node.answers]
         others.sort(key=lambda node: self._due[node.name])
         return [node for node in self.nodes if node.answers] + others
@@ -129,13 +134,13 @@ class Loop:
         return self._clock.monotonic() >= self._due[node.name]
 
     def stir(self) -> None:
-        """Make every device due, because an input may have changed. For any thread."""
+        """Make every device due, because an input may have changed. Any thread may call this method."""
         self._edge = True
         self.inbox.wake()
 
     def _take_edge(self) -> None:
-        """Make every device due after an edge. If the edge comes during a round, the next round scans
-        the devices."""
+        """Make every device due if an edge has come. An edge during this round counts in the next
+        round."""
         if self._edge:
             self._edge = False
             self._due = dict.fromkeys(self._due, AGES_AGO)

@@ -1,4 +1,4 @@
-"""systemd's notification protocol: READY=1, WATCHDOG=1, STOPPING=1 (sd_notify(3))."""
+"""systemd's notifications: READY=1, WATCHDOG=1, STOPPING=1 (sd_notify(3))."""
 
 import os
 import socket
@@ -6,9 +6,10 @@ from collections.abc import Mapping
 
 
 def notify(state: str, environ: Mapping[str, str] = os.environ) -> None:
-    """Notify systemd; do nothing if NOTIFY_SOCKET is not set. A full socket drops the message.
+    """Send a notification to systemd. Do nothing without NOTIFY_SOCKET. If the socket is full, the
+    notification is lost.
 
-    Raises OSError if no file descriptor is left, or writing is not permitted.
+    Raises OSError if no file descriptor is left, or if writing is not permitted.
     """
     path = environ.get("NOTIFY_SOCKET", "")
     if not path:
@@ -23,8 +24,8 @@ def notify(state: str, environ: Mapping[str, str] = os.environ) -> None:
 
 
 def watchdog_s(environ: Mapping[str, str] = os.environ) -> float | None:
-    """Return the longest time (s) that systemd allows between two WATCHDOG=1; None if systemd has no
-    watchdog for this process."""
+    """Return the maximum time (s) between two WATCHDOG=1 that systemd allows. Return None if systemd
+    does not watch this process."""
     usec = environ.get("WATCHDOG_USEC", "")
     ours = environ.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
     return int(usec) / 1e6 if usec.isdigit() and ours else None

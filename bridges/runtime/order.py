@@ -1,7 +1,7 @@
 """A person's order to a running daemon: a reset, or a decision about a workcell's requests.
 
-A signal carries the order. A decision is also a file in the runtime directory, written before the
-signal is sent. The file names the daemon's process, so that no later daemon obeys it.
+A signal delivers the order. A decision is also a file in the runtime directory, which is written before
+the signal is sent. The file names the daemon's process, so that no later daemon obeys it.
 """
 
 import logging
@@ -28,7 +28,8 @@ LONGEST: Final = 65536
 
 
 class PersonsOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A decision, its device ("" for every device), and the daemon that must obey."""
+    """A person's decision, and the daemon that must obey. `device`: a device's name, or "" for every
+    device."""
 
     verdict: DecidedByPerson
     device: str
@@ -37,8 +38,8 @@ class PersonsOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def places_of(file: Path, given: str | None) -> Directories | None:
-    """Find the directories of this file's daemon and act as their owner from now on. Return None, after
-    a message, if there is no such file. Raises PermissionError."""
+    """Return the directories of this file's daemon, and act as their owner from now on. If the file
+    does not exist, print this and return None. Raises PermissionError."""
     if not given and not file.exists():
         print(f"{file} does not exist", file=sys.stderr)
         return None
@@ -48,10 +49,13 @@ def places_of(file: Path, given: str | None) -> Directories | None:
 
 
 def send(file: Path, places: Directories, verdict: DecidedByPerson | None, device: str = "") -> int:
-    """Send a reset (None) or a decision to the daemon of this file. Return the exit code. Raises
-    PermissionError if this user may not see or signal the daemon."""
+    """Send an order to the daemon of this file, and return the exit code. `verdict`: the decision, or
+    None for a reset.
+
+    Raises PermissionError if this user may not see or signal the daemon.
+    """
     found = holder.look(places)
-    if found is None or not found.serves or not found.started:  # another process may have its pid
+    if found is None or not found.serves or not found.started:  # another process may have this pid
         why = (
             f"{found}, which is not a daemon of this version"
             if found
@@ -72,8 +76,8 @@ def send(file: Path, places: Directories, verdict: DecidedByPerson | None, devic
 
 
 def take(runtime: Path, file: Path) -> PersonsOrder | None:
-    """Return the decision that waits for this process, and remove it. Return None if there is none.
-    Does not raise."""
+    """Return the decision that waits for this process, and remove it. Return None without a decision.
+    Raises nothing."""
     path, ours = runtime / ORDER, holder.ourselves(file, serves=True)
     try:
         with opened(runtime):

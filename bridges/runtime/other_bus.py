@@ -1,8 +1,9 @@
-"""A device's inputs on another bus than its own: that bus's thread reads them, the device's takes them.
+"""The inputs that a device has on another bus than its own. The other bus's thread reads the inputs,
+and the device's thread takes them.
 
 The two threads share one Handover. A dead bus delays no other bus, because the device's thread only
-looks at the last reading. If that reading is late or failed, the device counts as not read: the device
-then has the same fate as with a cut cable on its own bus.
+looks at the last reading. If that reading is late or failed, the device counts as not read. The effect
+is that of a cut cable on the device's own bus.
 """
 
 import logging
@@ -21,8 +22,8 @@ log = logging.getLogger(__name__)
 
 
 class OtherReading(Struct, frozen=True):
-    """One reading: signal -> asserted, and the time just before it (monotonic s). `why_not`: the reason
-    if there is none."""
+    """One reading of the inputs. `shown`: for each signal, whether it is asserted. `read_at`: the time
+    before the reading (monotonic s). `why_not`: the reason why nothing was read, or ""."""
 
     shown: Mapping[str, bool] = {}
     read_at: float = AGES_AGO
@@ -30,9 +31,10 @@ class OtherReading(Struct, frozen=True):
 
 
 class Handover:
-    """The last reading of one device's inputs on another bus, with one writer and one reader.
+    """The last reading of one device's inputs on another bus. One thread writes it, and one thread
+    reads it.
 
-    `lasts_s`: how long a reading counts as present (s). `changed` is called from the writer's thread.
+    `lasts_s`: the time (s) for which a reading counts as present. The writer's thread calls `changed`.
     """
 
     def __init__(self, bus: str, lasts_s: float, clock: Clock) -> None:
@@ -49,7 +51,7 @@ class Handover:
             self.changed()
 
     def take(self) -> Mapping[str, bool]:
-        """Return the present inputs. Raises DriverError if they are not known now."""
+        """Return the present inputs. Raises DriverError if the last reading is late or failed."""
         last = self._last
         late = self._clock.monotonic() > last.read_at + self._lasts_s
         if why := last.why_not or (f"not read for {self._lasts_s:g} s" if late else ""):
@@ -58,12 +60,14 @@ class Handover:
 
 
 def taken(handovers: Iterable[Handover]) -> dict[str, bool]:
-    """Return the present inputs on all other buses. Raises DriverError if one bus is not read now."""
+    """Return the present inputs on all other buses. Raises DriverError if the last reading of one bus
+    is late or failed."""
     return {signal: on for one in handovers for signal, on in one.take().items()}
 
 
 class InputReader:
-    """Reads one device's inputs in the rounds of their bus (`bridges/runtime/loop.py`)."""
+    """The reader of one device's inputs on another bus. The loop of that bus
+    (`bridges/runtime/loop.py`) calls it."""
 
     def __init__(self, device: str, bus: str, points: Points, to: Handover, clock: Clock) -> None:
         self.name = device
@@ -81,7 +85,7 @@ class InputReader:
         self._to.put(OtherReading(why_not=f"nothing was read for {for_s:.1f} s"))
 
     def scan(self, events: Iterable[object] = ()) -> None:
-        """Read every input once and hand the values over, or the reason why there are none."""
+        """Read every input once, and hand over the values. If reading fails, hand over the reason."""
         before = self.answers or not self.ready
         reading = self._read()
         self._to.put(reading)
@@ -103,7 +107,7 @@ class InputReader:
             return OtherReading(why_not=str(error) or type(error).__name__)
 
     def make_safe(self) -> bool:
-        """Do nothing: there are no outputs here."""
+        """Return True, because a reader has no outputs."""
         return True
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""A node's publishers, by topic."""
+"""The publishers of one node, by topic."""
 
 import logging
 import threading
@@ -21,9 +21,9 @@ Named = Callable[[Topic[Message]], Topic[Message]]
 
 
 class Outlet:
-    """A node's publishers. They are declared as long as their node may publish.
+    """The publishers of one node. They are declared while the node may publish.
 
-    `bridges/messages/fallbacks.py` has substitutes for messages that RMF's release lacks. An alarm and
+    RMF's release may lack a message, and `bridges/messages/fallbacks.py` has substitutes. An alarm and
     its end go out on the same topic, even if the release changes in between.
     """
 
@@ -38,14 +38,14 @@ class Outlet:
         self._lock = threading.Lock()
 
     def open(self, topics: Iterable[Topic[Message]]) -> None:
-        """Declare publishers of the topics that RMF's release has. Raises TransportError."""
+        """Declare publishers for the topics that RMF's release has. Raises TransportError."""
         for topic in topics:
             if self._transport.release.has(topic.type):
                 self._end(topic)
 
     def publish(self, topic: Topic[Message], message: Message) -> bool:
-        """Publish a message. Return False if it was not sent; this is a fault until the next
-        success."""
+        """Publish a message. Return False if the message was not sent. This is a fault until a later
+        message is sent."""
         way, wanted = self._way(topic, message)
         if wanted is None:
             if isinstance(message, Alert):
@@ -66,15 +66,15 @@ class Outlet:
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """The faults NOT_PUBLISHED, one for each topic whose last message was not sent. Any thread may
-        read this."""
+        """The fault NOT_PUBLISHED for each topic whose last message was not sent. Any thread may read
+        this."""
         failing = sorted(self._once.wrong.copy().items())
         return tuple(Fault("NOT_PUBLISHED", f"{topic}: {why}") for topic, why in failing)
 
     def _way(
         self, topic: Topic[Message], message: Message
     ) -> tuple[Topic[Message], Message | None]:
-        """Return the topic and the message to send; None for a message that is only logged."""
+        """Return the topic and the message to send. The message is None if it is only logged."""
         if self._transport.release.has(topic.type) and topic.name not in self._instead:
             return topic, message
         if topic.name in INSTEAD:
@@ -88,11 +88,11 @@ class Outlet:
             return self._ends[topic.name]
 
     def heard_by(self) -> dict[str, int]:
-        """Return, by the topic's name, the number of subscriptions that receive each topic."""
+        """Return the number of subscriptions to each topic, by the topic's name."""
         return {name: end.matched() for name, end in self._ends.copy().items()}
 
     def close(self, topics: Iterable[Topic[Message]] | None = None) -> None:
-        """Withdraw the publishers of these topics. By default withdraw all publishers."""
+        """Withdraw the publishers of these topics. If `topics` is None, withdraw all publishers."""
         names = list(self._ends) if topics is None else [topic.name for topic in topics]
         for end in [self._ends.pop(name, None) for name in names]:
             if end is not None:

@@ -1,10 +1,14 @@
 """Switches off the outputs that a dead daemon left on, before this daemon claims outputs.
 
-A separate process, `outputs-off`, does the work, as after every death of a daemon. That process can
-hang without hanging this daemon, and it uses the dead daemon's profiles. Devices that do not answer are
-reported, and tried again later while this daemon serves. Devices in our own record are not tried again,
-because `SafeFirst` switches each off as soon as it answers. If another process has already tried these
-devices, after the death or at boot, this daemon's start does not try them.
+The separate process `outputs-off` does the work, as after every death of a daemon. If that process
+hangs, this daemon does not hang. That process uses the dead daemon's profiles.
+
+Devices that do not answer are reported. While this daemon serves, it tries again to switch them off.
+Devices in our own record are not tried again. `SafeFirst` switches each of these off when it first
+answers.
+
+Another process may already have tried the devices, after the death or at boot. In that case the start
+of this daemon does not try them.
 """
 
 import logging
@@ -29,8 +33,10 @@ LOOK_EVERY_S = 0.02
 
 
 class Predecessor:
-    """The records of dead daemons, and the tries to switch their outputs off. `ours`: this daemon's own
-    record. `command`: `outputs-off` for this daemon's file."""
+    """The records of dead daemons, and the attempts to switch their outputs off.
+
+    `ours`: this daemon's own record. `command`: the command `outputs-off` for this daemon's file.
+    """
 
     def __init__(self, records: Records, ours: ClaimRecord, command: Sequence[str]) -> None:
         self._records = records
@@ -41,11 +47,11 @@ class Predecessor:
         self._next_at = math.inf
 
     def make_safe(self, wait: Callable[[float], bool]) -> frozenset[str]:
-        """Switch off the outputs that dead daemons left on, before this daemon claims outputs.
+        """Switch off the outputs that dead daemons left on, before this daemon claims outputs. Return
+        the devices of our own record that are not verified off.
 
-        This waits until `outputs-off` has ended, but at most PATIENCE_S. The wait ends early if
-        `wait(s)` returns True, which means that the daemon must end. Returns the devices of our own
-        record that are not verified off.
+        Wait for the end of `outputs-off`, but at most PATIENCE_S. `wait(s)` returns True if the daemon
+        must end, and then the wait ends too.
         """
         found = self._records.unreleased()
         if found:
@@ -60,19 +66,19 @@ class Predecessor:
         return self._own_unsafe()
 
     def left(self) -> list[str]:
-        """Return the names of other daemons' records whose outputs are not verified off."""
+        """Return the names of other daemons' records that have outputs which are not verified off."""
         return [r.name for r in self._records.unreleased() if r.name != self._ours.name]
 
     def tick(self, now: float) -> None:
-        """Try again, after a pause, to switch off the records that are not verified off. The daemon
-        calls this about once a second."""
+        """Try again, after a pause, to switch off the outputs that are not verified off. The daemon
+        calls this method about once a second."""
         if self._child is not None and not self._running():
             self._judge(now)
         elif self._child is None and now >= self._next_at:
             self._start(self.left())
 
     def close(self) -> None:
-        """Stop trying. The `outputs-off` that follows this daemon handles the remaining records."""
+        """End the attempts. The `outputs-off` after this daemon handles the remaining records."""
         if self._child is not None:
             self._child.kill()
             self._child.wait()
@@ -95,8 +101,8 @@ class Predecessor:
         return self._child is not None and self._child.poll() is None
 
     def _judge(self, now: float, unsafe: Collection[str] = ()) -> None:
-        """Note the result of a try. `unsafe`: devices of our own record that are not verified off; they
-        are not tried again here."""
+        """Note the result of an attempt. `unsafe`: the devices of our own record that are not verified
+        off. `SafeFirst` handles these devices."""
         self.close()
         if left := self.left():
             if self._next_at == math.inf:
@@ -110,8 +116,8 @@ class Predecessor:
 
 
 class SafeFirst:
-    """A driver around the driver of a silent device. A dead daemon may have left this device on. As
-    soon as the device answers, its outputs are switched off, before anything else."""
+    """A driver around the driver of a silent device. A dead daemon may have left this device on. When
+    the device first answers, its outputs are switched off before anything else happens."""
 
     def __init__(self, name: str, driver: Driver[Any, Any]) -> None:
         self._name = name
@@ -123,7 +129,7 @@ class SafeFirst:
         self.close = driver.close
 
     def open(self) -> None:
-        """Claim the device. The first time, also make it safe."""
+        """Claim the device. At the first success, also switch the outputs off."""
         self._driver.open()
         if not self._safe:
             self._driver.make_safe()

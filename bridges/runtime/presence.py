@@ -1,7 +1,7 @@
-"""Decides whether a node without hardware may publish, because only one node may serve a graph.
+"""Decides whether a node without hardware may publish. Only one node may serve a graph.
 
-A node may publish after it was alone on its topics for the kind's quiet time. Only then are its
-publishers declared, so a waiting node does not count as a rival.
+A node may publish after the kind's quiet time, if it was alone on its topics during that time. It
+declares its publishers only then. So a waiting node does not count as a rival.
 """
 
 import logging
@@ -21,17 +21,19 @@ from bridges.transports.transport import Subscription, Transport
 log = logging.getLogger(__name__)
 
 LOOK_EVERY_S = 0.25
-"""The pause (s) between two looks for other nodes on the graph."""
+"""The interval (s) between two looks for other nodes on the graph."""
 MOST_NAMED: Final = 3
 SPREAD_LEAST_S, SPREAD_MOST_S = 0.5, 3.0
-"""The bounds (s) of a random time. A node that has met a rival listens longer by this time, which is
-more than discovery needs."""
+"""The limits (s) of a random time. A node that has met a rival listens longer by this time. Discovery
+needs less time."""
 
 
 class Presence:
-    """The lookout for rivals. `kind`: for the log. `rivals`: the number of other nodes' publishers on
-    our topics. `rivals_do`: the rivals and their topics, as in `/desk publishes lift_requests`; ""
-    without rivals."""
+    """The lookout for rivals. `kind`: a name for the log.
+
+    `rivals`: the number of other nodes' publishers on our topics. `rivals_do`: the rivals and their
+    topics, such as `/desk publishes lift_requests`, or "" without rivals.
+    """
 
     def __init__(self, kind: str, quiet_s: float) -> None:
         self.may_speak = False
@@ -51,13 +53,13 @@ class Presence:
 
     @property
     def waits(self) -> str:
-        """The reason for our silence. The requesters that wait for us are shown this reason."""
+        """The reason for our silence, for requesters that wait for us."""
         return f"while {self.rivals_do}" if self.rivals else LISTENS
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """The fault PASSIVE if a rival keeps us silent. It is a fault because the rival may not do our
-        work."""
+        """The fault PASSIVE if a rival keeps us silent. This is a fault because the rival may not do
+        our work."""
         if not self.rivals:
             return ()
         return (Fault("PASSIVE", f"{self.rivals_do}, so this node only listens"),)
@@ -92,7 +94,7 @@ class Presence:
         return f"{who or 'another node'} publishes {' and '.join(heard)}"
 
     def _set(self, yes: bool) -> None:
-        """Start or stop publishing. If two nodes began at the same time, both stop, each for a random
+        """Start or stop publishing. If two nodes began at the same time, each node stops for a random
         time."""
         if yes == self.may_speak:
             return
@@ -104,4 +106,4 @@ class Presence:
 
 
 def _ignore(message: Message) -> None:
-    """Ignore a rival's message, because rivals are only counted."""
+    """Ignore a rival's message, because only the number of rivals matters."""

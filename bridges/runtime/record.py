@@ -1,14 +1,15 @@
-"""The record of a daemon. It is written before the daemon claims outputs, and holds all data needed to
-switch the outputs off.
+"""The record of a daemon. It holds all data that `outputs-off` needs to switch the daemon's outputs
+off. The daemon writes the record before it claims outputs.
 
 The record holds the YAML and the validated settings. `outputs-off` uses the settings. If another
-version wrote them, they may not decode; only then does `outputs-off` load and check the YAML. Keys that
-another version has added are ignored.
+version wrote the settings, they may be undecodable. Only in that case does `outputs-off` load and check
+the YAML. Keys that another version has added are ignored.
 
-A record is a file whose name is a hash of its content. The file is in the daemon's state directory, or
-in its runtime directory if the state directory cannot be written. So a daemon that restarts on the same
-YAML finds its record, and a daemon on another YAML overwrites no record. Records hold no tokens,
-because tokens are read from files of their own.
+A record is a file, and its name is a hash of its content. So a daemon that restarts on the same YAML
+finds its record, and a daemon on another YAML overwrites no record. The file is in the daemon's state
+directory, or in its runtime directory if the state directory cannot be written.
+
+Records hold no tokens, because tokens are in files of their own.
 """
 
 import hashlib
@@ -32,11 +33,12 @@ log = logging.getLogger(__name__)
 
 PATTERN = "claimed-*.json"
 SIZE_MAX = 64 << 20
-"""The largest size of a record (bytes). No YAML with its profiles and DBC files is as large."""
+"""The maximum size (bytes) of a record. No YAML with its profiles and DBC files is as large."""
 
 
 class ClaimedSettings(msgspec.Struct, frozen=True):
-    """Validated settings, each as JSON. `version`: the version of the program that wrote them."""
+    """The validated settings of a YAML, each as JSON. `version`: the version of the program that wrote
+    them."""
 
     version: str
     kind: str
@@ -46,10 +48,10 @@ class ClaimedSettings(msgspec.Struct, frozen=True):
 
 
 class Claimed(msgspec.Struct, frozen=True):
-    """A record without settings. `file`: the YAML's path. `yaml`: its text. `texts`: each profile or
-    DBC file, by name.
+    """A record without settings. `file`: the YAML's path. `yaml`: the YAML's text. `texts`: each
+    profile or DBC file, by name.
 
-    `safe`: the devices verified off so far. Every version can read the fields from `file` to `safe`.
+    `safe`: the devices that are verified off. Every version can read the fields from `file` to `safe`.
     `tried`: a process has tried once to switch off all other devices.
     """
 
@@ -61,21 +63,21 @@ class Claimed(msgspec.Struct, frozen=True):
 
 
 class ClaimRecord(Claimed, frozen=True):
-    """A record with settings. `claim`: the settings that the YAML gave."""
+    """A record with settings. `claim`: the settings from the YAML."""
 
     claim: ClaimedSettings | None = None
 
     @property
     def name(self) -> str:
-        """The name of the record's file, a hash of the claim."""
+        """The name of the record's file, which is a hash of the claim."""
         claimed = msgspec.structs.asdict(self) | {"safe": ()}
-        del claimed["tried"]  # older versions lack this field, and must compute the same name
+        del claimed["tried"]  # older versions lack this field and compute the same name
         return f"claimed-{hashlib.sha256(msgspec.json.encode(claimed)).hexdigest()[:16]}.json"
 
     def config(self) -> Config:
-        """Return the claimed Config. Raises SettingsError.
+        """Return the Config of the record. Raises SettingsError.
 
-        Afterwards this process uses only the record's profiles and DBC files.
+        After this call the process uses only the record's profiles and DBC files.
         """
         texts.give(self.texts)
         with suppress(msgspec.MsgspecError, ImportError, AttributeError):
@@ -87,7 +89,7 @@ class ClaimRecord(Claimed, frozen=True):
 
 
 def of(config: Config) -> ClaimRecord:
-    """Return the record of this config, which must be the only config loaded in this process."""
+    """Return the record of this config. The process must not have loaded another config."""
     known = dict(sorted(texts.all_known().items()))
     return ClaimRecord(named(config.path), config.text, known, claim=_claim(config))
 
@@ -103,7 +105,7 @@ def _json(settings: msgspec.Struct) -> bytes:
 
 
 def _claimed(record: ClaimRecord, claim: ClaimedSettings) -> Config:
-    """Return the Config of these settings. Raises MsgspecError, ImportError or AttributeError."""
+    """Return the Config with these settings. Raises MsgspecError, ImportError or AttributeError."""
     return Config(
         path=Path(record.file),
         text=record.yaml,
@@ -120,8 +122,8 @@ def _claimed(record: ClaimRecord, claim: ClaimedSettings) -> Config:
 
 
 def _device(claim: ClaimedSettings, text: bytes) -> msgspec.Struct:
-    """Return a device's settings. They are decoded for the device's own driver, or else for the file's
-    driver."""
+    """Return a device's settings, decoded for its driver. This is the device's own driver, or else the
+    file's driver."""
     own = msgspec.json.decode(text, type=_OwnDriver).driver or claim.driver
     device: msgspec.Struct = msgspec.json.decode(
         text, type=names.driver_called(claim.kind, own).settings
@@ -141,8 +143,8 @@ class Records:
         self._file = named(file)
 
     def unreleased(self) -> list[ClaimRecord]:
-        """Return the records of this file whose outputs are not all off yet. Unreadable records are
-        logged and left out."""
+        """Return the records of this file that have outputs which are not all off. Log and leave out
+        unreadable records."""
         by_name = dict[str, ClaimRecord]()
         for path in paths(self._places):
             if (record := read(path)) is None:
@@ -152,7 +154,7 @@ class Records:
         return list(by_name.values())
 
     def write(self, record: ClaimRecord) -> Path:
-        """Write a record and return its path. Raises OSError if neither directory can be written."""
+        """Write a record and return its path. Raises OSError if both directories cannot be written."""
         content = msgspec.json.encode(record)
         refused: OSError | None = None
         for folder in self._places.folders:
@@ -169,14 +171,14 @@ class Records:
         raise refused
 
     def still_unsafe(self, record: ClaimRecord, devices: Collection[str], config: Config) -> None:
-        """Note that all devices except these are verified off. Raises OSError."""
+        """Write into the record that all devices are verified off, except `devices`. Raises OSError."""
         safe = tuple(name for name in config.devices if name not in devices)
         self.write(msgspec.structs.replace(record, safe=safe, tried=True))
 
     def release(self, record: ClaimRecord) -> None:
         """Remove a record whose outputs are all off. Raises OSError.
 
-        The file's name may differ from the record's `name` if another version wrote the file.
+        If another version wrote the record, the file's name may differ from the record's `name`.
         """
         for path in list(paths(self._places)):
             if path.name == record.name or ((found := read(path)) and found.name == record.name):
@@ -191,7 +193,8 @@ def paths(places: Directories) -> Iterator[Path]:
 
 
 def read(path: Path) -> ClaimRecord | None:
-    """Return the record in a file; None if it is invalid, unreadable or a symbolic link."""
+    """Return the record in a file. Return None if the file is invalid, unreadable or a symbolic
+    link."""
     try:
         return _decoded(files.read(path, SIZE_MAX))
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
@@ -202,5 +205,5 @@ def _decoded(content: bytes) -> ClaimRecord:
     """Decode a record. Raises MsgspecError or UnicodeDecodeError."""
     try:
         return msgspec.json.decode(content, type=ClaimRecord)
-    except msgspec.ValidationError:  # another version's settings: the YAML in the record is enough
+    except msgspec.ValidationError:  # another version wrote the settings; the YAML is enough
         return ClaimRecord(**msgspec.structs.asdict(msgspec.json.decode(content, type=Claimed)))

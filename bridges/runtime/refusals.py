@@ -1,4 +1,4 @@
-"""Counts refused requests by reason. The first refusal for each reason is logged."""
+"""Counts refused requests by reason, and logs the first refusal for each reason."""
 
 import logging
 import threading
@@ -11,14 +11,14 @@ log = logging.getLogger(__name__)
 
 
 class Refusals:
-    """The refusals of one device or node."""
+    """The refusals of one device or node, by reason."""
 
     def __init__(self) -> None:
         self._counts: Counter[str] = Counter()
         self._lock = threading.Lock()
 
     def add(self, kind: str, detail: object, **whose: str) -> None:
-        """Count one refusal. Any thread may call this."""
+        """Count one refusal. Any thread may call this method."""
         with self._lock:
             self._counts[kind] += 1
             first = self._counts[kind] == 1

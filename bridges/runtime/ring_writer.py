@@ -1,8 +1,8 @@
 """Records a daemon's readings, decisions and messages in its ring.
 
-A scan only puts events into a queue, which takes less than a microsecond. Later, when the outputs are
-written and the states published, `flush` encodes the queue and appends it to the ring. A writer that
-fails loses entries. It never raises, and it delays no scan.
+A scan only puts events into a queue, which takes less than a microsecond. After the outputs are written
+and the states are published, `flush` encodes the queue and appends it to the ring. A writer that fails
+loses entries, but raises nothing and delays no scan.
 """
 
 import struct
@@ -28,24 +28,23 @@ from bridges.runtime.clock import Clock
 from bridges.runtime.runtime_directory import Once
 
 KNOWN_EVERY_S: Final = 60.0
-"""The time (s) after which all known state is written again, so that a recording can begin at that
-entry."""
+"""The interval (s) at which all known state is written again. A recording can begin at such a place."""
 MOST_WAITING: Final = 20_000
 SAME_AT_ONCE: Final = 20
-"""The number of unchanged readings in one entry. A kill of the daemon loses at most as many
+"""The number of unchanged readings in one entry. A kill of the daemon loses at most this number of
 readings."""
 LONGEST_SAME: Final = 400
-"""The largest size (bytes) of an entry of unchanged readings."""
+"""The maximum size (bytes) of an entry with unchanged readings."""
 MOST_SPOKEN_PER_S: Final = 200.0
-"""The rate (messages per second) above which messages are only counted, because a flood must not delay
-a scan."""
+"""The maximum rate (messages per second) of recorded messages. Further messages are only counted,
+because a flood must not delay a scan."""
 STEP_S: Final = 0.05
 AGAIN_S: Final = 10.0
-"""The pause (s) between the failure of a ring and the next attempt to make one."""
+"""The pause (s) between the failure of a ring and the next attempt to make a ring."""
 
 
 class NoWriter:
-    """The writer of a daemon without a recording. It has the same interface as `RingWriter`."""
+    """The writer of a daemon that does not record. It has the interface of `RingWriter`."""
 
     def decided(
         self, subject: str, before: object, event: object, now: float, decision: AnyDecision
@@ -53,7 +52,7 @@ class NoWriter:
         """Note a core's decision. `before`: the subject's memory before the decision."""
 
     def published(self, subject: str, memory: object, now: float) -> None:
-        """Note a published report. `memory`: the core's memory afterwards."""
+        """Note that a report was published. `memory`: the core's memory after the publication."""
 
     def forgotten(self, subject: str, now: float) -> None:
         """Note that the daemon has forgotten a subject."""
@@ -61,16 +60,17 @@ class NoWriter:
     def spoken(
         self, topic: str, message: Message, *, sent: bool, sender: Sender | None = None
     ) -> None:
-        """Note a message that was heard or sent on this topic. `sender`: its publisher, if known."""
+        """Note a message that was heard or sent on this topic. `sender`: the message's publisher, if
+        known."""
 
     def flush(self) -> None:
-        """Write the noted events. The daemon calls this when nothing is urgent."""
+        """Write the noted events. The daemon calls this method when nothing urgent waits."""
 
     def look(self) -> None:
-        """Make a new ring if needed. The daemon's main thread calls this each second."""
+        """Make a new ring if needed. The daemon's main thread calls this method each second."""
 
     def died(self, reason: str) -> None:
-        """Note that a defect ends the daemon."""
+        """Note that the daemon ends because of a defect."""
 
     def ended(self, *, safe: bool) -> None:
         """Note that the daemon shuts down cleanly."""
@@ -80,12 +80,12 @@ NOBODY: Final = NoWriter()
 
 
 class RingWriter(NoWriter):
-    """The writer of one daemon's ring. Every method may be called from any thread."""
+    """The writer of one daemon's ring. Any thread may call any method."""
 
     def __init__(
         self, make: Callable[[], Ring], clock: Clock, release: Callable[[], Release]
     ) -> None:
-        """`make`: makes a new ring; it may raise OSError."""
+        """Make the writer and the first ring. `make()` returns a new ring, or raises OSError."""
         self._make = make
         self._clock = clock
         self._release = release
@@ -129,7 +129,7 @@ class RingWriter(NoWriter):
                 ring.close(ended=safe and not self._dead)
 
     def flush(self) -> None:
-        if self._lock.acquire(blocking=False):  # else another thread is flushing
+        if self._lock.acquire(blocking=False):  # otherwise another thread is flushing
             try:
                 self._drain()
             except Exception as error:  # noqa: BLE001 - logged by _failed
@@ -162,7 +162,7 @@ class RingWriter(NoWriter):
         self._fresh()
         if ring is not None:
             with suppress(OSError):
-                ring.close(ended=True)  # only this ring ends: the daemon continues
+                ring.close(ended=True)  # only the ring ends; the daemon continues
 
     def _fresh(self) -> None:
         """Reset the writer's state for an empty ring."""
@@ -185,8 +185,8 @@ class RingWriter(NoWriter):
         self._write()
 
     def _tell_time(self) -> None:
-        """Write the wall clock's time if that clock has stepped. Write all known state again after each
-        KNOWN_EVERY_S."""
+        """Write the wall clock's time if that clock has stepped. After each KNOWN_EVERY_S, write all
+        known state."""
         now = self._clock.monotonic()
         offset_s = self._clock.wall() - now
         stepped = abs(offset_s - self._offset_s) > STEP_S
@@ -229,8 +229,8 @@ class RingWriter(NoWriter):
             self._say_same(name)
 
     def _say_same(self, name: str) -> None:
-        """Write the times at which the last reading was repeated. The segment has reserved room for
-        them."""
+        """Write the times at which the last reading was repeated. The segment has room for this
+        entry."""
         subject = self._same.pop(name, None)
         if subject is not None:
             times, subject.times = subject.times, []
@@ -259,7 +259,7 @@ class RingWriter(NoWriter):
         self._put(Spoken(now, sent, topic, type_name(kind), release.name, sample, node))
 
     def _may_keep(self, now: float) -> bool:
-        """Return whether the rate of messages is low enough to record one more."""
+        """Return whether the rate of messages allows to record one more message."""
         gained = MOST_SPOKEN_PER_S * (now - self._spoken_at)
         self._may_speak = min(MOST_SPOKEN_PER_S, self._may_speak + gained)
         self._spoken_at = now
@@ -272,7 +272,7 @@ class RingWriter(NoWriter):
         return True
 
     def _last(self, entry: AnyEntry) -> None:
-        """Append the last entry of the ring, after the entries of repeated readings."""
+        """Append the ring's last entry. First write the entries of repeated readings."""
         self._say_all_same()
         self._put(entry)
 
@@ -304,7 +304,8 @@ class RingWriter(NoWriter):
         return self._ring.fits(len(self._out) + length + FRAME.size + reserved)
 
     def _know(self, now: float) -> None:
-        """Write all known state. Use this segment if it has room, else the next segment."""
+        """Write all known state into this segment. If it has too little room, begin the next
+        segment."""
         self._say_all_same()
         known = self._all_known(now)
         if not self._fits(sum(len(content) + FRAME.size for content in known)):
@@ -315,8 +316,8 @@ class RingWriter(NoWriter):
             self._frame(content)
 
     def _next_segment(self, now: float) -> None:
-        """Begin the next segment with the known state. The known state may fill half of the segment;
-        further subjects are left out."""
+        """Begin the next segment with the known state. If the state needs more than half of the
+        segment, leave out the remaining subjects."""
         assert self._ring is not None
         self._say_all_same()
         self._write()

@@ -1,9 +1,10 @@
 """Starts the daemon as a ROS node: `ros2 launch rmf_bridges <kind>.launch.py config:=FILE`.
 
-After any death of the daemon its guard runs `rmf-bridge outputs-off` (`bridges/runtime/guard.py`). Only
-the launch files in `ros/launch/` import this module; each kind has one such file. `ros2` runs this
-module with ROS's own Python, which has `launch` and `yaml`, but no other package that the project
-needs.
+After any death of the daemon its guard runs `rmf-bridge outputs-off` (`bridges/runtime/guard.py`).
+
+Only the launch files in `ros/launch/` import this module. Each kind has one launch file. `ros2` runs
+this module with ROS's own Python. That Python has `launch` and `yaml`, but none of the other packages
+that this project needs.
 """
 
 from pathlib import Path
@@ -41,7 +42,7 @@ def _actions(kind: str, context: LaunchContext) -> list[Node]:
 
 
 def _check(kind: str, file: str) -> None:
-    """Raise RuntimeError for a file of another kind. The daemon itself finds every other error."""
+    """Raise RuntimeError for a file of another kind. The daemon itself reports all other errors."""
     try:
         settings = yaml.safe_load(Path(file).read_bytes())
     except (OSError, yaml.YAMLError) as error:

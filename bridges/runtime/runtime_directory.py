@@ -1,13 +1,13 @@
 """A daemon's files while it runs: its lock, its name, its status and its record.
 
-`holder.lock`   locked by the daemon, `outputs-off` or a walk; other users may not open it, because a
-                user who locks it blocks `outputs-off`
-`holder.json`   the name of the lock's holder, for other processes: see `bridges/runtime/holder.py`
-`status.json`   the state of every device, for people and scripts
-`claimed-….json`   see `bridges/runtime/record.py`
+- `holder.lock`: the lock of the daemon, of `outputs-off`, or of a walk. Other users may not open this
+  file, because they could then take the lock and block `outputs-off`.
+- `holder.json`: the name of the lock's holder, for other processes (`bridges/runtime/holder.py`)
+- `status.json`: the state of every device, for people and scripts
+- `claimed-….json`: the record (`bridges/runtime/record.py`)
 
-The daemon also serves without these files. A failed write is logged once and retried each second, even
-after the directory was removed.
+The daemon also serves without these files. It logs a failed write once and tries again each second,
+even after somebody has removed the directory.
 """
 
 import fcntl
@@ -43,16 +43,16 @@ KEPT = "kept.json"
 KEPT_MAX = 64 << 20
 LOCK = "holder.lock"
 WAIT_S = 7.0
-"""The time (s) for which a starting daemon waits for `outputs-off`. `outputs-off` takes less."""
+"""The time (s) for which a starting daemon waits for `outputs-off`, which takes less."""
 LOOK_EVERY_S = 0.05
 
 
 class AlreadyRunning(Exception):
-    """Another daemon serves this YAML, or uses these directories."""
+    """The error if another daemon serves this YAML or uses these directories."""
 
 
 def find(file: Path, given: str | None) -> Directories:
-    """Return the directories of this file's daemon, by the rule in `bridges/system/directories.py`.
+    """Return the directories of this file's daemon. `bridges/system/directories.py` has the rule.
 
     Raises PermissionError if the service's directory cannot be read.
     """
@@ -85,16 +85,16 @@ def _in_use(folder: Path, found: LockHolder | None) -> str:
 
 
 def state_file(file: Path) -> Path:
-    """Return the path of the file that outlives a daemon and a reboot. The file is in systemd's state
+    """Return the path of a file that outlives the daemon and a reboot. The file is in systemd's state
     directory, or else in the user's state directory."""
     given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
     return Path(given or state_base() / file.stem).absolute() / KEPT
 
 
 class MemoryFile:
-    """A file that is replaced as a whole and is on disk when `write` returns.
+    """A file that is always replaced as a whole. When `write` returns, the content is on disk.
 
-    `instead`: the path used if `path` cannot be written. If files exist at both paths, the file at
+    `instead`: the path to use if `path` cannot be written. If both paths have a file, the file at
     `instead` is newer.
     """
 
@@ -104,14 +104,14 @@ class MemoryFile:
         self._once = Once()
 
     def read(self) -> bytes | None:
-        """Return the file's bytes; None if there is no file. Raises OSError."""
+        """Return the file's bytes. Return None without a file. Raises OSError."""
         for path in filter(None, (self._instead, self._path)):
             with suppress(FileNotFoundError, NotADirectoryError), opened(path.parent):
                 return files.read(path, KEPT_MAX)
         return None
 
     def write(self, kept: bytes) -> None:
-        """Replace the file. Raises OSError if neither path can be written; the old file then stays."""
+        """Replace the file. Raises OSError if no path can be written, and then keeps the old file."""
         try:
             _replace(self._path, kept)
             if self._instead is not None:
@@ -131,11 +131,11 @@ def _replace(path: Path, content: bytes) -> None:
 
 
 class Once:
-    """A log filter for an action that is repeated. It logs the first of several failures, and the first
-    success after them; the daemon continues.
+    """A log filter for an action that is repeated. It logs the first of several failures, and then the
+    first success.
 
     `fails`, `again`: the names of these two log events. `key`: the log's key for the failing thing.
-    `level`: the level of the first event. `wrong`: the error of each failing thing.
+    `level`: the log level of a failure. `wrong`: the error of each failing thing.
     """
 
     def __init__(
@@ -149,7 +149,7 @@ class Once:
         self._fails, self._again, self._key, self._level = fails, again, key, level
 
     def failed(self, what: str, error: Exception) -> None:
-        """Note a failed attempt, which the caller will repeat."""
+        """Note a failed attempt. The caller will try again."""
         if what not in self.wrong:
             log.log(self._level, pairs(self._fails, **{self._key: what}, reason=error))
         self.wrong[what] = str(error)
@@ -163,13 +163,13 @@ class Once:
 class RuntimeDirectory:
     """The lock, the status and the record of one process.
 
-    `serves`: the process is a daemon, which accepts a reset.
+    `serves`: the process is a daemon, so it accepts a reset.
     """
 
     def __init__(
         self, places: Directories, file: Path, *, serves: bool, wait_s: float = WAIT_S
     ) -> None:
-        """Take the locks. If an `outputs-off` holds them, wait for its end.
+        """Take the locks. If `outputs-off` has the locks, wait for its end.
 
         Raises AlreadyRunning. Raises PermissionError if a directory cannot be trusted.
         """
@@ -186,7 +186,7 @@ class RuntimeDirectory:
         self._sign(self._holder)
 
     def claim(self, record: ClaimRecord) -> None:
-        """Write the record before this daemon claims outputs. If that fails, `write_status` tries
+        """Write the record, before this daemon claims outputs. If writing fails, `write_status` tries
         again."""
         self._record = record
         self._write_record()
@@ -201,7 +201,7 @@ class RuntimeDirectory:
                 self._once.failed("record", error)
 
     def write_status(self, json: bytes) -> None:
-        """Replace the status file. Also write the other files again if they are missing."""
+        """Replace the status file. Also write any other file that is missing."""
         for folder in self.places.folders:
             self._lock(folder)
         self._sign(self._holder)
@@ -214,7 +214,7 @@ class RuntimeDirectory:
             self._once.works(STATUS)
 
     def close(self) -> None:
-        """Release the locks for another daemon and remove the outdated status."""
+        """Release the locks for another daemon, and remove the outdated status."""
         with suppress(OSError), opened(self.path):
             (self.path / STATUS).unlink(missing_ok=True)
         self._sign(msgspec.structs.replace(self._holder, pid=0))
@@ -222,13 +222,13 @@ class RuntimeDirectory:
 
     def _unlock(self) -> None:
         for lock in self._locks.values():
-            fcntl.flock(lock, fcntl.LOCK_UN)  # closing is not enough: a child has a copy
+            fcntl.flock(lock, fcntl.LOCK_UN)  # a child has a copy, so closing is not enough
             os.close(lock)
         self._locks.clear()
 
     def _lock_by(self, folder: Path, deadline: float) -> None:
-        """Take the lock. If `outputs-off` has the lock, wait. A daemon of an older version has another
-        lock, so its fresh status counts as a lock."""
+        """Take the lock. Wait while `outputs-off` has the lock. A daemon of an older version uses
+        another lock, so its fresh status counts as a lock."""
         while holder.shown(self.places) or not self._lock(folder):
             found = holder.look(self.places)
             if (found and found.serves) or time.monotonic() >= deadline:
@@ -237,8 +237,10 @@ class RuntimeDirectory:
             time.sleep(LOOK_EVERY_S)
 
     def _lock(self, folder: Path) -> bool:
-        """Take the folder's lock. Return False only if another process has the lock. Raises
-        Distrusted."""
+        """Take the folder's lock. Return False if another process has the lock. Raises Distrusted.
+
+        If the lock file cannot be written, log this and return True.
+        """
         try:
             return self._has(folder) or self._take(folder)
         except Distrusted:
@@ -248,7 +250,7 @@ class RuntimeDirectory:
             return True
 
     def _has(self, folder: Path) -> bool:
-        """Return whether we have the lock on the lock file that is in the folder now."""
+        """Return whether we have the lock of the folder's present lock file."""
         lock = self._locks.get(folder)
         try:
             return lock is not None and os.path.samestat(os.fstat(lock), os.lstat(folder / LOCK))
@@ -270,7 +272,7 @@ class RuntimeDirectory:
         return True
 
     def _sign(self, name: LockHolder) -> None:
-        """Write this name beside each lock that we have, unless the name is already there."""
+        """Write this name beside each lock that we have. Do nothing if the name is already there."""
         for folder in filter(self._has, self._locks):
             try:
                 if holder.written(folder) != name:
@@ -292,8 +294,8 @@ class RuntimeDirectory:
 
 
 def _lock_in(directory: int) -> int:
-    """Open the lock file for writing. If that is not permitted, open it for reading, which is enough to
-    lock it."""
+    """Open the lock file for writing. If this user may not write it, open it for reading, which is
+    enough for a lock."""
     flags = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
     try:
         return os.open(LOCK, flags | os.O_RDWR | os.O_CREAT, 0o600, dir_fd=directory)
@@ -304,7 +306,8 @@ def _lock_in(directory: int) -> int:
 def held(
     file: Path, given: str | None, *, serves: bool, simulated: bool = False
 ) -> RuntimeDirectory:
-    """Lock and return the directories for this file. A simulation never takes a service's directories.
+    """Lock the directories for this file, and return them. A simulation never takes a service's
+    directories.
 
     Raises AlreadyRunning or PermissionError.
     """

@@ -6,11 +6,12 @@ from typing import Any
 import msgspec
 
 COUNTS = "counts"
-"""The key in the status file. Counts are not published on /diagnostics, because they always change."""
+"""The key of the counts in the status file. Counts are not published on /diagnostics, because they
+change all the time."""
 
 
 class ScanCounts:
-    """Counted by the thread that scans the device, read by the thread that writes the status."""
+    """The counts of one device. The device's thread counts, and the main thread reads the counts."""
 
     def __init__(self) -> None:
         self._scans = self._failed = 0
@@ -20,7 +21,7 @@ class ScanCounts:
         self._last: object = None
 
     def scanned(self, took_s: float, outputs: object, *, failed: bool) -> None:
-        """Count a scan of `took_s` (s), and the outputs that its decision switched on."""
+        """Count a scan that took `took_s` (s), and the outputs that its decision switched on."""
         self._scans += 1
         self._failed += failed
         self._spent_s += took_s
@@ -30,7 +31,8 @@ class ScanCounts:
             self._switch(msgspec.structs.asdict(outputs))  # type: ignore[arg-type]
 
     def status(self) -> dict[str, Any]:
-        """Return the counts; `longest_scan_s` is the longest scan since the last call."""
+        """Return the counts. `longest_scan_s` is the longest scan since the last call of this
+        method."""
         longest_s, self._longest_s = self._longest_s, 0.0
         return {
             "scans": self._scans,
@@ -41,9 +43,10 @@ class ScanCounts:
         }
 
     def _switch(self, outputs: dict[str, object]) -> None:
-        """Count each output that is on now and was off, or that was another one of its group.
+        """Count each output that was switched on. In a group of outputs, also count a change to another
+        output.
 
-        Only levels count: a charger's numbers of orders are no relays.
+        Only levels count. A charger's numbers of orders do not count, because they are no relays.
         """
         for name, value in outputs.items():
             if value and isinstance(value, bool | str) and value != self._outputs.get(name):

@@ -1,6 +1,6 @@
-"""The service of a daemon: devices on buses, or a kind without hardware.
+"""The service of a daemon. It serves devices on buses, or a kind without hardware.
 
-Both sorts of service have threads, subscribe to RMF's topics, and report a status.
+In both cases the service has threads, subscribes to RMF's topics, and reports a status.
 """
 
 import logging
@@ -46,7 +46,8 @@ from drivers.hal.points import Points
 log = logging.getLogger(__name__)
 
 FIRST_S: Final = 0.5
-"""How long (s) a device's first scan waits for the first reading of its other bus."""
+"""The time (s) for which a device's first scan waits for the first reading of the device's other
+bus."""
 
 OpenBus = Callable[[str], Bus]
 
@@ -65,25 +66,27 @@ class Service(Protocol):
         """Clear latched faults on an operator's order."""
 
     def decided(self, verdict: DecidedByPerson, device: str) -> None:
-        """Pass on a person's decision about one device, or about every device ("")."""
+        """Pass on a person's decision about one device. `device` is "" for every device."""
 
     def look(self) -> None:
-        """Look for other nodes on the graph; called each second."""
+        """Look for other nodes on the graph. The daemon calls this method each second."""
 
     def status(self) -> Status:
         """Return the status of the whole service, for the status file."""
 
     def devices(self) -> Mapping[str, Status]:
-        """Return the status of each device, lift or door by name, for the status file."""
+        """Return the status of each device by name, for the status file. A supervisor's devices are its
+        lifts or doors."""
 
 
 def named_by(config: Config, topic: Topic[M_co]) -> Topic[M_co]:
-    """Return the topic, under its name in the YAML if the YAML renames it."""
+    """Return the topic under its name in the YAML, if the YAML renames the topic."""
     return topic.named(config.rmf.topics.get(topic.name, topic.name))
 
 
 def clock_of(transport: Transport) -> Clock:
-    """Return a clock that takes durations from the machine's clock, and stamps from RMF's clock."""
+    """Return a clock for durations and stamps. Durations come from the machine's clock, and stamps from
+    RMF's clock."""
     return Clock(machine_s, transport.wall)
 
 
@@ -100,10 +103,11 @@ def service(
 ) -> Service:
     """Return the service for this YAML. Raises HalError if a bus cannot be opened.
 
-    `kept`: the store for the memory across restarts, if the kind has such a memory; None for no store.
-    `new`: without a file in the store nothing has ever happened.
-    `unsafe`: devices that a dead daemon may have left on. `writer`: the recording's writer. `rmf`: the
-    stand-in of RMF's fleet adapter; None for the real one.
+    - `kept`: the store of the memory across restarts, or None. Not every kind has such a memory.
+    - `new`: nothing has ever happened if the store has no file.
+    - `unsafe`: the devices that a dead daemon may have left on
+    - `writer`: the writer of the recording
+    - `rmf`: an object that stands in for RMF's fleet adapter, or None for that adapter
     """
     kind = kind_called(config.kind)
     named = partial(named_by, config)
@@ -125,7 +129,7 @@ def service(
 
 
 class GraphService:
-    """A supervisor or coordinator: one thread, no bus."""
+    """The service of a supervisor or coordinator. It has one thread and no bus."""
 
     def __init__(self, node: AnyGraphNode, clock: Clock) -> None:
         self.loops = [Serving(node, clock)]
@@ -135,14 +139,15 @@ class GraphService:
         self.devices = node.devices
 
     def decided(self, verdict: DecidedByPerson, device: str) -> None:
-        """Do nothing: no kind without hardware has an outcome for a person to decide."""
+        """Do nothing, because a kind without hardware has no outcome that a person could decide."""
 
     def look(self) -> None:
         """Do nothing, because the node itself looks for other nodes."""
 
 
 class Devices:
-    """Lifts, doors or chargers: a loop with a thread for each bus, and a node for each device."""
+    """The service of lifts, doors, chargers or workcells. Each bus has a loop with its own thread, and
+    each device has a node."""
 
     def __init__(
         self,
@@ -157,7 +162,8 @@ class Devices:
         alarm: FleetAlarmNode | None = None,
         memories: DeviceMemories | None = None,
     ) -> None:
-        """`alarm`: the node that tells the fleets of the devices' alarms; None if no device does."""
+        """Prepare the service. `alarm`: the node that tells the fleets of the devices' alarms, or None
+        if no device raises alarms."""
         self._config = config
         self._alarm = alarm
         self._memories = memories
@@ -185,8 +191,8 @@ class Devices:
             handover.changed = self._placed[device][1].stir
 
     def subscribe(self) -> None:
-        """Subscribe to requests, to topics that are only recorded, and to states of our devices that
-        other nodes publish."""
+        """Subscribe to requests, and to topics that are only recorded. Subscribe also to our devices'
+        states, which a rival may publish."""
         for topic, accept in self._kind.requests.items():
             hear = self._to_inbox(topic, accept)
             self._hears[topic.name] = self._transport.subscribe(self._named(topic), hear)
@@ -199,20 +205,21 @@ class Devices:
             self._alarm.subscribe()
 
     def reset(self) -> None:
-        """Put the reset into the inbox of each device, and reset the alarm."""
+        """Put a reset into the inbox of each device, and reset the alarm."""
         if self._alarm:
             self._alarm.reset()
         for device, (_, loop) in self._placed.items():
             loop.inbox.put(device, OperatorReset())
 
     def decided(self, verdict: DecidedByPerson, device: str) -> None:
-        """Put the decision into the inbox of this device, or of each device ("")."""
+        """Put the decision into the inbox of this device. If `device` is "", put it into the inbox of
+        each device."""
         for name, (_, loop) in self._placed.items():
             if self._kind.keeping is not None and device in ("", name):
                 loop.inbox.put(name, verdict)
 
     def look(self) -> None:
-        """Tell each device when a first node that may send requests appears, and when the last such
+        """Tell each device when the first node appears that may send requests, and when the last such
         node disappears."""
         if self._alarm:
             self._alarm.look()
@@ -270,7 +277,7 @@ class Devices:
         driver = driver_type.create(name, device, bus)
         handovers = [one for (owner, _), one in self._handovers.items() if owner == name]
         if handovers:
-            assert isinstance(driver, TakesInputs)  # only contacts have `bus` in the YAML
+            assert isinstance(driver, TakesInputs)  # in the YAML, only contacts have `bus`
             driver.take_inputs(partial(taken, handovers))
         if name in self._unsafe:
             driver = SafeFirst(name, driver)
@@ -287,8 +294,8 @@ class Devices:
     def _to_inbox(
         self, topic: Topic[Message], accept: Callable[[Any, Any], object]
     ) -> Callable[[Message], None]:
-        """Return a callback for the transport's thread, which puts messages about our devices into the
-        inbox and counts requests for other devices."""
+        """Return a callback for the transport's thread. The callback puts messages about our devices
+        into the inbox, and counts requests for other devices."""
         states = topic == self._kind.states
         heard_on = self._named(topic)
 
@@ -310,7 +317,8 @@ class Devices:
         return put
 
     def _record(self, topic: Topic[Message], message: Message) -> None:
-        """Note a message about one of our devices; only in the transport's callback."""
+        """Record a message about one of our devices. Only the transport's callback calls this
+        method."""
         if self._kind.device_name(message) in self._placed:
             sender = self._transport.sender()
             self._writer.spoken(topic.name, message, sent=False, sender=sender)

@@ -1,4 +1,4 @@
-"""The steps by which `enable` and `disable` change a system; `--dry-run` prints the same steps."""
+"""The steps by which `enable` and `disable` change a system. `--dry-run` prints the steps instead."""
 
 import argparse
 import os
@@ -17,7 +17,7 @@ from bridges.system.files import replace
 
 CONFIG: Final = Path("etc/rmf-bridges")
 INSTANCE: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
-"""The pattern of service names that a unit's instance can have without escapes."""
+"""The pattern of a service's name. A unit's instance can have such a name without escapes."""
 NO_INSTANCE: Final = "{!r} is not a service name: use only letters, digits and _ . -"
 LEFT_ON: Final = (
     "the outputs of {} are not verified off, and a new drop-in may block access to them: mend the"
@@ -34,18 +34,18 @@ def add_root(parser: argparse.ArgumentParser) -> None:
 
 
 def unit(name: str) -> str:
-    """Return the full name of this service's unit."""
+    """Return the full name of the service's unit."""
     return f"rmf-bridge@{name}.service"
 
 
 def drop_in_file(name: str) -> Path:
-    """Return the path of the service's drop-in, below the root."""
+    """Return the path of the service's drop-in, relative to the root."""
     return Path(f"etc/systemd/system/{unit(name)}.d/10-enable.conf")
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A step that runs a command. `running_only`: the command makes sense only on a running system."""
+    """A step that runs a command. `running_only`: take the step only on a running system."""
 
     words: tuple[str, ...]
     running_only: bool = False
@@ -53,8 +53,8 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class SwitchOff:
-    """A step that runs `outputs-off` for a service, if a dead daemon has left a record in its
-    directory."""
+    """A step that runs `outputs-off` for a service. It does nothing if no dead daemon has left a
+    record."""
 
     words: tuple[str, ...]
     state: Path
@@ -62,8 +62,8 @@ class SwitchOff:
 
 @dataclass(frozen=True, slots=True)
 class WriteFile:
-    """A step that writes a file with this content, readable for everybody. With `source` the step
-    copies that file."""
+    """A step that writes a file, which everybody may read. `source`: the file that this step copies, or
+    None."""
 
     path: Path
     content: bytes
@@ -72,7 +72,7 @@ class WriteFile:
 
 @dataclass(frozen=True, slots=True)
 class Remove:
-    """A step that removes a file, and its directory if that becomes empty."""
+    """A step that removes a file. The step also removes the file's directory if it is then empty."""
 
     path: Path
 
@@ -81,15 +81,15 @@ Step = Run | SwitchOff | WriteFile | Remove
 
 
 def switch_off(name: str) -> SwitchOff:
-    """Return the step that switches off a service's leftover outputs."""
+    """Return the step that switches off the outputs which a dead daemon left on."""
     words = ("-P", "-m", "bridges.cli", "outputs-off", f"/{CONFIG}/{name}.yaml")
     return SwitchOff((sys.executable, *words), SERVICE_STATE / name)
 
 
 def carry_out(steps: Iterable[Step], args: argparse.Namespace, keeps: str = "") -> int:
-    """Carry out or print the steps in turn, up to the first failure. Return the exit code.
+    """Carry out or print the steps in order, until a step fails. Return the exit code.
 
-    `keeps`: a unit that is started again after a failed step, if it was running before.
+    `keeps`: the unit that is started again after a failed step, if it ran before.
     """
     live = args.root == Path("/")
     if live and not args.dry_run and os.geteuid() != 0:
@@ -134,7 +134,7 @@ def _show(step: Step) -> None:
 
 
 def _take(step: Step, root: Path) -> int:
-    """Carry out one step; return its exit code, 0 for success."""
+    """Carry out one step. Return its exit code, which is 0 on success."""
     try:
         return _taken(step, root)
     except OSError as error:  # for example a full disk

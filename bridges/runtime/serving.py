@@ -1,4 +1,4 @@
-"""A thread that runs round after round until it is stopped."""
+"""A thread that runs one round after another until it is stopped."""
 
 import logging
 import threading
@@ -14,13 +14,14 @@ from bridges.system.log import pairs
 log = logging.getLogger(__name__)
 
 LEAST_GAP_S = 0.001
-"""The shortest pause (s) before a round without an event."""
+"""The minimum pause (s) before a round without an event."""
 
 
 class Rounds(Protocol):
-    """Work that is done in rounds: a bus's devices, or a kind without hardware.
+    """Work that is done in rounds. This is the work of a bus's devices, or of a kind without hardware.
 
-    Only its own thread calls its methods. Tests call them without a thread, in virtual time.
+    Only the work's own thread calls the methods. Tests call the methods without a thread, in virtual
+    time.
     """
 
     @property
@@ -29,31 +30,31 @@ class Rounds(Protocol):
 
     @property
     def inbox(self) -> Inbox[Any]:
-        """The inbox whose events cause a round before `wake_at`."""
+        """The inbox. An event in it causes a round before `wake_at`."""
 
     @property
     def wake_at(self) -> float:
-        """The time of the next round if no event comes (monotonic s)."""
+        """The time (monotonic s) of the next round if no event comes before."""
 
     @property
     def finished(self) -> int:
-        """The number of finished steps, which may grow within a round."""
+        """The number of finished steps. It may grow within a round."""
 
     @property
     def ready(self) -> bool:
-        """Return whether the devices or the kind are in service."""
+        """Return whether the devices or the kind can serve."""
 
     def round(self) -> None:
-        """Take the waiting events and do the due work."""
+        """Take the waiting events, and do the work that is due."""
 
     def end(self) -> bool:
-        """Switch the outputs off and release everything. Return False if the outputs are not verified
+        """Switch the outputs off and release everything. Return False if an output is not verified
         off."""
 
 
 def stop(loops: Sequence["Serving"], within_s: float) -> bool:
     """End all loops at the same time. Return False if a loop does not end within `within_s` (s), or
-    leaves outputs on."""
+    leaves an output on."""
     for loop in loops:
         loop.close()
     deadline = time.monotonic() + within_s
@@ -62,7 +63,7 @@ def stop(loops: Sequence["Serving"], within_s: float) -> bool:
 
 
 class Serving:
-    """One thread of a service. `died`: the defect that ended the thread; "" without a defect."""
+    """One thread of a service. `died`: the defect that ended the thread, or "" without a defect."""
 
     def __init__(self, serves: Rounds, clock: Clock) -> None:
         self._rounds = 0
@@ -77,30 +78,30 @@ class Serving:
         self._thread.start()
 
     def close(self) -> None:
-        """Ask the thread to end: after the current round it switches the outputs off."""
+        """Ask the thread to end. After the present round the thread switches the outputs off."""
         self._serves.inbox.close()
 
     def ended(self, timeout_s: float) -> bool:
         """Wait for the thread's end. Return False if it does not end within `timeout_s` (s), or leaves
-        outputs on."""
-        if self._thread.ident is not None:  # the thread was started
+        an output on."""
+        if self._thread.ident is not None:  # otherwise it never started
             self._thread.join(timeout_s)
         return not self._thread.is_alive() and self._safe
 
     @property
     def alive(self) -> bool:
-        """Return whether the thread serves. The answer is False after a stop. It is also False after a
-        defect, even if the thread is still switching outputs off."""
+        """Return whether the thread serves. Return False after a stop and after a defect, even if the
+        thread is still switching outputs off."""
         return self._thread.is_alive() and not self.died
 
     @property
     def finished(self) -> int:
-        """A count that grows as long as the thread makes progress."""
+        """A number that grows while the thread makes progress."""
         return self._rounds + self._serves.finished
 
     @property
     def ready(self) -> bool:
-        """Return whether the thread has finished its first round and its service is ready."""
+        """Return whether the thread has finished its first round and its work is ready."""
         return self._rounds > 0 and self._serves.ready
 
     def _run(self) -> None:

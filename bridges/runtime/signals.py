@@ -1,9 +1,11 @@
-"""Signals. At each signal that by default ends or suspends a process, a daemon switches its outputs off
-and ends.
+"""Signals. A signal may end or suspend a process by default. At each such signal a daemon switches its
+outputs off and ends.
 
-Crashes, and SIGABRT from the watchdog, are not caught, because such a process cannot be trusted any
-more; `outputs-off` runs after it. SIGPIPE and SIGXFSZ stay ignored, as Python has set them, because an
-unread log or a full disk must not end a daemon. SIGKILL and SIGSTOP cannot be caught.
+Signals of a crash are not caught, and neither is the watchdog's SIGABRT. Nobody can trust such a
+process any more, so `outputs-off` runs after its death.
+
+SIGPIPE and SIGXFSZ stay ignored, as Python has set them. An unread log or a full disk must not end a
+daemon. SIGKILL and SIGSTOP cannot be caught.
 """
 
 import os
@@ -24,7 +26,7 @@ CRASHES: Final = {
     signal.SIGTRAP,
 }
 HARMLESS: Final = {signal.SIGCHLD, signal.SIGCONT, signal.SIGURG, signal.SIGWINCH}
-"""Signals whose default action neither ends nor suspends a process."""
+"""The signals that by default neither end nor suspend a process."""
 WRITES: Final = {signal.SIGPIPE, signal.SIGXFSZ}
 RESET: Final = signal.SIGUSR1
 TERMINAL: Final = {signal.SIGTTIN, signal.SIGTTOU}
@@ -40,39 +42,39 @@ ENDING: Final = frozenset(signal.valid_signals()) - {
 
 
 class End:
-    """A flag that the first signal of ENDING sets for ever. (A threading.Event would hang if a signal
-    arrived at a moment when the event's lock is taken.)"""
+    """A flag that the first signal of ENDING sets for ever. A threading.Event could hang, if a signal
+    arrives while the event's lock is taken."""
 
     def __init__(self) -> None:
-        """Begin to catch the signals. If the parent process ignores SIGHUP (nohup), the daemon also
-        ignores it."""
+        """Begin to catch the signals. If the parent process ignores SIGHUP (nohup), the daemon ignores
+        it too."""
         self._read, self._write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         for number in ENDING:
             if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, self._on_signal)
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait up to `timeout_s` (s); return True once a signal has come."""
+        """Wait up to `timeout_s` (s). Return True after a signal."""
         return bool(select.select([self._read], [], [], timeout_s)[0])
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        for each in TERMINAL:  # a background job's last log lines would raise these signals again
+        for each in TERMINAL:  # the last log lines of a background job would raise these again
             signal.signal(each, signal.SIG_IGN)
         with suppress(BlockingIOError):  # the pipe is full of earlier signals
             os.write(self._write, b".")
 
 
 def on_reset(reset: Callable[[], None]) -> None:
-    """Call `reset` when an operator sends `rmf-bridge reset`."""
+    """Call `reset` when an operator runs `rmf-bridge reset`."""
     signal.signal(RESET, lambda number, frame: reset())
 
 
 def ignore() -> None:
-    """Ignore every signal but SIGKILL in this short-lived process, which switches outputs off."""
+    """Ignore every signal except SIGKILL, in a short process that switches outputs off."""
     for number in ENDING | {RESET}:
         signal.signal(number, signal.SIG_IGN)
 
 
 def ignore_reset() -> None:
-    """Ignore a reset until the daemon serves. By default the signal would end the process."""
+    """Ignore a reset until the daemon serves. By default this signal would end the process."""
     signal.signal(RESET, signal.SIG_IGN)

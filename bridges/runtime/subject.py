@@ -24,18 +24,19 @@ Status = Mapping[str, Any]
 """A part of the status file, as JSON values."""
 
 Publish = Callable[[Topic[Message], Message], bool | None]
-"""A function that sends a message to RMF, never raises, and returns False if that failed."""
+"""A function that sends a message to RMF. It returns False on failure, and raises nothing."""
 
 V = TypeVar("V")
-"""The events of a core."""
+"""The type of a core's events."""
 
 
 class SubjectCore(Struct, Generic[M, V, O, R], frozen=True):
-    """A kind's core, as the daemon calls it. Its limits are already bound.
+    """The core of a kind, with its limits, as the daemon calls it.
 
-    `word`: the key of a subject's name in the log. `decide(memory, event, now)`: one step of the core.
-    `summary(report, now)`: keys and values for the log and the status file. `identity(fault)`: a value
-    that is equal in all reports of the same fault, so that the fault is logged once.
+    - `word`: the log's key for a subject's name
+    - `decide(memory, event, now)`: one step of the core
+    - `summary(report, now)`: keys and values for the log and the status file
+    - `identity(fault)`: a value that is equal in all reports of one fault. So the fault is logged once.
     """
 
     word: str
@@ -72,7 +73,7 @@ class Subject(Generic[M, V, O, R]):
         self._faults: Mapping[object, Fault] = {}
 
     def decide(self, event: V) -> Decision[M, O, R]:
-        """Let the core decide on an event, and act on the decision."""
+        """Let the core decide on an event, and carry out the decision."""
         before, now = self.memory, self._clock.monotonic()
         decision = self._core.decide(before, event, now)
         self._writer.decided(self.name, before, event, now, decision)
@@ -86,7 +87,8 @@ class Subject(Generic[M, V, O, R]):
         return decision
 
     def published(self, memory: M) -> None:
-        """Note that the subject's report was published. `memory`: the core's memory afterwards."""
+        """Note that the subject's report was published. `memory`: the core's memory after the
+        publication."""
         if memory is not self.memory:
             self.memory = memory
             self._writer.published(self.name, memory, self._clock.monotonic())
@@ -101,7 +103,7 @@ class Subject(Generic[M, V, O, R]):
             self._log_faults({self._core.identity(fault): fault for fault in report.faults})
 
     def status(self) -> Status:
-        """Return the subject's status for the status file. Any thread may call this."""
+        """Return the subject's status for the status file. Any thread may call this method."""
         decision = self.decision
         if decision is None:
             return {}

@@ -1,7 +1,7 @@
 """Switches off every output of a YAML or record, from a new process, with as few imports as possible.
 
-On each bus the devices that answered the dead daemon most recently come first, because silent devices
-would use up the time. Each device first gets one short try; then the failed devices are tried again.
+On each bus the devices that answered the dead daemon last come first, because silent devices would use
+up the time. Each device first gets one short attempt. Then the failed devices get a second attempt.
 """
 
 import logging
@@ -25,10 +25,10 @@ def outputs_off(
     ages: Mapping[str, float] | None = None,
 ) -> set[str]:
     """Switch off every output of a file, except the outputs of the devices in `but`. Return the devices
-    verified off. Give up after `timeout_s` (s) in total.
+    that are verified off. Give up after `timeout_s` (s) in total.
 
-    `ages`: the age (s) of each device's last answer to the dead daemon. A device that never answered is
-    missing.
+    `ages`: the age (s) of each device's last answer to the dead daemon. Devices that never answered are
+    not in it.
     """
     results: dict[str, bool] = {}
     left = [name for name in config.devices if name not in but]
@@ -46,7 +46,7 @@ def outputs_off(
 def _started(
     config: Config, bus_name: str, left: Sequence[str], results: dict[str, bool]
 ) -> threading.Thread:
-    """Start a thread for one bus, so that a dead bus does not delay the others."""
+    """Start a thread for one bus, so that a dead bus does not delay other buses."""
     here = set(config.devices_on(bus_name))
     devices = [name for name in left if name in here]
     arguments = (config, bus_name, devices, results)
@@ -76,7 +76,7 @@ def _bus_off(
 def _device_off(
     config: Config, name: str, bus: Bus, results: dict[str, bool], last: bool = False
 ) -> bool:
-    """Try to switch one device off. Only a failure of the `last` try counts and is logged."""
+    """Try to switch one device off. Log and count a failure only in the `last` attempt."""
     driver = config.driver_type(name).create(name, config.devices[name], bus)
     try:
         driver.open()
@@ -94,8 +94,7 @@ def _device_off(
 
 
 def _failed(name: str, error: Exception) -> None:
-    """Log the failure. Even a defect of ours is only logged, because it must not stop the other
-    devices."""
+    """Log the failure. A defect of ours is logged too, because it must not stop the other devices."""
     if isinstance(error, DriverError):
         log.error(pairs("outputs_not_off", device=name, reason=error))
     else:

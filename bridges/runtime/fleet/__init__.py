@@ -1,1 +1,1 @@
-"""A fleet in service: RMF's adapter on one side, the robots' buses on the other."""
+"""A fleet in service. RMF's adapter is on one side, and the robots' buses are on the other side."""

@@ -1,13 +1,14 @@
-"""RMF's own fleet adapter, `rmf_adapter`, of which this is the only importer.
+"""RMF's own fleet adapter, `rmf_adapter`. Only this module imports `rmf_adapter`.
 
-Debian's package is ros-jazzy-rmf-fleet-adapter-python. Tasks, traffic and negotiation are done there.
+Debian's package is ros-jazzy-rmf-fleet-adapter-python. RMF's adapter does the tasks, the traffic and
+the negotiation. It calls our callbacks on its own threads, and `robot.py` turns each call into an
+order.
 
-Its callbacks come on its own threads; `robot.py` makes an order of each. Facts about
-its interface: open-rmf/rmf_ros2, branch jazzy, rmf_fleet_adapter_python/src/adapter.cpp, and
-EasyFullControl.cpp of rmf_fleet_adapter.
+The source for its interface: open-rmf/rmf_ros2, branch jazzy, rmf_fleet_adapter_python/src/adapter.cpp,
+and EasyFullControl.cpp of rmf_fleet_adapter.
 
-`Adapter.make` waits for RMF's schedule node, and the whole process waits with it, because the binding
-does not release Python's lock. So one attempt waits MAKE_S only.
+`Adapter.make` waits for RMF's schedule node. The whole process waits too, because the binding does not
+release Python's lock. So one attempt waits at most MAKE_S.
 """
 
 import datetime
@@ -25,7 +26,7 @@ MAKE_S: Final = 3.0
 
 
 def installed() -> ModuleType:
-    """Import RMF's adapter. Raises TransportError with the package to install."""
+    """Import RMF's adapter. Raises TransportError, whose text names the package to install."""
     try:
         import rmf_adapter
         import rmf_adapter.easy_full_control
@@ -37,9 +38,11 @@ def installed() -> ModuleType:
 
 
 class FullControl:
-    """The adapter of one fleet, with `EasyFullControl`. `orders(robot, order)` takes its callbacks.
+    """RMF's adapter for one fleet, with `EasyFullControl`. `orders(robot, order)` receives RMF's
+    orders.
 
-    `update` is called by one thread for each robot. `failed`: robot -> why RMF did not take it.
+    For each robot, only one thread calls `update`. `failed`: for each robot, the reason why RMF did not
+    take it, or "".
     """
 
     def __init__(
@@ -55,8 +58,10 @@ class FullControl:
         rmf.init_rclcpp()
 
     def connect(self) -> bool:
-        """Join RMF; return False without a schedule node. Raises TransportError for files that RMF
-        refuses. The whole process waits for up to MAKE_S."""
+        """Join RMF. Return False if RMF has no schedule node. The whole process waits for up to MAKE_S.
+
+        Raises TransportError if RMF's adapter refuses the fleet's files.
+        """
         easy = self._rmf.easy_full_control
         files = self._site.config_file, self._site.graph_file
         configuration = easy.FleetConfiguration.from_config_files(*files, self._uri)
@@ -79,7 +84,7 @@ class FullControl:
         return True
 
     def update(self, name: str, report: RobotReport) -> None:
-        """Give RMF the levels of a robot's report: first its place, then the end of its command."""
+        """Pass a robot's report to RMF: first the robot's place, and then the end of its command."""
         if self._fleet is None:
             return
         robot = self._robots.setdefault(
@@ -90,11 +95,11 @@ class FullControl:
                 self.failed[name] = robot.add(self._fleet, self._configuration, report)
             else:
                 robot.update(report)
-        except RuntimeError as error:  # of C++
+        except RuntimeError as error:  # C++ raised it
             self.failed[name] = str(error)
 
     def close(self) -> None:
-        """Leave RMF."""
+        """Leave RMF's graph."""
         if self._fleet is not None:
             self._fleet = None
             self._adapter.stop()

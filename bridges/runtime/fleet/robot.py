@@ -1,6 +1,7 @@
-"""One robot at RMF's adapter: its handle, the execution under way, its commission and its issues.
+"""One robot at RMF's adapter: its handle, its present execution, its commission and its issues.
 
-RMF's callbacks come on foreign threads. They only put an order into the inbox of the robot's bus.
+RMF's adapter calls our callbacks on its own threads. A callback only puts an order into the inbox of
+the robot's bus.
 """
 
 import json
@@ -13,15 +14,16 @@ from bridges.kinds.fleet.report import RobotReport
 from bridges.kinds.fleet.signals import Act, Goal, Localize, Navigate, Order, Pose, Stop
 
 GIVEN_UP_S: Final = 2.0
-"""RMF gives up an activity a moment before it orders the next one, which must not cause a stop."""
+"""The time (s) between RMF's end of an activity and our stop of the robot. RMF often orders the next
+activity a moment later, and then the robot must not stop."""
 AGAIN_S: Final = 10.0
-"""The pause (s) after RMF has not taken a robot."""
+"""The pause (s) before the next attempt, after RMF has not taken a robot."""
 NOT_TAKEN: Final = "RMF does not take it: is it near the graph, on a level of the graph?"
 Put = Callable[[str, Order], None]
 
 
 class RmfRobot:
-    """One robot at RMF: its handle, the execution under way, and its issues."""
+    """One robot at RMF's adapter: its handle, its present execution, and its issues."""
 
     def __init__(self, name: str, rmf: Any, orders: Put, numbers: Iterator[int]) -> None:
         self.handle: Any = None
@@ -34,7 +36,7 @@ class RmfRobot:
         self._again_at = 0.0
 
     def add(self, fleet: Any, configuration: Any, report: RobotReport) -> str:
-        """Add the robot at its first place; return why RMF did not take it, or ""."""
+        """Add the robot at its first place. Return the reason why RMF did not take the robot, or ""."""
         if report.at is None or time.monotonic() < self._again_at:
             return "" if report.at is None else NOT_TAKEN
         self._again_at = time.monotonic() + AGAIN_S
@@ -75,7 +77,7 @@ class RmfRobot:
             self._orders(self._name, Stop(next(self._numbers), number))
 
     def _end(self, number: int) -> None:
-        """Forget an execution, unless RMF has begun the next one meanwhile."""
+        """Forget this execution. Do nothing if RMF has begun the next execution."""
         with self._lock:
             if self._now[0] == number:
                 self._now = (number, None)

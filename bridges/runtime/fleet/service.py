@@ -1,4 +1,5 @@
-"""The service of a fleet: robots on buses, as devices are, with RMF's adapter in place of topics."""
+"""The service of a fleet. The robots are on buses, as devices are. RMF's adapter takes the place of
+topics."""
 
 import itertools
 import logging
@@ -36,7 +37,7 @@ LOOK_S: Final = 0.5
 
 
 class RobotNode(Node[Any, Any, Any, Any, Any, Any, RobotReport]):
-    """One robot in service: its report goes to RMF's adapter."""
+    """The node of one robot. The robot's report goes to RMF's adapter."""
 
     adapter: FullControl
 
@@ -46,7 +47,7 @@ class RobotNode(Node[Any, Any, Any, Any, Any, Any, RobotReport]):
 
 
 class Joining:
-    """The thread that joins RMF, again and again until RMF's schedule node is there."""
+    """The thread that joins RMF. It tries again until RMF's schedule node is there."""
 
     name = "rmf-adapter"
 
@@ -61,7 +62,7 @@ class Joining:
         self._again_at = AGES_AGO
 
     def round(self) -> None:
-        """Join RMF if it is time. READY does not wait for RMF."""
+        """Join RMF, if an attempt is due. The daemon is ready without RMF."""
         now = self._clock.monotonic()
         self.wake_at = now + LOOK_S
         if self.joined or now < self._again_at:
@@ -75,7 +76,7 @@ class Joining:
             log.warning(pairs("rmf_not_joined", reason=NO_SCHEDULE, again_s=AGAIN_S))
 
     def end(self) -> bool:
-        """Leave RMF."""
+        """Leave RMF's graph."""
         self._adapter.close()
         return True
 
@@ -99,17 +100,18 @@ class FleetDevices(Devices):
         *,
         rmf: Any,
     ) -> None:
-        """`rmf`: the stand-in of the module `rmf_adapter`; None for the real one. Raises SettingsError
-        for RMF's files, and TransportError without the module."""
+        """Prepare the service. `rmf`: an object that stands in for the module `rmf_adapter`, or None
+        for that module.
+
+        Raises SettingsError for an error in RMF's files, and TransportError if the module is missing.
+        """
         assert isinstance(config.section, FleetFiles)
         self._site = read_site(config)
         self._stands_in = rmf is not None
         numbers = itertools.count(int(transport.wall()))
         uri = config.section.server_uri
         rmf = installed() if rmf is None else rmf
-        os.environ["ROS_DOMAIN_ID"] = str(
-            transport.domain_id
-        )  # RMF's adapter has a node of its own
+        os.environ["ROS_DOMAIN_ID"] = str(transport.domain_id)  # RMF's adapter makes its own node
         if config.rmf.network == "localhost":
             os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
         self._adapter = FullControl(rmf, self._site, uri, self._order, numbers)
@@ -122,7 +124,7 @@ class FleetDevices(Devices):
             log.info(pairs("map", text=note))
 
     def subscribe(self) -> None:
-        """Subscribe to the chargers' states."""
+        """Subscribe to the states of the chargers."""
         accept = self._kind.requests[CHARGER_STATES]
         hear = self._to_inbox(CHARGER_STATES, accept)
         ours = ("", self._site.fleet.fleet.name)
@@ -136,7 +138,7 @@ class FleetDevices(Devices):
         self._hears[CHARGER_STATES.name] = self._transport.subscribe(topic, ours_only)
 
     def status(self) -> Status:
-        """Return the service's status, with RMF's part."""
+        """Return the status of the service, with the state of RMF's adapter."""
         found = super().status()
         failed = self._adapter.failed.copy().items()
         faults = [Fault("RMF_TAKES_NO_ROBOT", f"{name}: {why}") for name, why in failed if why]
@@ -161,10 +163,10 @@ class FleetDevices(Devices):
         return node
 
     def _order(self, robot: str, order: Order) -> None:
-        """Take an order of RMF, on any thread."""
+        """Put an order of RMF into the inbox of the robot's bus. Any thread may call this method."""
         _, loop = self._placed[robot]
         loop.inbox.put(robot, order)
 
     def _speak(self, state: FleetState) -> None:
-        """Publish the fleet's state in place of RMF's adapter."""
+        """Publish the fleet's state, because the stand-in of RMF's adapter does not."""
         self._outlet.publish(FLEET_STATES, state)
