@@ -9,8 +9,8 @@ from enum import IntEnum
 
 
 class LiftRequestType(IntEnum):
-    """The values of LiftRequest.request_type. LiftState has other numbers for modes: HUMAN is 1, AGV is
-    2."""
+    """LiftRequest.request_type has these values. LiftState has other numbers for modes: HUMAN is 1, AGV
+    is 2."""
 
     REQUEST_END_SESSION = 0
     REQUEST_AGV_MODE = 1
@@ -18,14 +18,14 @@ class LiftRequestType(IntEnum):
 
 
 class LiftRequestDoor(IntEnum):
-    """The values of LiftRequest.door_state."""
+    """LiftRequest.door_state has these values."""
 
     DOOR_CLOSED = 0
     DOOR_OPEN = 2
 
 
 class LiftDoor(IntEnum):
-    """The values of LiftState.door_state."""
+    """LiftState.door_state has these values."""
 
     DOOR_CLOSED = 0
     DOOR_MOVING = 1
@@ -33,7 +33,7 @@ class LiftDoor(IntEnum):
 
 
 class LiftMotion(IntEnum):
-    """The values of LiftState.motion_state."""
+    """LiftState.motion_state has these values."""
 
     MOTION_STOPPED = 0
     MOTION_UP = 1
@@ -42,7 +42,7 @@ class LiftMotion(IntEnum):
 
 
 class LiftMode(IntEnum):
-    """The values of LiftState.current_mode and available_modes."""
+    """LiftState.current_mode has these values, and so has available_modes."""
 
     MODE_UNKNOWN = 0
     MODE_HUMAN = 1
@@ -53,7 +53,7 @@ class LiftMode(IntEnum):
 
 
 class DoorModeValue(IntEnum):
-    """The values of DoorMode.value."""
+    """DoorMode.value has these values."""
 
     MODE_CLOSED = 0
     MODE_MOVING = 1
@@ -63,8 +63,8 @@ class DoorModeValue(IntEnum):
 
 
 class ChargerStateValue(IntEnum):
-    """The values of ChargerState.state. The number 0 has no meaning, so a message with default values
-    is invalid."""
+    """ChargerState.state has these values. The number 0 has no meaning, so a message with default
+    values is invalid."""
 
     CHARGER_IDLE = 1
     CHARGER_ASSIGNED = 2
@@ -74,7 +74,7 @@ class ChargerStateValue(IntEnum):
 
 
 class WorkcellMode(IntEnum):
-    """The values of DispenserState.mode and IngestorState.mode."""
+    """DispenserState.mode has these values, and so has IngestorState.mode."""
 
     IDLE = 0
     BUSY = 1
@@ -82,7 +82,7 @@ class WorkcellMode(IntEnum):
 
 
 class WorkcellStatus(IntEnum):
-    """The values of DispenserResult.status and IngestorResult.status."""
+    """DispenserResult.status has these values, and so has IngestorResult.status."""
 
     ACKNOWLEDGED = 0
     SUCCESS = 1
@@ -90,7 +90,7 @@ class WorkcellStatus(IntEnum):
 
 
 class RobotModeValue(IntEnum):
-    """The values of RobotMode.mode."""
+    """RobotMode.mode has these values."""
 
     MODE_IDLE = 0
     MODE_CHARGING = 1
@@ -107,7 +107,7 @@ class RobotModeValue(IntEnum):
 
 
 class ChargingMode(IntEnum):
-    """The values of ChargingAssignment.mode. A robot charges at the waypoint, or waits there for a
+    """ChargingAssignment.mode has these values. A robot charges at the waypoint, or waits there for a
     charger."""
 
     MODE_CHARGE = 0
@@ -115,7 +115,7 @@ class ChargingMode(IntEnum):
 
 
 class AlertTier(IntEnum):
-    """The values of Alert.tier."""
+    """Alert.tier has these values."""
 
     TIER_INFO = 0
     TIER_WARNING = 1
@@ -123,7 +123,7 @@ class AlertTier(IntEnum):
 
 
 class DiagnosticLevel(IntEnum):
-    """The values of DiagnosticStatus.level."""
+    """DiagnosticStatus.level has these values."""
 
     OK = 0
     WARN = 1

@@ -1,1 +1,1 @@
-"""The machine that a daemon runs on: its log, its folders and files, its terminal."""
+"""The machine of a daemon: its log, its folders and files, and its terminal."""

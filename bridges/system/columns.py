@@ -9,9 +9,11 @@ from typing import TextIO
 
 
 def aligned(rows: Sequence[Sequence[str]], columns: int | None = None) -> list[str]:
-    """Return rows of equal length as lines, with two spaces between columns. If a line would be longer
-    than `columns`, the cells of the widest columns are wrapped between words. If that is not enough,
-    only one space stands between columns, and long words are cut."""
+    """Return rows of equal length as lines, with two spaces between columns.
+
+    If a line would be longer than `columns`, the cells of the widest columns are wrapped between words.
+    If the lines are still too long, only one space stands between columns, and long words are cut.
+    """
     columned = [*zip(*rows, strict=True)]
     widths, gap = [max(map(width, column)) for column in columned], 2
     if columns is not None:
@@ -26,8 +28,8 @@ def aligned(rows: Sequence[Sequence[str]], columns: int | None = None) -> list[s
 
 
 def _fitted(widths: Sequence[int], words: Sequence[int], columns: int) -> list[int]:
-    """Return the widths of the columns. The widest are cut back until all fit into `columns`. A word is
-    cut only if nothing else makes the columns fit."""
+    """Return the widths of the columns. Reduce the widest columns until all columns fit into `columns`.
+    Cut a word only if the columns would otherwise not fit."""
     for least in (words, [1] * len(words)):
         for most in range(max(widths), 0, -1):
             fitted = [min(w, max(most, one)) for w, one in zip(widths, least, strict=True)]
@@ -72,6 +74,6 @@ def hanging(text: str, columns: int, indent: int = 2) -> list[str]:
 
 
 def columns_of(out: TextIO) -> int:
-    """Return the width of a stream's terminal. Return 0 for a pipe or file, because its lines may have
-    any length."""
+    """Return the width of a stream's terminal. Return 0 for a pipe or file, whose lines may have any
+    length."""
     return shutil.get_terminal_size().columns if out.isatty() else 0

@@ -1,15 +1,14 @@
-"""A daemon's directories. Every command finds them by one rule.
+"""A daemon's directories. Every command finds them by one rule, in this order:
 
-The rule has this order:
-1. the directory given on the command line;
-2. in a systemd unit, the directories that systemd gives;
-3. the service's directories, if their lock or record names this file;
-4. the directories of a daemon started by hand. For root these also include the directories of the user
-   who called sudo.
+1. the directory that the command line gives
+2. in a systemd unit, the directories that systemd gives
+3. the service's directories, if their lock or record names this file
+4. the directories of a daemon that a person started by hand. For root, the directories of the user who
+   called sudo come before root's own.
 
-`runtime` holds lock and status, and is lost at a reboot. `state` holds the record of claimed outputs.
-It survives a reboot, because a Modbus relay stays on during a power cut of the Pi. A directory given on
-the command line serves as both.
+`runtime` holds the lock and the status, and is lost at a reboot. `state` holds the record of claimed
+outputs. It survives a reboot, because a Modbus relay stays on during a power cut of the Pi. A directory
+from the command line serves as `runtime` and as `state`.
 """
 
 import grp
@@ -28,7 +27,7 @@ USERS_RUN = Path("/run/user")
 TMP = Path("/tmp")
 SERVICE_USER = "rmf-bridge"
 GROUPS = ("gpio", "dialout")
-"""The additional groups that a drop-in may give the service's user (`drop_in.py`)."""
+"""The additional groups that a drop-in may give to the service's user (`drop_in.py`)."""
 
 
 class Directories(Struct, frozen=True):
@@ -39,7 +38,7 @@ class Directories(Struct, frozen=True):
 
     @property
     def folders(self) -> tuple[Path, ...]:
-        """Both directories, `state` first."""
+        """The two directories, with `state` first. Only one if they are the same."""
         return tuple(dict.fromkeys((self.state, self.runtime)))
 
 
@@ -49,7 +48,8 @@ def named(file: Path) -> str:
 
 
 def as_given(given: str | None) -> Directories | None:
-    """Return the directories that the command line or systemd's unit gives; None if neither does."""
+    """Return the directories that the command line or systemd's unit gives. Return None if neither
+    gives one."""
     if given:
         return Directories(Path(given).absolute(), Path(given).absolute())
     runtime = os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
@@ -76,8 +76,8 @@ def state_base() -> Path:
 
 
 def everywhere(file: Path) -> Iterator[Directories]:
-    """Yield the possible directories of this file's daemon. They differ by who started the daemon: the
-    service, the user who called sudo (only for root), or this user by hand."""
+    """Yield the possible directories of this file's daemon. They depend on who started the daemon:
+    systemd, the user who called sudo (only for root), or this user."""
     yield of_service(file)
     if os.geteuid() == 0 and (uid := os.environ.get("SUDO_UID", "")).isdecimal():
         yield from _of_user(int(uid), file)
@@ -85,7 +85,7 @@ def everywhere(file: Path) -> Iterator[Directories]:
 
 
 def _of_user(uid: int, file: Path) -> Iterator[Directories]:
-    """Yield this user's directories, but only if the user owns them."""
+    """Yield this user's directories, if the user owns them."""
     for base in (USERS_RUN / str(uid), TMP / f"rmf-bridge-{uid}"):
         runtime = base / "rmf-bridge" / file.stem
         try:
@@ -98,8 +98,8 @@ def _of_user(uid: int, file: Path) -> Iterator[Directories]:
 
 
 def runtimes() -> Iterator[Path]:
-    """Yield the runtime directories of this machine's services and of this user. For root, yield those
-    of all users."""
+    """Yield the runtime directories of this machine's services and of this user. For root, yield the
+    directories of all users."""
     bases = [SERVICE_RUN, by_hand(Path("any")).runtime.parent]
     if os.geteuid() == 0:
         bases += [*USERS_RUN.glob("*/rmf-bridge"), *TMP.glob("rmf-bridge-*/rmf-bridge")]
@@ -109,7 +109,8 @@ def runtimes() -> Iterator[Path]:
 
 
 class Distrusted(PermissionError):
-    """Another user made a directory, or could write into it. The error's text names the directory."""
+    """The error of a directory that another user made or can write. The error's text names the
+    directory."""
 
 
 def cannot_be_seen(folder: Path, error: OSError) -> PermissionError:
@@ -122,11 +123,11 @@ def cannot_be_seen(folder: Path, error: OSError) -> PermissionError:
 
 @contextmanager
 def opened(folder: Path, *, ours: bool = False, make: bool = False) -> Iterator[int]:
-    """Yield a descriptor of a daemon's directory. With `make`, make the directory if it is missing.
+    """Yield a descriptor of a daemon's directory. If `make`, make a missing directory.
 
-    Only the directory's owner or root can have made the directory, and no other user can write into it.
-    With `ours` the owner must be this user. Each parent directory is checked in the same way, from the
-    top down. So the caller may use the directory's path. Raises Distrusted, and other OSErrors.
+    The directory is safe: only its owner or root can have made it, and no other user can write it. If
+    `ours`, the owner is this user. Each parent directory is checked in the same way, from the top down.
+    So the caller may use the directory's path. Raises Distrusted, and other OSErrors.
     """
     folder = folder.absolute()
     owner = _owner(folder, ours=ours or make)
@@ -145,7 +146,7 @@ def opened(folder: Path, *, ours: bool = False, make: bool = False) -> Iterator[
 
 
 def _owner(folder: Path, *, ours: bool) -> int:
-    """Return a directory's owner. With `ours`, raises Distrusted if the owner is another user."""
+    """Return a directory's owner. If `ours` and another user is the owner, raises Distrusted."""
     try:
         owner = folder.lstat().st_uid
     except FileNotFoundError:
@@ -159,8 +160,8 @@ def _owner(folder: Path, *, ours: bool) -> int:
 
 
 def _distrusted(place: Path, owner: int, *, last: bool) -> str:
-    """Return the reason why a user other than root or the owner may have made this directory or link;
-    "" if there is none."""
+    """Return the reason why a user other than root or the owner may have made this directory or link.
+    Return "" without such a reason."""
     found = place.lstat()
     if found.st_uid not in (Path("/").stat().st_uid, owner):
         return "belongs to another user"
@@ -175,9 +176,9 @@ def _distrusted(place: Path, owner: int, *, last: bool) -> str:
 def act_as_owner(places: Directories) -> None:
     """Change permanently from root to the owner of the directories, with the unit's groups.
 
-    Then files in the directories can do no more than their owner could. Raises PermissionError if
-    another user could have made the directories. Raises it also if they belong to another user and we
-    are not root.
+    After that, a file in the directories can do no more harm than the owner could. Raises
+    PermissionError if another user could have made the directories. Without root, it is also raised if
+    another user owns them.
     """
     for folder in places.folders:
         with suppress(FileNotFoundError, NotADirectoryError):
@@ -194,7 +195,8 @@ def _become(uid: int, gid: int) -> None:
 
 
 def _groups(uid: int, gid: int) -> list[int]:
-    """Return the user's groups. For the service's user, add the groups that a unit may give it."""
+    """Return the user's groups. For the service's user, add the groups that a unit may give to this
+    user."""
     try:
         user = pwd.getpwuid(uid)
     except KeyError:
@@ -214,8 +216,8 @@ def owner_of(path: Path) -> str:
 
 
 def work_somewhere(places: Directories) -> None:
-    """Change to a directory in which lgpio can make its FIFO: one of `places`, else a temporary
-    directory."""
+    """Change to a directory in which lgpio can make its FIFO. This is one of `places`, or else a
+    temporary directory."""
     for folder in (places.runtime, places.state, TMP, Path("/dev/shm"), Path("/var/tmp")):
         probe = folder / f".rmf-bridge-{os.getpid()}"
         try:

@@ -1,14 +1,14 @@
-"""A daemon's own files. Each file is replaced as a whole, so a reader sees either the old or the new
-file."""
+"""A daemon's own files. Each file is replaced as a whole. So a reader sees either the old file or the
+new file."""
 
 import os
 from pathlib import Path
 
 
 def replace(path: Path, content: bytes) -> None:
-    """Replace a file, and sync the file and its folder to disk. Make the folder if needed.
+    """Replace a file, and write the file and its folder to disk. Make the folder if it is missing.
 
-    Raises OSError; the old file then remains.
+    Raises OSError, and then the old file remains.
     """
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     new = path.with_name(f".{path.name}.new")
@@ -30,10 +30,9 @@ def show(path: Path, content: bytes) -> None:
 
 
 def read(path: Path, longest: int) -> bytes:
-    """Return the file's content, up to `longest` bytes. Raises OSError; a symbolic link is also an
-    error.
+    """Return the file's content, up to `longest` bytes. Raises OSError, also for a symbolic link.
 
-    If a FIFO is in the file's place, this function does not wait for it.
+    If a FIFO is in the file's place, do not wait for it.
     """
     flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
     with open(os.open(path, flags), "rb") as source:

@@ -1,9 +1,9 @@
-"""Imports the optional packages: the workbench, the fakes and the page's library. No daemon needs them,
-and `bridges` imports them only through this module.
+"""Imports the optional packages: the workbench, the fakes and the page's library. No daemon needs these
+packages. `bridges` imports them only through this module.
 
-Each optional Debian package has a folder for its version. The daemons' tree has a `.pth` file that
-names the folder of the tree's own version (deb/scripts/rmf-bridges.postinst). For pip all packages are
-one distribution.
+Each version of an optional Debian package has its own folder. The daemons' tree has a `.pth` file,
+which names the folder of the tree's own version (deb/scripts/rmf-bridges.postinst). For pip, all
+packages are one distribution.
 """
 
 import importlib
@@ -16,11 +16,12 @@ SITE = Path(__file__).parents[2]
 
 
 class NotInstalled(Exception):
-    """An optional package is not installed. The text says how to install it."""
+    """The error of an optional package that is not installed. The error's text says how to install
+    it."""
 
 
 def is_there(package: str) -> bool:
-    """Return whether `workbench` or `hal_fakes` is installed in the version of these daemons."""
+    """Return whether `workbench` or `hal_fakes` is installed in the daemons' version."""
     return importlib.util.find_spec(package) is not None
 
 
@@ -32,7 +33,7 @@ def of_workbench(name: str) -> ModuleType:
 
 
 def how_to_install(part: str, site: Path = SITE) -> str:
-    """Return an instruction to install the missing `workbench` or `page`."""
+    """Return an instruction that installs the missing `workbench` or `page`."""
     package = f"rmf-bridges-{part}"
     try:
         place = Path((site / f"{package}.pth").read_text().strip())

@@ -1,4 +1,4 @@
-"""The log: one line `event key=value …` for each event, with a priority for journald."""
+"""The log. It has one line `event key=value …` for each event, with a priority for journald."""
 
 import codecs
 import logging
@@ -13,12 +13,12 @@ from enum import Enum
 import msgspec
 
 ESCAPED = "unicode_escape"
-codecs.lookup(ESCAPED)  # loads the codec now, because later no file descriptor may be free
+codecs.lookup(ESCAPED)  # loads the codec now; later there may be no free file descriptor
 _PRIORITY = {"DEBUG": 7, "INFO": 6, "WARNING": 4, "ERROR": 3, "CRITICAL": 2}
 
 
 class LogLine(str):
-    """A log line `event key=value …`. It keeps its event and values for `--log-format json`."""
+    """A log line `event key=value …`. It keeps the event and the values for `--log-format json`."""
 
     __slots__ = ("event", "values")
     event: str
@@ -26,7 +26,7 @@ class LogLine(str):
 
 
 def pairs(event: str, **values: object) -> LogLine:
-    """Return one log line. Values with spaces, quotes or line breaks are quoted and escaped."""
+    """Return one log line. Quote and escape values with spaces, quotes or line breaks."""
     shown = (f"{key}={_quoted(plain(value))}" for key, value in values.items())
     line = LogLine(" ".join([event, *shown]))
     line.event, line.values = event, values
@@ -36,8 +36,8 @@ def pairs(event: str, **values: object) -> LogLine:
 def plain(value: object) -> str:
     """Return a value as text for people, such as `agv_request yes, call L3`.
 
-    Fields of a record that are not set are left out. None is `-`, and so is a record without set
-    fields.
+    Leave out the fields of a record that are not set. None becomes `-`. A record without set fields
+    becomes `-` too.
     """
     match value:
         case None:
@@ -73,8 +73,8 @@ def _quoted(text: str) -> str:
 
 
 class _Formatter(logging.Formatter):
-    """A formatter of text lines. Under systemd a line is `<6>text`, with journald's priority; on a
-    terminal it is `12:34:56.789 INFO text`."""
+    """A formatter of text lines. Under systemd a line is `<6>text`, where 6 is journald's priority. On
+    a terminal a line is `12:34:56.789 INFO text`."""
 
     def __init__(self, journal: bool) -> None:
         super().__init__(
@@ -92,8 +92,8 @@ class _Formatter(logging.Formatter):
 
 
 class _Json(logging.Formatter):
-    """A formatter of JSON lines. Each event's line has its time `at` (ISO 8601), priority, event,
-    values and text."""
+    """A formatter of JSON lines. A line has the time `at` (ISO 8601), the priority and the text. For
+    our own events it also has the event and the values."""
 
     def __init__(self, journal: bool) -> None:
         super().__init__()
@@ -118,8 +118,11 @@ def _as_json(value: object) -> object:
 
 
 class _OthersOnce(logging.Filter):
-    """A filter that passes each log call of a library once. Without it anybody could trigger the call
-    endlessly with bad frames or datagrams. Our own code already logs each event once."""
+    """A filter that passes each log call of a library only once.
+
+    Without this filter anybody could cause endless lines with bad frames or datagrams. Our own code
+    already logs each event once.
+    """
 
     OURS = ("root", "bridges", "drivers", "hal_fakes", "workbench")
 
@@ -131,8 +134,8 @@ class _OthersOnce(logging.Filter):
         place = record.pathname, record.lineno
         if record.name.partition(".")[0] in self.OURS:
             return True
-        record.exc_info = record.exc_text = None  # a library's traceback helps no operator
-        text = record.getMessage()  # the text may quote untrusted input
+        record.exc_info = record.exc_text = None  # no operator needs a library's traceback
+        text = record.getMessage()  # may quote untrusted input
         record.args = None
         record.msg = text if text.isprintable() else text.encode(ESCAPED).decode("ascii")
         first = place not in self._said
@@ -141,11 +144,12 @@ class _OthersOnce(logging.Filter):
 
 
 class Seldom(logging.Filter):
-    """A filter for repeated lines. It passes the first OFTEN lines of a series, then one line in
-    AGAIN_S (s), with the number of lines left out. A pause longer than PAUSE_S (s) ends the series.
+    """A filter for repeated lines. It passes the first OFTEN lines of a series. Then it passes one line
+    in AGAIN_S (s), with the number of lines left out. A pause longer than PAUSE_S (s) ends the
+    series.
 
     Without this filter a device that is lost and found each second would fill the disk. Lines that
-    differ only in seconds count as equal. `now`: monotonic s.
+    differ only in a number of seconds count as equal. `now` returns the time (monotonic s).
     """
 
     OFTEN, PAUSE_S, AGAIN_S, MOST = 6, 10.0, 600.0, 1000
@@ -161,7 +165,7 @@ class Seldom(logging.Filter):
         run = self._runs.pop(text, None)
         if run is None or now - run.last_at > self.PAUSE_S:
             run = _Run()
-        self._runs[text] = run  # the newest series comes last
+        self._runs[text] = run  # the newest series is the last
         if len(self._runs) > self.MOST:
             del self._runs[next(iter(self._runs))]
         run.times, run.last_at = run.times + 1, now

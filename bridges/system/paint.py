@@ -1,5 +1,5 @@
-"""Colours and lines that are drawn in place. Colours are used only on a terminal and without NO_COLOR
-(https://no-color.org)."""
+"""Colours, and lines that are drawn in place. Colours are used only on a terminal, and only without
+NO_COLOR (https://no-color.org)."""
 
 import os
 from collections.abc import Iterable
@@ -7,12 +7,12 @@ from typing import TextIO
 
 
 def coloured(out: TextIO) -> bool:
-    """Return whether this output takes colours."""
+    """Return whether this stream shows colours."""
     return out.isatty() and not os.environ.get("NO_COLOR")
 
 
 def styled(text: str, style: str) -> str:
-    """Return the text in a style. `style`: numbers of ECMA-48's SGR, such as `1;31`; "" for plain
+    """Return the text in a style. `style`: numbers of ECMA-48's SGR, such as `1;31`, or "" for plain
     text."""
     return f"\x1b[{style}m{text}\x1b[0m" if style else text
 
@@ -28,7 +28,7 @@ def bold(text: str, out: TextIO) -> str:
 
 
 def repainted(lines: Iterable[tuple[str, str]], before: int) -> str:
-    """Return the text that draws these lines over the `before` lines above the cursor. `lines`: pairs
-    of text and style."""
+    """Return a text that replaces the `before` lines above the cursor by `lines`. `lines`: pairs of a
+    text and its style."""
     up = f"\x1b[{before}A" if before else ""
     return up + "".join(f"\r\x1b[K{styled(*line)}\n" for line in lines) + "\x1b[J"

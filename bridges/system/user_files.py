@@ -1,8 +1,8 @@
 """Files that a user names. Only regular files are read, and always as a whole. Secrets have stricter
 rules.
 
-A FIFO in a file's place would stop a daemon for ever, and a device might have no end. A secret comes
-from a file that only the daemon's user can read, never from a YAML.
+A FIFO in a file's place would stop a daemon for ever, and a device may have no end. A secret comes from
+a file that only the daemon's user can read. A secret is never in a YAML.
 """
 
 import errno
@@ -16,7 +16,8 @@ LONGEST_SECRET: Final = 4096
 
 
 class SecretError(Exception):
-    """The file cannot be read, or other users can read it, or it does not hold one secret."""
+    """The error of a secret's file. It cannot be read, other users can read it, or it does not hold one
+    secret."""
 
 
 class Content(NamedTuple):
@@ -27,8 +28,8 @@ class Content(NamedTuple):
 
 
 def read(file: str | os.PathLike[str], longest: int) -> Content:
-    """Return up to `longest` + 1 bytes of a file. The extra byte tells the caller that the file is
-    longer. Raises OSError."""
+    """Return up to `longest` + 1 bytes of a file. The extra byte shows that the file is too long.
+    Raises OSError."""
     descriptor = os.open(file, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     with open(descriptor, "rb") as opened:
         mode = os.fstat(descriptor).st_mode
@@ -40,9 +41,10 @@ def read(file: str | os.PathLike[str], longest: int) -> Content:
 
 
 def secret_line(name: str, file: str, what: str) -> str:
-    """Return the secret in a file: one line of printable ASCII. Raises SecretError with a remedy.
+    """Return the secret in a file, which is one line of printable ASCII. Raises SecretError with a
+    remedy.
 
-    `name`: the setting that has the file's path. `what`: `token` or `password`, for the error's text.
+    `name`: the setting that holds the file's path. `what`: `token` or `password`, for the error's text.
     """
     line = secret(name, file).strip()
     if not re.fullmatch(rb"[!-~]{1,%d}" % LONGEST_SECRET, line):

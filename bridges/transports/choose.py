@@ -1,7 +1,7 @@
 """Chooses a daemon's transport, ROS domain and network.
 
-The YAML decides. If the YAML lacks a key, ROS's environment variables decide, as for any ROS node. Each
-transport has a folder beside this file: `ros2/`, `dds/`, `zenoh/`.
+The YAML decides. If a key is missing in the YAML, ROS's environment variables decide, as for any ROS
+node. Each transport has a folder beside this file: `ros2/`, `dds/`, `zenoh/`.
 """
 
 import importlib
@@ -21,7 +21,7 @@ from bridges.transports.transport import Transport, TransportError
 log = logging.getLogger(__name__)
 
 NEEDED = sorted(set(PACKAGES.values()) - OF_WORKCELLS)
-"""The message packages that every daemon needs on `ros2`."""
+"""The message packages that every daemon with `ros2` needs."""
 
 NO_CYCLONEDDS = (
     "transport dds needs the Python package cyclonedds 11.0.1, and {}. On x86-64 `pip install"
@@ -40,9 +40,9 @@ NO_ROS = (
 def open_transport(
     rmf: Rmf, node_name: str, *, localhost: bool = False, ros_args: Sequence[str] = ()
 ) -> Transport:
-    """Join the RMF graph as `node_name`. Raises TransportError with a remedy.
+    """Join the RMF graph as `node_name`. Raises TransportError, whose text has a remedy.
 
-    `localhost` keeps all traffic on this machine, even if the YAML or the environment says otherwise.
+    `localhost`: keep all traffic on this machine, even if the YAML or the environment says otherwise.
     `ros_args`: `--ros-args` and the arguments after it on the command line.
     """
     domain = domain_id(rmf, os.environ)
@@ -68,7 +68,8 @@ def open_transport(
 
 
 def domain_id(rmf: Rmf, environ: Mapping[str, str]) -> int:
-    """Return the ROS domain: from the YAML, else from ROS_DOMAIN_ID, else 0. Raises TransportError."""
+    """Return the ROS domain from the YAML, or else from ROS_DOMAIN_ID, or else 0. Raises
+    TransportError."""
     if rmf.domain_id is not None:
         return rmf.domain_id
     text = environ.get("ROS_DOMAIN_ID", "") or "0"
@@ -78,10 +79,11 @@ def domain_id(rmf: Rmf, environ: Mapping[str, str]) -> int:
 
 
 def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str], peers: Sequence[str] = ()) -> bool:
-    """Does the YAML, ROS_LOCALHOST_ONLY or ROS_AUTOMATIC_DISCOVERY_RANGE keep us on loopback?
+    """Return whether the node must stay on loopback. The YAML, ROS_LOCALHOST_ONLY or
+    ROS_AUTOMATIC_DISCOVERY_RANGE may demand this.
 
-    As in ROS 2 Jazzy, the older ROS_LOCALHOST_ONLY=1 wins over the newer variable. With LOCALHOST the
-    node still reaches static `peers`. Raises TransportError.
+    As in ROS 2 Jazzy, the older ROS_LOCALHOST_ONLY=1 takes precedence over the newer variable. With
+    LOCALHOST the node may still reach static `peers`. Raises TransportError.
     """
     if rmf.network == "localhost" or environ.get("ROS_LOCALHOST_ONLY") == "1":
         return True
@@ -95,7 +97,7 @@ def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str], peers: Sequence[str]
 
 
 def _choice(rmf: Rmf) -> tuple[str, str]:
-    """Return (transport, the reason for choosing it)."""
+    """Return the transport, and the reason for this choice."""
     if rmf.transport in ("dds", "zenoh"):
         return rmf.transport, "configured"
     missing = missing_of_ros()
@@ -112,14 +114,14 @@ def _choice(rmf: Rmf) -> tuple[str, str]:
 
 
 def _best_without(ros: str) -> tuple[str, str]:
-    """Return the choice of `auto` without ROS, and its reason. `ros` describes the missing part of
-    ROS."""
+    """Return the transport that `auto` chooses without ROS, and the reason. `ros` names the missing
+    part of ROS."""
     missing = missing_of_dds()
     return ("zenoh", f"{ros}; {missing}") if missing else ("dds", ros)
 
 
 def missing_of_dds() -> str:
-    """Return the reason why transport `dds` cannot be used on this machine; "" if it can."""
+    """Return the reason why this machine cannot use the transport `dds`. Return "" if it can."""
     try:
         importlib.import_module("cyclonedds.core")
     except ImportError as error:
@@ -128,7 +130,7 @@ def missing_of_dds() -> str:
 
 
 def missing_of_ros() -> str:
-    """Return the reason why transport `ros2` cannot be used on this machine; "" if it can."""
+    """Return the reason why this machine cannot use the transport `ros2`. Return "" if it can."""
     try:
         importlib.import_module("rclpy")
     except ImportError as error:

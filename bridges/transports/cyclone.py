@@ -1,5 +1,5 @@
-"""Configurations of Cyclone DDS, for `dds` and for ROS on Cyclone. One uses the network, and one stays
-on this machine."""
+"""Configurations of Cyclone DDS for `dds`, and for ROS on Cyclone. One uses the network, and the other
+stays on this machine."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -16,26 +16,30 @@ INTERNAL: Final = (
     "<PrimaryReorderMaxSamples>1</PrimaryReorderMaxSamples>"
     "<SecondaryReorderMaxSamples>1</SecondaryReorderMaxSamples></Internal>"
 )
-"""Settings with which a node leaves at once, even when its address has gone. By default Cyclone 0.10
-ends its receive threads with a datagram to that address, and waits minutes for this datagram
-(q_receive.c, trigger_recv_threads). Every writer also waits 1 s for acknowledgements that do not
-come. During these waits rclpy holds Python's lock, and the whole daemon stops.
+"""Settings with which a node leaves at once, even when its address has gone.
+
+By default Cyclone 0.10 ends its receive threads with a datagram to that address, and waits minutes for
+this datagram (q_receive.c, trigger_recv_threads). Every writer also waits 1 s for acknowledgements that
+do not come. During these waits rclpy holds Python's lock, and the whole daemon stops.
 
 A sample longer than LONGEST is dropped at its first fragment. For each writer, memory holds at most one
-incomplete sample and one sample that came too early. (The defaults are 16 and 128.) After a loss the
-node asks the writer to send again.
+incomplete sample and one sample that came too early. Cyclone's defaults are 16 incomplete samples and
+128 early samples. After a loss the node asks the writer to send again.
 """
 FOUND_AGAIN: Final = "<SPDPInterval>2 s</SPDPInterval>"
-"""The period at which a node announces itself. The period is short, so that other nodes soon find the
-node after a network failure longer than a lease (10 s). By default Cyclone 0.10 announces itself
-every 8 s, and Cyclone 11 every 30 s to a lost peer."""
+"""The interval at which a node announces itself. Other nodes may forget the node in a network failure
+longer than a lease (10 s). With the short interval they soon find it again.
+
+By default Cyclone 0.10 announces itself every 8 s. Cyclone 11 announces itself to a lost peer every 30
+s.
+"""
 NEVER_FORGOTTEN: Final = (
     "<InitialLocatorPruneDelay>inf</InitialLocatorPruneDelay>"
     "<DiscoveredLocatorPruneDelay>inf</DiscoveredLocatorPruneDelay>"
 )
-"""Settings with which Cyclone 11 never gives up a peer. By default Cyclone 11 gives a peer up 30 s
-after a search without success, and 60 s after losing the peer. Cyclone 0.10 never gives up, and
-refuses these names."""
+"""Settings with which Cyclone 11 never gives up a peer. By default Cyclone 11 gives up a peer 30 s
+after a search without success, and 60 s after losing the peer. Cyclone 0.10 never gives up a peer,
+and refuses these settings."""
 LOOPBACK: Final = (
     "<CycloneDDS><Domain><General>"
     '<Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>'
@@ -44,16 +48,20 @@ LOOPBACK: Final = (
     "<MaxAutoParticipantIndex>30</MaxAutoParticipantIndex>"
     '<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>'
 )
-"""A configuration that keeps a node on this machine: unicast on `lo`, for up to 31 processes."""
+"""A configuration that keeps a node on this machine. It uses unicast on `lo`, for up to 31
+processes."""
 
 
 def configuration(environ: Mapping[str, str]) -> str:
-    """Return the configuration of a node on the network. Our settings come before those of
+    """Return the configuration of a node on the network. Our settings come before the settings in
     CYCLONEDDS_URI.
 
-    As in rmw_cyclonedds (ROS 2 Jazzy, rmw_node.cpp), the node uses multicast, and reaches static peers
-    by unicast. Peers can guess its participant index. With LOCALHOST the node reaches this machine and
-    the static peers, without multicast. With SYSTEM_DEFAULT Cyclone decides on discovery.
+    The rules are those of rmw_cyclonedds (ROS 2 Jazzy, rmw_node.cpp):
+
+    - The node uses multicast, and reaches static peers by unicast. Peers can guess its participant
+      index.
+    - With LOCALHOST the node reaches this machine and the static peers, without multicast.
+    - With SYSTEM_DEFAULT Cyclone decides on discovery.
     """
     own = environ.get("CYCLONEDDS_URI", "")
     wanted = environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE")
@@ -75,8 +83,8 @@ def configuration(environ: Mapping[str, str]) -> str:
 
 
 def for_ros(environ: Mapping[str, str]) -> str:
-    """Return CYCLONEDDS_URI for a ROS node on the network. Our settings come before the present
-    value."""
+    """Return a CYCLONEDDS_URI for a ROS node on the network. Our settings come before the settings in
+    the present CYCLONEDDS_URI."""
     ours, own = (
         f"<CycloneDDS><Domain>{INTERNAL}<Discovery>{FOUND_AGAIN}</Discovery></Domain></CycloneDDS>",
         environ.get("CYCLONEDDS_URI", ""),

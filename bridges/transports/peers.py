@@ -1,10 +1,11 @@
-"""The announced ends (publishers and subscriptions) of other nodes. The transports report the ends. The
-ends show RMF's release, and types that do not fit our types.
+"""The announced ends of other nodes. An end is a publisher or a subscription. The transports report the
+ends. The ends show RMF's release, and types that do not fit our types.
 
-A fleet adapter shows the release. It publishes FleetState, and in newer releases it subscribes to
-EmergencySignal; our daemons do neither. With `auto` we speak the release of the fleet adapters. Without
-a fleet adapter we speak the default release. Adapters of two releases are a fault, and we keep our
-present release.
+A fleet adapter shows the release. It publishes FleetState. In newer releases it also subscribes to
+EmergencySignal. Our daemons do neither.
+
+With `auto` we speak the release of the fleet adapters. Without a fleet adapter we speak the default
+release. Fleet adapters of two releases are a fault, and then we keep our present release.
 """
 
 import logging
@@ -24,20 +25,23 @@ from bridges.transports import notices
 log = logging.getLogger(__name__)
 
 MOST: Final = 5000
-"""The maximum number of remembered ends. No site has more."""
+"""The maximum number of ends in memory. No site has more."""
 WITNESSES: Final = {
     (type_name(FleetState), True),
     (type_name(EmergencySignal), False),
     (type_name(Alert), False),
 }
-"""(type of the message, whether the end publishes) of the ends that only RMF's own nodes have."""
+"""The message types whose ends only RMF's own nodes have. True stands for publishers, and False for
+subscriptions."""
 MISFIT: Final = "TYPE_MISFIT"
 MIXED: Final = "TWO_RELEASES"
 
 
 class Announced(Struct, frozen=True):
-    """An end of any node. `topic`: the topic's name without the first slash. `type`: package/msg/Name.
-    `hash`: the type hash, "" if unknown."""
+    """An announced end of any node. `topic`: the topic's name without the first slash.
+
+    `type`: the message's name in the form `package/msg/Name`. `hash`: the type hash, or "" if unknown.
+    """
 
     topic: str
     type: str
@@ -46,8 +50,8 @@ class Announced(Struct, frozen=True):
 
 
 class Peers:
-    """The announced ends of other nodes, and the release that these ends show. `wanted`: None for
-    `auto`."""
+    """The announced ends of other nodes, and the release that these ends show. `wanted`: the release of
+    the YAML, or None for `auto`."""
 
     def __init__(self, wanted: Release | None) -> None:
         self.release = wanted or DEFAULT
@@ -58,16 +62,16 @@ class Peers:
         self._named: set[tuple[str, bool]] = set()
 
     def ours(self, topic: AnyTopic, *, publishes: bool) -> None:
-        """Record an end of our own node."""
+        """Note an end of our own node."""
         self._ours[topic.name.strip("/"), publishes] = topic
 
     def seen(self, key: Hashable, end: Announced) -> None:
-        """Record an end of another node."""
+        """Note an end of another node."""
         if len(self._ends) < MOST or key in self._ends:
             self._ends[key] = end
 
     def gone(self, key: Hashable) -> None:
-        """Record that an end has left."""
+        """Note that an end has left the graph."""
         self._ends.pop(key, None)
 
     def clear(self) -> None:
@@ -75,7 +79,7 @@ class Peers:
         self._ends.clear()
 
     def settle(self) -> bool:
-        """Adopt the release of RMF's nodes; return True if our release has changed."""
+        """Adopt the release of RMF's nodes. Return True if our release has changed."""
         heard = self._heard()
         self._name_mixed(heard)
         if not self._auto or len(heard) != 1 or self.release in heard:
@@ -85,25 +89,26 @@ class Peers:
         return True
 
     def name_misfits(self) -> None:
-        """Log once each topic on which other nodes have another type."""
+        """Log each topic on which other nodes have another type. Log a topic only once."""
         for end in list(self._ends.values()):
             if self._misfits(end):
                 self.name(self._ours[end.topic, not end.publishes], published=end.publishes)
 
     def name(self, topic: AnyTopic, *, published: bool) -> None:
-        """Log once that other nodes use another type on a topic. `published`: they publish the topic;
-        otherwise they subscribe."""
+        """Log that other nodes use another type on a topic. Log this only once. `published`: the other
+        nodes publish the topic. Otherwise they subscribe to it."""
         key = topic.name.strip("/"), published
         if key not in self._named:
             self._named.add(key)
             notices.misfit(topic, notices.NOT_HEARD if published else notices.NOT_SERVED, "type")
 
     def differs(self, topic: AnyTopic, before: Release) -> bool:
-        """Does this topic's message differ between the present release and `before`?"""
+        """Return whether this topic's message differs between the present release and `before`."""
         return _hash_of(topic, self.release) != _hash_of(topic, before)
 
     def faults(self) -> list[tuple[str, str]]:
-        """Return (code, detail) of each present fault that keeps nodes from hearing each other."""
+        """Return the code and the detail of each present fault that keeps nodes from hearing each
+        other."""
         heard = sorted(release.name for release in self._heard())
         found = [(MIXED, f"{' and '.join(heard)} are both on this graph")] if len(heard) > 1 else []
         counts = Counter(end.topic for end in list(self._ends.values()) if self._misfits(end))
@@ -126,7 +131,7 @@ class Peers:
         return end.type != type_name(ours.type) or not fits
 
     def _name_mixed(self, heard: set[Release]) -> None:
-        """Log once that two releases are on the graph, when the second release appears."""
+        """Log when a second release appears on the graph."""
         if len(heard) > 1 and not self._mixed:
             names = " ".join(sorted(release.name for release in heard))
             log.warning(pairs("two_releases", on_this_graph=names, we_speak=self.release.name))
@@ -138,6 +143,6 @@ def _hash_of(topic: AnyTopic, release: Release) -> str:
 
 
 def _only(hashed: str) -> Iterator[Release]:
-    """Yield the release with this hash. If several releases have the hash, yield nothing."""
+    """Yield the release with this hash. Yield nothing if several releases have the hash."""
     found = releases_of(hashed)
     return iter(found if len(found) == 1 else ())

@@ -1,4 +1,5 @@
-"""The publishers of received messages. A publisher is looked up only when a listener asks for it."""
+"""The publishers of received messages. A transport finds out a publisher only when a listener asks for
+it."""
 
 import time
 from collections.abc import Callable, Hashable
@@ -8,18 +9,19 @@ from typing import Final
 from bridges.messages.heard import Sender
 
 MOST: Final = 1000
-"""The maximum number of remembered publishers. Beyond this number, the publisher heard longest ago is
+"""The maximum number of publishers in memory. Above this number, the publisher heard longest ago is
 forgotten."""
 AGAIN_S: Final = 1.0
 """The pause (s) between two attempts to find the node of a publisher."""
 
 
 class Senders:
-    """The publishers that one transport has heard, by their identities on its wire.
+    """The publishers that one transport has heard, by their identities on the transport's wire.
 
-    Before a subscription hands on a message, it sets two attributes. `key` is the identity of the
-    publisher (None if unknown). `node_of` finds the node of an identity ("" if unknown). A daemon never
-    asks for a publisher, so nothing more happens there.
+    Before a subscription delivers a message, it sets two attributes. `key` is the publisher's identity,
+    or None if unknown. `node_of` finds the node of an identity, or "" if unknown.
+
+    A daemon without a listener never asks for a publisher. In that case nothing more happens.
     """
 
     def __init__(self) -> None:
@@ -29,7 +31,7 @@ class Senders:
         self._look_at: dict[Hashable, float] = {}
 
     def now(self) -> Sender | None:
-        """Return the publisher of the message that the subscription hands on now."""
+        """Return the publisher of the message that the subscription now delivers."""
         key = self.key
         if key is None:
             return None

@@ -1,4 +1,4 @@
-"""The common base of the transports `dds`, `zenoh` and `ros2`. Each of them has a thread."""
+"""The common base of the transports `dds`, `zenoh` and `ros2`. Each transport has a thread."""
 
 import logging
 import math
@@ -19,23 +19,28 @@ from bridges.transports.transport import TransportError
 log = logging.getLogger(__name__)
 
 LOOK_EVERY_S: Final = 1.0
-"""The period (s) of checks for changed addresses of the machine. The libraries do not make such checks.
-A library that starts when only `lo` is up stays on `lo` for ever, and no library notices a changed
+"""The interval (s) at which a transport checks the machine's addresses. The libraries do not check
+them. A library that starts when only `lo` is up stays on `lo` for ever. No library notices a changed
 address."""
 SET_BACK_S: Final = 1.0
-"""The largest step back (s) that does no harm. Cyclone renews a lease of 10 s every 8 s."""
+"""The largest step back (s) of the clock that does no harm. Cyclone renews a lease of 10 s every 8
+s."""
 
 
 class WallClock:
-    """A clock watch that notices when the wall clock is set back, because Cyclone DDS waits by the wall
-    clock.
+    """A watch that notices when the wall clock is set back. It is needed because Cyclone DDS waits by
+    the wall clock.
 
-    Cyclone 0.10.5 (ROS 2 Jazzy) always does (github.com/eclipse-cyclonedds/cyclonedds, issue 1995).
-    Cyclone 11.0.1 does in the wheel on PyPI, built without pthread_condattr_setclock. When the clock is
-    set back, Cyclone's threads sleep longer by the size of the step. During this sleep a node renews no
-    lease, and other nodes forget it after 10 s. The node also answers no new node, and does not ask for
-    lost samples again. A node that joins later waits by the new time. A step forward wakes the threads
-    early, which does no harm.
+    Cyclone 0.10.5 (ROS 2 Jazzy) always waits by the wall clock
+    (github.com/eclipse-cyclonedds/cyclonedds, issue 1995). Cyclone 11.0.1 does so in the wheel on PyPI,
+    which is built without pthread_condattr_setclock.
+
+    When the clock is set back, Cyclone's threads sleep longer by the size of the step. During this
+    sleep a node renews no lease, and other nodes forget the node after 10 s. The node does not answer
+    new nodes. It does not ask again for lost samples. A node that joins after the step has no such
+    delay.
+
+    A step forward wakes the threads early, which does no harm.
 
     `ahead_s`, in all functions of this file: the wall clock minus a clock that never steps (s).
     """
@@ -44,7 +49,7 @@ class WallClock:
         self._most_s = ahead_s
 
     def set_back_s(self, ahead_s: float) -> float:
-        """Return how far (s) the clock was set back; 0 for a step of SET_BACK_S or less.
+        """Return by how much (s) the clock was set back. Return 0 for a step of SET_BACK_S or less.
 
         Small steps add up until they exceed SET_BACK_S, because several steps may come during one sleep
         of a thread.
@@ -58,15 +63,16 @@ class WallClock:
 
 
 def ahead_s() -> float:
-    """Return the wall clock minus the time since the machine's start (s). This time includes the
-    machine's sleep."""
+    """Return the wall clock minus the time since the machine's start (s). The machine's sleep counts in
+    that time."""
     return time.time() - time.clock_gettime(time.CLOCK_BOOTTIME)
 
 
 class Threaded:
     """A node on the graph with one thread. On DDS a second thread watches the clock.
 
-    `refusals`: the library's exceptions. `release`: None to follow RMF's release.
+    `refusals`: the library's exceptions. `release`: the release to speak, or None to follow RMF's
+    release.
     """
 
     refusals: ClassVar[tuple[type[Exception], ...]]
@@ -88,22 +94,22 @@ class Threaded:
 
     @property
     def release(self) -> Release:
-        """The release of RMF's messages that the node speaks at present."""
+        """The release of RMF's messages that the node speaks now."""
         return self._peers.release
 
     def faults(self) -> list[tuple[str, str]]:
-        """Return (code, detail) of each present fault that keeps nodes from hearing each other. Any
-        thread may call this."""
+        """Return the code and the detail of each present fault that keeps nodes from hearing each
+        other. Any thread may call this method."""
         return self._peers.faults()
 
     def sender(self) -> Sender | None:
-        """Return the publisher of the message that a callback receives now. Return None if the wire
-        does not tell, as with rclpy (Jazzy)."""
+        """Return the publisher of the message that a callback now receives. Return None if the wire
+        does not name the publisher, as with rclpy (Jazzy)."""
         return self._senders.now()
 
     @property
     def lives(self) -> bool:
-        """Does the transport's thread run? The answer is True even without a network, a router or a
+        """Return whether the transport's thread runs. It runs even without a network, a router or a
         peer."""
         return not self._closed and self._thread.is_alive()
 
@@ -116,10 +122,10 @@ class Threaded:
         self._thread.start()
 
     def _watch_clock(self) -> None:
-        """Start a thread that watches the wall clock. When the clock is set back, the thread sets
-        `_set_back` and wakes our thread.
+        """Start a thread that watches the wall clock. When the clock is set back, this thread sets
+        `_set_back` and wakes the transport's thread.
 
-        Our thread cannot watch the clock, because our thread may itself wait by the wall clock.
+        The transport's thread cannot watch the clock itself, because it may wait by the wall clock.
         """
         run, name = self._look_at_clock, f"{self.name}-clock"
         self._clock_thread = threading.Thread(target=run, name=name, daemon=True)
@@ -134,10 +140,10 @@ class Threaded:
                     self._wake()
 
     def _wake(self) -> None:
-        """If the node has joined, end the wait of our thread. The caller holds the lock."""
+        """End the wait of the transport's thread, if the node has joined. The caller holds the lock."""
 
     def _look_is_due(self) -> bool:
-        """Is it time to look at the network again? If so, the call also plans the next look."""
+        """Return whether the next look at the network is due. If it is due, plan the look after it."""
         now = time.monotonic()
         if now < self._look_at:
             return False
@@ -145,7 +151,7 @@ class Threaded:
         return True
 
     def _network_changed(self) -> bool:
-        """Have the machine's addresses changed since the node joined? If so, the call logs the new
+        """Return whether the machine's addresses have changed since the node joined. If so, log the new
         addresses."""
         found = addresses.addresses()
         if found == self._addresses:
@@ -155,7 +161,7 @@ class Threaded:
         return True
 
     def _join_thread(self) -> None:
-        """Wait for the end of the threads. The calling thread does not wait for itself."""
+        """Wait for the end of the threads. A thread does not wait for itself."""
         if self._clock_thread is not None:
             self._clock_thread.join()
         if threading.current_thread() is not self._thread:
@@ -163,7 +169,7 @@ class Threaded:
 
     @contextmanager
     def _reporting(self, text: str) -> Iterator[None]:
-        """Raise the library's exceptions as TransportError. `text` names the failure."""
+        """Raise the library's exceptions as TransportError. `text` says what failed."""
         if self._closed:
             raise TransportError(f"{text}: {self.name} has left the graph")
         try:

@@ -21,7 +21,7 @@ Receive = Callable[[Message], None]
 
 
 def any_type(received: Callable[[M], None]) -> Receive:
-    """Return a subscription's callback, cast to the type that transports store for every topic.
+    """Return a subscription's callback as a callback for any message type. Transports store this type.
 
     The cast is safe, because a transport decodes each message as the type of the subscription's topic.
     """
@@ -29,44 +29,46 @@ def any_type(received: Callable[[M], None]) -> Receive:
 
 
 class TransportError(Exception):
-    """The error of a transport that cannot be opened or has been lost. The network, library or domain
-    is missing."""
+    """The error of a transport that cannot be opened or is lost. A network, a library or a domain is
+    missing."""
 
 
 class Publisher(Protocol[M_contra]):
     """The sending end of one topic."""
 
     def publish(self, message: M_contra) -> None:
-        """Send a message. The call blocks for at most 20 ms. Raises TransportError without a
-        connection."""
+        """Send a message. Block for at most 20 ms. Raises TransportError without a connection."""
 
     def matched(self) -> int:
-        """Return the number of subscriptions, in any process, that receive our messages; 0 after
-        close."""
+        """Return the number of subscriptions, in all processes, that receive our messages. Return 0
+        after `close`."""
 
     def close(self) -> None:
-        """Take this publisher off the graph at once. Its node stays. The caller may call `close`
-        twice."""
+        """Take this publisher off the graph at once. Its node stays on the graph. A second call does
+        nothing."""
 
 
 class Subscription(Protocol):
     """The receiving end of one topic."""
 
     def matched(self) -> int:
-        """Return the number of publishers, in any process, that this subscription hears; 0 after
-        close."""
+        """Return the number of publishers, in all processes, that this subscription hears. Return 0
+        after `close`."""
 
     def senders(self) -> list[str]:
-        """Return the known nodes of the heard publishers, as `/namespace/name`. Anybody can forge a
-        name. Any thread may call this."""
+        """Return the nodes of the heard publishers, as `/namespace/name`. Leave out unknown nodes.
+        Anybody can forge a name. Any thread may call this method."""
 
 
 class Transport(Protocol):
-    """One node on the RMF graph. `speaks`: the transport's name in a YAML. `domain_id`: its ROS domain.
+    """One node on the RMF graph. `speaks`: the transport's name in a YAML. `domain_id`: the node's ROS
+    domain.
 
-    The transport's own thread calls `received`. A callback must only append to an inbox and must not
-    raise. If a sample does not decode, or its callback raises, the sample is dropped. The drop is
-    counted in `dropped` (topic name -> number), and logged once for each topic.
+    The transport's own thread calls `received`. This callback must only append to an inbox, and must
+    not raise.
+
+    A sample is dropped if it does not decode, or if its callback raises. `dropped` counts the dropped
+    samples by the topic's name. The first dropped sample of each topic is logged.
     """
 
     name: str
@@ -76,11 +78,11 @@ class Transport(Protocol):
 
     @property
     def release(self) -> Release:
-        """The release of RMF's messages that the node speaks at present."""
+        """The release of RMF's messages that the node speaks now."""
 
     def faults(self) -> list[tuple[str, str]]:
-        """Return (code, detail) of each present fault that keeps this node and others from hearing each
-        other. Any thread may call this."""
+        """Return the code and the detail of each present fault that keeps this node and other nodes
+        from hearing each other. Any thread may call this method."""
 
     def publisher(self, topic: Topic[M]) -> Publisher[M]:
         """Declare a publisher with `topic.publish` QoS."""
@@ -94,17 +96,17 @@ class Transport(Protocol):
         """
 
     def sender(self) -> Sender | None:
-        """Return the publisher of the message that `received` takes now; None if the wire hides it.
-        Only that callback may call this."""
+        """Return the publisher of the message that `received` now takes. Return None if the wire does
+        not name it. Only the callback `received` may call this method."""
 
     @property
     def lives(self) -> bool:
-        """Does the transport's thread run? The answer is True even without a network, a router or a
+        """Return whether the transport's thread runs. It runs even without a network, a router or a
         peer."""
 
     def wall(self) -> float:
-        """Return RMF's time for stamps (s since the epoch): the wall clock, or ROS's simulated time."""
+        """Return RMF's time for stamps (s since the epoch). This is the wall clock, or ROS's simulated
+        time."""
 
     def close(self) -> None:
-        """Leave the graph at once, so that no ghost endpoint remains. The caller may call `close`
-        twice."""
+        """Leave the graph at once, so that no ghost endpoint remains. A second call does nothing."""

@@ -1,8 +1,8 @@
-"""Makes our endpoints a named node on the ROS graph, through the topic `ros_discovery_info`.
+"""Shows our endpoints as a named node on the ROS graph, through the topic `ros_discovery_info`.
 
 DDS has participants, readers and writers, but no nodes. On this topic each ROS participant publishes
-which node owns each of its readers and writers. The message is retained for late joiners. Without this
-topic `ros2 node list` shows our endpoints under `_CREATED_BY_BARE_DDS_APP_`.
+the owner of each of its readers and writers, which is a node. Late joiners receive the message too.
+Without this topic `ros2 node list` shows our endpoints under `_CREATED_BY_BARE_DDS_APP_`.
 
 Source: ros2/rmw_dds_common, msg/*.msg, as rmw_cyclonedds and rmw_fastrtps publish them.
 """
@@ -51,7 +51,7 @@ class ParticipantEntitiesInfo(IdlStruct, typename=PACKAGE + "ParticipantEntities
 
 
 class NodeOnGraph:
-    """The node of a participant. It is published again whenever its endpoints change."""
+    """The node of a participant. Each change of its endpoints publishes the node again."""
 
     def __init__(self, participant: DomainParticipant, node_name: str) -> None:
         self._node = NodeEntitiesInfo("/", node_name, [], [])
@@ -64,12 +64,12 @@ class NodeOnGraph:
         self.writer.write(self._info)
 
     def add_reader(self, reader: DataReader) -> None:
-        """Publish that this reader belongs to the node."""
+        """Publish that the node owns this reader."""
         self._node.reader_gid_seq.append(_gid(reader))
         self.writer.write(self._info)
 
     def add_writer(self, writer: DataWriter) -> None:
-        """Publish that this writer belongs to the node."""
+        """Publish that the node owns this writer."""
         self._node.writer_gid_seq.append(_gid(writer))
         self.writer.write(self._info)
 
@@ -79,13 +79,13 @@ class NodeOnGraph:
         self.writer.write(self._info)
 
     def listen(self) -> DataReader:
-        """Begin to listen for the owners of writers. Each participant retains its last message."""
+        """Begin to listen for the owners of writers. Each participant's last message arrives too."""
         self.reader = DataReader(self._participant, self.topic, qos=_qos(MOST_PARTICIPANTS))
         return self.reader
 
     def owners(self, writers: Iterable[bytes]) -> list[str]:
-        """Return the nodes of these writers (guids). Nodes that have not announced themselves yet are
-        missing."""
+        """Return the nodes that own these writers (guids). Leave out nodes that have not announced
+        themselves yet."""
         assert self.reader is not None
         for info in self.reader.take(MOST_PARTICIPANTS):
             for node in info.node_entities_info_seq:

@@ -1,6 +1,7 @@
-"""The ends of the `dds` transport: its publishers and subscriptions.
+"""The ends of the `dds` transport, which are its publishers and subscriptions.
 
-An end outlives its DDS writer or reader. When the transport joins again, the end gets a new one.
+An end outlives its DDS writer or reader. When the transport joins again, the end gets a new writer or
+reader.
 """
 
 import threading
@@ -28,10 +29,10 @@ from bridges.transports.senders import Senders
 from bridges.transports.transport import Receive, TransportError
 
 WRITE_BLOCKS_NS: Final = 20_000_000
-"""The longest wait (ns) of a writer for a peer. The wait is shorter than a scan, because the writer
-holds Python's lock."""
+"""The longest time (ns) for which a writer waits for a peer. The time is shorter than a scan, because
+the writer holds Python's lock."""
 AT_ONCE: Final = 100
-"""The maximum number of samples taken from one subscription before other subscriptions have their
+"""The maximum number of samples from one subscription before the other subscriptions have their
 turn."""
 POLICIES: Final = {2: "durability", 11: "reliability", 23: "data representation", 24: "type"}
 
@@ -65,20 +66,20 @@ class DdsPublisher:
         return self._writer
 
     def drop(self) -> None:
-        """Record that the writer has gone together with its participant."""
+        """Note that the writer and its participant are gone."""
         self._writer = None
 
     def send_retained(self) -> None:
-        """Send again the messages that the earlier writer retained for late joiners."""
+        """Send the retained messages again, for late joiners."""
         for message in list(self._retained):
             self._write(message)
 
     def publish(self, message: Message) -> None:
-        """Send a message. The call blocks for at most 20 ms. Raises TransportError if the message was
-        not sent."""
+        """Send a message. Block for at most 20 ms. Raises TransportError if the message was not
+        sent."""
         if not self._reader_thread.is_alive():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
-        self._retained.append(message)  # this message is sent again when the node joins again
+        self._retained.append(message)  # sent again when the node joins again
         if self._writer is None:
             why = "there is no network, or RMF's release lacks the message"
             raise TransportError(f"topic {self.topic.name}: not sent: {why}")
@@ -88,7 +89,7 @@ class DdsPublisher:
             raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
 
     def matched(self) -> int:
-        """Return the number of matched subscriptions; 0 after close."""
+        """Return the number of matched subscriptions. Return 0 after `close`."""
         try:
             return len(self._writer.get_matched_subscriptions()) if self._writer else 0
         except DDSException:
@@ -112,8 +113,8 @@ class DdsPublisher:
 
 
 class DdsSubscription:
-    """The subscription of one topic. `dropped`: topic name -> number of invalid samples.
-    `owners(guids)` returns the nodes of these writers."""
+    """The subscription of one topic. `dropped`: the number of invalid samples, by the topic's name.
+    `owners(guids)` returns the nodes that own these writers."""
 
     def __init__(
         self,
@@ -128,7 +129,7 @@ class DdsSubscription:
         self.topic = topic
         self._owners = owners
         self._senders = senders
-        self._finds_node = self._node_of  # bound only once, because a daemon takes many messages
+        self._finds_node = self._node_of  # bound once, because many messages need it
         self._others_only = others_only
         self._reader: DataReader = None
         self._received = received
@@ -146,19 +147,19 @@ class DdsSubscription:
         return self._reader
 
     def drop(self) -> None:
-        """Record that the reader has gone together with its participant."""
+        """Note that the reader and its participant are gone."""
         self._reader = None
 
     def matched(self) -> int:
-        """Return the number of matched publishers; 0 after close."""
+        """Return the number of matched publishers. Return 0 after `close`."""
         try:
             return len(self._reader.get_matched_publications()) if self._reader else 0
         except DDSException:
             return 0
 
     def senders(self) -> list[str]:
-        """Return the nodes of the matched publishers. The list is empty until their announcements have
-        arrived."""
+        """Return the nodes of the matched publishers. Return nothing until the nodes' announcements
+        have arrived."""
         reader = self._reader
         try:
             handles = reader.get_matched_publications() if reader else []
@@ -167,7 +168,7 @@ class DdsSubscription:
         return self._nodes(handles)
 
     def _nodes(self, handles: list[int]) -> list[str]:
-        """Return the nodes of these matched publishers. Unknown nodes are missing."""
+        """Return the nodes of these matched publishers. Leave out unknown nodes."""
         reader = self._reader
         try:
             found = [reader.get_matched_publication_data(handle) for handle in handles if reader]
@@ -179,7 +180,7 @@ class DdsSubscription:
         return next(iter(self._nodes([handle])), "")  # type: ignore[list-item]
 
     def take(self) -> bool:
-        """Deliver the arrived samples; return False if no sample has arrived."""
+        """Deliver the samples that have arrived. Return False if no sample has arrived."""
         if self._reader is None:
             return False
         senders = self._senders
@@ -207,7 +208,7 @@ class DdsSubscription:
 
 
 class _Misfits(Protocol):
-    """Cyclone's status about peers whose QoS does not match an end."""
+    """Cyclone's report on peers whose QoS does not match an end."""
 
     last_policy_id: int
 
@@ -223,8 +224,8 @@ def _log_misfit(topic: AnyTopic, text: str, status: _Misfits, peers: Peers) -> N
 def _writer_qos(qos: topics.Qos, hashed: str) -> Qos:
     if qos.durability == "volatile":
         return Qos(Policy.Durability.Volatile, *_policies(qos, hashed))
-    # A late joiner gets the history of the durability service. By default this is only the last
-    # message.
+    # A late joiner gets the history of the durability service. By default this history has only the
+    # last message.
     retained = Policy.DurabilityService(0, Policy.History.KeepLast(qos.depth), -1, -1, -1)
     return Qos(Policy.Durability.TransientLocal, retained, *_policies(qos, hashed))
 

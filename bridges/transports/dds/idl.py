@@ -1,8 +1,10 @@
-"""The types of `definitions.py` for cyclonedds. Each type has a class with its name and fields.
+"""The types of `definitions.py` for cyclonedds. Each type has a class with the type's name and fields.
 
-cyclonedds announces these names and types to other nodes. Its C library refuses samples that do not fit
-the types. cyclonedds also calls these classes to encode and decode samples. The classes use `cdr.py`,
-which is five times faster than converting each message to another Python object.
+cyclonedds announces these names and fields to other nodes. Its C library refuses samples that do not
+fit them.
+
+cyclonedds also calls these classes to encode and decode samples. The classes use `cdr.py`. Converting
+each message to another Python object would take five times as long.
 """
 
 import types
@@ -19,7 +21,7 @@ from bridges.messages.rihs01 import type_hash
 
 
 class IdlSample(Protocol):
-    """One message in cyclonedds. It is an instance of a class that `sample_type` has made."""
+    """A message for cyclonedds. `sample_type` makes the classes of such messages."""
 
     message: Message
 
@@ -27,11 +29,11 @@ class IdlSample(Protocol):
 
 
 _made: dict[str, type[IdlSample]] = {}
-"""Type hash -> class. If a message is the same in several releases, they share one class."""
+"""The classes by type hash. Releases with the same message share one class."""
 
 
 def sample_type(message_type: type, release: Release = NEWEST) -> type[IdlSample]:
-    """Return the cyclonedds class of a message type. The class has the type's name in ROS's DDS.
+    """Return cyclonedds's class for a message type. The class has the type's name in ROS's DDS.
 
     cyclonedds sets `sample_info` on the instances that it reads.
     """
@@ -53,13 +55,13 @@ def _make(message_type: type, release: Release) -> type[IdlSample]:
     made = types.new_class(typename, (IdlStruct,), {"typename": typename}, body)
     final: type[IdlSample] = annotations.final(
         made
-    )  # ROS's types are final, and match no other types than final types
+    )  # ROS's types are final and match only final types
     return final
 
 
 def _calls(message_type: type, release: Release) -> dict[str, object]:
-    """Return the methods that cyclonedds calls. They ignore `options`, which give the encoding, because
-    each sample states its encoding too."""
+    """Return the methods that cyclonedds calls. cyclonedds gives the encoding in `options`. The methods
+    ignore `options`, because each sample states its encoding too."""
 
     def __init__(self: IdlSample, message: Message) -> None:
         self.message = message
@@ -71,7 +73,8 @@ def _calls(message_type: type, release: Release) -> dict[str, object]:
         return cls(cdr.decode(message_type, sample, release))
 
     def deserialize_key(cls: type[IdlSample], sample: bytes, /, **options: object) -> None:
-        """Do nothing. cyclonedds calls this when a writer has gone, but RMF's types have no keys."""
+        """Do nothing. cyclonedds calls this method when a writer has gone, but RMF's types have no
+        keys."""
 
     return {
         "__init__": __init__,

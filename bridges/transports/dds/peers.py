@@ -1,5 +1,5 @@
-"""The announcements of ends on a DDS graph. They give the topic, the type, and in the user data the
-type hash."""
+"""The announcements of ends on a DDS graph. An announcement has the topic and the type. Its user data
+have the type hash."""
 
 import re
 import threading
@@ -16,7 +16,7 @@ from bridges.transports.peers import Announced, Peers
 AT_ONCE: Final = 100
 HASH: Final = re.compile(r"typehash=(RIHS01_[0-9a-f]{64});")
 TYPE: Final = re.compile(r"(\w+)::msg::dds_::(\w+)_")
-"""A message's name in ROS's DDS."""
+"""The pattern of a message's name in ROS's DDS."""
 
 _reading = threading.Lock()
 
@@ -36,12 +36,12 @@ class _End(Protocol):
 
 
 class BuiltinReader(builtin.BuiltinDataReader):  # type: ignore[misc] # noqa: TID251
-    """A reader for the announcements of participants and their ends. Only one thread of the process may
-    read at a time.
+    """A reader of announcements of participants and ends. Only one thread of the process may read at a
+    time.
 
     cyclonedds reads each announced QoS into the same variables (11.0.1, qos._CQos._gc_*). If two
-    threads read at once, an end gets another end's user data. A process may have several nodes, each
-    with a thread of its own.
+    threads read at once, an end gets another end's user data. A process may have several nodes, and
+    each node has its own thread.
     """
 
     def take(self, count: int) -> list[Any]:
@@ -52,7 +52,7 @@ class BuiltinReader(builtin.BuiltinDataReader):  # type: ignore[misc] # noqa: TI
 
 
 class DdsPeers:
-    """A reader of the topics on which DDS announces ends. It reports the ends to `peers`."""
+    """The watcher of the topics on which DDS announces ends. It reports the ends to `peers`."""
 
     def __init__(self, peers: Peers) -> None:
         self._peers = peers
@@ -67,7 +67,7 @@ class DdsPeers:
         return readers
 
     def look(self) -> bool:
-        """Take the new announcements; return False if there are none."""
+        """Take the new announcements. Return False without new announcements."""
         news = False
         for publishes, reader in self._readers:
             while samples := reader.take(AT_ONCE):
@@ -89,7 +89,7 @@ class DdsPeers:
 
 
 def _hash(qos: Qos) -> str:
-    """Return the type hash in an end's user data; "" if it has none."""
+    """Return the type hash in an end's user data. Return "" without a hash."""
     if Policy.Userdata not in qos:
         return ""
     found = HASH.search(bytes(qos[Policy.Userdata].data).decode(errors="replace"))

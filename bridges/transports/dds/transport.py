@@ -1,11 +1,12 @@
 """The `dds` transport. It speaks as a ROS 2 node through cyclonedds 11.0.1, and needs no ROS.
 
-Names, types and QoS are those of rmw_cyclonedds and rmw_fastrtps: topic `rt/<name>`, type
-`<package>::msg::dds_::<Type>_`, plain CDR, the type hash in the endpoint's user data.
+Names, types and QoS are those of rmw_cyclonedds and rmw_fastrtps. The topic is `rt/<name>`, and the
+type is `<package>::msg::dds_::<Type>_`. The encoding is plain CDR. The endpoint's user data hold the
+type hash.
 
 One thread reads for all subscriptions. The thread drops and counts invalid samples, and logs the first
-invalid sample of each topic. (Cyclone's C library refuses samples that do not fit their type, and logs
-them on stderr.) If reading fails, the node joins again.
+invalid sample of each topic. Cyclone's C library refuses samples that do not fit their type, and logs
+them on stderr. If reading fails, the node joins again.
 
 Only this folder imports cyclonedds, and only `choose.py` imports this file.
 """
@@ -48,9 +49,9 @@ CANNOT_JOIN: Final = (
 LOOK_EVERY_NS: Final = int(LOOK_EVERY_S * 1e9)
 ANY_SAMPLE: Final = core.SampleState.Any | core.ViewState.Any | core.InstanceState.Any
 ERRORS: Final = 1 | 2
-"""The categories that Cyclone logs: errors and fatal errors. Cyclone would log a warning for each
-malformed datagram, which anybody can send. Neither its Python binding nor its configuration can turn
-warnings off."""
+"""The categories that Cyclone may log, which are errors and fatal errors. Anybody can send malformed
+datagrams, and Cyclone would log a warning for each. Neither its Python binding nor its configuration
+can turn warnings off."""
 
 _domains: WeakValueDictionary[tuple[int, str], Domain] = WeakValueDictionary()
 _domains_lock = threading.Lock()
@@ -59,8 +60,8 @@ _domains_lock = threading.Lock()
 class DdsTransport(Threaded):
     """One node: a participant, its reader thread, its publishers and its subscriptions.
 
-    `loopback`: stay on this machine, even if CYCLONEDDS_URI says otherwise. `release`: None to follow
-    RMF's release. Raises TransportError if the domain cannot be joined.
+    `loopback`: stay on this machine, even if CYCLONEDDS_URI says otherwise. `release`: the release to
+    speak, or None to follow RMF's release. Raises TransportError if the node cannot join the domain.
 
     The node joins the graph again when the wall clock is set back. Without `loopback` it also joins
     again when the machine's addresses change. The ends stay the same, and publishers repeat their
@@ -122,7 +123,7 @@ class DdsTransport(Threaded):
         return subscription
 
     def close(self) -> None:
-        """Leave the graph at once. Delete each entity now, because the garbage collector may come
+        """Leave the graph at once. Delete each entity now, because the garbage collector may come too
         late."""
         with self._lock:
             if self._closed:
@@ -184,7 +185,7 @@ class DdsTransport(Threaded):
         return self._topics[name]
 
     def _attach(self, end: DdsPublisher | DdsSubscription) -> None:
-        """Make the DDS entities of an end, if the present release has the end's message."""
+        """Make the DDS entities of an end. Make none if the present release lacks the end's message."""
         self._peers.ours(end.topic, publishes=isinstance(end, DdsPublisher))
         if not self.release.has(end.topic.type):
             end.drop()
@@ -225,9 +226,11 @@ class DdsTransport(Threaded):
                 end.log_misfits(self._peers)
 
     def _follow_release(self) -> None:
-        """Adopt RMF's release. Join again if a message of ours differs in this release. The lock keeps
-        other threads from declaring an end meanwhile, because its type of the earlier release would
-        stay for ever."""
+        """Adopt RMF's release. Join again if one of our messages differs in this release.
+
+        Meanwhile the lock keeps other threads from declaring an end. Such an end would keep its type of
+        the earlier release for ever.
+        """
         with self._lock:
             before, changed = self.release, self._peers.settle()
             stale = changed and any(self._peers.differs(e.topic, before) for e in self._ends)
@@ -237,7 +240,7 @@ class DdsTransport(Threaded):
             self._peers.name_misfits()
 
     def _recover(self, error: Exception) -> None:
-        """Recover from an unexpected exception. Log the exception once, and join again after a
+        """Recover from an unexpected exception. Log only the first exception, and join again after a
         pause."""
         if self._closed:
             return
@@ -256,8 +259,7 @@ class DdsTransport(Threaded):
             return self._node.owners(writers)
 
     def _withdraw(self, publisher: DdsPublisher, writer: DataWriter) -> None:
-        """Take one writer off the graph. After `close` do nothing, because `close` has removed all
-        writers."""
+        """Take one writer off the graph. Do nothing after `close`, which removes all writers."""
         with self._lock:
             if self._closed or publisher not in self._ends:
                 return
@@ -275,13 +277,13 @@ class DdsTransport(Threaded):
 
     def _delete_entities(self) -> None:
         while self._entities:
-            self._entities.pop().__del__()  # this deletes the C entity; a second call does nothing
+            self._entities.pop().__del__()  # deletes the C entity; a second call does nothing
         self._domain = None
 
 
 def _shared_domain(domain_id: int, configuration: str) -> Domain:
-    """Return this process's domain with this configuration. A process can open a domain only once, so
-    participants share the domain."""
+    """Return this process's domain with this configuration. Participants share the domain, because a
+    process can open a domain only once."""
     key = domain_id, configuration
     with _domains_lock:
         domain = _domains.get(key)

@@ -1,1 +1,1 @@
-"""The transport `ros2`: a ROS 2 node, through rclpy."""
+"""The transport `ros2`, which is a ROS 2 node with rclpy."""

@@ -1,4 +1,4 @@
-"""The ends of the `ros2` transport: its publishers and subscriptions.
+"""The ends of the `ros2` transport, which are its publishers and subscriptions.
 
 An end outlives rclpy's publisher or subscription. When the transport joins again, the end gets a new
 rclpy object. rclpy's callbacks run in the transport's thread, and only deliver the message.
@@ -31,15 +31,16 @@ from bridges.transports.ros2.types import ros_type
 from bridges.transports.transport import Receive, TransportError
 
 UNHEARD: Final = 256
-"""The maximum number of our own messages that have not come back yet. It is over twice any topic's
-depth."""
+"""The maximum number of our own messages that may be on their way back to us. It is more than twice the
+depth of any topic."""
 YIELD_S: Final = 50e-6
-"""A pause (s) after a callback. The callback's message wakes another thread, which can run during the
-pause. After the pause rclpy's executor holds Python's lock for a while."""
+"""The pause (s) after a callback. The callback's message wakes another thread, which can run during
+this pause. After the pause rclpy's executor holds Python's lock for a while."""
 
 
 class Ends:
-    """The ends of one node. Some pairs of them must not hear each other."""
+    """The ends of one node. A publisher and an `others_only` subscription of the node must not hear
+    each other."""
 
     def __init__(self, release: Release) -> None:
         self.release = release
@@ -51,19 +52,19 @@ class Ends:
         yield from self.subscriptions
 
     def heard_back(self, topic: AnyTopic) -> "list[Ros2Subscription]":
-        """Return this node's subscriptions that would hear its own messages on the topic, but must
-        not."""
+        """Return this node's subscriptions that would hear our own messages on the topic, but must not
+        hear them."""
         return [end for end in self.subscriptions if end.others_only and end.would_hear(topic)]
 
     def unheard_publishers(self, subscription: "Ros2Subscription") -> int:
-        """Return the number of this node's own publishers that a subscription must not hear."""
+        """Return the number of this node's own publishers that the subscription must not hear."""
         if not subscription.others_only:
             return 0
         return sum(subscription.would_hear(end.topic) for end in self.publishers)
 
 
 class Ros2Publisher:
-    """The publisher of one topic. `lives()` returns whether the transport lives. `withdraw(publisher)`
+    """The publisher of one topic. `lives()` returns whether the transport runs. `withdraw(publisher)`
     takes the publisher off the graph."""
 
     def __init__(
@@ -83,7 +84,7 @@ class Ros2Publisher:
         self._retained: deque[Message] = deque(maxlen=depth)
 
     def create(self, node: Node) -> None:
-        """Make rclpy's publisher. Send the messages again that are retained for late joiners."""
+        """Make rclpy's publisher. Send the retained messages again, for late joiners."""
         made = node.create_publisher(
             ros_type(self.topic.type, self._ends.release),
             self.topic.name,
@@ -98,7 +99,7 @@ class Ros2Publisher:
             self._write(message)
 
     def drop(self) -> None:
-        """Forget rclpy's publisher, which is not used any more."""
+        """Forget rclpy's publisher, because nobody uses it any more."""
         with self._using:
             self._end = None
 
@@ -110,16 +111,16 @@ class Ros2Publisher:
             self._end = None
 
     def publish(self, message: Message) -> None:
-        """Send a message. Raises TransportError if it was not sent, and CdrError if it cannot be
-        encoded."""
+        """Send a message. Raises TransportError if the message was not sent, and CdrError if it cannot
+        be encoded."""
         if not self._lives():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
         self._retained.append(message)
         self._write(message)
 
     def matched(self) -> int:
-        """Return the number of subscriptions that hear this publisher; 0 after close. This node's own
-        `others_only` subscriptions do not count."""
+        """Return the number of subscriptions that hear this publisher, without this node's own
+        `others_only` subscriptions. Return 0 after `close`."""
         with self._using:
             try:
                 count = int(self._end.get_subscription_count()) if self._end else 0
@@ -145,10 +146,11 @@ class Ros2Publisher:
 
 
 class Ros2Subscription:
-    """The subscription of one topic. `dropped`: topic name -> number of invalid samples.
+    """The subscription of one topic. `dropped`: the number of invalid samples, by the topic's name.
 
-    `said`: with `others_only`, this node's own messages that have not come back yet. When they come,
-    they are skipped. rclpy (Jazzy) has no option for this, and does not tell who sent a sample.
+    `said`: this node's own messages that have not come back yet, for an `others_only` subscription.
+    When such a message comes back, it is skipped. rclpy (Jazzy) has no option for this, and does not
+    tell who sent a sample.
     """
 
     def __init__(
@@ -187,19 +189,20 @@ class Ros2Subscription:
             self._end, self._node = made, node
 
     def drop(self) -> None:
-        """Forget rclpy's subscription, which is not used any more."""
+        """Forget rclpy's subscription, because nobody uses it any more."""
         with self._using:
             self._end = self._node = None
 
     def would_hear(self, published: AnyTopic) -> bool:
-        """Would DDS match this subscription with a publisher of that topic?"""
+        """Return whether DDS would match this subscription with a publisher of the topic
+        `published`."""
         durabilities = (self.topic.subscribe.durability, published.publish.durability)
         return (published.name, published.type) == (self.topic.name, self.topic.type) and (
             durabilities != ("transient_local", "volatile")
         )
 
     def matched(self) -> int:
-        """Return the number of publishers that this subscription hears; 0 after close."""
+        """Return the number of publishers that this subscription hears. Return 0 after `close`."""
         with self._using:
             try:
                 count = int(self._end.get_publisher_count()) if self._end else 0

@@ -29,7 +29,7 @@ class Graph(Protocol):
 
 
 def look(graph: Graph, peers: Peers, ours: Iterable[tuple[AnyTopic, bool]]) -> None:
-    """Report the present ends to `peers`. `ours` yields (topic, True if we publish the topic)."""
+    """Report the present ends to `peers`. `ours`: pairs of a topic and True if we publish it."""
     peers.clear()
     for topic, publishes in ours:
         peers.ours(topic, publishes=publishes)

@@ -1,8 +1,10 @@
-"""Sources ROS's setup file before the daemon starts (`ros_setup:` in the YAML).
+"""Sources ROS's setup file before the daemon starts, for `ros_setup:` in the YAML.
 
-Without the paths that the setup file sets, rclpy cannot be imported. So `transport: auto` would choose
-another transport under systemd than in a shell. The daemon's process becomes a shell. The shell sources
-the file, and then becomes the daemon. So the process id, which systemd knows, stays the same.
+rclpy needs the paths that the setup file sets. Without these paths, `transport: auto` would choose
+another transport under systemd than in a shell.
+
+The daemon's process becomes a shell. The shell sources the file, and then becomes the daemon again. So
+the process id stays the same, which systemd knows.
 """
 
 import logging
@@ -21,10 +23,10 @@ SHELL = 'setup=$1; shift; ours=("$@"); set --; . "$setup"; exec "${ours[@]}"'
 
 
 def sourcing(rmf: Rmf, environ: Mapping[str, str], argv: Sequence[str]) -> list[str]:
-    """Return the command that this process must become. Return an empty list if no file must be
-    sourced.
+    """Return the command that this process must become. Return an empty list if there is no file to
+    source.
 
-    `argv`: `sys.orig_argv`. Raises TransportError if the file is missing and the YAML says `transport:
+    `argv`: `sys.orig_argv`. Raises TransportError for a missing file, if the YAML says `transport:
     ros2`.
     """
     if (
@@ -42,5 +44,5 @@ def sourcing(rmf: Rmf, environ: Mapping[str, str], argv: Sequence[str]) -> list[
 
 
 def sourced(rmf: Rmf, environ: Mapping[str, str]) -> dict[str, str]:
-    """Return the environment for the command of `sourcing`. It marks the file as sourced."""
+    """Return the environment for the command of `sourcing`. A variable marks the file as sourced."""
     return {**environ, SOURCED: rmf.ros_setup or ""}

@@ -1,4 +1,5 @@
-"""One stay of a node on ROS 2's graph. It has rclpy's context, node and executor until the node leaves.
+"""One stay of a node on ROS 2's graph. A stay has rclpy's context, node and executor until the node
+leaves.
 
 An RMW reads the machine's network only when a context's node joins. So after a change of address the
 transport leaves the graph, and joins again with a new stay.
@@ -22,19 +23,21 @@ ON_LOOPBACK: Final = {
     "ROS_STATIC_PEERS": None,
     "CYCLONEDDS_URI": LOOPBACK,
 }
-"""Environment variables that an RMW reads when it joins. With these values the RMW finds only this
+"""The environment variables that an RMW reads when it joins. With these values the RMW finds only this
 machine's nodes, and Cyclone stays on the loopback interface."""
 FAST_DDS_SPEAKS: Final = "FASTDDS_BUILTIN_TRANSPORTS"
-"""The environment variable for Fast DDS's transports. UDPv4 excludes shared memory. Over shared memory,
-nodes of two users or containers find each other but do not hear each other. `LOCALHOST` brings
-shared memory back (rmw_fastrtps, participant.cpp), and a profile that names transports takes
-precedence."""
+"""The environment variable for Fast DDS's transports. Its value UDPv4 excludes shared memory. Over
+shared memory, nodes of two users or containers find each other, but do not hear each other.
+
+`LOCALHOST` brings shared memory back (rmw_fastrtps, participant.cpp). A profile that names transports
+takes precedence over this variable.
+"""
 REFUSALS: Final = (RuntimeError, NameValidationException)
 """rclpy's exceptions for a refusal. RCLError and InvalidHandle are RuntimeErrors too."""
 
 
 class Stay:
-    """A node on the graph. If the node cannot join, the constructor cleans up and raises one of
+    """A node on the graph. If the node cannot join, the constructor removes it and raises one of
     REFUSALS."""
 
     def __init__(
@@ -50,16 +53,17 @@ class Stay:
 
     @property
     def lasts(self) -> bool:
-        """Is rclpy's context still valid? It is invalid after any code has shut the context down."""
+        """Return whether rclpy's context is valid. It becomes invalid when any code shuts the context
+        down."""
         return bool(self._context.ok())
 
     def spin(self, timeout_s: float | None) -> None:
-        """Wait for a callback, and run the callback. Stop waiting after `leave_soon` or after
-        `timeout_s` seconds."""
+        """Wait for a callback, and run it. Stop waiting after `leave_soon`, or after `timeout_s`
+        (s)."""
         self._executor.spin_once(timeout_sec=timeout_s)
 
     def leave_soon(self) -> None:
-        """End a waiting `spin`. Any thread may call this."""
+        """End a waiting `spin`. Any thread may call this method."""
         self._leaving.trigger()
 
     def leave(self) -> None:
@@ -69,14 +73,14 @@ class Stay:
         self._context.try_shutdown()
 
     def _join(self, name: str, domain_id: int, ros_args: Sequence[str]) -> None:
-        # rclpy's logging stays off, because it opens a file below $HOME, and a service has no home
+        # rclpy's logging stays off. It would open a file below $HOME, and a service has no home
         # directory.
         self._context.init(args=list(ros_args), initialize_logging=False, domain_id=domain_id)
         self.node = Node(
             name,
             context=self._context,
             enable_rosout=False,
-            start_parameter_services=False,  # the clock of a running daemon must not change
+            start_parameter_services=False,  # nobody may change the clock of a running daemon
         )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
@@ -90,7 +94,7 @@ def _on_the_network() -> dict[str, str | None]:
 
 @contextmanager
 def _environment(wanted: Mapping[str, str | None]) -> Iterator[None]:
-    """Set these variables during the block; None removes a variable."""
+    """Set these variables during the block. The value None removes a variable."""
     before = {name: os.environ.get(name) for name in wanted}
     _set(wanted)
     try:

@@ -1,13 +1,14 @@
-"""The `ros2` transport: an ordinary ROS 2 node, with rclpy, on any installed RMW.
+"""The `ros2` transport, an ordinary ROS 2 node with rclpy. It works with any installed RMW.
 
 As on `dds`, samples pass through the library as bytes, and `cdr.py` encodes and decodes them. Invalid
-samples are dropped and counted. rclpy's executor runs in a thread of this transport. When the machine's
-addresses change or its wall clock is set back, this thread leaves the graph. The thread joins again
-with the same ends. (After a step of the clock only Cyclone needs to join again. Another RMW is only
-interrupted for a moment.)
+samples are dropped and counted. A thread of this transport runs rclpy's executor.
 
-Source: rclpy 7.1 (ROS 2 Jazzy), its public API. Only this file, `stay.py` and `ends.py` import rclpy,
-only `types.py` imports the message packages, and only `choose.py` imports this file.
+When the machine's addresses change or its wall clock is set back, this thread leaves the graph. Then it
+joins again with the same ends. After a step of the clock only Cyclone needs to join again. For another
+RMW this is only a short interruption.
+
+Source: rclpy 7.1 (ROS 2 Jazzy), its public API. Only this file, `stay.py` and `ends.py` import rclpy.
+Only `types.py` imports the message packages, and only `choose.py` imports this file.
 """
 
 import atexit
@@ -30,15 +31,15 @@ from bridges.transports.transport import M, TransportError, any_type
 log = logging.getLogger(__name__)
 
 AGAIN_S: Final = 1.0
-"""The pause (s) after an exception of rclpy. Then its executor runs again."""
+"""The pause (s) between an exception of rclpy and the next run of its executor."""
 
 
 class Ros2Transport(Threaded):
-    """One rclpy node, its ends and its executor's thread.
+    """One rclpy node, its ends, and the thread of its executor.
 
-    `ros_args`: the arguments after `--ros-args` on the command line: name, namespace, remappings and
-    parameters (`use_sim_time`). `loopback`: stay on this machine, even if the environment says
-    otherwise. Raises TransportError if the graph cannot be joined.
+    `ros_args`: the arguments after `--ros-args` on the command line, which are name, namespace,
+    remappings and parameters (`use_sim_time`). `loopback`: stay on this machine, even if the
+    environment says otherwise. Raises TransportError if the node cannot join the graph.
 
     The node joins the graph again when the wall clock is set back. Without `loopback` it also joins
     again when the machine's addresses change. Publishers then repeat their retained messages.
@@ -67,21 +68,21 @@ class Ros2Transport(Threaded):
         self.name = self.node.get_name()
         self._start(self._spin, "ros2")
         self._watch_clock()
-        # If an executor's thread still runs at exit, as after a failed start, it aborts the
-        # interpreter.
+        # An executor's thread that runs at exit aborts the interpreter. This could happen after a
+        # failed start.
         atexit.register(self.close)
 
     @property
     def node(self) -> Node:
-        """rclpy's node. It is a new node each time the transport joins again. Raises TransportError
+        """rclpy's node. The transport gets a new node when it joins again. Raises TransportError
         without a network."""
         if self._stay is None:
             raise TransportError(f"{self.name} has no network")
         return self._stay.node
 
     def publisher(self, topic: AnyTopic) -> Ros2Publisher:
-        """Declare a publisher with `topic.publish` QoS. Raises TransportError, for example if a ROS
-        package is missing."""
+        """Declare a publisher with `topic.publish` QoS. Raises TransportError, such as for a missing
+        ROS package."""
         publisher = Ros2Publisher(topic, self._ends, lambda: self.lives, self._withdraw)
         with self._lock, self._reporting(f"topic {topic.name} cannot be published"):
             if self._stay is not None:
@@ -104,8 +105,8 @@ class Ros2Transport(Threaded):
         return subscription
 
     def faults(self) -> list[tuple[str, str]]:
-        """Return (code, detail) of each fault that keeps nodes from hearing each other. Any thread may
-        call this."""
+        """Return the code and the detail of each fault that keeps nodes from hearing each other. Any
+        thread may call this method."""
         with self._lock:
             if not self.lives or self._stay is None:
                 return []
@@ -115,12 +116,12 @@ class Ros2Transport(Threaded):
             return self._peers.faults()
 
     def wall(self) -> float:
-        """Return ROS's time (s since the epoch): the wall clock, or `/clock` with use_sim_time."""
+        """Return ROS's time (s since the epoch). This is the wall clock, or `/clock` with
+        use_sim_time."""
         return float(self._clock.now().nanoseconds * 1e-9)
 
     def close(self) -> None:
-        """Leave the graph at once, so that no ghost endpoint remains. The caller may call `close`
-        twice."""
+        """Leave the graph at once, so that no ghost endpoint remains. A second call does nothing."""
         with self._lock:
             if self._closed:
                 return
@@ -166,8 +167,8 @@ class Ros2Transport(Threaded):
                     log.warning(pairs("not_joined", node=self.name, reason=error))
 
     def _spin(self) -> None:
-        """Run the executor. The thread ends after repeated exceptions of rclpy, or after a shutdown of
-        the context."""
+        """Run the executor. The thread ends after repeated exceptions of rclpy, or after the context
+        was shut down."""
         failures = 0
         while not self._closed and self._lasts() and failures < notices.FAILURES:
             try:
@@ -197,8 +198,7 @@ class Ros2Transport(Threaded):
             self._join_anew()
 
     def _withdraw(self, publisher: Ros2Publisher) -> None:
-        """Take one publisher off the graph. After `close` do nothing, because `close` has removed all
-        publishers."""
+        """Take one publisher off the graph. Do nothing after `close`, which removes all publishers."""
         with self._lock:
             if self._closed or publisher not in self._ends.publishers:
                 return

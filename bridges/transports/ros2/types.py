@@ -1,7 +1,7 @@
-"""The types of `definitions.py` for rclpy: the classes of the installed ROS packages.
+"""The types of `definitions.py` for rclpy, which are the classes of the installed ROS packages.
 
 Samples pass through rclpy as bytes (`transport.py`), so these classes only name the types. This file
-compares the classes' fields with `definitions.py`, because bytes of another definition would be
+compares the classes' fields with `definitions.py`. Otherwise bytes of another definition could be
 misread.
 """
 
@@ -14,7 +14,7 @@ from bridges.messages.releases import DEFAULT, DIFFERING, NEWEST, RELEASES, Rele
 from bridges.transports.transport import TransportError
 
 NAMES = {str: "string", bool: "boolean", "byte": "octet", "float32": "float", "float64": "double"}
-"""Our type -> its IDL name, as in ROS's Python classes."""
+"""The IDL names of our types, as ROS's Python classes use them."""
 
 
 class RosMessage(Protocol):
@@ -25,19 +25,19 @@ class RosMessage(Protocol):
 
 
 def installed() -> Release:
-    """Return the release of the installed RMF message packages. Return the default if no release
-    fits."""
+    """Return the release of the installed RMF message packages. Return the default release if no
+    release fits."""
     fitting = (one for one in RELEASES.values() if all(_fits(kind, one) for kind in DIFFERING))
     return next(fitting, DEFAULT)
 
 
 def _fits(message_type: type, release: Release) -> bool:
-    """Return whether the installed package agrees with the release about this message. Both define it
-    in the same way, or both lack it."""
+    """Return whether the installed package and the release define this message in the same way. Return
+    True also if the package and the release lack the message."""
     try:
         module = importlib.import_module(f"{PACKAGES[message_type]}.msg")
     except ImportError:
-        return True  # `ros_type` reports the missing package when the message is used
+        return True  # `ros_type` reports a missing package when the message is used
     found: type[RosMessage] | None = getattr(module, message_type.__name__, None)
     if found is None or not release.has(message_type):
         return found is None and not release.has(message_type)
@@ -73,7 +73,7 @@ def ros_type(message_type: type, release: Release = NEWEST) -> type[RosMessage]:
 
 
 def how_to_install(package: str) -> str:
-    """Return the instruction to install a package on Ubuntu with ROS 2's package sources."""
+    """Return an instruction that installs a package on Ubuntu with ROS 2's package sources."""
     return (
         f"`sudo apt install ros-jazzy-{package.replace('_', '-')}`, and source ROS's setup file"
         " (`ros_setup:` in the YAML does that for a service)"
@@ -81,7 +81,8 @@ def how_to_install(package: str) -> str:
 
 
 def fields_of(message_type: type, release: Release = NEWEST) -> dict[str, str]:
-    """Return field -> type. The types have the names of `get_fields_and_field_types()`."""
+    """Return the type of each field by the field's name. The types have the names that
+    `get_fields_and_field_types()` uses."""
     return {name: _name(kind) for name, kind in release.fields(message_type).items()}
 
 

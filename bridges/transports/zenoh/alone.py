@@ -1,6 +1,6 @@
-"""Keeps a node that must stay on this machine off the graph when a router links to the node. The router
-would forward the node's messages to other machines. The node returns some time after the router has
-gone."""
+"""Keeps a node off the graph while a router is linked to it, if the node must stay on this machine. The
+router would forward the node's messages to other machines. The node returns to the graph some time
+after the router has gone."""
 
 import math
 from typing import Final
@@ -11,19 +11,22 @@ WHY_AWAY: Final = (
     " until the router has gone, this node neither speaks nor hears"
 )
 GONE_AFTER_S: Final = 10.0
-"""The time (s) without a router after which the node returns to the graph. A router that has lost its
-link tries to connect every 4 s (zenoh's default for `connect/retry`). A restart takes the router a
-few seconds more."""
+"""The time (s) without a router after which the node returns to the graph.
+
+A router that has lost its link tries to connect every 4 s (zenoh's default for `connect/retry`). A
+router that restarts needs a few seconds more.
+"""
 
 
 class Alone:
-    """Decides when one node must be off the graph. `now` is in monotonic seconds."""
+    """The decision when one node must be off the graph. `now`: the time (monotonic s)."""
 
     def __init__(self) -> None:
         self._met_at = -math.inf
 
     def away(self, router: bool, now: float) -> bool:
-        """Must the node be off the graph? `router` is True when a router is linked to the node."""
+        """Return whether the node must be off the graph now. `router`: a router is linked to the
+        node."""
         if router:
             self._met_at = now
         return router or now < self._met_at + GONE_AFTER_S

@@ -1,5 +1,5 @@
-"""Configurations of a zenoh session. One is that of rmw_zenoh with the YAML's settings. The other keeps
-a node on this machine.
+"""Configurations of a zenoh session. One is rmw_zenoh's configuration with the YAML's settings. The
+other keeps a node on this machine.
 
 Source: ros2/rmw_zenoh, jazzy, DEFAULT_RMW_ZENOH_SESSION_CONFIG.json5; zenoh's DEFAULT_CONFIG.json5.
 """
@@ -12,21 +12,23 @@ from bridges.system import user_files
 from bridges.transports.transport import TransportError
 
 Configuration = dict[str, object]
-"""A key of zenoh's configuration -> its JSON value."""
+"""JSON values by the key in zenoh's configuration."""
 
 LOOPBACK_PORT: Final = 17400
-"""The port on which nodes of domain 0 on this machine meet. Domain N uses the Nth port after this port.
-Routers use another port (7447). The ports that Linux assigns by itself begin at 32768."""
+"""The port on which the nodes of domain 0 on this machine meet. Domain N uses this number plus N.
+
+Routers use another port (7447). The ports that Linux assigns by itself begin at 32768.
+"""
 RETRY: Final = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
 
 COMMON: Final[Configuration] = {
     "scouting/multicast/enabled": False,
-    "scouting/delay": 1,  # ms; scouting is off, so there is nothing to wait for
-    # zenoh's own clock panics at times before 1970. After the panic zenoh neither sends nor hears
-    # messages. Retained messages are ordered by their numbers and need no time.
+    "scouting/delay": 1,  # ms; scouting is off, so no node needs to wait for it
+    # zenoh's own clock panics at times before 1970. After a panic zenoh neither sends nor hears
+    # messages. Retained messages need no time, because they are ordered by their numbers.
     "timestamping/enabled": False,
-    # During the query for retained messages, new messages wait. A hung node must not delay a fire alarm
-    # for longer than this (ms). rmw_zenoh would wait for ever.
+    # This is the longest time (ms) for which a hung node can delay a fire alarm. New messages wait
+    # during the query for retained messages. rmw_zenoh would wait for ever.
     "queries_default_timeout": 3000,
     "transport/shared_memory/enabled": False,
     "connect/timeout_ms": -1,
@@ -37,16 +39,16 @@ _LOCAL = re.compile(r"[a-z]+/(localhost|127\.[0-9.]+|\[::1\]):[0-9]+")
 
 
 def is_local(endpoint: str) -> bool:
-    """Is this endpoint on the loopback interface of this machine?"""
+    """Return whether this endpoint is on the loopback interface of this machine."""
     return _LOCAL.fullmatch(endpoint) is not None
 
 
 def on_loopback(domain_id: int) -> list[Configuration]:
     """Return configurations for a node that meets only this machine's nodes of its domain, and no
-    router. The caller tries them in order.
+    router. The caller tries the configurations in order.
 
-    The first node listens on the domain's port, and introduces later nodes to each other. Later nodes
-    keep trying to connect to that port. So they also find a node that takes the port over later.
+    The first node listens on the domain's port, and introduces the later nodes to each other. A later
+    node keeps trying to connect to that port. So it also finds a node that takes over the port later.
     """
     meeting = f"tcp/127.0.0.1:{LOOPBACK_PORT + domain_id}"
     common = COMMON | {
@@ -68,7 +70,7 @@ def on_the_site(zenoh: Zenoh) -> Configuration:
         wanted["listen/endpoints"] = list(zenoh.listen)
         wanted["listen/exit_on_failure"] = True
     else:
-        wanted["connect/timeout_ms"] = 0  # a client's session opens without waiting for a router
+        wanted["connect/timeout_ms"] = 0  # a client's session opens without a router
     try:
         return wanted | _tls(zenoh.tls) | _user(zenoh)
     except user_files.SecretError as error:
@@ -76,11 +78,13 @@ def on_the_site(zenoh: Zenoh) -> Configuration:
 
 
 def mode(zenoh: Zenoh) -> str:
-    """Return the node's mode: `peer` or `client`.
+    """Return the node's mode, which is `peer` or `client`.
 
     A router forwards no messages between peers, because peers connect directly. So a node that peers
-    cannot reach must be a client. A node with several routers must be a client too. As a peer it would
-    connect to all routers, and receive each message from every router.
+    cannot reach must be a client.
+
+    A node with several routers must be a client too. As a peer it would connect to all routers, and
+    receive each message from every router.
     """
     if zenoh.mode != "auto":
         return zenoh.mode

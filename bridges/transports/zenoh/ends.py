@@ -1,9 +1,10 @@
-"""The ends of the `zenoh` transport: its publishers and subscriptions.
+"""The ends of the `zenoh` transport, which are its publishers and subscriptions.
 
-They are made as in rmw_zenoh (jazzy: rmw_publisher_data.cpp, rmw_subscription_data.cpp). A publisher
-that retains messages is an advanced publisher, whose cache is as deep as its history. A subscription
-that wants retained messages is an advanced subscriber. An advanced subscriber queries a publisher's
-cache when the publisher or the subscription is new, and again for missed samples.
+They are made as in rmw_zenoh (jazzy: rmw_publisher_data.cpp, rmw_subscription_data.cpp):
+
+- A publisher that retains messages is an advanced publisher. Its cache is as deep as its history.
+- A subscription that wants retained messages is an advanced subscriber. It queries a publisher's cache
+  when the publisher or the subscription is new. It also queries the cache for missed samples.
 
 An end outlives its session. When the transport joins again, the end gets a place in the new session.
 Callbacks on zenoh's threads only queue work for the transport's thread.
@@ -35,10 +36,10 @@ from bridges.transports.zenoh.place import Place, Tell
 from bridges.transports.zenoh.session import contained
 
 HEARTBEAT_S: Final = 0.5
-"""The time (s) after which a publisher sends the number of a retained message again, so that
-subscribers notice a loss. The value is that of rmw_zenoh."""
+"""The time (s) after which a publisher repeats the number of its last retained message. So subscribers
+notice a lost message. rmw_zenoh uses the same value."""
 AT_ONCE: Final = 100
-"""The maximum number of samples taken from one subscription before other subscriptions have their
+"""The maximum number of samples from one subscription before the other subscriptions have their
 turn."""
 
 
@@ -51,7 +52,7 @@ class Declared(Protocol):
 
 class ZenohEnd(ABC):
     """The base of publishers and subscriptions. `do(order)` runs an order on the transport's thread.
-    For `tell` see `Place`."""
+    `Place` explains `tell`."""
 
     def __init__(
         self, topic: AnyTopic, notice: str, do: Callable[[Order], None], tell: Tell
@@ -67,7 +68,7 @@ class ZenohEnd(ABC):
 
     @abstractmethod
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
-        """Take a place in a session. `number` is unique within the session."""
+        """Take a place in a session. `number` is unique in the session."""
 
     def _placed(self, session: zenoh.Session, keys: Keys, kind: Kind, number: int) -> Place:
         misfit, tell, do = self.log_misfit, self._tell, self._do
@@ -82,14 +83,14 @@ class ZenohEnd(ABC):
             end.undeclare()
 
     def give_up(self) -> object:
-        """Leave a session that is about to be closed. Return the objects that were declared in the
+        """Leave a session that will soon be closed. Return the objects that the end declared in the
         session."""
         held = self.place, self._end
         self.place = self._end = None
         return held
 
     def log_misfit(self, policy: str) -> None:
-        """Log a peer whose QoS does not fit, once for each policy."""
+        """Log that a peer's QoS does not fit. Log each policy only once."""
         if policy not in self._noticed:
             self._noticed.add(policy)
             self._do(partial(notices.misfit, self.topic, self._notice, policy))
@@ -98,9 +99,9 @@ class ZenohEnd(ABC):
 class ZenohPublisher(ZenohEnd):
     """The publisher of one topic.
 
-    `withdraw(publisher)` takes the publisher off the graph. `lives()` returns True if the transport is
-    open and its thread runs. `deaf`: tokens of this node's own subscriptions that must not hear this
-    publisher.
+    `withdraw(publisher)` takes the publisher off the graph. `lives()` returns whether the transport is
+    open and its thread runs. `deaf`: the tokens of this node's own subscriptions that must not hear
+    this publisher.
     """
 
     _end: zenoh.Publisher | ext.AdvancedPublisher | None
@@ -123,7 +124,7 @@ class ZenohPublisher(ZenohEnd):
         self._retained: deque[bytes] = deque(maxlen=depth)
 
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
-        """Take a place in a session. Send the messages again that are retained for late joiners."""
+        """Take a place in a session. Send the retained messages again, for late joiners."""
         place = self._placed(session, keys, "MP", number)
         self._release = keys.release
         self._end = end = self._declared(session, place.key)
@@ -133,13 +134,13 @@ class ZenohPublisher(ZenohEnd):
             self._put(end, place, sample)
 
     def publish(self, message: Message) -> None:
-        """Send a message. Raises TransportError if it was not sent, and CdrError if it cannot be
-        encoded."""
+        """Send a message. Raises TransportError if the message was not sent, and CdrError if it cannot
+        be encoded."""
         if not self._lives():
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
         sample = cdr.encode(self.topic.type, message, self._release)
         self._retained.append(sample)
-        place, end = self.place, self._end  # another thread may clear both attributes at any time
+        place, end = self.place, self._end  # another thread may clear both at any time
         if place is None or end is None:
             raise TransportError(f"topic {self.topic.name}: not sent: the node is not on the graph")
         try:
@@ -149,7 +150,7 @@ class ZenohPublisher(ZenohEnd):
             raise TransportError(f"topic {self.topic.name}: not sent: {error}") from error
 
     def matched(self) -> int:
-        """Return the number of subscriptions that hear this publisher; 0 after close."""
+        """Return the number of subscriptions that hear this publisher. Return 0 after `close`."""
         place = self.place
         return len(place.peers.keys() - self._deaf) if place else 0
 
@@ -189,8 +190,8 @@ class ZenohPublisher(ZenohEnd):
 class ZenohSubscription(ZenohEnd):
     """The subscription of one topic.
 
-    `dropped`: topic name -> number of invalid samples. `others_only`: skip this node's own publishers.
-    `attached`: accept only samples that have the attachment of a ROS node.
+    `dropped`: the number of invalid samples, by the topic's name. `others_only`: skip this node's own
+    publishers. `attached`: accept only samples with the attachment of a ROS node.
     """
 
     def __init__(
@@ -208,7 +209,7 @@ class ZenohSubscription(ZenohEnd):
         super().__init__(topic, notices.NOT_HEARD, do, tell)
         self.others_only = others_only
         self._senders = senders
-        self._finds_node = self._node_of  # bound only once, because a daemon takes many messages
+        self._finds_node = self._node_of  # bound once, because many messages need it
         self._ring = Merged(do, self.take)
         self._own_session = ""
         self._received = received
@@ -239,7 +240,7 @@ class ZenohSubscription(ZenohEnd):
         place.appear()
 
     def matched(self) -> int:
-        """Return the number of publishers that this subscription hears; 0 after close."""
+        """Return the number of publishers that this subscription hears. Return 0 after `close`."""
         return len(self.senders())
 
     def senders(self) -> list[str]:
@@ -254,7 +255,8 @@ class ZenohSubscription(ZenohEnd):
         return next((peer.node for token, peer in peers if zenoh_keys.gid(token) == gid), "")
 
     def take(self) -> None:
-        """Deliver at most AT_ONCE of the arrived samples. Further samples wait for the next turn."""
+        """Deliver at most AT_ONCE of the arrived samples. The remaining samples wait for the next
+        turn."""
         self._senders.node_of = self._finds_node
         for _ in range(min(AT_ONCE, len(self._waiting))):
             try:
@@ -268,16 +270,16 @@ class ZenohSubscription(ZenohEnd):
             self._ring()
 
     def _arrived(self, sample: Sample) -> None:
-        """Queue a sample. zenoh's thread calls this. A full queue drops its oldest sample, as KEEP_LAST
-        demands."""
+        """Queue a sample. zenoh's thread calls this method. A full queue drops its oldest sample, as
+        KEEP_LAST demands."""
         size = len(sample.payload)
         long = size > cdr.longest(self.topic.type)
         self._waiting.append(CdrError(f"{size} bytes long") if long else sample)
         self._ring()
 
     def _message(self, sample: Sample | CdrError) -> Message | None:
-        """Return a sample's message. Return None if the subscription must not hear its publisher.
-        Raises CdrError."""
+        """Return the message of a sample. Return None if the subscription must not hear the sample's
+        publisher. Raises CdrError."""
         if isinstance(sample, CdrError):
             raise sample
         place = self.place

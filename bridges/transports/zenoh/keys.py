@@ -1,12 +1,12 @@
-"""Names of ROS's topics and nodes on zenoh: data keys, liveliness tokens, attachments.
+"""Names of ROS's topics and nodes on zenoh: data keys, liveliness tokens, attachments. The functions
+are pure.
 
-The functions are pure. There are two naming schemes. Nodes with different schemes do not hear each
-other.
+There are two naming schemes. Nodes with different schemes do not hear each other.
 
-- The scheme of rmw_zenoh, where each ROS context is a zenoh session. Source: ros2/rmw_zenoh, jazzy: its
+- rmw_zenoh's scheme makes each ROS context a zenoh session. Source: ros2/rmw_zenoh, jazzy: its
   design.md; rmw_zenoh_cpp/src/detail/liveliness_utils.cpp and attachment_helpers.cpp.
-- The scheme of zenoh-bridge-ros2dds, which routes a DDS domain. Source:
-  eclipse-zenoh/zenoh-plugin-ros2dds, liveliness_mgt.rs and ros2_utils.rs.
+- zenoh-bridge-ros2dds's scheme routes a DDS domain. Source: eclipse-zenoh/zenoh-plugin-ros2dds,
+  liveliness_mgt.rs and ros2_utils.rs.
 
 A liveliness token is a key that exists as long as its session. Tokens announce a node, a publisher or a
 subscription to other nodes. An end is a publisher or a subscription.
@@ -26,22 +26,23 @@ from bridges.messages.topics import AnyTopic, Qos
 from bridges.transports.peers import WITNESSES, Announced
 
 Kind = Literal["MP", "MS"]
-"""A publisher or a subscription: rmw_zenoh's Message Publisher and Message Subscription."""
+"""The kind of an end: rmw_zenoh's Message Publisher or Message Subscription."""
 NODE_ID: Final = 0
 _HEAD: Final = struct.Struct("<qqB")
 GID_LENGTH: Final = 16
 LONGEST: Final = 2000
-"""The maximum length (characters) of a ROS node's token. It follows from ROS's limit of 255 for each
-name."""
+"""The maximum length (characters) of a ROS node's token. ROS limits each name in a token to 255
+characters."""
 HASH: Final = re.compile(r"typehash=(RIHS01_[0-9a-f]{64});")
 
 
 class Peer(Struct, frozen=True):
-    """An end that its token has announced.
+    """An end that a token has announced.
 
-    `type`: the message type, with the hash if the token has a hash. `transient_local`: the publisher
-    retains its messages, or the subscription wants retained messages. `announced`: the end's topic,
-    type and hash. `node`: the end's node, as `/namespace/name`.
+    - `type`: the message type, with the hash if the token has a hash
+    - `transient_local`: the publisher retains messages, or the subscription wants retained messages.
+    - `announced`: the end's topic, type and hash
+    - `node`: the end's node, as `/namespace/name`
     """
 
     session: str
@@ -52,7 +53,8 @@ class Peer(Struct, frozen=True):
 
 
 class Keys(Protocol):
-    """The names of one node's ends, in one of the two schemes. `session` is the zenoh session's id."""
+    """The names of one node's ends in one of the two schemes. `session`: the id of the zenoh
+    session."""
 
     session: str
     release: Release
@@ -67,7 +69,7 @@ class Keys(Protocol):
         """Return the topic's type, in the form of `Peer.type`."""
 
     def token(self, kind: Kind, topic: AnyTopic, number: int) -> str:
-        """Return the token of an end. `number` is unique within the session."""
+        """Return the token of an end. `number` is unique in the session."""
 
     def others(self, kind: Kind, topic: AnyTopic) -> str:
         """Return a key expression that matches the tokens of all ends of this kind on a topic."""
@@ -76,7 +78,7 @@ class Keys(Protocol):
         """Return key expressions for the tokens that show RMF's release (`peers.py`)."""
 
     def peer(self, token: str) -> Peer | None:
-        """Return the end that a token announces. Return None if the token announces no end."""
+        """Return the end that a token announces. Return None for any other token."""
 
 
 class RmwZenoh:
@@ -103,7 +105,7 @@ class RmwZenoh:
         qos = _qos(topic, kind)
         ids = f"{self._domain}/{self.session}/{NODE_ID}/{number}/{kind}"
         retained = "1" if qos.durability == "transient_local" else ""
-        # rmw_zenoh leaves out its defaults: reliable, volatile, keep last 42.
+        # rmw_zenoh leaves out its defaults, which are reliable, volatile and keep last 42.
         depth = "" if qos.depth == 42 else qos.depth
         return (
             f"@ros2_lv/{ids}/{self._node}/{_name(topic, '%')}/{self.type(topic)}"
@@ -134,7 +136,7 @@ class RmwZenoh:
 class Ros2Dds:
     """The keys of zenoh-bridge-ros2dds. In a token, `§` replaces a name's slashes.
 
-    Keys hold no domain, because a bridge serves only one domain. They hold no type, because the token
+    A key has no domain, because a bridge serves only one domain. A key has no type, because the token
     states the type.
     """
 
@@ -187,19 +189,19 @@ WAYS: Final[dict[str, type[RmwZenoh] | type[Ros2Dds]]] = {
 
 
 def gid(token: str) -> bytes:
-    """Return an end's 16-byte identity in ROS. It is the XXH3-128 of the end's token, lower half
-    first."""
+    """Return an end's identity in ROS, which has 16 bytes. It is the XXH3-128 of the end's token, with
+    the lower half first."""
     return xxhash.xxh3_128_digest(token.encode())[::-1]
 
 
 def attachment(number: int, wall_ns: int, sender: bytes) -> bytes:
-    """Return a sample's attachment. `number` counts an end's samples from 1. `wall_ns` is the time of
-    sending (ns since the epoch). `sender` is the gid of the sending end."""
+    """Return the attachment of a sample. `number`: the number of the end's sample, from 1. `wall_ns`:
+    the time of sending (ns since the epoch). `sender`: the gid of the sending end."""
     return _HEAD.pack(number, wall_ns, GID_LENGTH) + sender
 
 
 def sender(attached: bytes) -> bytes | None:
-    """Return the gid of the sending end. Return None if the attachment is not that of a ROS node."""
+    """Return the gid of the sending end. Return None for an attachment that no ROS node has made."""
     if len(attached) != _HEAD.size + GID_LENGTH or attached[_HEAD.size - 1] != GID_LENGTH:
         return None
     return attached[_HEAD.size :]

@@ -1,7 +1,7 @@
 """The tokens with which ends announce themselves on a zenoh graph.
 
 Each of our ends watches the tokens on its own topic (`place.py`). `ZenohPeers` watches the tokens that
-show RMF's release. Their topics need not be ours.
+show RMF's release, also on topics that we do not use.
 """
 
 import logging
@@ -21,21 +21,22 @@ from bridges.transports.zenoh.keys import Keys, Peer
 log = logging.getLogger(__name__)
 
 MOST: Final = 1000
-"""The maximum number of tokens that are kept. No site has more ends on one topic."""
+"""The maximum number of tokens in memory. No site has more ends on one topic."""
 
 Order = Callable[[], None]
 """Work for the transport's thread."""
 
 
 class Merged:
-    """An order for the transport's thread. If it is queued already, it is not queued again."""
+    """An order for the transport's thread. A call does nothing while the order is already in the
+    queue."""
 
     def __init__(self, do: Callable[[Order], None], order: Order) -> None:
         self._do, self._order = do, order
         self._waits = False
 
     def __call__(self) -> None:
-        """Queue the order. Any thread may call this."""
+        """Queue the order. Any thread may call this method."""
         if not self._waits:
             self._waits = True
             self._do(self._run)
@@ -46,17 +47,18 @@ class Merged:
 
 
 class Tokens:
-    """The tokens that match some key expressions. They are tracked until `leave` or the end of the
-    session.
+    """The tokens that match some key expressions, until `leave` or the end of the session.
 
     zenoh's threads call `came(token, peer)` and `gone(token)`, one call at a time. `do(order)` runs an
-    order on the transport's thread. At most MOST tokens are kept. Further tokens are left out, and this
-    is logged once. When half of the kept tokens have gone, all tokens are queried again, so that no
-    token is missing after a flood.
+    order on the transport's thread.
 
-    zenoh reports the present tokens on another thread than the changes. So a token's departure can
-    overtake its arrival. If a token comes after it has gone, the graph is asked for the token. The
-    token counts only if the graph has it.
+    At most MOST tokens are kept. Further tokens are left out, and the first such token is logged. When
+    half of the kept tokens have gone, all tokens are queried again. So no token is missing after a
+    flood.
+
+    zenoh reports the present tokens on one thread and the changes on another thread. So the report that
+    a token has gone may come before the report of its arrival. In that case the graph is asked for the
+    token. The token counts only if the graph has it.
     """
 
     def __init__(
@@ -72,9 +74,11 @@ class Tokens:
         self._came, self._gone, self._do = came, gone, do
         self._known: set[str] = set()
         self._gone_before: dict[str, None] = {}
-        """The last MOST tokens whose departure came before their arrival, the oldest first."""
+        """The tokens that went before their arrival was reported, the oldest first. At most MOST are
+        kept."""
         self._doubtful: dict[str, Peer] = {}
-        """Tokens whose arrival came after their departure. The graph will be asked for them."""
+        """The tokens whose arrival was reported after they had gone. The graph will be asked for these
+        tokens."""
         self._asked: dict[str, Peer] = {}
         self._ask = Merged(do, self._ask_all)
         self._crowded = self._named = self._left = False
@@ -92,7 +96,7 @@ class Tokens:
             _undeclare(watching)
 
     def _watch(self) -> None:
-        """Watch all present tokens, and each token that comes or goes."""
+        """Watch the present tokens, and each token that comes or goes."""
         on_token = Callback(partial(self._look, self._watch_number), indirect=False)
         self._watching = [
             self._live.declare_subscriber(expression, on_token, history=True)
@@ -100,7 +104,7 @@ class Tokens:
         ]
 
     def _watch_again(self) -> None:
-        with self._lock, suppress(zenoh.ZError):  # the session may be closed already
+        with self._lock, suppress(zenoh.ZError):  # the session may already be closed
             if self._left:
                 return
             _undeclare(self._watching)
@@ -113,9 +117,9 @@ class Tokens:
             self._watch()
 
     def _look(self, watch: int, sample: zenoh.Sample) -> None:
-        """Record a token that has come or gone. zenoh's threads call this.
+        """Note a token that has come or gone. zenoh's threads call this method.
 
-        Changes from an earlier watch are ignored, because they may come after the end of that watch.
+        Ignore changes from an earlier watch, because they may arrive after the end of that watch.
         """
         token = str(sample.key_expr)
         goes = sample.kind == zenoh.SampleKind.DELETE
@@ -158,17 +162,17 @@ class Tokens:
         self._asked.pop(token, None)
 
     def _ask_all(self) -> None:
-        """Ask the graph for the doubtful tokens. The transport's thread calls this."""
+        """Ask the graph for the doubtful tokens. The transport's thread calls this method."""
         with self._changing:
             asked, self._doubtful = self._doubtful, {}
             self._asked.update(asked)
             on_reply = Callback(partial(self._answered, self._watch_number), indirect=False)
-        with suppress(zenoh.ZError):  # the session may be closed already
+        with suppress(zenoh.ZError):  # the session may already be closed
             for token in asked:
                 self._live.get(token, on_reply)
 
     def _answered(self, watch: int, reply: zenoh.Reply) -> None:
-        """Record that the graph has a token. Ignore the answer if the token has gone after the
+        """Note that the graph has a token. Ignore the answer if the token has gone since the
         question."""
         if (sample := reply.ok) is None:
             return
@@ -190,8 +194,8 @@ class Tokens:
 
 
 class ZenohPeers:
-    """A watch that reports tokens to `peers`, on zenoh's thread. It calls `news` after each token. For
-    `do` see `Tokens`."""
+    """A watch that reports tokens to `peers`, on zenoh's thread. It calls `news` after each token.
+    `Tokens` explains `do`."""
 
     def __init__(self, peers: Peers, news: Order, do: Callable[[Order], None]) -> None:
         self._peers = peers
@@ -199,13 +203,13 @@ class ZenohPeers:
         self._do = do
 
     def watch(self, session: zenoh.Session, keys: Keys) -> Tokens:
-        """Watch in this session from its beginning. The caller must keep the returned Tokens until the
+        """Watch this session from its beginning. The caller must keep the returned Tokens until the
         session is closed."""
         self._peers.clear()
         return Tokens(session, keys, keys.witnesses(), self._came, self._gone, self._do)
 
     def tell(self, token: str, end: Announced | None) -> None:
-        """Record an end that has come. If `end` is None, the end of this token has gone."""
+        """Note an end that has come. If `end` is None, the end with this token has gone."""
         if end is None:
             self._peers.gone(token)
         else:

@@ -1,5 +1,5 @@
-"""An end's place in one zenoh session. It knows the peers that the end reaches, and the peers that do
-not fit."""
+"""An end's place in one zenoh session. A place knows the peers that the end reaches, and the peers that
+do not fit."""
 
 from collections.abc import Callable
 
@@ -13,16 +13,20 @@ from bridges.transports.zenoh.keys import Keys, Kind
 from bridges.transports.zenoh.peers import Order, Tokens
 
 Tell = Callable[[str, Announced | None], None]
-"""A callback with a token and its end. The end is None if it has gone."""
+"""A callback with a token and the token's end. The end is None if it has gone."""
 
 
 class Place:
     """An end's place in one session: its token, and the tokens of its peers.
 
-    Peers are the ends of the other kind on the same topic, in any process. `peers`: the peers that this
-    end reaches, by token. `unheard`: the gids of peers that do not fit. zenoh's thread calls
-    `misfit(policy)` for each peer whose QoS does not fit. It calls `tell(token, end)` for each peer
-    that comes, and with None when the peer goes. For `do` see `Tokens`.
+    A peer is an end of the other kind on the same topic, in any process.
+
+    - `peers`: the peers that this end reaches, by token
+    - `unheard`: the gids of the peers that do not fit
+    - `misfit(policy)`: zenoh's thread calls it for each peer whose QoS does not fit.
+    - `tell(token, end)`: zenoh's thread calls it for each peer that comes. When a peer goes, `end` is
+      None.
+    - `do`: see `Tokens`
     """
 
     def __init__(
@@ -64,7 +68,7 @@ class Place:
         self._tokens.leave()
 
     def _part(self, token: str) -> None:
-        """Forget a peer that has gone. zenoh's thread calls this, as it calls `_meet`."""
+        """Forget a peer that has gone. zenoh's thread calls this method and `_meet`."""
         self.peers.pop(token, None)
         self.unheard.discard(zenoh_keys.gid(token))
         self._tell(token, None)
@@ -76,11 +80,12 @@ class Place:
             self.peers[token] = peer
             return
         self.unheard.add(zenoh_keys.gid(token))
-        if policy != "type":  # `peers.py` logs misfits of types
+        if policy != "type":  # `peers.py` logs types that do not fit
             self._misfit(policy)
 
     def _incompatible(self, theirs: zenoh_keys.Peer) -> str:
-        """Return the QoS policy that would keep DDS from matching the two ends; "" if they match."""
+        """Return the QoS policy that would keep DDS from matching the two ends. Return "" if the ends
+        match."""
         hashed = type_hash(self._topic.type, self._keys.release)
         if theirs.type != self._keys.type(self._topic) or theirs.announced.hash not in ("", hashed):
             return "type"

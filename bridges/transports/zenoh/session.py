@@ -12,21 +12,21 @@ from bridges.transports.zenoh.config import Configuration
 
 @contextmanager
 def contained() -> Iterator[None]:
-    """Raise a panic of zenoh as ZError. A panic is not an Exception, and would end the daemon. Every
-    call into zenoh needs this."""
+    """Raise a panic of zenoh as ZError. A panic is no Exception, and would end the daemon. So every
+    call into zenoh needs this block."""
     try:
         yield
     except BaseException as error:
         if (
             type(error).__name__ != "PanicException"
-        ):  # the class belongs to pyo3 and cannot be imported
+        ):  # pyo3 owns the class, which cannot be imported
             raise
         raise zenoh.ZError(f"zenoh has panicked: {error}") from error
 
 
 def opened(ways: list[Configuration]) -> zenoh.Session:
-    """Open a session with the first of these configurations that works. Raises ZError if no
-    configuration works."""
+    """Open a session with the first configuration that works. Raises ZError if no configuration
+    works."""
     wanted, *further = ways
     config = zenoh.Config()
     for key, value in wanted.items():
@@ -41,12 +41,12 @@ def opened(ways: list[Configuration]) -> zenoh.Session:
 
 
 def closed(session: zenoh.Session, held: list[object]) -> None:
-    with suppress(zenoh.ZError), contained():  # on a dead link the closing message cannot be sent
+    with suppress(zenoh.ZError), contained():  # a dead link does not take the closing message
         session.close()  # type: ignore[no-untyped-call]
     held.clear()
 
 
 def trim_memory() -> None:
-    """Return freed memory to the system. After a session has opened, this is 2.5 MB."""
+    """Return freed memory to the system. This is 2.5 MB after a session has opened."""
     with suppress(AttributeError):  # only glibc has this call
         ctypes.CDLL(None).malloc_trim(0)

@@ -1,9 +1,9 @@
-"""The `zenoh` transport. Its session looks like a ROS node on rmw_zenoh, or like a zenoh-bridge-ros2dds
-with one node behind the bridge.
+"""The `zenoh` transport. Its session looks like a ROS node on rmw_zenoh. With the other naming scheme
+it looks like a zenoh-bridge-ros2dds with one node behind the bridge.
 
 zenoh reconnects by itself. It keeps looking for its routers, and declares everything again when a
 router answers. This transport opens a new session only when the machine's addresses have changed. The
-old session would notice that change only when its links time out.
+old session would notice that change only after its links time out.
 
 Source: eclipse-zenoh 1.10 (Python API), and the sources named in `keys.py` and `ends.py`. Only this
 folder imports zenoh, and only `choose.py` imports this file.
@@ -49,7 +49,7 @@ class ZenohTransport(Threaded):
     """One node: a session, its publishers and subscriptions, and the thread that delivers messages.
 
     `loopback`: stay on this machine without a router, even if `settings` say otherwise. Raises
-    TransportError if no session can be opened. It is no error if no other node answers.
+    TransportError if no session can be opened. The node needs no other node on the graph.
     """
 
     speaks = "zenoh"
@@ -90,12 +90,12 @@ class ZenohTransport(Threaded):
         self._join()
         if self._session is None and not self._wants_router:
             raise TransportError(f"cannot open a zenoh session: {self._why_unlinked}")
-        # If a session is open at exit, it aborts the interpreter.
+        # A session that is open at exit aborts the interpreter.
         atexit.register(self.close)
         self._start(self._listen, "zenoh")
 
     def faults(self) -> list[tuple[str, str]]:
-        """Return the faults of every transport, and also ROUTER_ON_LOOPBACK or NO_ROUTER."""
+        """Return the faults that every transport has, and also ROUTER_ON_LOOPBACK or NO_ROUTER."""
         found = super().faults()
         if self._away:
             found.insert(0, (ROUTER_MET, WHY_AWAY))
@@ -139,8 +139,7 @@ class ZenohTransport(Threaded):
         return subscription
 
     def close(self) -> None:
-        """Leave the graph at once, so that no ghost endpoint remains. The caller may call `close`
-        twice."""
+        """Leave the graph at once, so that no ghost endpoint remains. A second call does nothing."""
         with self._lock:
             if self._closed:
                 return
@@ -156,7 +155,7 @@ class ZenohTransport(Threaded):
     # --- the session ---------------------------------------------------------------------------
 
     def _join(self) -> None:
-        """Open a session if possible. A client gets a session only after a router has answered."""
+        """Try to open a session. A client gets a session only after a router has answered."""
         self._addresses = addresses.addresses()
         if self._loopback:
             ways = zenoh_config.on_loopback(self.domain_id)
@@ -167,7 +166,7 @@ class ZenohTransport(Threaded):
         except zenoh.ZError as error:
             self._why_unlinked = str(error).partition(" at /")[
                 0
-            ]  # the text without the place in zenoh's source
+            ]  # without the place in zenoh's source
             return
         way, name = WAYS[self._settings.keys], str(session.zid())
         self._keys: Keys = way(self.domain_id, name, self.name, self.release)
@@ -188,8 +187,8 @@ class ZenohTransport(Threaded):
             self._attach(end)
 
     def _vanish(self) -> None:
-        """Take the node and every end off the graph. Keep the session, because it shows when the router
-        leaves."""
+        """Take the node and every end off the graph. Keep the session, which later shows that the
+        router has gone."""
         for end in self._ends:
             end.leave()
         self._deaf.clear()
@@ -200,7 +199,8 @@ class ZenohTransport(Threaded):
             presence.undeclare()  # type: ignore[no-untyped-call]
 
     def _attach(self, end: ZenohEnd) -> None:
-        """Give an end its place, if the node is on the graph and the release has the end's message."""
+        """Give an end its place. Do nothing if the node is off the graph, or if the release lacks the
+        end's message."""
         self._peers.ours(end.topic, publishes=isinstance(end, ZenohPublisher))
         off = self._away or end.place or not self.release.has(end.topic.type)
         if self._session is None or off:
@@ -211,10 +211,10 @@ class ZenohTransport(Threaded):
         end.create(self._session, self._keys, number)
 
     def _neighbour(self, neighbours: dict[str, zenoh.WhatAmI], event: zenoh.TransportEvent) -> None:
-        """Record a router or peer that has connected or gone. zenoh's thread calls this.
+        """Note a router or peer that has connected or gone. zenoh's thread calls this method.
 
-        This file tracks the neighbours itself. A question to the session would wait for a lock that
-        this thread holds.
+        This file keeps its own list of neighbours. A question to the session would wait for a lock that
+        zenoh's thread holds.
         """
         if event.kind == zenoh.SampleKind.PUT:
             neighbours[str(event.transport.zid)] = event.transport.whatami
@@ -229,10 +229,11 @@ class ZenohTransport(Threaded):
                 publisher.leave()
 
     def _leave(self) -> None:
-        """Leave the session. Another thread closes the session, because this takes 10 s on a dead link.
+        """Leave the session. Another thread closes the session, because closing takes 10 s on a dead
+        link.
 
-        Objects declared in the session are kept until the session is closed. Dropping them earlier may
-        block this thread.
+        Keep the objects that are declared in the session until the session is closed. Dropping them
+        earlier may block this thread.
         """
         session, self._session = self._session, None
         held: list[object] = [end.give_up() for end in self._ends]
@@ -252,7 +253,7 @@ class ZenohTransport(Threaded):
             self._closing = [closing for closing in self._closing if closing.is_alive()]
             try:
                 self._join()
-            except (TransportError, zenoh.ZError) as error:  # for example, a secret's file is gone
+            except (TransportError, zenoh.ZError) as error:  # a secret's file is missing
                 self._why_unlinked = str(error)
                 self._leave()
 
@@ -291,7 +292,8 @@ class ZenohTransport(Threaded):
                 self._recover(error)
 
     def _recover(self, error: Exception) -> None:
-        """Recover from an unexpected exception. Log the exception once, and open a new session."""
+        """Recover from an unexpected exception. Log only the first exception, and open a new
+        session."""
         if not self._failed:
             log.exception(pairs("reader_failed", node=self.name, reason=error))
         self._failed = True
@@ -300,7 +302,7 @@ class ZenohTransport(Threaded):
             self._join_anew()
 
     def _follow_network(self) -> None:
-        """Join again if the machine's addresses have changed, or if there is no session."""
+        """Join again if the machine's addresses have changed, or if the node has no session."""
         if self._loopback:
             if self._away:
                 self._look()
@@ -312,13 +314,13 @@ class ZenohTransport(Threaded):
             self._join_anew()
 
     def _leaves_machine(self) -> bool:
-        """Is any endpoint on another machine?"""
+        """Return whether an endpoint in the settings is on another machine."""
         endpoints = (*self._settings.connect, *self._settings.listen)
         return not all(map(zenoh_config.is_local, endpoints))
 
     def _look(self) -> None:
-        """Log once that no router or peer answers, and once that a router or peer answers again. On
-        loopback, leave the graph when a router is linked."""
+        """Log when no router or peer answers any more, and when one answers again. On loopback, leave
+        the graph when a router is linked."""
         neighbours = list(self._neighbours.values())
         routers = zenoh.WhatAmI.ROUTER in neighbours
         if self._loopback:
@@ -337,7 +339,7 @@ class ZenohTransport(Threaded):
             log.warning(pairs("not_linked", node=self.name, connect=where, reason=reason))
 
     def _keep_apart(self, away: bool) -> None:
-        """If `away` (a router is linked), leave the graph; otherwise return to the graph."""
+        """Leave the graph if `away`, because a router is linked. Otherwise return to the graph."""
         with self._lock:
             before, session = self._away, self._session
             if self._closed or session is None or not (before or away):
@@ -355,4 +357,4 @@ class ZenohTransport(Threaded):
 
 
 def _nothing() -> None:
-    """Do nothing. This order only wakes our thread."""
+    """Do nothing. This order only wakes the transport's thread."""
