@@ -33,7 +33,7 @@ COMMANDS = {
         "check my_lift.yaml --building-map hospital.building.yaml",
     ),
     "migrate": (
-        "rewrite keys of a device YAML that an earlier version named otherwise",
+        "replace old names of keys in a device YAML by the present names",
         "migrate my_lift.yaml --dry-run",
     ),
     "enable": (
@@ -44,7 +44,7 @@ COMMANDS = {
         "save this machine's configuration in one file, or restore it",
         "backup pi-lift1.tar.gz",
     ),
-    "disable": ("end a service, with its outputs off; its YAML stays", "disable my_lift"),
+    "disable": ("stop a service with its outputs off, and keep its YAML", "disable my_lift"),
     "schema": ("print the JSON Schema of a device YAML", "schema > rmf-bridge.json"),
     "watch": ("show lifts, doors and chargers live, as RMF sees them", "watch --localhost"),
     "page": (
@@ -52,7 +52,7 @@ COMMANDS = {
         "page --localhost",
     ),
     "mqtt-out": (
-        "publish lifts, doors and chargers to an MQTT broker; commands nothing",
+        "publish lifts, doors and chargers to an MQTT broker; command nothing",
         "mqtt-out 192.168.1.5 --home-assistant",
     ),
     "exporter": (
@@ -68,11 +68,11 @@ COMMANDS = {
         "status --json",
     ),
     "doctor": (
-        "find what keeps a bridge from working on this machine; switches nothing",
+        "find what keeps a bridge from working on this machine; switch nothing",
         "doctor my_lift.yaml --scan",
     ),
     "explain": (
-        "say why a robot waits for a lift, door or charger: live, or from a recording",
+        "say why a robot waits for a lift, door or charger, live or from a recording",
         "explain --live Lift1 --localhost",
     ),
     "plot": (
@@ -88,9 +88,9 @@ COMMANDS = {
         "judge lift Lift1 --active --ride L1 L3 --localhost",
     ),
     "release": ("end the session that holds a lift", "release Lift1"),
-    "reset": ("tell a running daemon that its latched faults may clear", "reset my_lift.yaml"),
+    "reset": ("let a running daemon clear its latched faults", "reset my_lift.yaml"),
     "workcell": (
-        "decide what became of a dispenser's or ingestor's request that is in doubt",
+        "decide the outcome of a dispenser's or ingestor's request in doubt",
         "workcell again my_dispenser.yaml",
     ),
     "walk": (
@@ -102,7 +102,7 @@ COMMANDS = {
         "press my_lift.yaml fire_alarm on",
     ),
     "fail": (
-        "in a simulation, let a wire or a part fail; `ok` mends it",
+        "in a simulation, let a wire or a part fail, or mend it with `ok`",
         "fail my_lift.yaml door_opened stuck",
     ),
     "log": ("show the log of a device's service", "log my_lift.yaml --follow --event fault"),

@@ -111,7 +111,7 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
         1: "a daemon has a fault",
         2: "a daemon died or is silent",
         3: "there is no daemon",
-        4: "with --idle: a device is in use, or that is not known",
+        4: "with --idle: a device is in use, or nobody knows whether one is",
     },
     "doctor": {
         0: "all is well",

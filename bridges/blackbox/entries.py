@@ -202,7 +202,7 @@ def _decoded(decode: Callable[..., E], content: bytes | str) -> E:
     try:
         return decode(content)
     except (msgspec.MsgspecError, RecursionError) as error:
-        raise Invalid(f"not of this version, or damaged: {error}") from None
+        raise Invalid(f"damaged, or of another version: {error}") from None
 
 
 def _known(entry: AnyEntry) -> AnyEntry:
@@ -211,7 +211,9 @@ def _known(entry: AnyEntry) -> AnyEntry:
     if isinstance(entry, Spoken):
         kind, release = MESSAGES.get(entry.type), RELEASES.get(entry.release)
         if kind is None or release is None or not release.has(kind):
-            raise Invalid(f"no {entry.type[:80]!r} of release {entry.release[:80]!r} is known")
+            raise Invalid(
+                f"release {entry.release[:80]!r} has no known message {entry.type[:80]!r}"
+            )
     elif isinstance(entry, Known):
         for tree in (entry.memory, entry.reading, entry.outputs, entry.report):
             _require_shallow(tree, DEEPEST)

@@ -103,7 +103,7 @@ def _value(found: Tree) -> Any:
 def _twos(held: list[Tree]) -> list[tuple[Tree, Tree]]:
     found = [(part[0], part[1]) for part in held if isinstance(part, list) and len(part) == 2]
     if len(found) != len(held):
-        raise UnknownValue("a mapping of other than pairs")
+        raise UnknownValue("a mapping with parts that are no pairs")
     return found
 
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 COORDINATOR, FLEET = "charger_coordinator", "fleet"
 NAMED_BY_GRAPH = ("lift", "door", "charger", COORDINATOR)
 NOTHING_BESIDE = (
-    "no YAML of a charger coordinator or a lift is given, with which this file could be compared"
+    "this file is compared with YAMLs of a charger coordinator or lifts, and no such YAML is given"
 )
 
 
@@ -48,9 +48,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="CONFIG",
         action="append",
         default=[],
-        help="compare a charger coordinator and lifts with a fleet adapter's config.yaml; with a"
-        " navigation graph as --building-map, compare the positions too. Give this option once for each"
-        " fleet",
+        help="compare a charger coordinator and lifts with a fleet adapter's config.yaml. If"
+        " --building-map is a navigation graph, also compare the positions. Give this option once for"
+        " each fleet",
     )
     parser.add_argument(
         "--several-machines",
@@ -119,7 +119,7 @@ def _against(config: Config, building: "BuildingMap | None") -> tuple[list[Probl
     if problems:
         return problems, []
     if not names:
-        return [], [f"this file uses no names that {building.file} could confirm"]
+        return [], [f"this file has no names to compare with {building.file}"]
     return [], [f"same names as in {building.file}: {names}"]
 
 

@@ -87,7 +87,7 @@ def _anonymous(incident: Incident) -> Incident:
 
 def _hint(*, died: bool) -> str:
     if died:
-        return "--died asks for the run before the last; leave it out for the last run"
+        return "--died records the run before the last run; without --died the last run is recorded"
     return "Does the daemon run, and does the YAML keep a ring?"
 
 
@@ -106,7 +106,7 @@ def _incident(ring: Path, args: argparse.Namespace, follows: bool) -> Incident:
     if follows:
         _wait(args.after)
     else:
-        print(f"no daemon serves {args.file} now: not waiting for later events")
+        print(f"no daemon serves {args.file} now, so no later events will come")
     try:
         after = RingContent(ring)
     except RingError:

@@ -121,7 +121,7 @@ def _serve(
         directories.work_somewhere(held.places)  # lgpio leaves a FIFO in the working directory
         return Daemon(config, held, end, ros_args=args.ros_args, outputs_off=outputs_off).serve()
     simulate = of_workbench("hal_fakes.simulate")
-    logging.warning("SIMULATED: no hardware moves, and RMF is told simulated states")
+    logging.warning("SIMULATED: no hardware moves, and RMF hears simulated states")
     simulation = simulate.Simulation(config, held.path, log_format=args.log_format)
     from bridges.runtime.daemon import Daemon  # imported while the fakes start
 

@@ -86,11 +86,11 @@ def users(one: DaemonStatus) -> Iterator[str]:
     if one.state == "stopped":
         return
     if one.state != "serving":
-        yield f"{one.name}: its devices' users are not known, because it is not serving"
+        yield f"{one.name}: it does not serve, so nobody knows whether its devices are in use"
         return
     kind = str(one.status.get("kind"))
     if kind not in IN_USE:
-        yield f"{one.name}: of kind {kind} it is not known whether a device is in use"
+        yield f"{one.name}: nobody knows whether a device of kind {kind} is in use"
     for name, device in one.devices.items():
         for key in IN_USE.get(kind, ()):
             if (value := str(device.get(key, ""))) not in FREE:
@@ -167,7 +167,7 @@ def _state(one: DaemonStatus) -> str:
             return "cannot be seen"
         case "serving" if one.status.get("passive"):
             rivals = one.status.get("other_publishers")
-            return "passive" if rivals else "still listens before it publishes"
+            return "passive" if rivals else "listens before it publishes"
         case other:
             return other
 

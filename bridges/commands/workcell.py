@@ -23,8 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "verdict",
         choices=("done", "again", "failed"),
-        help="done: the robot has it, RMF sends the robot on; again: nothing was moved, the cycle runs"
-        " (once more); failed: RMF ends the robot's task",
+        help="done: the items were moved, and RMF sends the robot on; again: nothing was moved, and the"
+        " cycle runs again; failed: RMF ends the robot's task",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="the device YAML of the daemon")
     parser.add_argument("--device", default="", metavar="NAME", help="one device of the file")
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--request",
         default="",
         metavar="GUID",
-        help="one request; without this option every request in doubt, and a lost memory",
+        help="decide only this request; default: every request in doubt, and a lost memory",
     )
     parser.add_argument("--runtime-dir", metavar="DIR", help="the daemon's runtime directory")
 

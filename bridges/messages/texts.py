@@ -105,7 +105,7 @@ A default value follows the name without `=`."""
 def _read(name: str, definition: str) -> Shape:
     """Return the shape of a definition. Raises UnknownDefinition."""
     if len(definition) > LONGEST:
-        raise UnknownDefinition("longer than any message's")
+        raise UnknownDefinition("longer than the definition of any message")
     sections = re.split(r"^=+$\n?", definition, flags=re.MULTILINE)
     own, *others = sections
     texts = {name: own}

@@ -54,7 +54,7 @@ def switch_off(args: argparse.Namespace) -> int:
     except runtime.AlreadyRunning as error:
         if claimed:
             logging.warning(
-                "%s. The outputs of the run before are not off yet, so they are switched off now",
+                "%s. The outputs of the earlier run are not off yet, and are switched off now",
                 error,
             )
             return _off_by_records(records, answered)

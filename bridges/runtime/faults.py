@@ -17,9 +17,9 @@ QUOTED: Final = re.compile(r"`([^`]*)`")
 HEAD: Final = """\
 # Faults, by name
 
-Faults by their names in `rmf-bridge status`, `watch`, the log and ROS's `/diagnostics`, with the likely
-cause and what to do. `rmf-bridge status` prints the same for the present faults. Other symptoms:
-[Troubleshoot](../how-to/troubleshoot.md).
+This page lists each fault with its likely cause and the remedy. `rmf-bridge status`, `watch`, the log
+and ROS's `/diagnostics` show the names of faults. `rmf-bridge status` also prints this advice for the
+present faults. For other symptoms see [Troubleshoot](../how-to/troubleshoot.md).
 
 | fault | likely cause | do |
 |---|---|---|

@@ -87,7 +87,7 @@ class Keeper(Generic[S, L, M, E, R]):
             self._kept.write(kept)
         except OSError as error:
             self._again_at = now + AGAIN_S
-            self._fails(Fault(NOT_KEPT, f"a restart would forget what was published last: {error}"))
+            self._fails(Fault(NOT_KEPT, f"a restart would forget the last messages: {error}"))
         else:
             self._bytes = kept
             self._keeps()

@@ -72,7 +72,7 @@ def test_a_person_records_an_incident_and_replays_it(
 
     assert made.returncode == 0, made.stderr
     assert (
-        late.stdout.splitlines()[0] == f"no daemon serves {lift} now: not waiting for later events"
+        late.stdout.splitlines()[0] == f"no daemon serves {lift} now, so no later events will come"
     )
     assert (late.returncode, (tmp_path / "late.mcap").exists()) == (0, True)
     assert [(note.code, note.text) for note in notes_in(file)] == [("OPERATOR", "it stood")]
@@ -128,7 +128,7 @@ def test_a_command_without_a_ring_or_a_recording_says_what_to_do(
     )
     assert died.stderr == (
         f"{none}/ring.died cannot be read: No such file or directory."
-        " --died asks for the run before the last; leave it out for the last run\n"
+        " --died records the run before the last run; without --died the last run is recorded\n"
     )
     assert (nowhere.returncode, nowhere.stdout, nowhere.stderr) == (
         73,

@@ -98,8 +98,8 @@ def test_a_remedy_names_the_device_its_file_and_what_the_file_sets() -> None:
     )
     held = faults.here(told["HOLDER_SILENT"], "/x/lift a.yaml", "Lift 1", {})
     assert held.do == (
-        "look into the car; then `rmf-bridge release 'Lift 1'`. With `holder_ttl_s` the supervisor"
-        " releases such a lift by itself"
+        "look into the car; then `rmf-bridge release 'Lift 1'`. If `holder_ttl_s` is set, the"
+        " supervisor releases such a lift by itself"
     )
     assert faults.values("/no/such.yaml", "Lift1") == faults.values(file, "Lift9") == {}
 
@@ -260,7 +260,7 @@ def test_an_unknown_name_is_answered_with_the_known_ones(
         (
             "new_kind",
             {"session": "-"},
-            ["one: of kind new_kind it is not known whether a device is in use"],
+            ["one: nobody knows whether a device of kind new_kind is in use"],
         ),
     ],
 )
@@ -275,7 +275,9 @@ def test_a_device_with_a_user_is_not_idle_and_an_unknown_kind_neither(
 @pytest.mark.parametrize("state", ["old", "died", "left on", "unknown", "failed"])
 def test_the_users_of_a_daemon_that_does_not_serve_are_not_known(state: str) -> None:
     one = DaemonStatus(name="one", state=state, by="service")
-    assert list(users(one)) == ["one: its devices' users are not known, because it is not serving"]
+    assert list(users(one)) == [
+        "one: it does not serve, so nobody knows whether its devices are in use"
+    ]
 
 
 def test_idle_is_an_exit_code_for_a_rollout(

@@ -232,7 +232,7 @@ def test_a_map_without_any_lift_says_so(capsys: pytest.CaptureFixture[str]) -> N
 def test_a_kind_without_names_on_a_map_says_so(capsys: pytest.CaptureFixture[str]) -> None:
     Path("device.yaml").write_text("kind: lift_supervisor\n")
     assert main(["check", "device.yaml", "--building-map", "building.yaml"]) == 0
-    assert "\nthis file uses no names that building.yaml could confirm\n" in capsys.readouterr().out
+    assert "\nthis file has no names to compare with building.yaml\n" in capsys.readouterr().out
 
 
 def test_a_file_that_is_not_a_map_is_refused_at_the_place_that_is_wrong(

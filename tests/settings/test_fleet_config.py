@@ -329,7 +329,10 @@ def test_a_fleet_configuration_without_a_coordinator_is_compared_with_nothing(
         main(["check", "-q", "config/door_modbus.yaml", "--fleet-config", str(theirs)])
         == os.EX_CONFIG
     )
-    assert "no YAML of a charger coordinator or a lift is given" in capsys.readouterr().err
+    assert (
+        "YAMLs of a charger coordinator or lifts, and no such YAML is given"
+        in capsys.readouterr().err
+    )
 
 
 def test_the_shipped_fleet_agrees_with_the_shipped_coordinator(

@@ -18,7 +18,7 @@ GIVEN_UP_S: Final = 2.0
 activity a moment later, and then the robot must not stop."""
 AGAIN_S: Final = 10.0
 """The pause (s) before the next attempt, after RMF has not taken a robot."""
-NOT_TAKEN: Final = "RMF does not take it: is it near the graph, on a level of the graph?"
+NOT_TAKEN: Final = "RMF does not take the robot: is it near a lane, on a level of the graph?"
 Put = Callable[[str, Order], None]
 
 
