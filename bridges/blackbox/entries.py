@@ -1,4 +1,4 @@
-"""The contents of a ring. A head describes one run of a daemon, and entries tell the events of that
+"""The contents of a ring. A head describes one run of a daemon. The entries tell what happened in that
 run.
 
 All times come from the daemon's monotonic clock (s). A `Clocks` entry pairs such a time with the wall
@@ -21,8 +21,8 @@ from bridges.messages.releases import RELEASES
 from bridges.messages.rihs01 import MESSAGES
 
 LATEST_S: Final = 4e9
-"""The greatest time (s), before or after zero. The sum of three such times can still be written as a
-date and into an MCAP file."""
+"""The greatest absolute value (s) of a time. The sum of three such times is still a valid date, and
+fits into an MCAP file."""
 Seconds = Annotated[float, Meta(ge=-LATEST_S, le=LATEST_S)]
 DEEPEST: Final = 60
 """The maximum depth of a tree of values. The memory of a core is about a tenth as deep."""
@@ -66,7 +66,7 @@ class Clocks(RingEntry, frozen=True, tag_field="is", tag=0):
 
 
 class Spoken(RingEntry, frozen=True, tag_field="is", tag=1):
-    """A message of RMF's graph. The daemon heard the message, or sent it if `sent`.
+    """A message of RMF's graph. `sent`: the daemon sent the message. Otherwise the daemon heard it.
 
     `cdr`: the message's bytes on the wire, as `release` encodes them. `node`: the publisher's node,
     `/namespace/name`, or "" if the wire does not name the node.
@@ -97,8 +97,8 @@ class Known(RingEntry, frozen=True, tag_field="is", tag=2):
 
 
 class Decided(RingEntry, frozen=True, tag_field="is", tag=3):
-    """An event, and the core's decision on the event. The lists `outputs`, `news` and `faults` are
-    empty if the decision has not changed them."""
+    """An event, and the core's decision on the event. Each of `outputs`, `news` and `faults` is empty
+    if its value has not changed."""
 
     subject: str
     event: Tree

@@ -1,5 +1,5 @@
-"""One incident: the reasons for a recording, and a daemon's entries around that time. The module is
-pure."""
+"""One incident: the reasons for a recording, and the daemon's entries before and after these reasons.
+The module is pure."""
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -36,8 +36,8 @@ class Incident(msgspec.Struct, frozen=True):
 
 
 def part(entries: Sequence[AnyEntry], begin_at: float, end_at: float) -> Sequence[AnyEntry]:
-    """Return the entries from `begin_at` to `end_at` (monotonic s). Before them, return the earlier
-    entries from which a replay can start."""
+    """Return the entries from `begin_at` to `end_at` (monotonic s). Also return the earlier entries
+    from which a replay can start."""
     first = 0
     for place, (entry, following) in enumerate(pairwise(entries)):
         if entry.at > begin_at:

@@ -120,8 +120,8 @@ class Recorder:
             log.warning(pairs("not_counted", folder=self._recordings.folder, reason=error))
 
     def _take_died(self, path: Path) -> None:
-        """Record the ring of a run that did not shut down cleanly, once. Record nothing if the run
-        never served, because the log explains a failed start."""
+        """Record a run that did not shut down cleanly. Record it only once, and only if it served. The
+        log explains a failed start."""
         try:
             identity = _identity(path)
             if identity in self._seen_dead:

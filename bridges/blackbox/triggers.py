@@ -1,7 +1,7 @@
 """Finds the reasons for a recording in a daemon's entries. The module is pure. The reasons are:
 
 - A fault appears. A hazard is a fault too, because it takes the device away from RMF.
-- The daemon refuses a request, and the refusal is not one that every normal handover or start causes.
+- The daemon refuses a request. Refusals that every normal handover or start causes do not count.
 - A request has waited longer than `waiting_s`.
 - The daemon reports that a defect in its program ends it.
 

@@ -126,11 +126,8 @@ def _against(config: Config, building: "BuildingMap | None") -> tuple[list[Probl
 def _of_fleet(
     file: str, right: Mapping[str, tuple[Config, Findings]], found: Mapping[str, Findings]
 ) -> dict[str, Findings]:
-    """Return the findings after a fleet's YAML was compared with RMF's files.
-
-    The fleet's YAML names these files. The findings are on that YAML, and on the YAMLs of the
-    coordinator and the lifts, whose names must match RMF's files.
-    """
+    """Compare a fleet's YAML with the RMF files that it names. Compare the YAMLs of the coordinator and
+    the lifts with these files too. Return the findings on all these YAMLs."""
     from bridges.settings.building_map import load_map
     from bridges.settings.fleet_site import read_site
 

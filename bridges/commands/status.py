@@ -1,5 +1,5 @@
-"""`rmf-bridge status` prints the state of each daemon on this machine, with faults and remedies. A
-state is shown as RMF sees it.
+"""`rmf-bridge status` prints the state that RMF sees of each daemon on this machine. It also prints
+faults and remedies.
 
 The command reads the daemons' status files and asks systemd. It opens no bus and joins no graph.
 """

@@ -28,8 +28,8 @@ class Sender(Struct, eq=False):
     """One publisher on the graph. All messages of a publisher share one `Sender`.
 
     `node`: the publisher's node, `/namespace/name`, or "" until discovery finds the node. Anybody can
-    forge this name. `look`: a function that asks discovery for the node again. Any thread may call it.
-    None means that discovery cannot find the node.
+    forge this name. `look`: a function that asks discovery for the node again, or None if this is
+    impossible. Any thread may call it.
     """
 
     node: str = ""

@@ -66,8 +66,8 @@ CHARGER_REFUSALS = Topic("charger_refusals", d.DiagnosticStatus)
 # Our own topics for requests to the charger coordinator. RMF has no such topics.
 ADAPTER_CHARGER_REQUESTS = Topic("adapter_charger_requests", d.ChargerRequest)
 ADAPTER_CHARGER_CANCELS = Topic("adapter_charger_cancels", d.ChargerCancel)
-# A topic without messages. Its publisher tells other coordinators that one serves the graph. A second
-# coordinator waits.
+# A topic without messages. The coordinator that serves the graph declares a publisher. A second
+# coordinator sees this publisher and waits.
 CHARGER_COORDINATOR = Topic("charger_coordinator", d.Bool)
 # Humble to Lyrical have the same topics of workcells. The fleet adapter's endpoints have SystemDefaults
 # keep_last(100).

@@ -95,7 +95,8 @@ class ObservedGraph(Generic[D]):
             self.spoke.popitem(last=False)
 
     def moment(self, heard: Heard | Own) -> Moment:
-        """Return the message's time. If a recording has a message too late, return the present time."""
+        """Return the message's time. If a recording has the messages out of order, return the latest
+        time so far."""
         at = heard.at if self.began is None else max(heard.at, self.now.at)
         offset = heard.wall - heard.at
         if self.began is None:

@@ -15,8 +15,8 @@ CHARGING: Final = "charging"
 
 
 class ObservedCharger(ObservedDevice[d.ChargerState]):
-    """A charger as observed. A requester's name is the id of its request, and its wish is a robot's
-    charge.
+    """A charger as observed. A requester's name is the id of its request. The requester wants a robot
+    charged.
 
     `condition`: RMF's word for the charger's state. `robot`: the robot that has the charger. Nobody
     knows this robot before the first state and during a silence. `request`: the id of the present

@@ -120,13 +120,12 @@ class ObservedDevice(ABC, Generic[T]):
         return 0.0 if self.last_state is None else now.at - self.last_state.at
 
     def steps_back(self, now: float, by_s: float, within_s: float) -> int:
-        """Count the stamps of the last `within_s` that were older than the stamp before them by more
-        than `by_s`. Two nodes under one name cause such stamps."""
+        """Count how often a stamp was older than the stamp before it by more than `by_s`, within the
+        last `within_s`. Two nodes under one name cause such stamps."""
         return sum(by > by_s and now - at < within_s for at, by in self._back)
 
     def flaps(self, now: Moment) -> list[float]:
-        """Return one age (s) for each recent change to OFFLINE or from OFFLINE. It is the age of the
-        reading at the change."""
+        """Return the age (s) of the reading at each recent change to or from OFFLINE."""
         return [age_s for at, age_s in self._flips if now.at - at < FLAPS_WITHIN_S]
 
     def checks(self, one: DeviceRequester) -> tuple[Check, ...]:

@@ -16,8 +16,8 @@ CLOSED: Final = "closed"
 LISTS: Final = "lists it"
 LISTS_NOT: Final = "does not list it"
 SUPERVISOR: Final = "door_supervisor"
-"""The requester_id that supervisors use on `door_requests`, both RMF's (door_supervisor/Node.hpp) and
-ours."""
+"""The requester_id of RMF's supervisor (door_supervisor/Node.hpp) and of our supervisor on
+`door_requests`."""
 
 
 def listed(heartbeat: d.SupervisorHeartbeat, door: str) -> list[str]:

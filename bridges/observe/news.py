@@ -10,7 +10,7 @@ What = Literal[
     "states again",  # a state has come after a silence of `gap_s`
     "read",  # the age of the readings is now as `text` says
     "changed",  # the state changes the facts in `changed`
-    "asks",  # a requester has a new wish; `text`: the mode it asks of a lift
+    "asks",  # a requester has a new wish; `text`: the mode it wants of a lift
     "passed on",  # the supervisor sends a new request to the device
     "ends",  # a requester sends END, or the supervisor if `passed_on`
     "has",  # a requester got the device

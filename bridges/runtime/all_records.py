@@ -5,7 +5,8 @@ and then forks a child for each service. So a wire that hangs delays no other se
 uses its own profiles.
 
 This machine's pins come first, because they depend on no other device. The command has a time limit,
-because every daemon waits for its end. A daemon that starts switches off the outputs that remain.
+because every daemon waits for the command. Each daemon switches off the remaining outputs when it
+starts.
 """
 
 import argparse
@@ -31,8 +32,8 @@ OWN_S, OTHERS_S = 4.0, 2.0
 these times."""
 LOOK_EVERY_S = 0.01
 OWN_PINS = re.compile(rb"\btype: *[\"']?gpio\b")
-"""A pattern that finds a YAML whose outputs are this machine's pins. Only the order depends on the
-pattern."""
+"""A pattern that finds a YAML whose outputs are this machine's pins. The pattern decides only which
+outputs come first."""
 
 
 def switch_off_all(

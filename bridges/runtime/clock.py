@@ -48,8 +48,8 @@ class PublishPace:
         self._told: object = None
 
     def due_at(self, news: object, *, at_once: bool = False) -> float:
-        """Return the time (monotonic s) at which `news` must be published. `at_once`: publish soon,
-        even if `news` has not changed."""
+        """Return the time (monotonic s) at which `news` must be published. `at_once`: do not wait for
+        the next second, even if `news` has not changed."""
         unchanged = news == self._told and not at_once
         return self.told_at + (TELL_EVERY_S if unchanged else TELL_GAP_S)
 

@@ -207,7 +207,7 @@ class Daemon:
         return safe
 
     def _left(self) -> list[str]:
-        """Return the names of dead daemons' records that have outputs which are not verified off."""
+        """Return the names of dead daemons' records with outputs that are not verified off."""
         return self._predecessor.left() if self._predecessor else []
 
     def _convenience(self, what: str, do: Callable[[], None]) -> None:
@@ -229,8 +229,8 @@ class Daemon:
         return [{"code": code, "detail": detail} for code, detail in self._transport.faults()]
 
     def _slack(self) -> dict[str, float]:
-        """Return the least time (s) that was left before systemd's watchdog, since the last call of
-        this method."""
+        """Return the smallest time (s) that remained until systemd's watchdog would act, since the last
+        call."""
         unfed_s, self._longest_unfed_s = self._longest_unfed_s, 0.0
         allowed_s = watchdog_s()
         return {"watchdog_slack_s": round(allowed_s - unfed_s, 3)} if allowed_s else {}

@@ -1,5 +1,5 @@
-"""The daemons on this machine, with their status files. They are found by their folders and their
-systemd units."""
+"""The daemons on this machine, with their status files. Folders and systemd units show which daemons
+there are."""
 
 import json
 import shutil
@@ -68,7 +68,7 @@ class DaemonStatus(msgspec.Struct, kw_only=True):
 
     - `serving`: The daemon runs and writes its status.
     - `old`: The daemon runs, but its status is not fresh.
-    - `died`: The daemon has died, because it left a status file behind.
+    - `died`: The daemon has died, as a left-over status file shows.
     - `left on`: The daemon has died, and its outputs are not verified off.
     - `failed`: systemd does not start the daemon any more.
     - `stopped`: The daemon does not run.

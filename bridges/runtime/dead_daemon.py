@@ -1,8 +1,8 @@
 """Switches off a dead daemon's outputs from a new process, for `rmf-bridge outputs-off`.
 
-The dead daemon wrote a record before it claimed outputs. The record counts and not the YAML, because
-somebody may have edited the YAML since. A directory that is full, missing or read-only does not delay
-the switching off.
+The dead daemon wrote a record before it claimed outputs. The record takes precedence over the YAML,
+because somebody may have edited the YAML since. A directory that is full, missing or read-only causes
+no delay.
 """
 
 import argparse

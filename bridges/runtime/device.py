@@ -107,8 +107,8 @@ class Node(Generic[S, L, M, X, E, O, R]):
 
     @property
     def ready(self) -> bool:
-        """Return whether the first state is published. Before that, each input was read or has timed
-        out once."""
+        """Return whether the first state is published. Before the first state, each input is read or
+        times out once."""
         return self._pace.told_at > AGES_AGO
 
     @property

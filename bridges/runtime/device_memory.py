@@ -46,7 +46,7 @@ class Unkept:
 class DeviceMemories:
     """The file of one daemon's devices. `lost`: the reason why the file cannot be read, or "".
 
-    `new`: nothing has ever happened if the file is missing. This is true only of a simulation.
+    `new`: a missing file means that the devices have no past. This is true only of a simulation.
     """
 
     def __init__(self, store: MemoryStore, *, new: bool = False) -> None:

@@ -108,7 +108,7 @@ def _hosts(rmf: Rmf, needs: Iterable[Needs]) -> list[str] | None:
 
 
 def _graph_hosts(rmf: Rmf) -> list[str]:
-    """Return the hosts of the other nodes. Return a host name or "*" if a host may have any address."""
+    """Return the hosts of the other nodes. A host name or "*" in the result means any address."""
     if rmf.network == "localhost":
         return []
     zenoh = rmf.zenoh or Zenoh()

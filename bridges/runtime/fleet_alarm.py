@@ -131,8 +131,8 @@ class FleetAlarmNode(
         self.look()
 
     def look(self) -> None:
-        """Subscribe to topics that RMF's release has, but the release before did not have. The daemon
-        calls this method each second."""
+        """Subscribe to the alarm topics that RMF's release has, if they are not yet subscribed. The
+        release may change, so the daemon calls this method each second."""
         self._name_senders()
         for topic in alarming.TOPICS.values():
             if topic.name not in self._hears and self._transport.release.has(topic.type):
@@ -141,8 +141,8 @@ class FleetAlarmNode(
                 self._hears[topic.name] = self._transport.subscribe(name, hear, others_only=True)
 
     def round(self) -> None:
-        """Do the round of a node. Later withdraw the retained `false` of an ended alarm, when every
-        node has heard it."""
+        """Do the round of a node. After the end of an alarm, wait for RENEW_S and then withdraw the
+        retained `false`. Every node has heard it by then."""
         super().round()
         memory, now = self.subjects[ALARM].memory, self._clock.monotonic()
         if memory.told is not None:

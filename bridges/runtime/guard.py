@@ -38,11 +38,11 @@ done
 """
 """The shell's program.
 
-After exit code 1, hardware does not answer. The program then repeats `outputs-off` for minutes with
-growing pauses, because nobody restarts this daemon.
+Exit code 1 of `outputs-off` means that hardware does not answer. The program then repeats `outputs-off`
+for minutes, with growing pauses, because nobody restarts this daemon.
 
-After EX_UNAVAILABLE the program repeats `outputs-off` once. Either the dead daemon's lock was not free
-yet, or another daemon now serves and switches the outputs off.
+EX_UNAVAILABLE means that the dead daemon's lock was not free yet, or that another daemon serves now. A
+daemon that serves switches the outputs off itself. The program repeats `outputs-off` once.
 """
 
 

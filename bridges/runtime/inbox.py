@@ -20,9 +20,8 @@ T = TypeVar("T")
 class Inbox(Generic[T]):
     """An inbox. Any thread puts events in, and the serving thread takes them out.
 
-    A new event replaces a waiting event with the same `key`. This is right because a request states a
-    level, not a pulse. So a flood of repeats costs a scan only one event. Events keep the order of
-    their arrival.
+    A new event replaces a waiting event with the same `key`, because a request states a level, not a
+    pulse. So a flood of repeats costs a scan only one event. Events keep the order of their arrival.
     """
 
     def __init__(self) -> None:

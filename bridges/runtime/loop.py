@@ -29,8 +29,8 @@ from drivers.hal import Bus
 log = logging.getLogger(__name__)
 
 SUSPENDED_S = 0.5
-"""The delay (s) that shows a suspension of the process. The loop woke so late although it did not wait
-for its bus."""
+"""The minimum delay (s) of a wake-up that shows a suspension of the process. During this delay the loop
+did not wait for its bus."""
 
 
 class Loop:

@@ -4,8 +4,8 @@ The separate process `outputs-off` does the work, as after every death of a daem
 hangs, this daemon does not hang. That process uses the dead daemon's profiles.
 
 Devices that do not answer are reported. While this daemon serves, it tries again to switch them off.
-Devices in our own record are not tried again. `SafeFirst` switches each of these off when it first
-answers.
+Devices in our own record are not tried again. `SafeFirst` switches such a device off when the device
+first answers.
 
 Another process may already have tried the devices, after the death or at boot. In that case the start
 of this daemon does not try them.
@@ -66,7 +66,7 @@ class Predecessor:
         return self._own_unsafe()
 
     def left(self) -> list[str]:
-        """Return the names of other daemons' records that have outputs which are not verified off."""
+        """Return the names of other daemons' records with outputs that are not verified off."""
         return [r.name for r in self._records.unreleased() if r.name != self._ours.name]
 
     def tick(self, now: float) -> None:

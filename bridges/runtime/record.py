@@ -143,8 +143,8 @@ class Records:
         self._file = named(file)
 
     def unreleased(self) -> list[ClaimRecord]:
-        """Return the records of this file that have outputs which are not all off. Log and leave out
-        unreadable records."""
+        """Return this file's records whose outputs are not all off. Log unreadable records, and leave
+        them out."""
         by_name = dict[str, ClaimRecord]()
         for path in paths(self._places):
             if (record := read(path)) is None:

@@ -104,7 +104,7 @@ def service(
     """Return the service for this YAML. Raises HalError if a bus cannot be opened.
 
     - `kept`: the store of the memory across restarts, or None. Not every kind has such a memory.
-    - `new`: nothing has ever happened if the store has no file.
+    - `new`: a store without a file means that the devices have no past.
     - `unsafe`: the devices that a dead daemon may have left on
     - `writer`: the writer of the recording
     - `rmf`: an object that stands in for RMF's fleet adapter, or None for that adapter

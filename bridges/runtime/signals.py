@@ -1,5 +1,5 @@
-"""Signals. A signal may end or suspend a process by default. At each such signal a daemon switches its
-outputs off and ends.
+"""Handles signals. Many signals by default end or suspend a process. At each of these signals a daemon
+switches its outputs off and ends.
 
 Signals of a crash are not caught, and neither is the watchdog's SIGABRT. Nobody can trust such a
 process any more, so `outputs-off` runs after its death.

@@ -1,7 +1,8 @@
 """Switches off every output of a YAML or record, from a new process, with as few imports as possible.
 
-On each bus the devices that answered the dead daemon last come first, because silent devices would use
-up the time. Each device first gets one short attempt. Then the failed devices get a second attempt.
+On each bus, the devices with the most recent answers to the dead daemon come first, because silent
+devices would use up the time. Each device first gets one short attempt. Then the failed devices get a
+second attempt.
 """
 
 import logging

@@ -38,7 +38,7 @@ class Directories(Struct, frozen=True):
 
     @property
     def folders(self) -> tuple[Path, ...]:
-        """The two directories, with `state` first. Only one if they are the same."""
+        """Both directories, with `state` first. The result has one directory if both are the same."""
         return tuple(dict.fromkeys((self.state, self.runtime)))
 
 
@@ -177,8 +177,8 @@ def act_as_owner(places: Directories) -> None:
     """Change permanently from root to the owner of the directories, with the unit's groups.
 
     After that, a file in the directories can do no more harm than the owner could. Raises
-    PermissionError if another user could have made the directories. Without root, it is also raised if
-    another user owns them.
+    PermissionError if another user could have made the directories. A user who is not root must be the
+    owner. Otherwise PermissionError is raised too.
     """
     for folder in places.folders:
         with suppress(FileNotFoundError, NotADirectoryError):

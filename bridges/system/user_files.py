@@ -16,8 +16,8 @@ LONGEST_SECRET: Final = 4096
 
 
 class SecretError(Exception):
-    """The error of a secret's file. It cannot be read, other users can read it, or it does not hold one
-    secret."""
+    """The error of a secret's file. The file cannot be read, or other users can read it, or it does not
+    hold one secret."""
 
 
 class Content(NamedTuple):

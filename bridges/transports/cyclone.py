@@ -30,8 +30,7 @@ FOUND_AGAIN: Final = "<SPDPInterval>2 s</SPDPInterval>"
 """The interval at which a node announces itself. Other nodes may forget the node in a network failure
 longer than a lease (10 s). With the short interval they soon find it again.
 
-By default Cyclone 0.10 announces itself every 8 s. Cyclone 11 announces itself to a lost peer every 30
-s.
+The default in Cyclone 0.10 is 8 s. In Cyclone 11 the default towards a lost peer is 30 s.
 """
 NEVER_FORGOTTEN: Final = (
     "<InitialLocatorPruneDelay>inf</InitialLocatorPruneDelay>"

@@ -1,4 +1,4 @@
-"""The publishers of received messages. A transport finds out a publisher only when a listener asks for
+"""The publishers of received messages. A transport looks up a publisher only when a listener asks for
 it."""
 
 import time

@@ -21,7 +21,8 @@ Receive = Callable[[Message], None]
 
 
 def any_type(received: Callable[[M], None]) -> Receive:
-    """Return a subscription's callback as a callback for any message type. Transports store this type.
+    """Return a subscription's callback as a callback for any message type. Transports store callbacks
+    of that type.
 
     The cast is safe, because a transport decodes each message as the type of the subscription's topic.
     """

@@ -95,7 +95,7 @@ class FullControl:
                 self.failed[name] = robot.add(self._fleet, self._configuration, report)
             else:
                 robot.update(report)
-        except RuntimeError as error:  # C++ raised it
+        except RuntimeError as error:  # an exception of C++
             self.failed[name] = str(error)
 
     def close(self) -> None:

@@ -168,5 +168,6 @@ class FleetDevices(Devices):
         loop.inbox.put(robot, order)
 
     def _speak(self, state: FleetState) -> None:
-        """Publish the fleet's state, because the stand-in of RMF's adapter does not."""
+        """Publish the fleet's state. Only the stand-in of RMF's adapter calls this method, because
+        RMF's adapter publishes the state itself."""
         self._outlet.publish(FLEET_STATES, state)

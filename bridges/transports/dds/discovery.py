@@ -1,8 +1,8 @@
 """Shows our endpoints as a named node on the ROS graph, through the topic `ros_discovery_info`.
 
 DDS has participants, readers and writers, but no nodes. On this topic each ROS participant publishes
-the owner of each of its readers and writers, which is a node. Late joiners receive the message too.
-Without this topic `ros2 node list` shows our endpoints under `_CREATED_BY_BARE_DDS_APP_`.
+which node owns each of its readers and writers. Late joiners receive the message too. Without this
+topic `ros2 node list` shows our endpoints under `_CREATED_BY_BARE_DDS_APP_`.
 
 Source: ros2/rmw_dds_common, msg/*.msg, as rmw_cyclonedds and rmw_fastrtps publish them.
 """

@@ -33,7 +33,7 @@ def installed() -> Release:
 
 def _fits(message_type: type, release: Release) -> bool:
     """Return whether the installed package and the release define this message in the same way. Return
-    True also if the package and the release lack the message."""
+    True also if neither has the message."""
     try:
         module = importlib.import_module(f"{PACKAGES[message_type]}.msg")
     except ImportError:

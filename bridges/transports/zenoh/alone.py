@@ -1,6 +1,6 @@
-"""Keeps a node off the graph while a router is linked to it, if the node must stay on this machine. The
-router would forward the node's messages to other machines. The node returns to the graph some time
-after the router has gone."""
+"""Keeps a node on this machine. If a router is linked to such a node, the node leaves the graph,
+because the router would forward its messages to other machines. The node returns some time after the
+router has gone."""
 
 import math
 from typing import Final

@@ -15,7 +15,7 @@ Configuration = dict[str, object]
 """JSON values by the key in zenoh's configuration."""
 
 LOOPBACK_PORT: Final = 17400
-"""The port on which the nodes of domain 0 on this machine meet. Domain N uses this number plus N.
+"""The port on which the nodes of domain 0 on this machine meet. Domain N uses this port number plus N.
 
 Routers use another port (7447). The ports that Linux assigns by itself begin at 32768.
 """

@@ -3,10 +3,10 @@ are pure.
 
 There are two naming schemes. Nodes with different schemes do not hear each other.
 
-- rmw_zenoh's scheme makes each ROS context a zenoh session. Source: ros2/rmw_zenoh, jazzy: its
-  design.md; rmw_zenoh_cpp/src/detail/liveliness_utils.cpp and attachment_helpers.cpp.
-- zenoh-bridge-ros2dds's scheme routes a DDS domain. Source: eclipse-zenoh/zenoh-plugin-ros2dds,
-  liveliness_mgt.rs and ros2_utils.rs.
+- The scheme of rmw_zenoh, in which each ROS context is a zenoh session. Source: ros2/rmw_zenoh, jazzy:
+  its design.md; rmw_zenoh_cpp/src/detail/liveliness_utils.cpp and attachment_helpers.cpp.
+- The scheme of zenoh-bridge-ros2dds, which routes a DDS domain. Source:
+  eclipse-zenoh/zenoh-plugin-ros2dds, liveliness_mgt.rs and ros2_utils.rs.
 
 A liveliness token is a key that exists as long as its session. Tokens announce a node, a publisher or a
 subscription to other nodes. An end is a publisher or a subscription.

@@ -23,10 +23,10 @@ class Place:
 
     - `peers`: the peers that this end reaches, by token
     - `unheard`: the gids of the peers that do not fit
-    - `misfit(policy)`: zenoh's thread calls it for each peer whose QoS does not fit.
-    - `tell(token, end)`: zenoh's thread calls it for each peer that comes. When a peer goes, `end` is
-      None.
-    - `do`: see `Tokens`
+    - `misfit(policy)`: a callback on zenoh's thread for each peer whose QoS does not fit
+    - `tell(token, end)`: a callback on zenoh's thread for each peer that comes or goes. `end` is None
+      if the peer goes.
+    - `do`: the function that `Tokens` explains
     """
 
     def __init__(

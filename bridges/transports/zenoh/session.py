@@ -12,8 +12,8 @@ from bridges.transports.zenoh.config import Configuration
 
 @contextmanager
 def contained() -> Iterator[None]:
-    """Raise a panic of zenoh as ZError. A panic is no Exception, and would end the daemon. So every
-    call into zenoh needs this block."""
+    """Raise a panic of zenoh in the block as ZError. A panic is no Exception, and would end the daemon.
+    Every call into zenoh needs this block."""
     try:
         yield
     except BaseException as error:
