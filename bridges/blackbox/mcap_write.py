@@ -130,7 +130,7 @@ class _Channels:
         way = "sent" if spoken.sent else "heard"
         key = (spoken.topic, spoken.type, spoken.release, way, spoken.node)
         if key not in self._channels and len(self._channels) >= MOST_CHANNELS:
-            key = (*key[:-1], "")  # so many nodes can only be invented
+            key = (*key[:-1], "")  # leave out the node, because so many nodes are invented
         if key not in self._channels:
             self._channels[key] = self._declare(spoken, way, key[-1])
         self._add(self._channels[key], spoken.cdr, steady, wall)

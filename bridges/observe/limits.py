@@ -28,7 +28,7 @@ OLD_S: Final = 3.0
 """The age (s) from which a reading is old, because three polls are missing. A stamp that is this far in
 the future comes from another clock."""
 CLOCKS_DIFFER_S: Final = 5.0
-"""The difference (s) from our time at which a request's stamp must come from another clock."""
+"""The minimum difference (s) between our time and a request's stamp that shows another clock."""
 FLAPS: Final = 3
 FLAPS_WITHIN_S: Final = 30.0
 """The time (s) in which FLAPS changes to or from OFFLINE show that a device's readings come and go."""

@@ -36,7 +36,7 @@ class Clock(Struct, frozen=True):
 
 
 def machine_s() -> float:
-    """Return the seconds since the machine's start, with the time that the machine slept."""
+    """Return the time (s) since the machine's start. The machine's sleep counts too."""
     return time.clock_gettime(time.CLOCK_BOOTTIME)
 
 

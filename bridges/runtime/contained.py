@@ -39,7 +39,7 @@ class Contained(Generic[X, O]):
         self._name = name
         self._driver = driver
         self.contacts: Callable[[], Mapping[str, bool]] = dict
-        """The driver's `OnContacts.contacts`. A driver without contacts has no entries."""
+        """The driver's `OnContacts.contacts`. For a driver without contacts it returns nothing."""
         if isinstance(driver, OnContacts):
             self.contacts = driver.contacts
         self._clock = clock

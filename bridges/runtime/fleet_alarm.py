@@ -194,7 +194,7 @@ class FleetAlarmNode(
             sender = self._transport.sender()
             names = self._names(sender, topic.name) or [self._unknown(sender, topic.name)]
             event = alarming.heard(message, names)
-            if event.senders != {self._transport.name}:  # not of an earlier run
+            if event.senders != {self._transport.name}:  # else our earlier run sent it
                 name = self._named(topic).name
                 self._writer.spoken(name, message, sent=False, sender=sender)
                 self.inbox.put(ALARM, (topic, event))

@@ -66,7 +66,7 @@ class Loop:
 
     @property
     def finished(self) -> int:
-        """The number of finished scans and bus calls, with the failed calls."""
+        """The number of finished scans and bus calls. Failed calls count too."""
         return self._scans + self._bus.calls
 
     @property

@@ -259,7 +259,7 @@ class RingWriter(NoWriter):
         self._put(Spoken(now, sent, topic, type_name(kind), release.name, sample, node))
 
     def _may_keep(self, now: float) -> bool:
-        """Return whether the rate of messages allows to record one more message."""
+        """Return whether the rate of messages is low enough to record one more message."""
         gained = MOST_SPOKEN_PER_S * (now - self._spoken_at)
         self._may_speak = min(MOST_SPOKEN_PER_S, self._may_speak + gained)
         self._spoken_at = now

@@ -80,7 +80,7 @@ class Stay:
             name,
             context=self._context,
             enable_rosout=False,
-            start_parameter_services=False,  # nobody may change the clock of a running daemon
+            start_parameter_services=False,  # no parameter may change a daemon's clock
         )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)

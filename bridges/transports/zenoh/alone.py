@@ -19,7 +19,7 @@ router that restarts needs a few seconds more.
 
 
 class Alone:
-    """The decision when one node must be off the graph. `now`: the time (monotonic s)."""
+    """The decision whether one node must be off the graph. `now`: the time (monotonic s)."""
 
     def __init__(self) -> None:
         self._met_at = -math.inf
