@@ -82,8 +82,7 @@ def _save(file: Path, root: Path, *, dry_run: bool) -> int:
 
 
 def _write_archive(file: Path, root: Path, kept: Iterable[Path]) -> None:
-    """Write a new archive. Raises OSError. An existing file is such an error, because it may be another
-    backup."""
+    """Write a new archive. Raises OSError, also for an existing file, which may be another backup."""
     opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     with open(opened, "wb") as out, tarfile.open(fileobj=out, mode="w:gz") as archive:
         for path in kept:

@@ -102,13 +102,13 @@ class ObservedDevice(ABC, Generic[T]):
         return list(said.take(moment, status, self.text, self.sentence))
 
     def text(self, name: str) -> str:
-        """Return a name from the network in the form that we remember. `explain` overrides this method
-        and makes the name printable."""
+        """Return a name from the network in the form that is kept in memory. `explain` overrides this
+        method and makes the name printable."""
         return name
 
     def sentence(self, text: str) -> str:
-        """Return a sentence from the network in the form that we remember. `explain` overrides this
-        method and shortens the sentence."""
+        """Return a sentence from the network in the form that is kept in memory. `explain` overrides
+        this method and shortens the sentence."""
         return text
 
     def is_silent(self, now: Moment, after_s: float = SILENT_S) -> bool:

@@ -84,7 +84,7 @@ class Diagnosis:
         sentence: Callable[[str], str] = str,
     ) -> Iterator[News]:
         """Take the next status, and yield the news. `text` converts a name from the network to the form
-        that we remember. `sentence` converts the detail of a fault."""
+        that is kept in memory. `sentence` converts the detail of a fault."""
         self.kind, self.last, self.message = kind_in(status), moment, status.message
         self.values = {pair.key: pair.value for pair in status.values[:MOST_VALUES]}
         codes = faults(status)[:MOST_CODES]

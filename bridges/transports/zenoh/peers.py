@@ -74,11 +74,11 @@ class Tokens:
         self._came, self._gone, self._do = came, gone, do
         self._known: set[str] = set()
         self._gone_before: dict[str, None] = {}
-        """The tokens that went before their arrival was reported, the oldest first. At most MOST are
-        kept."""
+        """The tokens whose departure was reported before their arrival, the oldest first. At most MOST
+        are kept."""
         self._doubtful: dict[str, Peer] = {}
-        """The tokens whose arrival was reported after they had gone. The graph will be asked for these
-        tokens."""
+        """The tokens whose arrival was reported after their departure. The graph will be asked for
+        these tokens."""
         self._asked: dict[str, Peer] = {}
         self._ask = Merged(do, self._ask_all)
         self._crowded = self._named = self._left = False
