@@ -1,7 +1,7 @@
-"""The kinds of bridges. Each kind has a folder with its pure rules, and this file finds the folders.
+"""The kinds of devices. Each kind has a folder with its rules, and this file finds the folders.
 
-A YAML names its kind. Only folders that exist are imported: there is no table to edit, and no other
-file imports a kind by its name.
+A YAML names its kind. An installation may lack a kind's folder. Therefore no table lists the kinds, and
+no other file imports a kind by its name.
 """
 
 import importlib
@@ -25,15 +25,15 @@ def kind_names() -> list[str]:
 def holding(
     roots: Iterable[str], pattern: str, record: str, name: Callable[[Path], str]
 ) -> list[str]:
-    """List the names of the files in these folders that define `record`; `name` makes a name of a
-    path."""
+    """List the names of the files that match `pattern` below `roots` and define `record`. `name(path)`
+    returns the name of a file."""
     return sorted({name(path) for path in _files(tuple(roots), pattern, record)})
 
 
 @cache
 def _files(roots: tuple[str, ...], pattern: str, record: str) -> list[Path]:
-    """Find the files that define `record`. This reads the files as text once, because importing some of
-    them needs a vendor's library."""
+    """Find the files that define `record`. The files are read as text and not imported, because some of
+    them need a vendor's library."""
     found = (path for root in roots for path in Path(root).glob(pattern))
     holds = re.compile(rf"^{record}(:| =)", re.MULTILINE).search
     return [path for path in found if holds(path.read_text("utf-8"))]
@@ -46,7 +46,8 @@ def kind_called(name: str) -> "AnyKind":
 
 
 def recorded(kind: str) -> "Recorded":
-    """Return the recorded names of a kind's values. A kind that uses another kind's values has none."""
+    """Return a kind's types by their names in recordings. A kind that uses only another kind's types
+    has no names."""
     found: Recorded = getattr(_package(kind), "RECORDED", {})
     return found
 

@@ -1,37 +1,45 @@
 """The lift's decision core: its session, its outputs, and its report to RMF.
 
 Rules, in the order in which they are applied:
-LIFT-1. If the lift is free, the first request gets a session, unless an obstacle (LIFT-4) is present.
-   Requests of the same session refresh it; requests of other sessions are refused. Only the session's
-   own END ends it; a hazard, a fault or a timeout does not. A session in HUMAN mode has no outputs.
-LIFT-2. END ends the session at once, unless the END is older than the session. AGV mode and the door's
-   hold may stay on for `release_grace_s`. During that time only the same session is granted, even in a
-   fire. The reason is that a restarted supervisor sends END for a robot that is still inside and must
-   get out. For the same reason (`bridges/kinds/lift/forgotten.py`):
-   - An END on `lift_requests` does not end a session if the robot may be inside and its own requests go
-     on. The session ends at the robot's own END, at a person's END, or after the robot's silence.
-   - If RMF's supervisor asks for another session, or has ended the holder's session, the holder's robot
-     is heard directly: the requests and the END that this robot itself sends count too.
-   - A new fleet adapter sends END in mid-ride. The lift then waits longer for that robot: until
-     IN_CAR_S after its last message. Nothing is energised after `release_grace_s`.
+LIFT-1. The first request at a free lift gets a session. Under an obstacle (LIFT-4) no request gets one.
+   Later requests of that session refresh the session, and requests of other sessions are refused. Only
+   the session's own END ends the session. No hazard, fault or timeout ends the session. A session in
+   HUMAN mode has no outputs.
+LIFT-2. An END ends the session at once. An END that is older than the session does not count. For
+   `release_grace_s` after END (the grace), AGV mode and the door's hold may stay on. During the grace
+   only the ended session is granted again, even in a fire. The reason is a restarted supervisor: it
+   sends END for a robot that is still inside and must get out. For the same reason
+   (`bridges/kinds/lift/forgotten.py`):
+   - An END on `lift_requests` does not end the session of a robot that may be inside and goes on
+     asking. Such a session ends at the robot's own END, at a person's END, or after the robot's
+     silence.
+   - If RMF's supervisor asks for another session, or has ended the present session, the present robot
+     is heard directly. The requests and the END of its own fleet adapter then count too.
+   - A restarted fleet adapter sends END in mid-ride. The lift then waits longer for that robot: until
+     IN_CAR_S after the robot's last message. After `release_grace_s` every output is off.
 LIFT-3. A request sets the destination and the mode. If the door is held, a request for another
    destination may have to wait (`bridges/kinds/lift/replayed.py`). `bridges/kinds/lift/drive.py` has
    the rules for the outputs.
-LIFT-4. An obstacle switches every output off and never changes the session. Obstacles are: fire (and
-   its latch, if an operator must reset it), code blue, earthquake, emergency, out of service, manual
-   mode, a second node for this lift, inputs that cannot be believed, outputs that cannot be written. A
-   gap in reading or writing that is shorter than `stale_after_s` is no obstacle. Overload is no
-   obstacle: it only delays the ride.
-LIFT-5. RMF is told OPEN when fresh inputs show that the car stands at a known floor with its door open.
-   - Until OPEN has been published at a session's destination, its robot is outside. During that time
+LIFT-4. An obstacle switches every output off and never changes the session. The obstacles are:
+   - fire, and a fire's latch that an operator must reset;
+   - code blue, earthquake, emergency, out of service, manual mode;
+   - a second node for this lift;
+   - inputs that cannot be believed, outputs that cannot be written. A gap in reading or writing that is
+     shorter than `stale_after_s` is no obstacle.
+   Overload is no obstacle, because overload only delays the ride.
+LIFT-5. The report says OPEN when fresh inputs show that the car stands at a known floor with its door
+   open. Some doors are open and not shown OPEN:
+   - A session's robot is outside until OPEN has been published at the session's destination. Until then
      OPEN also needs AGV mode and no fault. A robot looks only at session, floor and door, and must not
      board a lift in a fire.
-   - After that a robot may be inside. To get out, the robot must see the door's true state in any mode.
+   - After that OPEN a robot may be inside. To get out, the robot must see the door's true state in any
+     mode.
    - A door is not shown OPEN if its hold is wanted but the relay must rest first. Such a door may close
      by itself while a robot drives through.
-   - A door that nobody holds may be open at the floor for which the robot itself asks, while the
-     session is about to send the car elsewhere. Such a door is not shown OPEN, because RMF's supervisor
-     may be passing on an earlier ride, and the robot would drive in.
+   - An open door that nobody holds is not shown OPEN at the floor that the robot itself last requested,
+     if the session is about to send the car away. RMF's supervisor may be passing on an earlier ride,
+     and the robot would drive in.
+
 """
 
 from msgspec.structs import replace
@@ -71,7 +79,7 @@ NOT_RMFS = frozenset(
         Hazard.MANUAL,
     }
 )
-"""Hazards that take the lift away from RMF. Overload is not among them, because it only delays the
+"""Hazards that take the lift away from RMF. Overload is missing, because overload only delays the
 ride."""
 
 
@@ -83,7 +91,7 @@ def initial(limits: LiftLimits, now: float) -> LiftMemory:
 def decide(
     memory: LiftMemory, event: Event, now: float, limits: LiftLimits
 ) -> Decision[LiftMemory, LiftOutputs, LiftReport]:
-    """Decide one scan: apply the event, judge the inputs, derive the outputs and the report afresh."""
+    """Apply the event, judge the inputs, and derive the outputs and the report."""
     memory, refused = _take(sessions.lapse(memory, now, limits), event, now, limits)
     view = look(memory.senses, now, limits)
     memory = _latch(memory, view, now, limits)
@@ -99,7 +107,8 @@ def decide(
 
 
 def published(memory: LiftMemory, shown: LiftReport) -> LiftMemory:
-    """Note that this report was sent. After OPEN at the destination a robot may be inside."""
+    """Note that this report was sent. If it shows OPEN at the destination, a robot may be inside from
+    now on."""
     session = memory.session
     if session is None or not shown.open_at:
         return memory
@@ -178,8 +187,8 @@ def _take(
 
 
 def _read(memory: LiftMemory, sample: LiftSample, now: float, limits: LiftLimits) -> LiftMemory:
-    """Add a reading. If no write has failed since the last reading, note that the outputs were
-    written."""
+    """Add a reading to the memory. If no write has failed since the last reading, note that the outputs
+    were written."""
     return replace(
         memory,
         senses=take(memory.senses, sample, now, limits),
@@ -190,7 +199,7 @@ def _read(memory: LiftMemory, sample: LiftSample, now: float, limits: LiftLimits
 
 
 def _why_not(memory: LiftMemory, now: float, limits: LiftLimits) -> str:
-    """Return the reason why a free lift must not be granted to a session; "" if there is none."""
+    """Return the obstacle that forbids a grant of the free lift; "" if no obstacle is present."""
     view = look(memory.senses, now, limits)
     why_not = obstacles(memory, view, now, limits)
     if not why_not:
@@ -200,12 +209,13 @@ def _why_not(memory: LiftMemory, now: float, limits: LiftLimits) -> str:
 
 
 def _reset(memory: LiftMemory, now: float, limits: LiftLimits) -> LiftMemory:
-    """Clear the latches at an operator's order. A latch stays if its cause may still be present."""
+    """Clear the latches at an operator's order. The latch of a fire stays while the inputs are not
+    fresh."""
     session = memory.session
     if session and session.fault:
         session = replace(drive.paused(session), tries=0, retry_at=None, fault=None)
-    # With fresh inputs a latch may clear, because a fire that is still present latches again in this
-    # decision. With stale inputs the latch stays, because they may hide a fire.
+    # Fresh inputs clear the latch of a fire. A fire that is still present latches again in this same
+    # decision. Stale inputs may hide a fire, so the latch stays.
     unseen = not look(memory.senses, now, limits).fresh
     return replace(
         memory,
@@ -247,8 +257,8 @@ def _faults(
 
 
 def _faults_of_rmf(session: LiftSession, now: float, limits: LiftLimits) -> list[Fault]:
-    """List the faults on RMF's side. If RMF's supervisor asks for another session, that fault explains
-    the silence."""
+    """List the faults on RMF's side. A forgotten session has no fault RMF_SILENT, because the
+    supervisor's fault explains the silence."""
     if session.forgotten:
         fault = forgotten.fault(session, now)
         return [fault] if fault else []

@@ -2,26 +2,28 @@
 
 Rules:
 LIFT-DRIVE-1. Without a session no output is switched on. All outputs are off under an obstacle
-   (`core.py`), for a session in HUMAN mode, and between the tries after a fault. They are also off if
-   RMF is silent and the robot is outside. For `release_grace_s` after END, AGV mode and the door's hold
-   stay on if they were on; the hold ends `dead_time_s` before AGV mode.
-LIFT-DRIVE-2. The order is: AGV mode, then the call to the destination, then the door's hold, when the
+   (`core.py`), for a session in HUMAN mode, and between the tries after a fault. The outputs are also
+   off if RMF is silent and the robot is outside. If AGV mode and the door's hold are on at END, they
+   stay on for `release_grace_s`. The hold then ends `dead_time_s` before AGV mode.
+LIFT-DRIVE-2. AGV mode comes first, then the call to the destination. The door's hold follows when the
    car stands at the destination. With `by_call` a call switches AGV mode on. The call then comes first,
    even if the car already stands at the destination.
-LIFT-DRIVE-3. A call is given only in AGV mode (except with `by_call`), away from the destination, and
-   without overload. A door command is given only in AGV mode, when the car stands at the destination's
-   landing. A call and a door command are never on together. Either comes on only after all calls and
-   door commands have been off for `dead_time_s`.
-LIFT-DRIVE-4. A call is held until the car stands at its destination, or is a pulse. The call is given
-   again after every interruption. It is also given again if the car had arrived and is then seen at
-   another floor. No new call is given during a change of the floor code, because the car may be
-   arriving at that moment.
+LIFT-DRIVE-3. A call is given only away from the destination and without overload. Except with
+   `by_call`, a call also needs AGV mode. A door command is given only in AGV mode, when the car stands
+   at the destination's landing. A call and a door command are never on together. A call or a door
+   command comes on only after all calls and door commands have been off for `dead_time_s`.
+LIFT-DRIVE-4. A call is held until the car stands at its destination. With `call_pulse_s` a call is a
+   pulse. The call is given again after every interruption. The call is also given again if the car had
+   arrived and is later seen at another floor. No new call is given during a change of the floor code,
+   because the car may be arriving at that moment.
 LIFT-DRIVE-5. AGV mode, the arrival and the open door each have a timeout. When a timeout ends, the
-   outputs go off and a fault is shown. Three more tries follow, 10, 30 and 60 s later; then the fault
-   latches. The end of AGV mode during the ride is such a fault too. With `by_call` AGV mode may end
-   between two destinations, when the call and the hold are off. During an overload no timeout runs.
+   outputs go off and a fault is shown. Three retries follow, after 10, 30 and 60 s. If the last retry
+   fails, the fault latches. An end of AGV mode during the ride is such a fault too. With `by_call` AGV
+   mode may end between two destinations, when the call and the hold are off. During an overload no
+   timeout runs.
 LIFT-DRIVE-6. Switching off is immediate. A relay is switched on only after it has been off for
    `min_off_s`, and at most `max_cycles_per_min` times a minute (`Channel` in `relays.py`).
+
 """
 
 from msgspec.structs import replace
@@ -42,8 +44,7 @@ def at_destination(session: LiftSession, view: BelievedLift, limits: LiftLimits)
 
 
 def agv_ok(view: BelievedLift) -> bool:
-    """Return whether AGV mode is on, as far as the wiring can tell. Without a wired status line the
-    answer is True."""
+    """Return whether AGV mode is on. Without a status line for AGV mode, assume that AGV mode is on."""
     return view.agv is not False
 
 
@@ -53,7 +54,8 @@ def silent(session: LiftSession, now: float, limits: LiftLimits) -> bool:
 
 
 def serves(session: LiftSession, allowed: bool, now: float, limits: LiftLimits) -> bool:
-    """Return whether any output may be energised for this session. `allowed`: there is no obstacle."""
+    """Return whether any output may be energised for this session. `allowed` means that no obstacle is
+    present."""
     outside_and_gone = silent(session, now, limits) and not session.boarded
     return allowed and session.agv and not outside_and_gone
 
@@ -66,7 +68,7 @@ def paused(session: LiftSession) -> LiftSession:
 def advance(
     session: LiftSession, view: BelievedLift, relays: Relays, now: float, limits: LiftLimits
 ) -> LiftSession:
-    """Advance the session by this scan's inputs: note arrivals, timeouts and retries.
+    """Update the session from this scan's inputs. Note arrivals, timeouts and retries.
 
     `relays`: the state of the relays before this scan.
     """
@@ -92,7 +94,7 @@ def advance(
 
 
 def wanted(session: LiftSession, view: BelievedLift, now: float, limits: LiftLimits) -> LiftOutputs:
-    """Choose the outputs for a session that is served."""
+    """Choose the outputs for a session that may have outputs (`serves`)."""
     if session.retry_at is not None:
         return LiftOutputs()
     if not (agv_ok(view) or limits.by_call):
@@ -119,7 +121,7 @@ def stays_on(
 
 
 def let_go_at(grace: Grace, limits: LiftLimits) -> float:
-    """Return the time after END when the door's hold ends."""
+    """Return the time when the door's hold ends during the grace."""
     return min(grace.off_at, grace.until) - limits.t.dead_time_s
 
 
@@ -135,17 +137,17 @@ def next_at(session: LiftSession, limits: LiftLimits) -> tuple[float, ...]:
 
 
 def _requested(session: LiftSession, relays: Relays, limits: LiftLimits) -> bool:
-    """Return whether one of our outputs has requested AGV mode until now."""
+    """Return whether our outputs requested AGV mode before this scan."""
     if limits.by_call:
         return session.call_at is not None or relays.hold.on is not None
     return bool(relays.agv.on)
 
 
 def _arrive(session: LiftSession, view: BelievedLift, limits: LiftLimits) -> LiftSession:
-    """End the call when the car stands at the destination. Call again if the car is then seen
-    elsewhere.
+    """End the call when the car stands at the destination. Call again if the car is later seen at
+    another floor.
 
-    With `by_call`, a call is not ended before AGV mode is on, even if the car already stands at the
+    With `by_call`, AGV mode must be on before a call ends, even if the car already stands at the
     destination.
     """
     if limits.by_call and not agv_ok(view):

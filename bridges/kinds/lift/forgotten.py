@@ -1,33 +1,37 @@
-"""Sessions that RMF's lift supervisor forgets or ends: the robot's own requests still reach its lift.
+"""Sessions that RMF's lift supervisor forgets or ends, although their robot goes on asking.
 
-If a supervisor restarts, or has missed an END, it may serve another robot than the robot in the car.
-From then on the supervisor drops the holder's requests and END (rmf_ros2, lift_supervisor/Node.cpp),
-and this node refuses the other robot's requests. The holder would never leave the car. A restarted
-supervisor also sends END for any session that the lift shows, even if that session's robot goes on
-asking. Rules:
-1. A session is forgotten if the last request on `lift_requests` was for another session. It is no
-   longer forgotten once `lift_requests` has a request for it, or the END of that other session.
-2. A session whose robot may be inside is not ended by an END on `lift_requests` if that robot itself
-   goes on asking. A robot goes on asking under three conditions: its last request is at most ASKS_S
-   old, it has sent no END after that request, and its last END is older than FORWARDED_S (the
-   supervisor may be passing on a younger END). The session is then disowned until `lift_requests` has a
-   request for it. A disowned session ends when its robot sends END, or is silent for ASKS_S. A person's
-   END always ends it.
-3. If a session is forgotten or disowned, and only then, its own robot's requests on
-   `adapter_lift_requests` count as if the supervisor had passed them on: they set mode and destination,
-   and show that RMF is alive. That topic grants no session. But during the grace after END it restores
-   the session of a robot that may be inside.
+A supervisor that restarts, or that has missed an END, may serve another robot than the robot in the
+car. From then on the supervisor drops the requests and the END of the robot in the car (rmf_ros2,
+lift_supervisor/Node.cpp), and this node refuses the other robot's requests. The robot in the car would
+never get out. A restarted supervisor also sends END for any session that the lift shows, even if that
+session's robot goes on asking.
+
+Rules:
+1. A session is forgotten if the last request on `lift_requests` was for another session. The mark ends
+   when `lift_requests` has a request for the forgotten session, or the END of that other session.
+2. An END on `lift_requests` does not end the session of a robot that may be inside and goes on asking.
+   A robot goes on asking under three conditions. Its last request is at most ASKS_S old. It has sent no
+   END after that request. Its last END is older than FORWARDED_S, because the supervisor may be passing
+   on a younger END. The session is then disowned until `lift_requests` has a request for the session. A
+   disowned session ends when its robot sends END, or is silent for ASKS_S. A person's END always ends
+   the session.
+3. Requests of the session's own robot on `adapter_lift_requests` count only if the session is forgotten
+   or disowned. They then count as if the supervisor had passed them on: they set mode and destination,
+   and show that RMF is alive. A request on `adapter_lift_requests` grants no session. But during the
+   grace after END it restores the session of a robot that may be inside.
 4. A request counts if its stamp is newer than the requester's last stamp. The END of a forgotten robot
    counts only when it is heard twice, with no newer request between. Jazzy's fleet adapters send END
    without a stamp; such an END is never too old.
-5. A robot may have been left in the car if its session ended before OPEN was shown at its destination,
-   or after a silence of its adapter: a killed fleet adapter sends END when it is back. Until IN_CAR_S
-   after the robot's last message nobody else gets the lift, and the robot's own request restores the
-   session. The lift does not wait after a person's END, or for a robot that was never heard on
-   `adapter_lift_requests`.
-6. An END on `lift_requests` with a stamp from before the session's grant is old. An old END counts only
-   after it has been repeated for a second, because its sender's clock may differ.
-7. After NAMED_AFTER_S a fault names the other robot, for which the supervisor asks.
+5. A robot may be left in the car in two cases: its session ended before OPEN was shown at its
+   destination, or its adapter was silent before the END. A killed fleet adapter sends END when it is
+   back. Until IN_CAR_S after the robot's last message nobody else gets the lift, and the robot's own
+   request restores the session. The lift does not wait after a person's END. The lift does not wait for
+   a robot that was never heard on `adapter_lift_requests` either.
+6. An END on `lift_requests` is old if its stamp is earlier than the stamp of the request that got the
+   session. An old END counts only after it has been repeated for a second, because its sender's clock
+   may differ.
+7. If the mark lasts for NAMED_AFTER_S, a fault names the session for which the supervisor asks.
+
 """
 
 from typing import Final
@@ -41,18 +45,20 @@ from bridges.kinds.shared.durations import AGES_AGO, NEVER
 from bridges.kinds.shared.freshness import SECOND_NS, Requester, Rules
 
 NAMED_AFTER_S: Final = 3.0
-"""The time (s) for which the supervisor may ask for the next robot without a fault, because of a normal
-handover."""
+"""The delay (s) of the fault. In a normal handover the supervisor asks for the next robot for less
+time."""
 ASKS_S: Final = 5.0
-"""The silence (s) after which five repeats are missing. States go out each second, and a fleet adapter
-repeats its request at each LiftState (RobotContext.cpp, _check_lift_state)."""
+"""The longest silence (s) of a robot that goes on asking: five missing repeats. A LiftState goes out
+each second, and a fleet adapter repeats its request at each LiftState (RobotContext.cpp,
+_check_lift_state)."""
 IN_CAR_S: Final = 60.0
 """The longest wait (s) for a robot in the car. A killed fleet adapter gives its robot a task again
 after 20 s (docs/how-to/ros.md)."""
 FORWARDED_S: Final = 3.0
-"""The greatest delay (s) between the two topics. A supervisor passes END on at once."""
+"""The longest time (s) from an END on `adapter_lift_requests` to the same END on `lift_requests`. A
+supervisor passes an END on at once."""
 CLOSE_S: Final = 1e-6
-"""The least difference (s) between two stamps of today's date that a float can hold."""
+"""The accuracy (s) with which a float holds a stamp of today's date."""
 CODE: Final = "FORGOTTEN_BY_SUPERVISOR"
 
 
@@ -63,7 +69,8 @@ def overruled(session: LiftSession, other: str, now: float) -> LiftSession:
 
 
 def remembered(session: LiftSession, other: str) -> LiftSession:
-    """Unmark the session after the END of another session on `lift_requests`."""
+    """Clear the mark after the END of the other session on `lift_requests`. A disowned session stays
+    marked."""
     forgotten = session.forgotten
     if forgotten is None or forgotten.by != other:
         return session
@@ -71,13 +78,14 @@ def remembered(session: LiftSession, other: str) -> LiftSession:
 
 
 def disowned(session: LiftSession, now: float) -> LiftSession:
-    """Mark the session as disowned: the supervisor has ended it although its robot goes on asking."""
+    """Mark the session as disowned, because the supervisor has ended it although its robot goes on
+    asking."""
     before = session.forgotten or ForgottenSession("", now)
     return replace(session, forgotten=replace(before, disowned=True))
 
 
 def goes_on(session: LiftSession, now: float) -> bool:
-    """Return whether the robot may be inside and itself goes on asking."""
+    """Return whether the robot may be inside and goes on asking (rule 2)."""
     robot = session.robot
     if not session.boarded or robot.ended_at >= robot.asked_at:
         return False
@@ -92,12 +100,12 @@ def lapses_at(session: LiftSession) -> float:
 
 
 def in_car_until(session: LiftSession, now: float) -> float:
-    """Return the end of the wait for a robot that an END now may leave in the car; AGES_AGO if the lift
-    does not wait.
+    """Return the time until which the lift waits for a robot in the car, if its session ends now;
+    AGES_AGO for no wait.
 
-    The lift waits if OPEN was not shown at the robot's destination. It also waits if the robot's
-    adapter was silent: the END then comes from a new adapter, and no adapter has made the robot leave.
-    The lift never waits for a robot that was not heard.
+    The lift waits if OPEN was not shown at the robot's destination. The lift also waits after a silence
+    of the robot's adapter. In that case the END comes from a restarted adapter, and no adapter has made
+    the robot leave. The lift never waits for a robot that was not heard on `adapter_lift_requests`.
     """
     robot = session.robot
     rides = robot.asked_at > AGES_AGO and not (robot.told and _has_just_asked(robot, now))
@@ -119,8 +127,8 @@ def granted(session: LiftSession, stamp: int) -> LiftSession:
 
 
 def counts(session: LiftSession, ended: EndRequested, now: float) -> tuple[LiftSession, bool]:
-    """Note an END of the session. Also return whether the END counts; an END that is too old does
-    not."""
+    """Note an END of the session. Also return whether the END counts. An old END does not count (rule
+    6)."""
     if not ended.stamp:
         return session, True
     ends, counts = session.ends.hears(ended.stamp / SECOND_NS, 0.0, now, Rules(), ends=True)
@@ -156,7 +164,7 @@ def named_at(session: LiftSession) -> float:
 
 
 def fault(session: LiftSession, now: float) -> Fault | None:
-    """Return the fault of the supervisor; None if a normal handover may still explain its requests."""
+    """Return the fault that RMF's supervisor serves another session; None before `named_at`."""
     if session.forgotten is None or now < named_at(session):
         return None
     other = session.forgotten.by

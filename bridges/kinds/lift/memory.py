@@ -21,7 +21,7 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
     """The settings of a lift that its core needs.
 
     `stops` maps RMF's floor name to landing and door, from the lowest up. `t`: the durations.
-    `debounce` maps a signal to its debounce (s). `alarm_on`: the hazards that the fleets are told of.
+    `debounce` maps a signal to its debounce (s). `alarm_on`: the hazards that raise the fleets' alarm.
     `by_call`: a call switches AGV mode on.
     """
 
@@ -55,12 +55,12 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
         return {level: place for place, level in enumerate(landings)}
 
     def floors_between(self, level: str, other: str) -> int:
-        """Count the landings between these two."""
+        """Count the landings between these two landings."""
         return abs(self.levels[level] - self.levels[other]) - 1
 
     def floor_name(self, level: str, preferred: str) -> str:
-        """Return RMF's name for a landing: `preferred` if the landing has that name, else its first
-        name."""
+        """Return RMF's name for a landing. The name is `preferred` if the landing has that name, else
+        the landing's first name."""
         if preferred in self.stops and self.stops[preferred].level == level:
             return preferred
         return next(name for name, stop in self.stops.items() if stop.level == level)
@@ -71,10 +71,11 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
 
 
 class CarPosition(msgspec.Struct, frozen=True):
-    """The car's position. `trusted`: the landing that was last believed, and last seen at `seen_at`.
-    `suspect`: a landing in the floor code that the car cannot have reached.
+    """The car's position, as far as the floor code is believed.
 
-    `moved_at`: the time of the last reading in which the car did not stand.
+    `trusted`: the last landing that was believed. `seen_at`: the time when the car was last seen there.
+    `suspect`: a landing that the floor code shows, but that the car cannot have reached. `moved_at`:
+    the time of the last reading in which the car did not stand.
     """
 
     trusted: str | None = None
@@ -99,11 +100,11 @@ class LiftSenses(msgspec.Struct, frozen=True):
 
 
 class ForgottenSession(msgspec.Struct, frozen=True):
-    """The mark of a forgotten or disowned session (`bridges/kinds/lift/forgotten.py`), present since
-    the time `since`.
+    """The mark of a forgotten or disowned session (`bridges/kinds/lift/forgotten.py`).
 
-    `by`: the session for which the supervisor asks instead, "" for none. `disowned`: the supervisor has
-    ended this session, but its robot goes on asking. `ended`: the robot's own END was heard once.
+    `by`: the other session for which the supervisor asks; "" if there is none. `since`: the time of the
+    mark. `ended`: the robot's own END was heard once. `disowned`: the supervisor has ended this
+    session, but its robot goes on asking.
     """
 
     by: str
@@ -113,11 +114,12 @@ class ForgottenSession(msgspec.Struct, frozen=True):
 
 
 class OwnWords(msgspec.Struct, frozen=True):
-    """The messages of a robot's own adapter. `stamp`: the newest stamp (ns), by the adapter's clock.
+    """The messages of a robot's own fleet adapter.
 
-    `asked_at`: the time of its last request for the lift. `ended_at`: the time of its first END after
-    that request. `floor`: the requested destination. `opened`: OPEN has been published at that floor
-    since. `told`: the adapter has requested again after that OPEN.
+    `stamp`: the newest stamp (ns), by the adapter's clock. `asked_at`: the time of the last request for
+    the lift. `ended_at`: the time of the first END after that request. `floor`: the destination of that
+    request. `opened`: OPEN has been published at `floor` since. `told`: the adapter has sent a request
+    after that OPEN.
     """
 
     stamp: int = 0
@@ -129,8 +131,8 @@ class OwnWords(msgspec.Struct, frozen=True):
 
 
 class Doubted(msgspec.Struct, frozen=True):
-    """A destination, requested since `since`, that may belong to an earlier ride
-    (`bridges/kinds/lift/replayed.py`)."""
+    """A requested destination that may belong to an earlier ride (`bridges/kinds/lift/replayed.py`).
+    `since`: the time of its first request."""
 
     destination: str
     since: float
@@ -141,11 +143,11 @@ class LiftSession(msgspec.Struct, frozen=True):
 
     `boarded`: OPEN at the destination has been published for this session, so a robot may be inside.
     `agv_seen`: AGV mode has come on at our request. `arrived`: the car has stood at the destination.
-    `call_at`: the start of the present call. `waiting`: the step for which we wait, begun at `since`.
-    `tries`: how often that step has failed. `retry_at`: outputs stay off until this time (inf: the
-    fault has latched). `forgotten`: RMF's supervisor does not ask for this session. `robot`: the
-    messages of its own adapter. `doubted`: a destination that does not count yet. `ends`: the stamps
-    that the session's END may have.
+    `call_at`: the start of the present call. `waiting`: the step for which the ride waits. `since`: the
+    start of that wait. `tries`: how often that step has failed. `retry_at`: the outputs stay off until
+    this time; inf means that the fault has latched. `forgotten`: the mark of a session that RMF's
+    supervisor has forgotten or ended. `robot`: the messages of the robot's own adapter. `doubted`: a
+    destination that does not count yet. `ends`: the check that an END is not older than the session.
     """
 
     id: str
@@ -168,9 +170,11 @@ class LiftSession(msgspec.Struct, frozen=True):
 
 
 class Grace(msgspec.Struct, frozen=True):
-    """The time after END, until `until`. During the grace only the ended session can be granted. Its
-    outputs go off at `off_at`. `in_car`: the session's robot may still be inside, and this robot's
-    own requests restore the session too."""
+    """The time after END in which only the ended session can be granted again.
+
+    `until`: the end of the grace. `off_at`: the time when the session's outputs go off. `in_car`: the
+    robot may still be inside, and its own requests restore the session too.
+    """
 
     session: LiftSession
     until: float
@@ -181,9 +185,10 @@ class Grace(msgspec.Struct, frozen=True):
 class LiftMemory(msgspec.Struct, frozen=True):
     """The memory of one lift from scan to scan.
 
-    `io_fault`: the error of the last read or write; "" if both succeeded. `unwritten_since`: no write
-    has succeeded since this time. `write_failed`: the last scan's write failed. `own`: the destination
-    that each session's robot itself last requested.
+    `rival_at`: the time when another node for this lift was last heard. `io_fault`: the error of the
+    last read or write; "" if both succeeded. `unwritten_since`: no write has succeeded since this time.
+    `write_failed`: the last scan's write failed. `own` maps a session to the destination that its robot
+    itself last requested.
     """
 
     senses: LiftSenses = LiftSenses()

@@ -19,8 +19,8 @@ from bridges.messages.definitions import (
 from bridges.messages.topics import ADAPTER_LIFT_REQUESTS
 
 OWN_REQUESTS = ADAPTER_LIFT_REQUESTS.live()
-"""The topic of fleet adapters' requests to RMF's supervisor. On it we hear the robot that has the
-lift."""
+"""The topic on which fleet adapters send requests to RMF's supervisor. This node listens there for the
+robot that has the lift."""
 AVAILABLE_MODES = (int(LiftMode.MODE_HUMAN), int(LiftMode.MODE_AGV))
 
 
@@ -28,10 +28,10 @@ def accept(request: LiftRequest, settings: LiftSettings) -> LiftRequested | EndR
     """Turn a request into an event. Raises RequestRefused if it is malformed or impossible.
 
     An END_SESSION counts with any floor and door, because fleet adapters send "" and 0
-    (rmf_fleet_adapter RobotContext.cpp). Jazzy's supervisor sends an END_SESSION without a session at
-    each state of a free lift (lift_supervisor/Node.cpp); this message ends nothing. An END_SESSION with
-    DOOR_OPEN comes from a person (`rmf-bridge send`, rmf-web), because no node of RMF sends both
-    together.
+    (rmf_fleet_adapter RobotContext.cpp). At each state of a free lift, Jazzy's supervisor sends an
+    END_SESSION without a session (lift_supervisor/Node.cpp). Such an END_SESSION ends nothing. An
+    END_SESSION with DOOR_OPEN comes from a person (`rmf-bridge send`, rmf-web), because no node of RMF
+    combines these two.
     """
     check_length(session_id=request.session_id)
     stamp = _stamp(request)
@@ -68,7 +68,7 @@ def _stamp(request: LiftRequest) -> int:
 
 
 def device_name(message: LiftRequest | LiftState) -> str:
-    """Return the lift that a message is about."""
+    """Return the name of the lift in a message."""
     return message.lift_name
 
 

@@ -1,5 +1,5 @@
-"""The lift's relays from scan to scan: their rest, their cycles per minute, and the outputs that
-exclude each other. Switching off never waits."""
+"""The lift's relays from scan to scan. A relay rests after it was switched off, and has a greatest
+number of cycles per minute. Calls and door commands exclude each other. Switching off never waits."""
 
 import math
 from collections.abc import Iterator
@@ -28,7 +28,7 @@ class Channel(msgspec.Struct, Generic[T], frozen=True):
 
     def step(self, wanted: T | None, now: float, ready_at: float, t: LiftDurations) -> "Channel[T]":
         """Return the next state. Switching off is immediate. Switching on waits for the relay's rest
-        and for `ready_at`; so does the change to another output of the group."""
+        and for `ready_at`. A change to another output of the group waits too."""
         if self.on is not None:
             return self if wanted == self.on else replace(self, on=None, off_at=now)
         if wanted is None or now < self.may_switch_on_at(now, ready_at, t):
@@ -69,7 +69,7 @@ class Relays(msgspec.Struct, frozen=True):
         return Relays(agv, call, hold)
 
     def changes_at(self, wanted: LiftOutputs, now: float, t: LiftDurations) -> float:
-        """Return the time when a wanted output may come on; always later than `now`."""
+        """Return the next time, later than `now`, when a wanted output may come on."""
         off = self._still_off(wanted, now, t)
         due = [channel.may_switch_on_at(now, ready_at, t) for _, channel, ready_at in off]
         return max(min(due, default=NEVER), math.nextafter(now, NEVER))
@@ -86,8 +86,8 @@ class Relays(msgspec.Struct, frozen=True):
     def _still_off(
         self, wanted: LiftOutputs, now: float, t: LiftDurations
     ) -> Iterator[tuple[str, Channel[Any], float]]:
-        """Yield each wanted output that is off: its name, its channel, and the time when the other
-        outputs allow it."""
+        """Yield (name, channel, ready_at) of each wanted output that is off. The other outputs allow it
+        from `ready_at` on."""
         agv_at = now if self.agv.on else self.agv.may_switch_on_at(now, AGES_AGO, t)
         ready_at = max(agv_at, self._rested_at(t))
         if wanted.agv_request and not self.agv.on:

@@ -1,18 +1,19 @@
-"""Replayed requests: a floor of an earlier ride is requested while a robot may be on the threshold.
+"""Replayed requests: RMF repeats a request of an earlier ride while a robot may be on the threshold.
 
 A fleet adapter retains its last 100 requests. When RMF's supervisor restarts, or reaches a cut-off
-adapter again, it hears all these requests once more and passes each on with a new stamp (rmf_ros2,
-lift_supervisor/Node.cpp). Requests of earlier rides would release the door before the present request
-is heard. On `adapter_lift_requests` our node hears no replays, but only the requests that each robot
-sends now.
+adapter again, the supervisor hears all these requests once more. The supervisor passes each request on
+with a new stamp (rmf_ros2, lift_supervisor/Node.cpp). Requests of earlier rides would release the door
+before the present request arrives. On `adapter_lift_requests` this node hears no replays, but only the
+requests that each robot sends now.
 Rules:
-LIFT-REPLAYED-1. If the door is held, a request for another destination is doubted if the robot's own
-   last request was for the present destination. That own request counts even if the robot sent it
-   before it got the lift, because the robot may have been cut off since.
-LIFT-REPLAYED-2. The doubted request counts when the robot itself asks for that destination too, or
-   when LASTS_S have passed without a request for another destination.
-LIFT-REPLAYED-3. An END is never doubted. A request within the grace resumes the session as it was; then
-   LIFT-REPLAYED-1 decides.
+LIFT-REPLAYED-1. While the door is held, a request for another destination is doubted if the robot's own
+   last request was for the present destination. That own request may be older than the session, because
+   the robot may have been cut off since.
+LIFT-REPLAYED-2. The doubted request counts when the robot itself asks for that destination too. It also
+   counts when LASTS_S have passed and no other destination was requested in that time.
+LIFT-REPLAYED-3. An END is never doubted. A request within the grace first restores the session as it
+   was. After that LIFT-REPLAYED-1 judges the request.
+
 """
 
 from collections.abc import Mapping
@@ -22,15 +23,16 @@ from bridges.kinds.lift.memory import Doubted, LiftSession
 from bridges.kinds.lift.signals import EndRequested, LiftRequested
 
 LASTS_S: Final = 3.0
-"""The time (s) after which a request is no replay: a replay is over within a second, and the robot's
-own repeats come at 1 Hz."""
+"""The time (s) after which a request is no replay. A replay is over within a second, and the robot
+repeats its own request at 1 Hz."""
 MOST: Final = 100
-"""The greatest number of robots remembered; no site has more. Beyond this number the robot heard first
-is forgotten."""
+"""The greatest number of robots in the table; no site has more. One more robot displaces the robot that
+was silent for longest."""
 
 
 def noted(own: Mapping[str, str], asked: LiftRequested | EndRequested) -> Mapping[str, str]:
-    """Note a robot's own request in the table, which maps a session to its destination."""
+    """Note a robot's own request in the table, which maps a session to its destination. An END removes
+    the session."""
     others = {session: floor for session, floor in own.items() if session != asked.session_id}
     if isinstance(asked, EndRequested):
         return others
@@ -42,8 +44,10 @@ def noted(own: Mapping[str, str], asked: LiftRequested | EndRequested) -> Mappin
 def doubt(
     session: LiftSession, request: LiftRequested, own: str, held_open: bool, now: float
 ) -> Doubted | None:
-    """Return the doubt about a request of this session; None if the request counts. `own`: the
-    destination that the robot itself last requested."""
+    """Return the doubt about a request of this session; None if the request counts.
+
+    `own`: the destination that the robot itself last requested.
+    """
     other = request.destination != session.destination
     if not (held_open and other and request.agv and own == session.destination):
         return None

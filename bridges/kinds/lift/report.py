@@ -17,13 +17,13 @@ OFFLINE = frozenset({"OUTPUTS_NOT_WRITTEN", "TWO_NODES_FOR_ONE_DEVICE"})
 
 
 class LiftReport(msgspec.Struct, frozen=True):
-    """The content of LiftState except its name, floors and stamp, and further facts for the status
+    """The report of a lift: LiftState without name, floors and stamp, and more facts for the status
     file.
 
-    `floor`: RMF's name, "" when unknown. `read_at`: monotonic seconds, None before the first reading.
+    `read_at`: monotonic seconds, None before the first reading. `floor`: RMF's name, "" when unknown.
     `estimated`: no contact proves `door`. `boarded`: a robot may be inside. `waits`: the reason why the
-    session's request is not fulfilled yet; "" without a request, or once RMF sees the request
-    fulfilled. `alarm`: the hazards of `alarm_on`.
+    session's request is not fulfilled yet; "" if no request waits. `alarm`: the present hazards of
+    `alarm_on`.
     """
 
     read_at: float | None
@@ -45,8 +45,8 @@ class LiftReport(msgspec.Struct, frozen=True):
         return self.floor if self.door is LiftDoor.DOOR_OPEN else ""
 
     def news(self) -> object:
-        """Return everything except the age and the faults' details, because both may change at each
-        reading."""
+        """Return everything except the age and the faults' details. Both may change at each reading,
+        and such a change is no news."""
         shown = (self.floor, self.destination, self.door, self.motion, self.mode, self.session)
         return *shown, self.estimated, tuple(fault.code for fault in self.faults)
 
@@ -130,12 +130,12 @@ def _may_enter(
 ) -> bool:
     """Return whether an open door may be shown as OPEN. A robot that sees OPEN drives through.
 
-    - The door is not shown OPEN if the hold is wanted and its relay must rest. Such a door stands open
-      only for its own dwell time, and would then close on the robot.
-    - The door is not shown OPEN for a served session at the floor for which the robot itself asks, if
-      the car is about to leave. RMF's supervisor may then be passing on an earlier ride.
+    - The door is not shown OPEN if the hold is wanted and its relay must rest. Nothing holds such a
+      door, so it would close on the robot.
+    - The door is not shown OPEN if a served session is about to send the car away from the floor that
+      its robot itself last requested. RMF's supervisor may be passing on an earlier ride.
     - Before a robot has boarded, its session must also be served, in AGV mode, and without a fault. The
-      fault that RMF's supervisor has forgotten the session does not matter.
+      fault FORGOTTEN_BY_SUPERVISOR does not matter.
     """
     session, held = memory.session, memory.relays.hold.on is not None
     if wanted.hold_door is not None and not held:
@@ -168,9 +168,9 @@ def _mode(view: BelievedLift, faults: tuple[Fault, ...], relays: Relays) -> Lift
 def _door(
     session: LiftSession | None, view: BelievedLift, floor: str, limits: LiftLimits
 ) -> tuple[LiftDoor, bool]:
-    """Return the door's state from the inputs, and True if it is an estimate.
+    """Return the door's state from the inputs, and True if that state is an estimate.
 
-    With a session and a known floor, only the door at that floor counts.
+    With a session and a known floor, only the door that serves that floor counts.
     """
     if not view.fresh:
         return LiftDoor.DOOR_MOVING, False
@@ -188,8 +188,8 @@ def _door(
 
 
 def _motion(view: BelievedLift, door: LiftDoor) -> LiftMotion:
-    """Return the motion from its lines. Without lines, a car with an open door at a floor counts as
-    stopped."""
+    """Return the motion from the motion lines. Without motion lines, a car with an open door at a floor
+    counts as stopped."""
     if not view.fresh:
         return LiftMotion.MOTION_UNKNOWN
     if view.motion is None:

@@ -1,22 +1,23 @@
 """Judgement of a lift's inputs: debounce, age, and contradictions.
 
 Rules:
-LIFT-SENSING-1. A change of an input counts once it has lasted for the signal's debounce. The end of a
-   hazard counts once it has lasted for `hazard_clear_s`. All inputs are unknown until every input has
-   settled once. They are unknown again if any input has been changing for longer than `RESTLESS_S`.
-   Settling after the start is no fault.
+LIFT-SENSING-1. A change of an input counts when it has lasted for the signal's debounce. The end of a
+   hazard counts when it has lasted for `hazard_clear_s`. All inputs are unknown until every input has
+   settled once. All inputs are unknown again while any input changes for longer than its debounce and
+   `RESTLESS_S`. Settling after the start is no fault.
 LIFT-SENSING-2. After `stale_after_s` without a reading all inputs are unknown, because the car may be
    anywhere. After a shorter gap the values stay, and a running debounce starts again.
 LIFT-SENSING-3. A floor code is believed only if the car can have reached that floor. The code is
-   rejected if it skips floors faster than a car travels, or (with motion lines) if it changes while the
-   car stands. Then the position is unknown until the code shows the last trusted floor or another
-   reachable floor, or until an operator resets.
+   rejected if it skips floors faster than a car travels. With motion lines the code is also rejected if
+   it changes while the car stands. After a rejection the position is unknown until the code shows the
+   last trusted floor or another reachable floor, or until an operator resets the lift.
 LIFT-SENSING-4. If the floor code is invalid (`valid_when`) for longer than its debounce, the car may go
    anywhere unseen. Therefore the next valid floor code is believed.
-LIFT-SENSING-5. The contact for the open door decides that a door is open. If a door has only one
+LIFT-SENSING-5. A door is open when its contact for the open door says so. If a door has only one
    contact, its other end position is estimated from the door's travel time, and marked as an estimate.
 LIFT-SENSING-6. A car stands when the motion lines say so. Without motion lines the car always counts as
    standing.
+
 """
 
 from collections.abc import Iterator, Sequence
@@ -33,16 +34,18 @@ from bridges.kinds.shared.durations import AGES_AGO, NEVER
 HAZARDS = tuple(Hazard)
 
 MOTION_MEMORY_S = 2.0
-"""The time (s) after the car was last seen moving in which a new floor code is believed."""
+"""The time (s) after the car's last motion during which a new floor code is believed."""
 
 RESTLESS_S = 2.0
-"""The longest time (s) that an input may take to settle. An input that takes longer is restless; the
-cause is a loose wire or interference."""
+"""The longest time (s), on top of the debounce, that an input may take to settle. A slower input is
+restless. The cause is a loose wire or interference."""
 
 
 class DoorSeen(msgspec.Struct, frozen=True):
-    """One door: open, closed, or moving (neither `open` nor `closed`). `settles_at`: the time (s) of
-    the next estimate."""
+    """The judged state of one door. A door that is neither `open` nor `closed` moves.
+
+    `estimated`: no contact proves the state. `settles_at`: the time (s) when an estimate begins.
+    """
 
     open: bool
     closed: bool
@@ -53,8 +56,8 @@ class DoorSeen(msgspec.Struct, frozen=True):
 class BelievedLift(msgspec.Struct, frozen=True):
     """The judged inputs at one instant.
 
-    `blind`: the reason why no input is believed, "" if all inputs are believed. `settling`: the only
-    reason is that inputs still settle after the start. `level`: the landing, None when unknown.
+    `blind`: the reason why no input is believed, "" if all inputs are believed. `settling`: inputs
+    settle after the start, and no input is restless. `level`: the landing, None when unknown.
     `level_settles`: the floor code is changing. `agv`: None if not wired. `changes_at`: the next time
     (s) when these judgements may change without a reading.
     """
@@ -85,7 +88,7 @@ class BelievedLift(msgspec.Struct, frozen=True):
 
 
 def take(senses: LiftSenses, sample: LiftSample, now: float, limits: LiftLimits) -> LiftSenses:
-    """Add one reading."""
+    """Add one reading to the senses."""
     if now >= stale_at(senses, limits):
         senses = unsure(senses, now)
     hold = limits.debounce_s

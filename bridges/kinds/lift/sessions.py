@@ -1,7 +1,7 @@
 """The lift's sessions: grants, refusals, END, and the time after END (the grace).
 
-Three files have the rules: LIFT-1 and LIFT-2 in `core.py`, `forgotten.py` for robots that RMF's
-supervisor forgets, and `replayed.py` for replayed requests.
+The rules are in three files: `core.py` (LIFT-1, LIFT-2), `forgotten.py` (sessions that RMF's supervisor
+forgets) and `replayed.py` (replayed requests).
 """
 
 from collections.abc import Callable
@@ -22,7 +22,9 @@ def ask(
     memory: LiftMemory, request: LiftRequested, now: float, why_not: Callable[[], str]
 ) -> tuple[LiftMemory, str]:
     """Apply a request from `lift_requests`. Also return the reason for a refusal, "" if there is none.
-    `why_not` returns the reason why a free lift must not be granted now."""
+
+    `why_not()` returns the obstacle that forbids a grant of the free lift.
+    """
     held, grace = memory.session, memory.grace
     if held and held.id != request.session_id:
         session = forgotten.overruled(held, request.session_id, now)
@@ -55,9 +57,12 @@ def _heed(
 def hear_adapter(
     memory: LiftMemory, asked: LiftRequested | EndRequested, now: float, limits: LiftLimits
 ) -> LiftMemory:
-    """Apply a robot's own request. The request counts in three cases: the robot has the lift and its
-    session is forgotten or disowned; the request settles a doubt about that session; the robot was
-    left in the car."""
+    """Apply a robot's own request. The request counts in three cases:
+
+    - The robot has the lift, and its session is forgotten or disowned.
+    - The request confirms a doubted destination of the session.
+    - The robot was left in the car.
+    """
     held = memory.session
     memory = replace(memory, own=replayed.noted(memory.own, asked))
     if held is None:
@@ -97,7 +102,7 @@ def _refresh(session: LiftSession, request: LiftRequested, now: float) -> LiftSe
 
 
 def _anew(session: LiftSession, now: float) -> LiftSession:
-    """Return the session as if it was granted now. Only the facts about its robot stay."""
+    """Return the session as if the lift were granted to it now. The facts about its robot stay."""
     return LiftSession(
         session.id,
         session.agv,

@@ -43,16 +43,18 @@ class LiftDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     stale_after_s: Annotated[
         Period,
-        tells("""the time without a good reading, or without a good write, after which the lift is
-        OFFLINE and its outputs are off."""),
+        tells("""how long reading or writing may fail. After that the lift is OFFLINE and its outputs
+        are off."""),
     ] = 1.0
     release_grace_s: Annotated[
-        Seconds, tells("how long AGV mode and the hold stay on after END, for the same session.")
+        Seconds,
+        tells("""how long AGV mode and the door's hold stay on after END. In this time only the same
+        session gets the lift."""),
     ] = 3.0
     agv_timeout_s: Annotated[
         Timeout,
-        tells("""how long AGV mode may take to come on. Then the outputs go off and a fault is shown.
-        Retries follow after 10, 30 and 60 s; then the fault latches."""),
+        tells("""how long AGV mode may take to come on. After that the outputs go off and a fault is
+        shown. Retries follow after 10, 30 and 60 s; then the fault latches."""),
     ] = 600.0
     floor_timeout_s: Annotated[
         Timeout,
@@ -100,7 +102,7 @@ class LiftDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     ] = 20
 
     def problems(self) -> Remarks:
-        """Yield the limits that no ride can keep."""
+        """Yield a problem for limits that no ride can keep."""
         least_s = self.floor_travel_min_s
         if self.floor_timeout_s <= least_s:
             text = (
@@ -120,19 +122,19 @@ class LiftSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
     agv_mode: Annotated[
         Literal["requested", "by_call"],
         tells("""how AGV mode is switched on. `requested`: by an output that is held. `by_call`: by
-        a call; AGV mode stays on as long as the call is served and the door is held."""),
+        a call. AGV mode then stays on while the call is served, and while the door is held."""),
     ] = "requested"
     limits: Annotated[LiftDurations, tells("the limits that differ from their defaults.")] = (
         LiftDurations()
     )
     fire_reset: Annotated[
         Literal["auto", "manual"],
-        tells("""RMF may use the lift again when the alarm clears (`auto`), or only after
-        `rmf-bridge reset` (`manual`)."""),
+        tells("""when RMF may use the lift again after a fire alarm. `auto`: when the alarm clears.
+        `manual`: only after `rmf-bridge reset`."""),
     ] = "auto"
     alarm_on: Annotated[
         AlarmOn,
-        tells("""the hazards that raise this alarm. All robots then leave the lifts and stop
+        tells("""the hazards that raise the alarm of `alarm`. All robots then leave the lifts and stop
         elsewhere, until `rmf-bridge reset`."""),
     ] = msgspec.field(default_factory=lambda: ["fire_alarm"])
 
@@ -141,7 +143,7 @@ class LiftSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
         return self.limits.stale_after_s
 
     def on_map(self) -> list[Place]:
-        """List the floors. RMF's map must have them too."""
+        """List the floors, which RMF's map must have too."""
         if isinstance(self.floors, list):
             return [(("floors", str(i)), FLOOR, name) for i, name in enumerate(self.floors)]
         return [(("floors", name), FLOOR, name) for name in self.floors]

@@ -25,8 +25,8 @@ class DoorReading(Enum):
 
 
 class Motion(Enum):
-    """The reading of the motion lines. CONTRADICTORY: the lines cannot all be true (up and down at
-    once)."""
+    """The reading of the motion lines. CONTRADICTORY: the lines cannot all be true, such as up and down
+    at once."""
 
     STOPPED = "stopped"
     UP = "up"
@@ -36,7 +36,7 @@ class Motion(Enum):
 
 
 class Hazard(StrEnum):
-    """Inputs that take the lift away from RMF. The names are the YAML's signal names."""
+    """The hazard inputs of a lift. Their values are the YAML's signal names."""
 
     FIRE = "fire_alarm"
     CODE_BLUE = "code_blue"
@@ -50,10 +50,11 @@ class Hazard(StrEnum):
 class LiftSample(msgspec.Struct, frozen=True):
     """Every input of one lift, decoded but not debounced.
 
-    `level`: the landing that the floor code names, None if there is no code (between floors).
-    `code_fault`: the reason why the code is illegal (not listed, two of one-hot, parity), "" if legal.
-    `floor_valid`: the code is valid now. If it is not, the car may go anywhere unseen. `motion`, `agv`,
-    `rear_door`: None if not wired. `agv` is also None when its line is not valid.
+    `level`: the landing that the floor code names; None if there is no code (between floors).
+    `code_fault`: the reason why the code is illegal; "" if it is legal. A code is illegal if it is not
+    listed, if its parity is wrong, or if two lines of a one-hot code are on. `floor_valid` is False
+    while the code is invalid; the car may then go anywhere unseen. `motion`, `agv`, `rear_door`: None
+    if not wired. `agv` is also None when its line is not valid.
     """
 
     level: str | None
@@ -94,7 +95,7 @@ class LiftOutputs(msgspec.Struct, frozen=True):
 class LiftRequested(msgspec.Struct, frozen=True):
     """A well-formed LiftRequest for AGV or HUMAN mode, for this lift and one of its floors.
 
-    `stamp`: its request_time (ns) by the sender's clock; 0 without a time.
+    `stamp`: the request_time (ns) by the sender's clock; 0 without a time.
     """
 
     session_id: str
@@ -104,8 +105,10 @@ class LiftRequested(msgspec.Struct, frozen=True):
 
 
 class EndRequested(msgspec.Struct, frozen=True):
-    """A LiftRequest for END_SESSION, with any floor. `by_person`: a person sent this END, with
-    `rmf-bridge send` or `release`."""
+    """A LiftRequest for END_SESSION, with any floor.
+
+    `by_person`: a person sent this END with `rmf-bridge send` or `release`.
+    """
 
     session_id: str
     stamp: int = 0
