@@ -87,9 +87,9 @@ def test_every_text_that_pyyaml_takes_for_something_else_is_known(text: str) -> 
 OTHER_NAMES = {
     '""': "has 0 characters: 1 to 128 are allowed",
     "x" * 129: "has 129 characters: 1 to 128 are allowed",
-    '" a"': "is ' a': write text without control characters, or spaces at its ends",
-    '"a\\n"': "is 'a\\n': write text without control characters, or spaces at its ends",
-    '"a\\0b"': "is 'a\\x00b': write text without control characters, or spaces at its ends",
+    '" a"': "is ' a': write text without control characters, and without spaces at its ends",
+    '"a\\n"': "is 'a\\n': write text without control characters, and without spaces at its ends",
+    '"a\\0b"': "is 'a\\x00b': write text without control characters, and without spaces at its ends",
     "[a]": "is a list: write text",
     "{a: b}": "is a mapping: write text",
 }

@@ -158,7 +158,8 @@ def test_a_device_is_a_mapping_with_a_name(file: Path) -> None:
         "6:9: '1' needs 'lanes': a list ([...]) or a mapping (key: value)",
         '6:9: this name is the number 1: if the text is meant, write "1" in quotes',
         "6:16: ' a' is a list: write a mapping (key: value)",
-        "6:16: this name is ' a': write text without control characters, or spaces at its ends",
+        "6:16: this name is ' a': write text without control characters, and without spaces at its"
+        " ends",
         "6:29: 'b' is the text 'x': write a mapping (key: value)",
     ]
 

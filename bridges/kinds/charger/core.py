@@ -4,25 +4,27 @@ CHARGER-1. The states are IDLE → ASSIGNED → CHARGING → RELEASED → IDLE, 
    request can only bring the state ASSIGNED; the station's readings bring every other state. CHARGING
    lasts as long as current flows, even if the current is already ramping down. In RELEASED the station
    is disconnected from its robot, and the pad is not clear yet.
-CHARGER-2. A request is granted only in the state IDLE. A repeat of the request changes nothing, even
-   after the request has ended. Every other request is refused until the station is IDLE. One exception:
-   if the station can identify the robot on the pad, a request for that robot may be granted (`pad.py`).
-CHARGER-3. `start_timeout` counts from the grant. If no charge has started by then, the request ends,
-   and the state goes through RELEASED to IDLE. A fault shows the reason, because RMF leaves the error
-   message blank in every state but ERROR.
+CHARGER-2. A request is granted only in the state IDLE. A repeat of a granted request changes nothing,
+   even after the request has ended. Every other request is refused until the station is IDLE. One
+   exception: if the station can identify the robot on the pad, a request for that robot may be granted
+   (`pad.py`).
+CHARGER-3. `start_timeout` counts from the grant. If no charge starts within this time, the request
+   ends, and the state goes through RELEASED to IDLE. A fault shows the reason, because RMF leaves the
+   error message blank in every state but ERROR.
 CHARGER-4. A cancel ends only the request that the cancel names. If current flows, the power is switched
    off, and the state stays CHARGING until the station has stopped. A full battery ends a request in the
    same way.
 CHARGER-5. The station is energised only for its assigned robot. That robot must be on the pad and in
-   range, and a movable pad must be at its height. If another robot is on the pad, it gets no power: the
-   state is ERROR, the error message names that robot, and the request goes on waiting.
+   range, and a movable pad must be at its height. Another robot on the pad gets no power. The state is
+   then ERROR, the error message names that other robot, and the request goes on waiting.
 CHARGER-6. At a fault the core first switches the power off and then reports the fault. Only a new
    request brings power back. A station is out of service (PROTECTION) if it reports a fault, or goes on
    charging after an order to stop. The state is then ERROR until the errors have been cleared and a
    good reading follows. A fault of the robot does not take the station out of service.
 CHARGER-7. Failed polls say nothing about the charge. After `misses` failed polls the state is ERROR,
    but the robot and the request stay. Only a good reading ends a request or frees a station. An
-   operator can free a station that must have switched itself off by now (`peer_internal_timeout_s`).
+   operator can free a silent station after `peer_internal_timeout_s`, when it must have switched itself
+   off.
 CHARGER-8. A charge may be under way when the daemon starts, or when it reaches the station again. Such
    a charge is shown and not stopped. The next request takes that charge over only if the request's
    robot is seen on the pad.
@@ -78,7 +80,7 @@ def initial(limits: ChargerLimits, now: float) -> ChargerMemory:
 def decide(
     memory: ChargerMemory, event: Event, now: float, limits: ChargerLimits
 ) -> Decision[ChargerMemory, ChargerOutputs, ChargerReport]:
-    """Decide one scan: apply the event, then derive the outputs and the report afresh."""
+    """Apply the event, and derive the outputs and the report."""
     memory, refused = _take(memory, event, now, limits)
     memory = replace(memory, power=_power(memory, now, limits))
     outputs = ChargerOutputs(memory.power, memory.clear_errors, memory.range_checks)
@@ -224,8 +226,8 @@ def _granted(
 
 
 def _in_the_way(memory: ChargerMemory, on_pad: bool, now: float, limits: ChargerLimits) -> bool:
-    """Return whether an error forbids granting this request. A wrong robot on the pad does not, if that
-    robot is the one of this request (`on_pad`)."""
+    """Return whether an error forbids a grant of this request. The error WRONG_DOCKING forbids nothing
+    if the robot on the pad is the request's robot (`on_pad`)."""
     found = report.errors(memory, now, limits)
     return any(not (on_pad and fault.code == pad.WRONG_DOCKING) for fault in found)
 

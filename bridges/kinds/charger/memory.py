@@ -62,14 +62,15 @@ class ChargeSession(msgspec.Struct, frozen=True):
 
 
 class ChargerMemory(msgspec.Struct, frozen=True):
-    """The memory of one charger from scan to scan. `sample`: the last good reading, at `read_at`.
+    """The memory of one charger from scan to scan.
 
-    `misses`: the number of failed polls in a row. `write_misses`: the number of scans in a row with
-    failed commands. `write_failed`: a command failed in this scan. `power`: the last decision.
-    `disobeyed_since`: the station has charged since this time although `power` is off. `adopted`: the
-    station was charging when we reached it, and we leave that charge alone. `protection`: the reason
-    why the station is out of service, "" in service. `clear_by`: a good reading up to this time proves
-    that the errors were cleared. `over`: the requests that ended last.
+    `sample`: the last good reading, at `read_at`. `misses`: the number of failed polls in a row.
+    `write_misses`: the number of scans in a row with failed commands. `write_failed`: a command failed
+    in this scan. `over`: the ids of the requests that ended last. `adopted`: the station was charging
+    when we reached it, and we leave that charge alone. `power`: the last decision about the power.
+    `disobeyed_since`: the station has charged since this time although `power` is off. `protection`:
+    the reason why the station is out of service, "" in service. `clear_by`: a good reading up to this
+    time proves that the errors were cleared.
     """
 
     sample: ChargerSample | None = None

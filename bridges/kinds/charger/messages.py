@@ -44,7 +44,8 @@ def accept_request(request: ChargerRequest, settings: ChargerSettings) -> Charge
 def accept_cancel(cancel: ChargerCancel, settings: ChargerSettings) -> Cancelled:
     """Turn a ChargerCancel into an event. Raises RequestRefused if it is malformed.
 
-    To cancel a charge that nobody requested, send the request id in the charger's published state.
+    A charge that nobody requested can be cancelled too. The cancel must name the request id in the
+    charger's published state.
     """
     _check("request_id", cancel.request_id)
     if cancel.request_id == UNREQUESTED + cancel.charger_name:

@@ -1,12 +1,12 @@
 """The robot on the pad, and the permission to energise the pad.
 
-The station sees a receiver on its pad: does the receiver belong to the request's robot? Without
-`receivers` in the YAML nobody can tell, so every robot counts as the request's robot. With `receivers`,
-a station that sees a receiver without its id charges nobody.
+The station sees a receiver on its pad. The YAML's `receivers` tell which robot carries the receiver.
+Without `receivers` every robot counts as the request's robot. With `receivers`, a station that sees a
+receiver but not its id charges nobody.
 
 Some stations move their pad, or check the robot's range. Such a station gives power only if the pad is
-at its height and the robot in range. No message announces that a robot leaves; only the readings of
-height and range show it. If the pad leaves its height while current flows, the station is at fault.
+at its height and the robot in range. No message announces that a robot leaves. Only the readings of
+height and range show that. If the pad leaves its height while current flows, the station is at fault.
 
 ChargerState's error_message names a wrong robot or receiver on the pad. `Misplaced.text` writes that
 text and `misplaced_in` reads it. An id that would make the text ambiguous is quoted as in JSON, so
@@ -42,11 +42,14 @@ _TEXT = re.compile(
 
 
 class PadOccupant(msgspec.Struct, frozen=True):
-    """The occupant of the pad. `unverified`: the YAML has no receivers. `mute`: the station does not
-    identify the receiver. `stranger`: the YAML does not list the receiver.
+    """The occupant of the pad.
 
-    `receiver`: the id that the station sees. `robot`: the robot that carries the receiver, None if not
-    listed.
+    `sort` has five values. `empty`: the pad is free. `robot`: the YAML lists the receiver. `stranger`:
+    the YAML does not list the receiver. `mute`: the station does not identify the receiver.
+    `unverified`: the YAML has no receivers.
+
+    `receiver`: the id that the station sees. `robot`: the robot that carries the receiver; None if the
+    YAML does not list the receiver.
     """
 
     sort: Literal["unverified", "mute", "empty", "robot", "stranger"]

@@ -20,8 +20,8 @@ from bridges.messages.words import LONGEST_NAME
 
 NAME = "ChargerRequest refused"
 OCCUPIED = "charger occupied"
-"""The reason for a refusal that ends by itself: another robot has the charger, and will release it. All
-other reasons remain."""
+"""The reason for a refusal that ends by itself, because the robot that has the charger will release it.
+All other reasons remain."""
 LONGEST_REASON = 500
 
 
@@ -29,8 +29,9 @@ class ChargerRefusal(msgspec.Struct, frozen=True, kw_only=True):
     """The reason of a refusal, and the robot that has the charger.
 
     `robot`: the FLEET/ROBOT of the refused request. `state`: the charger's state, in RMF's word.
-    `held_by`: the robot that has the charger. `held_request`: the id of that robot's request. Both are
-    "" if no robot has the charger. `error`: the charger's error text, "" without an error.
+    `held_by`: the robot that has the charger; "" if no robot has it. `held_request`: the id of that
+    robot's request; "" if no robot has the charger. `error`: the charger's error text, "" without an
+    error.
     """
 
     request_id: str
@@ -50,7 +51,7 @@ class ChargerRefusal(msgspec.Struct, frozen=True, kw_only=True):
         return ": ".join(filter(None, (self.reason, "; ".join(filter(None, (who, self.error))))))
 
     def message(self) -> DiagnosticStatus:
-        """Make the published message: its values are the fields, by their names."""
+        """Make the published message. Its values are these fields, by their names."""
         values = tuple(KeyValue(key, value) for key, value in self.fields().items())
         return DiagnosticStatus(int(DiagnosticLevel.WARN), NAME, self.text, self.charger, values)
 

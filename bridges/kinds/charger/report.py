@@ -1,8 +1,8 @@
 """A charger's report to RMF, the log and the status file, and the diagnosis of its error texts.
 
-RMF's ChargerState has one text for all errors. From that text the coordinator
-(`bridges/kinds/charger_coordinator/`) must find out whether robot or station is at fault:
-`error_message` writes the text and `diagnosis` reads it.
+RMF's ChargerState has one text for all errors. The coordinator (`bridges/kinds/charger_coordinator/`)
+must find in that text whether the robot or the station is at fault. `error_message` writes the text,
+and `diagnosis` reads it.
 """
 
 from enum import StrEnum
@@ -25,25 +25,26 @@ RELEASED = ChargerStateValue.CHARGER_RELEASED
 ERROR = ChargerStateValue.CHARGER_ERROR
 
 UNREQUESTED = "unrequested/"
-"""The beginning of a request id that we make up. ChargerState needs an id in every state but IDLE. If
-there is no request (at an error of a free station, or an unrequested charge), the id is this text
-and the charger's name."""
+"""The beginning of a made-up request id. ChargerState needs an id in every state but IDLE. An error of
+a free station and an unrequested charge have no request. Their id is this text and the charger's
+name."""
 
 LOST = {
     "TWO_NODES_FOR_ONE_DEVICE": "two nodes for one device",
     "CHARGER_UNREACHABLE": "Charger unreachable",
     "CHARGER_NOT_COMMANDED": "Charger takes no commands",
 }
-"""Fixed error messages of stations that cannot be reached or commanded. The fault gives the reason."""
+"""Fixed error messages of stations that cannot be reached or commanded. The fault's detail gives the
+reason."""
 OUT_OF_SERVICE = "out of service after: "
 
 
 class FaultCause(StrEnum):
     """The side at fault.
 
-    PAD: a wrong robot or receiver is on the pad. LOST: the station cannot be reached or commanded; this
-    says nothing about station or robot. UNCLEAR: the text names no side. Then the robot tries a second
-    station: a robot that fails there too is at fault.
+    PAD: a wrong robot or receiver is on the pad. LOST: the station cannot be reached or commanded, so
+    neither the station nor the robot is known to be at fault. UNCLEAR: the text names no side. The
+    robot then tries a second station. A robot that fails at both stations is at fault.
     """
 
     NONE = ""
@@ -71,8 +72,8 @@ def error_message(fault: Fault) -> str:
 
 
 def diagnosis(message: str) -> FaultCause:
-    """Find the side at fault in a ChargerState's error_message. A text of another program is
-    UNCLEAR."""
+    """Find the side at fault in a ChargerState's error_message; UNCLEAR for a text of another
+    program."""
     found = (whose for start, whose in _BEGINNINGS.items() if message.startswith(start))
     return next(found, FaultCause.UNCLEAR)
 
@@ -82,9 +83,9 @@ class ChargerReport(msgspec.Struct, frozen=True):
 
     `read_at`: monotonic seconds of the last good reading, None before the first. `error_message`: blank
     unless `state` is CHARGER_ERROR. `request_id`: blank if no request holds the station. `fleet`,
-    `robot`: the request's robot. Without a request they name the robot on the pad, if the station is
-    not idle. `verified`: the station sees that robot's receiver. `waits`: the reason why the robot is
-    not charged yet; "" without a request, during and after the charge, and in ERROR.
+    `robot`: the request's robot. Without a request, `fleet` and `robot` name the robot on the pad if
+    the station is not idle. `verified`: the station sees that robot's receiver. `waits`: the reason why
+    the robot is not charged yet; "" without a request, during and after the charge, and in ERROR.
     """
 
     read_at: float | None
@@ -106,7 +107,7 @@ class ChargerReport(msgspec.Struct, frozen=True):
 
 
 def report(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerReport:
-    """Report the present state."""
+    """Report the charger's present state."""
     found = errors(memory, now, limits)
     shown = ERROR if found else state(memory)
     lost = unreachable(memory, limits)

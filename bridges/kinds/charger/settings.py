@@ -47,34 +47,37 @@ class ChargerDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
     misses: Annotated[
         Misses,
         tells("""the number of failed polls in a row after which the charger is shown as unreachable.
-        After as many failed commands in a row it is shown as a charger that takes no commands."""),
+        After as many failed commands in a row the charger is shown as one that takes no commands."""),
     ] = 3
     start_timeout_s: Annotated[
         StartTimeout, tells("how long charging may take to start, if the request gives no time.")
     ] = 300.0
     stop_timeout_s: Annotated[
         StopTimeout,
-        tells("""how long a station may go on charging after an order to stop. Then the station is
-        out of service."""),
+        tells("""how long a station may go on charging after an order to stop. After that the station
+        is out of service."""),
     ] = 30.0
     released_s: Annotated[
         Released, tells("the least time for which RELEASED is shown. States go out at 1 Hz.")
     ] = 2.0
     full_percent: Annotated[
-        Percent, tells("the charge at which a robot is released, if the station knows the charge.")
+        Percent,
+        tells(
+            "the battery's charge at which a robot is released, if the station reports the charge."
+        ),
     ] = 100.0
     clear_errors_per_h: Annotated[
-        PerHour, tells("how often the daemon may clear the station's errors by itself; 0: never.")
+        PerHour, tells("how often the daemon itself may clear the station's errors; 0: never.")
     ] = 0
     peer_internal_timeout_s: Annotated[
         Seconds | None,
-        tells("""the time without the daemon after which the station has certainly switched itself off.
-        When absent, an operator cannot free a station that does not answer."""),
+        tells("""the time after which a station that does not hear from the daemon has certainly
+        switched itself off. When absent, an operator cannot free a station that does not answer."""),
     ] = None
 
 
 class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Settings of every charger with any driver."""
+    """Settings of every charger, whatever its driver."""
 
     limits: Annotated[ChargerDurations, tells("the limits that differ from their defaults.")] = (
         ChargerDurations()
@@ -90,17 +93,20 @@ class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_
         request. `serve_known` charges the robot; `refuse` only reports its name."""),
     ] = "refuse"
     on_death: Annotated[
-        Literal["stop", "keep"], tells("`stop` or `keep` the present charge when the daemon ends.")
+        Literal["stop", "keep"],
+        tells(
+            "the present charge when the daemon ends: `stop` ends the charge, `keep` continues it."
+        ),
     ] = "stop"
 
     def can_stop(self) -> bool:
-        """Return whether this station obeys an order to stop. Drivers override this for stations that
-        do not."""
+        """Return whether this station obeys an order to stop. The drivers of stations that do not obey
+        override this method."""
         return True
 
     def problems(self) -> Remarks:
-        """Yield the names that do not have the form FLEET/ROBOT. A robot may have a second receiver as
-        a spare."""
+        """Yield a problem for each name that does not have the form FLEET/ROBOT. Two receivers may
+        belong to the same robot, because a robot may have a spare."""
         for receiver, text in self.receivers.items():
             try:
                 robot(text)

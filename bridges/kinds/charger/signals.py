@@ -41,10 +41,10 @@ class Measured(msgspec.Struct, frozen=True):
     report it.
 
     `receiver_id`: the receiver on the pad, "" for none. `in_range`: a range check has found the robot's
-    coil in range for charging; False before the check. `range_ok`: the same fact from a station that
-    reports the range all the time, without a check. `at_height`: a movable pad is at its height for
-    charging. `volts`, `amps`: at the battery. `battery_percent`: the battery's charge. `temperatures`:
-    pairs of a name and °C.
+    coil in range for charging; False before the check. `range_ok`: the robot's coil is in range, from a
+    station that reports the range all the time, without a check. `at_height`: a movable pad is at its
+    height for charging. `volts`, `amps`: at the battery. `battery_percent`: the battery's charge.
+    `temperatures`: pairs of a name and °C.
     """
 
     receiver_id: str | None = None
@@ -77,12 +77,13 @@ class ChargerSample(msgspec.Struct, frozen=True):
 class ChargerOutputs(msgspec.Struct, frozen=True):
     """Every command to a station.
 
-    `power`: may the station energise its pad? With None the driver sends no order, because we did not
-    start the present charge, or because the station does not answer. `clear_errors`, `range_checks`:
-    the numbers of orders, since the daemon's start, to clear the errors and to check the range. Sending
-    such a command twice would do harm, so the outputs hold counts: a driver sends one command when a
-    count rises, and never repeats it, even if it failed. A station that always knows the robot's
-    position ignores `range_checks`.
+    `power`: whether the station may energise its pad. With None the driver sends no order, because we
+    did not start the present charge, or because the station does not answer.
+
+    `clear_errors`, `range_checks`: the numbers of orders, since the daemon's start, to clear the errors
+    and to check the range. Such a command would do harm if it were sent twice, so the outputs hold
+    counts. A driver sends one command when a count rises, and never repeats it, even after a failure. A
+    station that always knows the robot's position ignores `range_checks`.
     """
 
     power: bool | None = None

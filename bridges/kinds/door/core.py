@@ -2,28 +2,28 @@
 
 Rules:
 DOOR-1. An OPEN from any requester latches the hold; a repeated OPEN is harmless. A CLOSE releases the
-   hold after `close_grace_s`. An OPEN during that time cancels the CLOSE; a repeated CLOSE does not
-   prolong that time. The time is needed because RMF's supervisor first sends a CLOSE when it is
-   restarted, even if a robot stands in the doorway.
+   hold after `close_grace_s`. An OPEN within that time cancels the CLOSE. A repeated CLOSE does not
+   prolong that time. The delay is needed because RMF's supervisor sends a CLOSE when it restarts, even
+   if a robot stands in the doorway.
 DOOR-2. Nothing ever drives the door shut. Silence never releases the hold, because RMF is silent while
    a robot passes. One exception: if the site has set `supervisor_lost_s`, the hold ends when no node
    has published door requests for that time.
-DOOR-3. An obstruction switches the hold on again if the hold has ended and the door has not been seen
-   closed since.
+DOOR-3. After the end of a hold, an obstruction switches the hold on again, as long as the obstruction
+   lasts. When the door has been seen closed, an obstruction has no effect any more.
 DOOR-4. In a fire alarm the site's `on_fire` decides. `open` holds the door open, and no CLOSE releases
    the hold. `release` switches the hold off, clears the latch and refuses OPEN. The state is then
-   UNKNOWN, so that no robot enters a door that is about to close, and so that RMF's supervisor stops
-   repeating its request.
+   UNKNOWN for two reasons: no robot may enter a door that is about to close, and RMF's supervisor must
+   stop repeating its request.
 DOOR-5. Without a fresh reading the state is OFFLINE and the hold is off. The latch is kept, and the
    hold comes on again with the first good reading.
 DOOR-6. The state is OPEN only if the limit contact of the open door is active. If both limit contacts
-   are active, the state is UNKNOWN. If no limit contact is active, the state is MOVING, and UNKNOWN
-   after `travel_s`. If the controller does not report the door's position, the state is UNKNOWN.
+   are active, the state is UNKNOWN. If no limit contact is active, the state is MOVING, and after
+   `travel_s` UNKNOWN. If the controller does not report the door's position, the state is UNKNOWN.
 DOOR-7. If another node publishes states under this door's name, the state is OFFLINE and the hold is
    off.
 
-A fault is only a description; it changes no output. It lasts as long as its cause, so there is nothing
-to reset.
+A fault only describes; it changes no output. A fault ends with its cause, so an operator has nothing to
+reset.
 """
 
 from collections.abc import Iterator
@@ -64,7 +64,10 @@ def initial(limits: DoorLimits, now: float) -> DoorMemory:
 def decide(
     memory: DoorMemory, event: Event, now: float, limits: DoorLimits
 ) -> Decision[DoorMemory, DoorOutputs, DoorReport]:
-    """Decide one scan. `now`: monotonic s, never earlier than in the last scan. Never raises."""
+    """Apply the event, and derive the hold and the report. Never raises.
+
+    `now`: monotonic seconds, never earlier than in the last call.
+    """
     memory, refused = _hear(memory, event, now, limits)
     memory = _let_go(memory, now, limits)
     memory = _hold(memory, _look(memory, now, limits), now, limits)

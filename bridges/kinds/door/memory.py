@@ -11,10 +11,10 @@ from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
 
 
 class DoorLimits(msgspec.Struct, frozen=True):
-    """The settings of a door that its core needs. `t`: the durations. `debounce` maps a signal to its
-    debounce (s).
+    """The settings of a door that its core needs.
 
-    `estimated`: the passing of time replaces a missing limit contact.
+    `t`: the durations. `debounce` maps a signal to its debounce (s). `estimated`: the time since the
+    hold was switched replaces a missing limit contact.
     """
 
     t: DoorDurations = DoorDurations()
@@ -63,7 +63,8 @@ class DoorMemory(msgspec.Struct, frozen=True):
     releases the hold. `held`: the hold is on. `held_since`: the time when the hold was last switched.
     `closing`: the hold has ended, and the door has not been seen closed since. `between_since`: the
     door has been between its end positions since this time. `shut_since`: the door has not been fully
-    open since this time. `unattended_since`: no node has published requests since this time.
+    open since this time. `rival_at`: the time when another node for this door was last heard.
+    `unattended_since`: no node has published requests since this time.
     """
 
     latched_at: float | None = None

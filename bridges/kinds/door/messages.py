@@ -25,7 +25,7 @@ def accept(message: DoorRequest, settings: DoorSettings) -> OpenRequested | Clos
     if mode == DoorModeValue.MODE_CLOSED:
         return CloseRequested(message.requester_id)
     raise RequestRefused(
-        "mode that cannot be asked", f"requested_mode {mode}; only OPEN (2) and CLOSED (0) can be"
+        "mode that cannot be asked", f"requested_mode {mode} is neither OPEN (2) nor CLOSED (0)"
     )
 
 

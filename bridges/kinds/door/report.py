@@ -90,8 +90,8 @@ def _mode(memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits
 def _faults(
     memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits
 ) -> Iterator[Fault]:
-    """Yield all present faults, most serious first. No text contains a number that runs on, because
-    every change of a text is published."""
+    """Yield all present faults, most serious first. No text contains a running number, because every
+    change of a text is published."""
     if rivalled(memory, now):
         yield Fault("TWO_NODES_FOR_ONE_DEVICE", "another node publishes states of this door")
     if not view.fresh:

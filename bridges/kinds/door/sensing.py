@@ -1,9 +1,9 @@
 """Judgement of a door's inputs: debounce, age, and estimates for contacts that are not wired.
 
 Rules:
-DOOR-SENSING-1. A change of an input counts once it has lasted for the signal's debounce. The end of a
-   fire alarm or of an obstruction counts once it has lasted for `hazard_clear_s`. If the input of a
-   hazard has never settled yet, a single reading of the hazard counts.
+DOOR-SENSING-1. A change of an input counts when it has lasted for the signal's debounce. The end of a
+   fire alarm or of an obstruction counts when it has lasted for `hazard_clear_s`. Until the input of a
+   hazard has settled for the first time, a single reading of the hazard counts.
 DOOR-SENSING-2. After `stale_after_s` without a reading all inputs are unknown again, because the door
    may have moved.
 DOOR-SENSING-3. If the YAML sets `feedback: estimated`, the time for which the relay has been on or off
@@ -48,7 +48,7 @@ class BelievedDoor(msgspec.Struct, frozen=True):
 
 
 def take(senses: DoorSenses, sample: DoorSample, now: float, limits: DoorLimits) -> DoorSenses:
-    """Add one reading."""
+    """Add one reading to the senses."""
     if not is_fresh(senses, now, limits):
         senses = DoorSenses()
     contacts: dict[str, Contact] = {}
@@ -140,8 +140,8 @@ def _feared(contact: Contact | None) -> bool:
 def _estimates(
     senses: DoorSenses, held: bool, held_since: float, limits: DoorLimits
 ) -> tuple[float, float]:
-    """Return two times for a door without contacts: when it counts as open, and when it counts as
-    closed. NEVER: it does not."""
+    """Return the times at which a door without contacts counts as open and as closed; NEVER for a
+    position in which it will not count."""
     if not limits.estimated or senses.linked_since is None:
         return NEVER, NEVER
     since = max(held_since, senses.linked_since)

@@ -18,31 +18,33 @@ class DoorDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     stale_after_s: Annotated[
         StaleAfter,
-        tells("""the time without a good reading after which the door is OFFLINE and the hold is
-        off."""),
+        tells("how long reading may fail. After that the door is OFFLINE and the hold is off."),
     ] = 1.0
     close_grace_s: Annotated[
         Seconds,
         tells(
-            "the time from a CLOSE to the end of the hold. An OPEN in that time cancels the CLOSE."
+            "how long the hold stays on after a CLOSE. An OPEN within that time cancels the CLOSE."
         ),
     ] = 3.0
     travel_s: Annotated[
         Timeout,
-        tells("how long the door may be between its end positions; then its state is UNKNOWN."),
+        tells(
+            "how long the door may be between its end positions; after that its state is UNKNOWN."
+        ),
     ] = 10.0
     open_timeout_s: Annotated[
         Timeout, tells("how long a held door may take to open; after that a fault is shown.")
     ] = 15.0
     hazard_clear_s: Annotated[
-        Seconds, tells("how long a fire alarm or obstruction must be clear to count as over.")
+        Seconds,
+        tells("how long the input of a fire alarm or obstruction must be clear to count as over."),
     ] = 1.0
     open_delay_s: Annotated[
-        Seconds | None, tells("how long the door takes to open, for `feedback: estimated`.")
+        Seconds | None, tells("how long the door takes to open. Only for `feedback: estimated`.")
     ] = None
     max_hold_s: Annotated[
         Patience | None,
-        tells("how long RMF may hold the door; then a fault is shown, and the hold stays."),
+        tells("how long RMF may hold the door. After that a fault is shown, but the hold stays."),
     ] = None
     supervisor_lost_s: Annotated[
         Patience | None,
@@ -66,12 +68,12 @@ class DoorSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
     )
     feedback: Annotated[
         Literal["sensors", "estimated"],
-        tells("""`estimated` if a limit contact is missing; the passing of time then replaces the
-        contact. Logs and status mark an estimate; RMF cannot see the difference."""),
+        tells("""`estimated` if a limit contact is missing. The time since the hold was switched then
+        replaces the contact. Logs and status mark an estimate, but RMF cannot see the difference."""),
     ] = "sensors"
     on_fire: Annotated[
         Literal["open", "release"] | None,
-        tells("a fire alarm holds the door open (`open`) or releases the hold (`release`)."),
+        tells("the effect of a fire alarm: `open` holds the door open, `release` ends the hold."),
     ] = None
     pulse: Annotated[
         Pulse | None,
@@ -83,10 +85,12 @@ class DoorSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
         return self.limits.stale_after_s
 
     def problems(self) -> Remarks:
-        """Yield the fields that contradict each other."""
+        """Yield a problem for fields that contradict each other."""
         yield from alarm_problems(self)
         if self.alarm != "none" and self.on_fire is None:
-            text = "this door has no fire input, so it raises no alarm: delete alarm, or wire fire"
+            text = (
+                "this door has no fire input, so it can raise no alarm: delete alarm, or wire fire"
+            )
             yield ("alarm",), text
         if self.pulse and self.pulse.on_s >= self.pulse.every_s:
             yield (

@@ -6,8 +6,8 @@ from bridges.kinds.shared.decision import Attended, IoFailed, OperatorReset, Riv
 
 
 class DoorSample(msgspec.Struct, frozen=True):
-    """Every input of one door: active or not, in whichever way it is wired, and not debounced. None if
-    not wired.
+    """Every input of one door, not debounced. True: the input is active, however it is wired. None: the
+    input is not wired.
 
     `opened`, `closed`: the limit contacts of the fully open and the fully closed door. `obstruction`:
     somebody or something is in the doorway. `fire`: the fire alarm's contact. `lost`: the reason why

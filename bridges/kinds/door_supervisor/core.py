@@ -1,27 +1,31 @@
 """The door supervisor's core, for one door: its holders, and the requests to the door's node.
 
-It replaces RMF's supervisor (rmf_ros2, door_supervisor/Node.cpp). Fleet adapters and web users send
-their requests on `adapter_door_requests`; the supervisor sends requests on `door_requests`, with the
-requester_id "door_supervisor". Rules:
+This supervisor replaces RMF's supervisor (rmf_ros2, door_supervisor/Node.cpp). Fleet adapters and web
+users send their requests on `adapter_door_requests`. The supervisor sends its requests on
+`door_requests`, with the requester_id "door_supervisor".
+
+Rules:
 DOOR-SUPERVISOR-1. OPEN adds its requester to the holders, or renews the holder's stamp. CLOSE removes
    the requester. A stale request (`bridges/kinds/shared/freshness.py`) has no effect.
-DOOR-SUPERVISOR-2. The first holder causes an OPEN to the door's node. The departure of the last holder
-   causes a CLOSE.
-   - The request is repeated when a requester repeats OPEN. It is also repeated when the door's state
-     contradicts it: a held door is CLOSED or MOVING, or a door without holders is OPEN or MOVING.
-   - For INSIST_S after a holder has come, OPEN is repeated at every state of the door. The reason is
-     that the first OPEN may have been lost, and that an earlier CLOSE may be about to close the door.
+DOOR-SUPERVISOR-2. When the first holder comes, the supervisor sends OPEN to the door's node. When the
+   last holder leaves, the supervisor sends CLOSE.
+   - The request is repeated when a requester repeats OPEN. The request is also repeated when the door's
+     state contradicts it: a held door is CLOSED or MOVING, or a door without holders is OPEN or MOVING.
+   - For INSIST_S after a holder has come, OPEN is repeated at every state of the door. The first OPEN
+     may have been lost, or an earlier CLOSE may be about to close the door.
    - The states OFFLINE and UNKNOWN cause no request.
 DOOR-SUPERVISOR-3. Silence ends no hold, because a robot in the doorway is silent. After `open_alarm_s`
    a fault is shown, and the door stays open.
 DOOR-SUPERVISOR-4. During the quiet start, and whenever another supervisor publishes, our supervisor
    only listens. After that it sends OPEN at once to a door with holders. It sends CLOSE only when a new
-   state of the door contradicts CLOSE. One exception to the quiet start: a door that was held before
+   state of the door contradicts CLOSE. The quiet start has one exception. A door that was held before
    the restart, and is not seen CLOSED, is held from the start if no other supervisor is there. The
-   door's node may have died too, with a robot in the doorway.
+   reason is that the door's node may have died too, with a robot in the doorway.
 DOOR-SUPERVISOR-5. Two messages are at least GAP_S apart. An unchanged message is repeated after
    REPEAT_S at the earliest.
-The heartbeat (`report.py`) lists the holders of all doors, and `keep.py` saves them across a restart.
+
+The heartbeat (`report.py`) lists the holders of all doors. `keep.py` saves the holders across a
+restart.
 """
 
 from typing import Final

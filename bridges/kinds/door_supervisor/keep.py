@@ -1,6 +1,6 @@
 """The doors' holders, saved across a restart.
 
-A holder is saved before the heartbeat lists it, because a robot drives on as soon as it is listed.
+A holder is saved before the heartbeat lists the holder, because a listed robot drives on at once.
 """
 
 from collections.abc import Mapping
@@ -21,8 +21,8 @@ Stamp = Annotated[int, Meta(ge=0, lt=2**31 * SECOND_NS)]
 
 
 class KeptDoors(keep.Kept, frozen=True, forbid_unknown_fields=True):
-    """The saved holders. `doors` maps a door, and then a requester, to the stamp (ns) of the first OPEN
-    of the requester's visit."""
+    """The saved holders. `doors` maps a door to its holders, and each holder to a stamp (ns). This is
+    the stamp of the first OPEN of the holder's present visit."""
 
     doors: dict[Text, dict[Text, Stamp]]
 
@@ -41,8 +41,8 @@ def restore(kept: bytes, settings: DoorSupervisorSettings, now: float) -> dict[s
     """Make the memories at start from the bytes of `persist`, for the doors that the supervisor still
     serves.
 
-    Raises ValueError for other bytes. All holds count from now, because times on the monotonic clock
-    from before the restart mean nothing.
+    Raises ValueError for other bytes. Every hold counts from now, because monotonic times from before
+    the restart mean nothing.
     """
     found = keep.read(kept, KeptDoors, VERSION, "a table of doors and their holders")
     served = found.doors if settings.doors is None else set(settings.doors)

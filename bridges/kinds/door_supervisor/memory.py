@@ -12,7 +12,7 @@ from bridges.kinds.shared.graph_kind import LISTENS
 from bridges.messages.definitions import DoorModeValue
 
 VISIT_S: Final = 2.5
-"""The longest silence (s) within one visit. A waiting robot repeats OPEN at 1 Hz; an OPEN after a
+"""The longest silence (s) within one visit. A waiting robot repeats OPEN at 1 Hz. An OPEN after a
 longer silence begins a new visit."""
 
 CLOSED: Final = DoorModeValue.MODE_CLOSED
@@ -34,9 +34,9 @@ class DoorSupervisorLimits(msgspec.Struct, frozen=True):
 class Holder(msgspec.Struct, frozen=True):
     """A requester that has held the door open since `since` (our clock).
 
-    `stamp`: the stamp of its latest OPEN, which came at `asked_at`. `visit`: the stamp of the first
-    OPEN of its present visit; repeats do not change it. `restored`: the requester held the door before
-    our restart.
+    `asked_at`: the time of the latest OPEN. `stamp`: the stamp of the latest OPEN. `visit`: the stamp
+    of the first OPEN of the present visit; repeats do not change it. `restored`: the requester held the
+    door before our restart.
     """
 
     requester: str
@@ -55,11 +55,11 @@ class Holder(msgspec.Struct, frozen=True):
 class SupervisedDoor(msgspec.Struct, frozen=True):
     """The memory of one door from event to event.
 
-    `passive`: if we may not publish, the reason why requesters must wait. `holders`: in the order of
-    arrival. `requesters`: the record of each name. `mode`: the door's last mode, heard at `shown_at`.
-    `at_once`: we may hold a restored holder's door even before we may publish. `sent`: the last request
-    to the door's node; None after a change of the permission to publish. `prompted`: the request must
-    be repeated.
+    `passive`: if we may not publish, the reason why requesters must wait. `at_once`: a door with a
+    restored holder may be held even before we may publish. `holders`: the requesters that hold the
+    door, in the order of arrival. `requesters`: the record of each requester's stamps. `mode`: the
+    door's last mode, heard at `shown_at`. `sent`: the last request to the door's node; None after a
+    change of the permission to publish. `prompted`: the request must be repeated.
     """
 
     door: str
@@ -111,5 +111,5 @@ class SupervisedDoor(msgspec.Struct, frozen=True):
         return max(self.shown_at, self.holders[0].since) + SILENT_S
 
     def holder(self, requester: str) -> Holder | None:
-        """Find this requester among the holders; None if it does not hold the door."""
+        """Find this requester among the holders; None if the requester does not hold the door."""
         return next((h for h in self.holders if h.requester == requester), None)

@@ -27,8 +27,8 @@ def accept_request(
     stamps are compared only with stamps of the same requester.
 
     A request without a requester_id is refused, because nobody filled in its fields, and its default
-    mode, 0, would mean CLOSE. A request with our own requester_id is refused too: it is our own request
-    to a door, and a renamed topic has brought it back.
+    mode, 0, would mean CLOSE. A request with our own requester_id is refused too. Such a request is our
+    own request to a door, which a renamed topic has brought back to us.
     """
     check_listed("door", request.door_name, settings.doors)
     who = request.requester_id
@@ -43,7 +43,7 @@ def accept_request(
         return RequesterOpens(who, stamp)
     if mode == DoorModeValue.MODE_CLOSED:
         return RequesterCloses(who, stamp)
-    text = f"requested_mode {mode}; only OPEN (2) and CLOSED (0) can be"
+    text = f"requested_mode {mode} is neither OPEN (2) nor CLOSED (0)"
     raise RequestRefused("mode that cannot be asked", text)
 
 
@@ -57,7 +57,7 @@ def accept_state(state: DoorState, settings: DoorSupervisorSettings, wall: float
 
 
 def device_name(message: DoorRequest | DoorState) -> str:
-    """Return the door that a message is about."""
+    """Return the name of the door in a message."""
     return message.door_name
 
 
@@ -69,8 +69,8 @@ def requester(event: RequesterOpens | RequesterCloses | DoorStateHeard) -> str:
 def stamped(
     message: DoorRequest | SupervisorHeartbeat, time: Time
 ) -> DoorRequest | SupervisorHeartbeat:
-    """Add the time of sending to a message. A heartbeat carries only its requesters' stamps, so it
-    stays unchanged."""
+    """Add the time of sending to a message. A heartbeat stays unchanged, because it has only the stamps
+    of its requesters."""
     if isinstance(message, SupervisorHeartbeat):
         return message
     return replace(message, request_time=time)

@@ -1,10 +1,12 @@
 """Doors and their holders: in the heartbeat, in the log and in the status file.
 
-Fleet adapters rely on the heartbeat. Their phase DoorOpen ends only when the heartbeat lists the robot,
-and their phase DoorClose only when it no longer lists the robot. If the heartbeat lists a robot for a
-door that the robot does not hold, the adapter sends CLOSE (rmf_ros2, RobotContext.cpp
-_check_door_supervisor). RMF's own supervisor sends the heartbeat only after adapter requests. So the
-sessions of a restarted fleet adapter stay in it for ever. Our supervisor also sends the heartbeat each
+Fleet adapters rely on the heartbeat. Their phase DoorOpen ends only when the heartbeat lists the robot.
+Their phase DoorClose ends only when the heartbeat no longer lists the robot. If the heartbeat lists a
+robot for a door that the robot does not hold, the adapter sends CLOSE (rmf_ros2, RobotContext.cpp
+_check_door_supervisor).
+
+RMF's own supervisor sends the heartbeat only after adapter requests. Therefore the sessions of a
+restarted fleet adapter stay in that heartbeat for ever. Our supervisor also sends the heartbeat each
 second.
 """
 
@@ -29,7 +31,7 @@ class DoorHoldReport(msgspec.Struct, frozen=True):
     """One door, for the log and the status file. Times are monotonic seconds.
 
     `holders`: pairs of a requester and the start of its hold. `mode`: the door's last mode, heard at
-    `read_at`. `waits`: the reason why we send nothing to the door for the holders; else "".
+    `read_at`. `waits`: the reason why we send nothing to a held door; else "".
     """
 
     read_at: float | None

@@ -13,8 +13,8 @@ class DoorSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
 
     doors: Annotated[
         list[Name] | None,
-        tells("""the doors that the supervisor serves; messages about other doors are refused. When
-        absent, it serves every door that it hears of, as RMF's supervisor does."""),
+        tells("""the doors that the supervisor serves. Messages about other doors are refused. When
+        absent, the supervisor serves every door that it hears of, as RMF's supervisor does."""),
     ] = None
     open_alarm_s: Annotated[
         Patience,
@@ -25,7 +25,7 @@ class DoorSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
     def problems(self) -> Remarks:
         """Yield a problem if the list of doors is empty."""
         if self.doors == []:
-            yield ("doors",), "is empty: name the doors, or leave it out to serve every door"
+            yield ("doors",), "is empty: name the doors, or delete the key to serve every door"
 
 
 def speaks_of(settings: DoorSupervisorSettings) -> Iterable[Place]:

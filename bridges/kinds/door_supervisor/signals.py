@@ -8,14 +8,14 @@ from bridges.messages.definitions import DoorModeValue
 
 
 class RequesterOpens(msgspec.Struct, frozen=True):
-    """A requester's OPEN. `stamp`: its time (ns) by the requester's clock."""
+    """A requester's OPEN. `stamp`: the request's time (ns) by the requester's clock."""
 
     requester: str
     stamp: int
 
 
 class RequesterCloses(msgspec.Struct, frozen=True):
-    """A requester's CLOSE. `stamp`: its time (ns) by the requester's clock."""
+    """A requester's CLOSE. `stamp`: the request's time (ns) by the requester's clock."""
 
     requester: str
     stamp: int

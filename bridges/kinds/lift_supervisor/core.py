@@ -1,29 +1,32 @@
 """The lift supervisor's core, for one lift: the order of sessions, and the requests to the lift's node.
 
-It replaces RMF's supervisor (rmf_ros2, lift_supervisor/Node.cpp). Fleet adapters send their requests on
-`adapter_lift_requests`. The supervisor passes on the requests of one session at a time to the lift's
-node, on `lift_requests`, until the lift's states show that they were obeyed.
-`bridges/kinds/shared/freshness.py` rejects stale requests. Rules:
+This supervisor replaces RMF's supervisor (rmf_ros2, lift_supervisor/Node.cpp). Fleet adapters send
+their requests on `adapter_lift_requests`. The supervisor passes on the requests of one session at a
+time, on `lift_requests`, until the lift's states show that the lift's node has obeyed.
+`bridges/kinds/shared/freshness.py` rejects stale requests.
+
+Rules:
 LIFT-SUPERVISOR-1. Sessions are served in the order of their first requests. A session leaves the queue
-   at its END, or after `silent_after_s` without a request. This time does not run if the lift is
+   at its END, or after `silent_after_s` without a request. This time stands still while the lift is
    silent, because adapters repeat their requests only when the lift's states come.
 LIFT-SUPERVISOR-2. The lift's states name the session that has the lift. This session is served before
    the queue if its robot still requests it. If nobody has requested the session for `orphan_after_s`,
-   the supervisor ends it.
+   the supervisor ends the session.
 LIFT-SUPERVISOR-3. One session at a time has its turn. Its request is sent when it is new or has
    changed. The request is repeated when the lift's state does not fulfil it. The request is also
    repeated when the adapter has repeated it, because the lift's node would otherwise consider RMF
-   silent. The request is never sent if the lift shows another session.
+   silent. The request is never sent while the lift shows another session.
 LIFT-SUPERVISOR-4. Only END ends a turn. Usually the holder sends END, wherever the lift is and in any
-   mode. For a silent holder the supervisor sends END: after `silent_after_s` if the lift never showed
-   the holder's session, else after `holder_ttl_s`, if the site has set that time. END is repeated until
-   a later state shows another session or none. Only then is the next session served.
-LIFT-SUPERVISOR-5. If the lift is in fire, emergency or offline mode, no robot is sent to it and the
-   queue waits. The supervisor still passes on END, and also requests for HUMAN mode, because they call
-   no robot to the lift.
+   mode. For a silent holder the supervisor sends END. If the lift never showed the holder's session,
+   the supervisor sends END after `silent_after_s`. Otherwise the supervisor sends END after
+   `holder_ttl_s`, if the site has set that time. END is repeated until a later state shows another
+   session or none. Only after that is the next session served.
+LIFT-SUPERVISOR-5. While the lift is in fire, emergency or offline mode, no robot is sent to the lift
+   and the queue waits. The supervisor still passes on END. It also passes on requests for HUMAN mode,
+   because they call no robot to the lift.
 LIFT-SUPERVISOR-6. During the quiet start, and whenever another supervisor publishes, our supervisor
-   only listens. After that it begins with the states and requests that it has heard in the meantime, so
-   that a restart ends no ride.
+   only listens. After that it begins with the states and requests that it has heard in the meantime.
+   Therefore a restart ends no ride.
 LIFT-SUPERVISOR-7. Two messages are at least GAP_S apart. An unchanged message is repeated after
    REPEAT_S at the earliest.
 """
@@ -62,11 +65,12 @@ def initial(lift: str, started_at: float) -> SupervisedLift:
 
 
 def idle(memory: SupervisedLift, now: float) -> bool:
-    """Return whether this lift may be forgotten, after a long silence.
+    """Return whether the memory of this lift may be dropped, after a long silence.
 
-    A lift without claims is forgotten after FORGOTTEN_S: if it comes back, its states show any session
-    that must still end. If robots only wait for the lift, it is forgotten after 10 times as long; they
-    request again when the lift is back. A lift that has claims and shows a session is never forgotten.
+    A lift without claims is dropped after FORGOTTEN_S. If the lift comes back, its states show any
+    session that must still end. A lift for which robots only wait is dropped after 10 times
+    FORGOTTEN_S. These robots request again when the lift is back. A lift that has claims and shows a
+    session is never dropped.
     """
     heard_at = max(memory.heard_at, memory.shown_at)
     has_it = memory.session_shown or (memory.turn and memory.turn.seen)
@@ -248,8 +252,8 @@ def _take_turns(memory: SupervisedLift, now: float, limits: LiftSupervisorLimits
 def _obey_the_lift(
     memory: SupervisedLift, shown: str, now: float, limits: LiftSupervisorLimits
 ) -> SupervisedLift:
-    """Serve or end a session that the lift shows although we did not begin it. The session is from
-    before our restart, or of another node."""
+    """Serve or end a session that the lift shows although we did not begin it. Such a session is from
+    before our restart, or from another node."""
     if memory.claim(shown):
         return _begin(memory, Turn(shown, now, seen=True))
     if memory.shown_at >= memory.session_since + limits.orphan_after_s:
@@ -260,8 +264,8 @@ def _obey_the_lift(
 def _let_go(
     memory: SupervisedLift, turn: Turn, now: float, limits: LiftSupervisorLimits
 ) -> SupervisedLift:
-    """End a silent holder's turn: after `silent_after_s` if the lift never showed the session, else
-    after `holder_ttl_s`."""
+    """End the turn of a silent holder. If the lift never showed the session, the turn ends after
+    `silent_after_s`, else after `holder_ttl_s`."""
     claim = memory.claim(turn.session)
     assert claim is not None
     after_s = limits.holder_ttl_s if turn.seen else limits.silent_after_s
@@ -299,8 +303,8 @@ def wanted(memory: SupervisedLift) -> LiftRequest | None:
 
 
 def _due_at(memory: SupervisedLift, message: LiftRequest | None) -> float:
-    """Return the time to send this request. If the last END had another floor, this END counts as its
-    repeat."""
+    """Return the time to send this request. An END that differs from the last END only in its floor
+    counts as a repeat."""
     if message is None:
         return NEVER
     new = memory.sent is None or (message != memory.sent and message.request_type != END)

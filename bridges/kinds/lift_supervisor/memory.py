@@ -12,7 +12,7 @@ from bridges.kinds.shared.graph_kind import LISTENS
 from bridges.messages.definitions import LiftMode, LiftRequest
 
 NOBODY_IS_SENT: Final = (LiftMode.MODE_FIRE, LiftMode.MODE_EMERGENCY, LiftMode.MODE_OFFLINE)
-"""The modes of a lift in which no robot is sent to it."""
+"""The lift modes in which no robot is sent to the lift."""
 
 
 class LiftSupervisorLimits(msgspec.Struct, frozen=True):
@@ -50,8 +50,11 @@ class SessionClaim(msgspec.Struct, frozen=True):
 
 
 class Turn(msgspec.Struct, frozen=True):
-    """The session whose requests we pass on. `ends`: we now send the session's END. `by_person`: a
-    person sent this END. `seen`: the lift's states have shown this session."""
+    """The session whose requests we pass on.
+
+    `since`: the start of the turn. `ends`: we now send the session's END. `by_person`: a person sent
+    this END. `seen`: the lift's states have shown this session.
+    """
 
     session: str
     since: float
@@ -63,12 +66,13 @@ class Turn(msgspec.Struct, frozen=True):
 class SupervisedLift(msgspec.Struct, frozen=True):
     """The memory of one lift from event to event.
 
-    `passive`: if we may not publish, the reason why requesters must wait. `claims`: in the order of
-    first requests, including the holder's claim. `heard_at`: the time of the last adapter request.
-    `requesters`: the record of each name. `shown`: the latest state, which came at `shown_at`.
-    `session_since`: states have shown this session since this time. `flowing_since`: states have come
-    without a gap since this time. `sent`: the last request of this turn. `last_sent`: the last request
-    of any turn, sent at `sent_at`. `prompted`: the request must be repeated.
+    `passive`: if we may not publish, the reason why requesters must wait. `claims`: the waiting
+    sessions and the holder, in the order of their first requests. `heard_at`: the time of the last
+    adapter request. `requesters`: the record of each session's stamps. `shown`: the latest state.
+    `shown_at`: the time of the latest state. `session_since`: the states have shown the present session
+    since this time. `flowing_since`: states have come without a gap since this time. `sent`: the last
+    request of this turn. `last_sent`: the last request of any turn, sent at `sent_at`. `prompted`: the
+    request must be repeated.
     """
 
     lift: str
@@ -89,7 +93,7 @@ class SupervisedLift(msgspec.Struct, frozen=True):
     prompted: bool = False
 
     def claim(self, session: str) -> SessionClaim | None:
-        """Find the claim of this session; None if it has no claim."""
+        """Find the claim of this session; None if the session has no claim."""
         return next((claim for claim in self.claims if claim.session == session), None)
 
     @property

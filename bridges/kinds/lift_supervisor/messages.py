@@ -28,7 +28,7 @@ def accept_request(
     """Turn an adapter's request into an event. Raises RequestRefused. `wall`: our clock (s since the
     epoch).
 
-    Of an END_SESSION only the session counts, because fleet adapters send no floor with it
+    Only the session of an END_SESSION counts, because fleet adapters send END_SESSION without a floor
     (rmf_fleet_adapter RobotContext.cpp).
     """
     check_listed("lift", request.lift_name, settings.lifts)
@@ -72,7 +72,7 @@ def accept_state(state: LiftState, settings: LiftSupervisorSettings, wall: float
 
 
 def device_name(message: LiftRequest | LiftState) -> str:
-    """Return the lift that a message is about."""
+    """Return the name of the lift in a message."""
     return message.lift_name
 
 

@@ -12,7 +12,7 @@ from bridges.messages.definitions import LiftMode
 
 SILENT: Final = "LIFT_SILENT"
 OVERDUE_S: Final = 30.0
-"""The time (s) after which a lift that has not obeyed is at fault."""
+"""The time (s) within which a lift must obey. After that a fault is shown."""
 
 
 class SupervisorReport(msgspec.Struct, frozen=True):

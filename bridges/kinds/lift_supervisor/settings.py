@@ -13,8 +13,8 @@ class LiftSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
 
     lifts: Annotated[
         list[Name] | None,
-        tells("""the lifts that the supervisor serves; messages about other lifts are refused. When
-        absent, it serves every lift that it hears of, as RMF's supervisor does."""),
+        tells("""the lifts that the supervisor serves. Messages about other lifts are refused. When
+        absent, the supervisor serves every lift that it hears of, as RMF's supervisor does."""),
     ] = None
     quiet_start_s: Annotated[
         QuietStart,
@@ -24,8 +24,8 @@ class LiftSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
     ] = 3.0
     silent_after_s: Annotated[
         Patience,
-        tells("""the time without a request after which a waiting session leaves the queue. Fleet
-        adapters repeat their requests at every LiftState."""),
+        tells("""how long a waiting session may be without a request; after that it leaves the queue.
+        Fleet adapters repeat their requests at every LiftState."""),
     ] = 10.0
     holder_alarm_s: Annotated[
         Patience, tells("how long the holder may be silent before a fault is shown.")
@@ -37,8 +37,8 @@ class LiftSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
     ] = None
     clock_synchronised: Annotated[
         bool,
-        tells("""this clock and the fleet adapters' clocks agree (NTP), so that the age of a request
-        can be judged. Otherwise only the stamps of one requester are compared."""),
+        tells("""whether this machine's clock and the fleet adapters' clocks agree (NTP). If they agree,
+        the age of a request is judged. Otherwise only the stamps of one requester are compared."""),
     ] = False
     max_request_age_s: Annotated[
         Seconds,
@@ -55,7 +55,7 @@ class LiftSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
             text = f"must be more than holder_alarm_s ({least}), so that the alarm comes first"
             yield ("holder_ttl_s",), text
         if self.lifts == []:
-            yield ("lifts",), "is empty: name the lifts, or leave it out to serve every lift"
+            yield ("lifts",), "is empty: name the lifts, or delete the key to serve every lift"
 
 
 def speaks_of(settings: LiftSupervisorSettings) -> Iterable[Place]:

@@ -15,8 +15,10 @@ class Target(msgspec.Struct, frozen=True):
 
 
 class RideRequested(msgspec.Struct, frozen=True):
-    """An adapter's request for AGV or HUMAN mode. `stamp`: its time (s) by the adapter's clock.
-    `age_s`: its age by our clock."""
+    """An adapter's request for AGV or HUMAN mode.
+
+    `stamp`: the request's time (s) by the adapter's clock. `age_s`: the request's age (s) by our clock.
+    """
 
     session: str
     target: Target

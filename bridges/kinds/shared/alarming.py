@@ -38,13 +38,13 @@ class AlarmingSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown
     ] = "none"
     fleets: Annotated[
         tuple[Name, ...],
-        tells("""the fleets that are told, by their names in RMF; all fleets when absent. Only
-        `emergency_signal` names fleets."""),
+        tells("""the fleets that are told of the alarm, by their names in RMF. When absent, all fleets
+        are told. Only the topic `emergency_signal` can name fleets."""),
     ] = ()
     without_fleets: Annotated[
         Literal["tell_all", "tell_nobody"] | None,
-        tells("""with `fleets`, the effect of an alarm under a release of RMF without
-        `emergency_signal` (Jazzy and older): all fleets of the graph stop, or no fleet is told."""),
+        tells("""the effect of an alarm with `fleets` if RMF's release has no `emergency_signal` (Jazzy
+        and older). `tell_all`: all fleets of the graph stop. `tell_nobody`: no fleet is told."""),
     ] = None
 
 

@@ -16,11 +16,12 @@ T_co = TypeVar("T_co", covariant=True)
 
 
 class Settled(msgspec.Struct, Generic[T_co], frozen=True):
-    """A debounced input. `value` counts. `candidate` has been read since `since` (s), and may become
-    the value.
+    """A debounced input.
 
-    `steady_at`: the time when `value` was last confirmed; None before the first. `torn_since`: the time
-    since which readings have been unsteady; None if they are steady.
+    `value`: the value that counts. `candidate`: the value that has been read since `since` (s), and may
+    become `value`. `steady_at`: the time when `value` was last confirmed; None before the first
+    confirmation. `torn_since`: the time since which readings have been unsteady; None if they are
+    steady.
     """
 
     value: T_co | None
@@ -35,7 +36,8 @@ class Settled(msgspec.Struct, Generic[T_co], frozen=True):
 
 
 def settle(before: "Settled[T] | None", seen: T, now: float, hold_s: float) -> "Settled[T]":
-    """Add one sample. A value counts after it was seen for `hold_s` seconds, and at once with 0."""
+    """Add one sample. A value counts after it was seen for `hold_s` seconds. With `hold_s` 0 it counts
+    at once."""
     if before is None:
         before = Settled(None, seen, now, torn_since=now)
     elif seen != before.candidate:

@@ -23,7 +23,7 @@ R = TypeVar("R", bound="Report")
 
 
 Said = tuple[Topic[Message], Message]
-"""A message, after the topic on which it must be published."""
+"""A message to publish, as a pair of topic and message."""
 
 
 class Fault(msgspec.Struct, frozen=True):
@@ -61,7 +61,7 @@ class RivalSeen(msgspec.Struct, frozen=True):
 
 
 class Attended(msgspec.Struct, frozen=True):
-    """The answer to a question: does any node publish the requests that this device obeys?"""
+    """The news whether any node publishes the requests that this device obeys."""
 
     yes: bool
 

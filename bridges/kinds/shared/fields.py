@@ -1,9 +1,9 @@
 """The building blocks of every device YAML: numbers with units, names, common structs.
 
-`bridges/settings/load.py` reads a file into these types; the kinds and drivers derive their own structs
-from them. A struct may have a method `problems() -> Remarks` that checks several fields together. It
-yields pairs: a path below the struct, and a text with the remedy. The loader calls `problems` when
-every field is present and has the right type, even if a struct below has problems of its own.
+`bridges/settings/load.py` reads a file into these types. The kinds and drivers derive their own structs
+from them. A struct may have a method `problems() -> Remarks` that checks several fields together. The
+method yields pairs: a path below the struct, and a text with the remedy. The loader calls `problems`
+when every field is present and has the right type, even if a struct below has problems of its own.
 """
 
 from typing import Annotated
@@ -17,7 +17,7 @@ Name = Annotated[
         min_length=1,
         max_length=128,
         pattern=r"^[^\x00-\x20\x7f-\x9f]([^\x00-\x1f\x7f-\x9f]*[^\x00-\x20\x7f-\x9f])?$(?!\n)",
-        extra={"pattern": "text without control characters, or spaces at its ends"},
+        extra={"pattern": "text without control characters, and without spaces at its ends"},
     ),
 ]
 """A name in RMF, which may be any text. Put a text in quotes if YAML would read it as a number or
@@ -56,13 +56,13 @@ Patience = Annotated[
 
 
 def tells(text: str) -> Meta:
-    """Describe a key of the YAML. The schema, the reference and an editor show this text; its line
-    breaks count as spaces."""
+    """Describe a key of the YAML. The schema, the reference and an editor show this text. Line breaks
+    count as spaces."""
     return Meta(description=" ".join(text.split()))
 
 
 class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Settings of every lift, door and charger with any driver."""
+    """Settings of every device with any driver."""
 
     bus: Annotated[
         Name | None, tells("the device's bus; not needed if the file has only one bus.")
@@ -72,7 +72,9 @@ class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     ] = None
     accept_unsafe: Annotated[
         dict[Name, Name],
-        tells("signal -> the reason why its unsafe wiring is accepted, which `check` prints."),
+        tells(
+            "signal -> the reason why the site accepts its unsafe wiring. `check` prints the reason."
+        ),
     ] = {}
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:

@@ -1,15 +1,17 @@
 """Decides whether an adapter's request counts, or is a replay of an old request.
 
-A stamp comes from the requester's clock, which may disagree with our clock. So a stamp is first
-compared with the earlier stamps of the same requester. Rules:
+A stamp comes from the requester's clock, which may disagree with our clock. Therefore a stamp is first
+compared with the earlier stamps of the same requester.
+
+Rules:
 FRESHNESS-1. A request counts if its stamp is newer than the stamps of all requests of the same
-   requester that counted before. An END is compared only with earlier ENDs, because an operator, whose
-   clock may differ, may end a robot's session.
+   requester that counted before. An END is compared only with earlier ENDs. The reason is that an
+   operator may end a robot's session, and the operator's clock may differ.
 FRESHNESS-2. A retained topic (`adapter_lift_requests`) replays up to 100 old requests of every adapter
-   to each new subscriber, and again when an adapter's network comes back. On such a topic an equal
-   stamp is a replay. A requester's first request counts only if it was sent after our own start. Later
-   requests are compared only with the requester's own stamps. With `clock_synchronised` the age of
-   every request is judged too.
+   to each new subscriber. The replay comes again when an adapter's network comes back. On such a topic
+   an equal stamp is a replay. A requester's first request counts only if it was sent after our own
+   start. Later requests are compared only with the requester's own stamps. With `clock_synchronised`
+   the age of every request is judged too.
 FRESHNESS-3. On a topic that is not retained (`adapter_door_requests`) an old request was delayed or
    arrived twice. On such a topic an equal stamp counts, because a requester without a clock always
    sends 0. A requester's first request counts. A requester that holds no door is forgotten after a
@@ -17,9 +19,10 @@ FRESHNESS-3. On a topic that is not retained (`adapter_door_requests`) an old re
 FRESHNESS-4. During the quiet start on a retained topic a stamp from the future does not count. The
    reason is that every replayed request looks new if our clock is not set yet.
 FRESHNESS-5. A rejected request may come from a live requester whose clock is wrong or was set back.
-   Such a request counts once it has been repeated for longer than a replay lasts (REPLAY_S, retained
-   topics), or for longer than a message can be late (LATE_S, other topics). The repeats' stamps must
-   rise, or all be 0. A pause of BROKEN_OFF_S, or a stamp that does not rise, restarts that time.
+   Such a request counts when the requester has repeated it for long enough. On retained topics that is
+   REPLAY_S, longer than a replay lasts. On other topics it is LATE_S, longer than a message can be
+   late. The repeats' stamps must rise, or all be 0. A pause of BROKEN_OFF_S, or a stamp that does not
+   rise, restarts that time.
 """
 
 from collections.abc import Collection, Mapping
@@ -33,8 +36,8 @@ from bridges.kinds.shared.durations import AGES_AGO, FORGOTTEN_S, NEVER
 from bridges.messages.definitions import Time
 
 REPLAY_S: Final = 1.0
-"""The longest duration of a replay (s). A replay comes in a burst; a live requester repeats itself at 1
-Hz."""
+"""The longest duration of a replay (s). A replay comes in a burst, while a live requester repeats its
+request at 1 Hz."""
 LATE_S: Final = 10.0
 """The greatest delay (s) of a message on a topic that is not retained."""
 BROKEN_OFF_S: Final = 3.0
@@ -46,9 +49,9 @@ SECOND_NS: Final = 10**9
 class Rules(msgspec.Struct, frozen=True):
     """The rules for judging a topic's requests.
 
-    `most_s`: the greatest age of a request, by its stamp. `known_clocks`: a requester with a request
-    that counted before is judged only by its own stamps. `future_s`: the greatest time by which a stamp
-    may be ahead of our clock. `retained`: the topic replays old requests.
+    `most_s`: the greatest age (s) of a request, by its stamp. `known_clocks`: after the first request
+    that counted, a requester is judged only by its own stamps. `future_s`: the greatest time (s) by
+    which a stamp may be ahead of our clock. `retained`: the topic replays old requests.
     """
 
     most_s: float = NEVER
@@ -58,13 +61,14 @@ class Rules(msgspec.Struct, frozen=True):
 
     @property
     def doubt_s(self) -> float:
-        """The time (s) for which a doubted requester must repeat itself before its request counts."""
+        """The time (s) for which a requester must repeat a rejected request until the request
+        counts."""
         return REPLAY_S if self.retained else LATE_S
 
 
 class Requester(msgspec.Struct, frozen=True):
-    """The record of one requester. All its stamps have the same unit, and come from the requester's own
-    clock.
+    """The record of one requester's stamps. All stamps have the same unit, and come from the
+    requester's own clock.
 
     `newest`: the newest stamp that counted. `newest_end`: the newest stamp of an END that counted.
     `heard_at`: the time when a request last counted. `doubted`: the stamp of the last request that did
@@ -108,7 +112,8 @@ class Requester(msgspec.Struct, frozen=True):
 
 
 Requesters = Mapping[str, Requester]
-"""The record of each name, in the order in which the requesters were last heard."""
+"""The record of each requester, by its name. The requester that has been silent for the longest time
+comes first."""
 
 
 def hear(

@@ -2,7 +2,7 @@
 
 A supervisor or coordinator has no driver and no bus. It learns of its subjects (lifts, doors) from
 messages, and keeps one core memory for each subject. `bridges/kinds/<kind>/__init__.py` holds the
-`KIND`; `bridges/runtime/graph_node.py` runs it.
+record `KIND`, and `bridges/runtime/graph_node.py` runs the kind.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -25,8 +25,8 @@ class MaySpeak(Struct, frozen=True):
     publishes.
 
     `waits`: if the core may not publish, the reason why requesters must wait. `at_once`: no other node
-    publishes. Messages that a restart must not interrupt may then be sent even during the quiet start.
-    `alone`: no other node publishes on a topic of `yields`.
+    publishes. The core may then send messages that a restart must not interrupt, even during the quiet
+    start. `alone`: no other node publishes on a topic of `GraphKind.yields`.
     """
 
     yes: bool
@@ -46,36 +46,49 @@ GraphEvent = Union[MaySpeak, Woken, OperatorReset, E]  # noqa: UP007
 class GraphKind(Struct, Generic[S, L, M, E, R], frozen=True):
     """One kind without hardware: its settings, limits, memory, events and report.
 
-    `devices_key`: the section of its settings in the YAML. `settings`: the struct for this section.
-    `requests`: each topic that the node hears, with its function `accept(message, settings, wall) ->
-    event`. `accept` raises RequestRefused; `wall` is our clock (s since the epoch). `publishes`: the
-    topics on which the node publishes. `sole`: topics that may have only one publisher; if another node
-    publishes there, our node only listens. `yields`: topics on which our node is silent if another node
-    publishes there; on its other topics our node continues. `device_name`: a function that returns the
-    subject of a message. `shown_by`: the topic on which a subject publishes its own states. Such states
-    prove that the subject exists, while a request may name anything. None: there is only one subject.
-    `reserved(settings)`: the subjects that the YAML names. `requester(event)`: the sender of a request;
-    "" for a state. `requesters(memory)`: the requesters that the subject remembers. Anybody can invent
-    requesters, so their number over all subjects has a bound. `quiet_s(settings)`: the time (s) after
-    the start in which the node only listens. `limits(settings)`: the settings that the core needs.
-    `initial(subject, started_at)`: a subject's memory; `started_at` is the daemon's start. `decide`:
-    the core. Its messages have no stamps: `stamped(message, time)` adds them when the node sends them.
-    `summary(report, now)`: keys and values for the status file and `watch`. `idle(memory, now)`: may
-    this subject be forgotten? `answer(request, reason)`: the published answer to a refused request;
-    None for no answer. `request` is the message if `accept` refused it, and the event if the core
-    refused it. `on_map(settings)`: settings that name a place on RMF's map
-    (`bridges/kinds/shared/kind.py`).
+    Topics:
+    - `requests`: each topic that the node hears, with its function `accept(message, settings, wall) ->
+      event`. `accept` raises RequestRefused. `wall` is our clock (s since the epoch).
+    - `publishes`: the topics on which the node publishes.
+    - `sole`: topics that may have only one publisher. If another node publishes on such a topic, our
+      node only listens.
+    - `yields`: topics on which our node is silent if another node publishes on them. Our node continues
+      on its other topics.
+    - `shown_by`: the topic on which a subject publishes its own states. Such states prove that the
+      subject exists, while a request may name anything. None: there is only one subject.
 
-    `together(memories)`: one message about all subjects, sent each second and at every change. Only
-    some kinds have such a message. A kind whose memory must survive a restart has two functions.
-    `persist(memories)` returns the bytes to save, which change only when something worth keeping has
-    changed. `restore(kept, settings, now)` reads them, and raises ValueError for bytes that `persist`
-    did not make. The memory is saved before `together` is sent. `urgent(memory)`: does the subject hold
-    something that a restart must not interrupt (`MaySpeak.at_once`)?
+    Settings:
+    - `devices_key`: the section of its settings in the YAML. `settings`: the struct for this section.
+    - `limits(settings)`: the settings that the core needs.
+    - `quiet_s(settings)`: the time (s) after the start in which the node only listens.
+    - `reserved(settings)`: the subjects that the YAML names.
+    - `on_map(settings)`: settings that name a place on RMF's map (`bridges/kinds/shared/kind.py`).
+    - `tables(settings)`: tables for `check`.
+    - `warnings(settings)`: legal settings that may be mistakes, each as its path and a text.
+    - `speaks_of(settings)`: the devices that the settings name, each as path, kind and name. Some file
+      of the site must define each of these devices.
 
-    `tables(settings)`: tables for `check`. `warnings(settings)`: legal settings that may be mistakes,
-    each as its path and a text. `speaks_of(settings)`: the devices that the settings name, each as
-    path, kind and name. Some file of the site must define each of these devices.
+    The core:
+    - `initial(subject, started_at)`: a subject's memory. `started_at` is the daemon's start.
+    - `decide`: the core. Its messages have no stamps.
+    - `stamped(message, time)`: the message with its stamp, when the node sends it.
+    - `summary(report, now)`: keys and values for the status file and `watch`.
+    - `idle(memory, now)`: whether the subject may be forgotten.
+    - `device_name(message)`: the subject of a message.
+    - `requester(event)`: the sender of a request; "" for a state.
+    - `requesters(memory)`: the requesters that the subject remembers. Anybody can invent requesters, so
+      their number over all subjects has a bound.
+    - `answer(request, reason)`: the published answer to a refused request; None for no answer.
+      `request` is the message if `accept` refused it, and the event if the core refused it.
+
+    Only some kinds have these:
+    - `together(memories)`: one message about all subjects, sent each second and at every change.
+    - `persist(memories)`: the bytes to save for a restart. The bytes change only when something worth
+      keeping has changed. They are saved before `together` is sent.
+    - `restore(kept, settings, now)`: the memories from these bytes. Raises ValueError for bytes that
+      `persist` did not make.
+    - `urgent(memory)`: whether the subject holds something that a restart must not interrupt
+      (`MaySpeak.at_once`).
     """
 
     name: str

@@ -10,7 +10,7 @@ Text = Annotated[str, Meta(min_length=1)]
 
 
 class Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The content of a kind's file. `version`: the version of its layout."""
+    """The content of a kind's file. `version`: the version of the file's layout."""
 
     version: int
 

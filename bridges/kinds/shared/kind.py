@@ -1,7 +1,7 @@
 """The record of a kind of device: its topics, and the pure functions of its folder.
 
-`bridges/kinds/<kind>/__init__.py` holds one `KIND`; the loop knows nothing else about lifts or
-doors. Each `KIND` states its types, so mypy proves that its functions fit together.
+`bridges/kinds/<kind>/__init__.py` holds one record `KIND`. The daemon's loop knows a kind only by this
+record. Each `KIND` states its types, so mypy proves that its functions fit together.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -39,7 +39,8 @@ FLOOR, LIFT, DOOR, CHARGER, WAYPOINT = "floor", "lift", "door", "charger", "wayp
 """Kinds of names on RMF's map."""
 
 Place = tuple[tuple[str, ...], str, str]
-"""A setting with a name on RMF's map: the setting's path, the kind of name (`FLOOR`, …), the name."""
+"""A setting with a name on RMF's map: the setting's path, the kind of name (`FLOOR`, …), and the
+name."""
 
 
 class RefusalAnswer(NamedTuple):
@@ -53,11 +54,13 @@ class RefusalAnswer(NamedTuple):
 class Keeping(Struct, Generic[M], frozen=True):
     """The part of a device's memory that must survive a restart.
 
-    `part(memory)`: this part, compared by value. `persist(memory)`: its bytes. `restore(kept, now)`:
-    the memory from these bytes; raises ValueError for other bytes. `lost(reason)`: the memory of a
-    daemon that finds no bytes, or wrong bytes, where there may have been some.
-    The core's events include `MemoryKept` and `MemoryNotKept`, for each attempt to write, before
-    outputs and messages; and `DecidedByPerson`.
+    `part(memory)`: this part, compared by value. `persist(memory)`: the bytes of this part.
+    `restore(kept, now)`: the memory from these bytes. It raises ValueError for other bytes.
+    `lost(reason)`: the memory of a daemon that finds no bytes, or wrong bytes, although earlier bytes
+    may have existed.
+
+    The core also gets the event `MemoryKept` or `MemoryNotKept` for each attempt to write, before
+    outputs and messages go out. It also gets the event `DecidedByPerson`.
     """
 
     part: Callable[[M], object]
@@ -69,31 +72,41 @@ class Keeping(Struct, Generic[M], frozen=True):
 class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     """One kind of device: its settings, limits, memory, sample, requests, outputs and report.
 
-    `devices_key`: the section of the devices in the YAML. `states`: the topic of their states; None if
-    RMF has no message about their state.
-    `requests`: each topic that it obeys, with `accept(message, settings) -> event`, which raises
-    RequestRefused for a message that is malformed or impossible for this device.
-    `device_name`: the device named in a message (request or state). `sender`: the requester behind a
-    request. If several requests wait for the next scan, only the last of each sender counts.
-    `limits(settings, debounce_s)`: the limits, from the device's settings and the debounce of each
-    signal in the wiring table. `initial(limits, now)`: the core's memory at start.
-    `decide`: the core. `state_message(name, settings, report, stamp)`: the report as RMF's message.
-    `summary(report)`: key -> value for the log line, the status file and `watch`.
-    `published(memory, report)`: the memory after this report has gone out to RMF.
-    `publishes(settings)`: the topics on which a device publishes beside its states.
-    `alarm_inputs(report)`: the causes of an alarm for the fleets that the device sees
-    (`bridges/kinds/shared/fleet_alarm.py`); None for a kind without alarms.
-    `answer(name, request, reason, report)`: the published answer to a refused request; None for no
-    answer. `request`: the message if it is malformed, else the event.
-    `on_map(settings)`: settings that name a place on RMF's map, as `Place`s. The device's own name is
-    checked for every kind.
-    `drives`: do its devices have outputs? Without outputs there is nothing to switch off.
-    `results(name, report)`: messages that go out right after the state of this report; while there
-    are any, the state is due. `stamped(message, stamp)`: a result or an answer with its time.
-    `section`: the key and the struct of a section that all devices of a file share.
-    `keeping`: for a memory that must survive a restart.
-    `attended_by`: a topic of requests; the core gets `Attended` when its publishers appear or vanish.
-    `recorded`: topics with messages about the device that are recorded, and that no core gets.
+    Messages:
+    - `states`: the topic of the devices' states; None if RMF has no message about such states.
+    - `requests`: each topic that a device obeys, with `accept(message, settings) -> event`. `accept`
+      raises RequestRefused for a message that is malformed or impossible for this device.
+    - `device_name`: the device named in a message (request or state).
+    - `sender`: the requester behind a request. If several requests wait for the next scan, only the
+      last request of each sender counts.
+    - `publishes(settings)`: the topics on which a device publishes beside its states.
+    - `answer(name, request, reason, report)`: the published answer to a refused request; None for no
+      answer. `request`: the message if it is malformed, else the event.
+    - `results(name, report)`: messages that go out right after the state of this report. While there
+      are any, the state is due.
+    - `stamped(message, stamp)`: a result or an answer with its time.
+    - `attended_by`: a topic of requests. The core gets `Attended` when the topic's publishers appear or
+      vanish.
+    - `recorded`: topics with messages about the device that are recorded, and that no core gets.
+
+    The core:
+    - `limits(settings, debounce_s)`: the limits, from the device's settings and the debounce of each
+      signal in the wiring table.
+    - `initial(limits, now)`: the core's memory at start.
+    - `decide`: the core.
+    - `state_message(name, settings, report, stamp)`: the report as RMF's message.
+    - `summary(report)`: key -> value for the log line, the status file and `watch`.
+    - `published(memory, report)`: the memory after this report has gone out to RMF.
+    - `alarm_inputs(report)`: the causes of a fleet alarm that the device sees
+      (`bridges/kinds/shared/fleet_alarm.py`); None for a kind without alarms.
+    - `keeping`: for a memory that must survive a restart.
+
+    Settings:
+    - `devices_key`: the section of the devices in the YAML.
+    - `section`: the key and the struct of a section that all devices of a file share.
+    - `on_map(settings)`: settings that name a place on RMF's map, as `Place`s. The device's own name is
+      checked for every kind.
+    - `drives`: whether the devices have outputs. Without outputs nothing must be switched off.
     """
 
     name: str

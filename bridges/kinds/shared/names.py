@@ -1,5 +1,5 @@
-"""Checks of names and texts in messages from the graph. They limit the lengths, because the daemon
-stores these texts and anybody can send them."""
+"""Checks of names and texts in messages from the graph. The checks limit the lengths, because the
+daemon stores these texts and anybody can send them."""
 
 from collections.abc import Collection
 from typing import Final

@@ -15,13 +15,14 @@ Patience = Annotated[float, Meta(ge=10, le=86400, extra={"unit": "s"})]
 
 
 class RecordingSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The recording of the daemon's work. If all is well, nothing is written to a disk."""
+    """The recording of the daemon's work. With `ring`, nothing is written to a disk while all is
+    well."""
 
     keep: Annotated[
         Literal["nothing", "ring", "continuous"],
-        tells("""`ring` keeps the last minutes in memory, and the recorder makes a file of them when
-        something goes wrong; `continuous` writes everything into files, and deletes the oldest files;
-        `nothing` records nothing."""),
+        tells("""`ring`: the last minutes stay in memory, and the recorder makes a file of them when
+        something goes wrong. `continuous`: everything is written into files, and the oldest files are
+        deleted. `nothing`: nothing is recorded."""),
     ] = "ring"
     ring_mb: Annotated[
         Megabytes, tells("the ring's size. 1 MB holds at least 10 minutes of a lift.")
@@ -36,5 +37,5 @@ class RecordingSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
         tells("how large these files may be together. The largest number of all YAMLs counts."),
     ] = 200.0
     waiting_s: Annotated[
-        Patience, tells("a file is made when a requester has waited this long.")
+        Patience, tells("how long a requester may wait; after that the recorder makes a file.")
     ] = 180.0

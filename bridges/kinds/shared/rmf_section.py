@@ -35,7 +35,8 @@ class ZenohTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         tells("the daemon's certificate, if the router asks for one (mutual TLS)."),
     ] = None
     private_key: Annotated[
-        AbsolutePath | None, tells("the certificate's key. Only the daemon's user may read it.")
+        AbsolutePath | None,
+        tells("a file with the certificate's key. Only the daemon's user may read the file."),
     ] = None
 
     def problems(self) -> Remarks:
@@ -60,14 +61,14 @@ class Zenoh(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     ] = ("tcp/localhost:7447",)
     mode: Annotated[
         Literal["auto", "peer", "client"],
-        tells("""`client` speaks to a router only, `peer` also to other nodes directly. `auto` is `peer`
-        if there is one router, and this router is on this machine or `listen` is open to other
-        machines. Else `auto` is `client`."""),
+        tells("""`client`: the node speaks only to a router. `peer`: the node also speaks to other nodes
+        directly. `auto` is `peer` if there is one router, and this router is on this machine or
+        `listen` is open to other machines. Else `auto` is `client`."""),
     ] = "auto"
     listen: Annotated[
         tuple[Endpoint, ...],
         tells("""the addresses at which other nodes reach this node as a peer. When absent, only nodes
-        of this machine reach it."""),
+        of this machine reach this node."""),
     ] = ("tcp/127.0.0.1:0",)
     tls: Annotated[ZenohTls | None, tells("certificates, for `tls/…` and `quic/…`.")] = None
     user: Annotated[Name | None, tells("the daemon's user name at the routers.")] = None
@@ -77,7 +78,7 @@ class Zenoh(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     ] = None
 
     def problems(self) -> Remarks:
-        """Yield invalid combinations."""
+        """Yield a problem for each invalid combination of keys."""
         if (self.user is None) != (self.password_file is None):
             yield (), "user and password_file go together: give both, or none"
         if self.tls and not any(map(_is_encrypted, (*self.connect, *self.listen))):
@@ -109,7 +110,7 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     ros_setup: Annotated[
         AbsolutePath | None,
         tells("""ROS's setup file. The daemon sources the file before it starts, because no shell does
-        so for a service. The key has no use with `dds` and `zenoh`. If the file is missing,
+        so for a service. With `dds` and `zenoh` the key has no effect. If the file is missing,
         `auto` logs this and continues."""),
     ] = None
     diagnostics: Annotated[
@@ -126,7 +127,7 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     ] = "auto"
 
     def problems(self) -> Remarks:
-        """Yield settings that have no effect."""
+        """Yield a problem for each setting that has no effect."""
         if self.release != "auto" and self.transport == "ros2":
             yield (
                 ("release",),
@@ -140,7 +141,7 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
 
 def warnings(rmf: Rmf) -> Remarks:
-    """Yield valid settings that are probably mistaken."""
+    """Yield a warning for each valid setting that is probably a mistake."""
     if rmf.domain_id is not None and 101 < rmf.domain_id < 215:
         text = "is in a range whose ports Linux gives to other programs: take 0 to 101"
         yield ("domain_id",), f"{rmf.domain_id} {text}"
@@ -158,7 +159,7 @@ TRANSPORTS = ("auto", "ros2", "dds", "zenoh")
 
 
 def overridden(rmf: Rmf, args: argparse.Namespace) -> Rmf:
-    """Return the YAML's `rmf:` section after applying the command line's options."""
+    """Return the YAML's `rmf:` section, changed by the command line's options."""
     if args.domain_id is not None:
         rmf = msgspec.structs.replace(rmf, domain_id=args.domain_id)
     if args.transport is not None:

@@ -1,8 +1,8 @@
 """Estimates the similarity transform (rotation, scale, shift) between two maps, from pairs of points.
 
 The fleet adapter template estimates the same least-squares transform with `nudged`, from a fleet
-configuration's `reference_coordinates` (open-rmf/fleet_adapter_template, fleet_adapter.py). Its mean
-squared error is the same too. A point is a complex number in this file: x + y·i.
+configuration's `reference_coordinates` (open-rmf/fleet_adapter_template, fleet_adapter.py). `nudged`
+also gives the same mean squared error. In this file a point is a complex number: x + y·i.
 """
 
 import cmath
@@ -14,8 +14,11 @@ Point = tuple[float, float]
 
 
 class Similarity(Struct, frozen=True):
-    """The transform `to = turn · from + shift`. `mse` is the mean squared error of the pairs that gave
-    the transform, in squared units of `to`."""
+    """The transform `to = turn · from + shift`.
+
+    `mse`: the mean squared error, in squared units of `to`, of the pairs from which the transform was
+    estimated.
+    """
 
     turn: complex
     shift: complex

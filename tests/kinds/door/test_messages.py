@@ -29,7 +29,7 @@ def test_no_other_mode_can_be_requested(mode: int) -> None:
         messages.accept(request(mode), SETTINGS)
     assert (caught.value.kind, caught.value.detail) == (
         "mode that cannot be asked",
-        f"requested_mode {mode}; only OPEN (2) and CLOSED (0) can be",
+        f"requested_mode {mode} is neither OPEN (2) nor CLOSED (0)",
     )
 
 

@@ -48,11 +48,11 @@ def test_open_and_close_are_taken_with_their_senders_stamp_to_the_nanosecond() -
         ),
         (
             request(1),
-            "mode that cannot be asked: requested_mode 1; only OPEN (2) and CLOSED (0) can be",
+            "mode that cannot be asked: requested_mode 1 is neither OPEN (2) nor CLOSED (0)",
         ),
         (
             request(7),
-            "mode that cannot be asked: requested_mode 7; only OPEN (2) and CLOSED (0) can be",
+            "mode that cannot be asked: requested_mode 7 is neither OPEN (2) nor CLOSED (0)",
         ),
         (request(who="x" * 257), f"impossible requester_id: '{'x' * 40}'…, 257 characters"),
         (request(door="x" * 257), f"impossible door_name: '{'x' * 40}'…, 257 characters"),
