@@ -1,4 +1,4 @@
-"""The charger coordinator. It allots all chargers of a site to robots, and queues the robots."""
+"""The charger coordinator, which allots all chargers of a site to robots, and queues the robots."""
 
 from bridges.kinds.charger_coordinator import (
     core,

@@ -1,7 +1,9 @@
 """The coordinator's core: it allots all stations of a site to robots.
 
-Its inputs are FleetState, ChargerState and the requests of operators. It sends ChargerRequest and
-ChargerCancel; no part of RMF sends these. A wish is a robot's need to be charged. Rules:
+The core's inputs are FleetState, ChargerState and the requests of operators. The core sends
+ChargerRequest and ChargerCancel, which no part of RMF sends. A wish is a robot's need to be charged.
+
+Rules:
 COORDINATOR-1. `wishes.py` finds the robots with a wish. An operator's wish lasts until the operator's
    request is over or the robot is full.
 COORDINATOR-2. Wishes are served in the order of their arrival, each at one of the robot's suitable
@@ -10,8 +12,8 @@ COORDINATOR-2. Wishes are served in the order of their arrival, each at one of t
 COORDINATOR-3. A request is repeated until the station shows the request. If a station does not show the
    request within TAKEN_S, the coordinator passes the station over for SHUNNED_S, and the wish goes to
    the end of the queue.
-COORDINATOR-4. The stations' states tell when a request has ended, and whether robot or station was at
-   fault (`stations.py`).
+COORDINATOR-4. The stations' states show when a request has ended, and whether the robot or the station
+   was at fault (`stations.py`).
 COORDINATOR-5. The coordinator tells a robot on a wrong pad to leave the pad, or alerts a person
    (`wrong_pad.py`).
 COORDINATOR-6. If another node requests a station for one of our robots, the coordinator treats that
@@ -49,7 +51,7 @@ def initial(subject: str, started_at: float) -> SiteMemory:
 
 
 def idle(memory: SiteMemory, now: float) -> bool:
-    """Return False: there is only one subject, the site, and it is never forgotten."""
+    """Return False, because the only subject, the site, is never forgotten."""
     return False
 
 
@@ -91,7 +93,7 @@ def _take(memory: SiteMemory, event: Event, now: float, site: SiteLimits) -> tup
 
 
 def _may_speak(memory: SiteMemory, yes: bool, alone: bool, now: float) -> SiteMemory:
-    """Start or stop publishing. A station gets its full time again to show a request, and all
+    """Start or stop publishing. Every station gets its full time again to show a request, and all
     assignments are sent again."""
     grants = {
         name: grant if grant.shown else replace(grant, made_at=now)
@@ -101,8 +103,8 @@ def _may_speak(memory: SiteMemory, yes: bool, alone: bool, now: float) -> SiteMe
 
 
 def _as_dedicated(memory: SiteMemory, site: SiteLimits) -> SiteMemory:
-    """Take stations back from robots that RMF will not bring there, because another node's schedule
-    dedicates other stations to these robots."""
+    """Take a station back from a robot if RMF will not bring the robot there. This is so if another
+    node's schedule dedicates another station to the robot."""
     if memory.alone:
         return memory
     for name, grant in memory.grants.items():

@@ -1,8 +1,8 @@
 """The memory on disk, for a restart: the queue, each station's robot, and the robots' failures.
 
-States of robots and stations are not saved, because new states arrive within a second. If a request was
-sent but not saved, the station's state still shows the request's id, and the coordinator recognises
-that id.
+States of robots and stations are not saved, because new states arrive within a second. A request may
+have been sent but not saved. In that case the station's state still shows the request's id, and the
+coordinator recognises that id.
 """
 
 from collections.abc import Mapping
@@ -84,7 +84,7 @@ def _grant(g: Grant) -> GrantRecord:
 def restore(kept: bytes, settings: CoordinatorSettings, now: float) -> dict[str, SiteMemory]:
     """Make the memory at start, for the robots and stations that are still in the YAML.
 
-    Raises ValueError for bytes not made by `persist`. Durations count from now.
+    Raises ValueError for bytes that `persist` did not make. Durations count from now.
     """
     found = keep.read(kept, KeptCoordinator, VERSION, "a coordinator's memory")
     return {SITE: _memory(found, settings, now)}

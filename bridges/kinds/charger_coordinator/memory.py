@@ -23,8 +23,8 @@ NODE: Final = "charger_coordinator"
 STATION_SILENT_S: Final = 5.0
 """The silence (s) after which a station counts as silent. States come at 1 Hz."""
 STRIKES: Final = 2
-"""The number of failures after which a robot is not tried again. If two stations suit the robot, the
-failures are at both."""
+"""The number of failures after which a robot is not tried again. If two stations suit the robot, it has
+failed at both."""
 
 IDLE: Final = ChargerStateValue.CHARGER_IDLE
 ASSIGNED: Final = ChargerStateValue.CHARGER_ASSIGNED
@@ -38,8 +38,8 @@ class SiteLimits:
     """The settings that the core needs.
 
     `robots` maps a robot to its suitable stations, best first. `waits_at` maps a robot to its waypoint
-    for waiting. `places` maps a station, and then a fleet, to a waypoint. `receivers` maps a receiver's
-    id to its robot.
+    for waiting. `places` maps a station to a table from fleet to waypoint. `receivers` maps a
+    receiver's id to its robot.
     """
 
     robots: Mapping[RobotName, tuple[str, ...]]
@@ -91,11 +91,12 @@ WHOSE: Final[Mapping[By, str]] = {
 
 
 class Wish(msgspec.Struct, frozen=True):
-    """One robot's need to be charged. `by`: its origin (the fleet's state, the schedule, an operator).
+    """One robot's need to be charged.
 
-    `task_id`: the robot's task; empty for an operator's wish. `called`: that task began after a station
-    was allotted to the robot, so the task is the drive to that station. `station`, `request_id`,
-    `start_timeout_s`: from the operator's request.
+    `by`: the origin of the wish (the fleet's state, the schedule, an operator). `task_id`: the robot's
+    task; empty for an operator's wish. `called`: that task began after a station was allotted to the
+    robot, so the task is the drive to that station. `station`, `request_id`, `start_timeout_s`: from
+    the operator's request.
     """
 
     robot: RobotName
@@ -119,12 +120,13 @@ class Wish(msgspec.Struct, frozen=True):
 
 
 class Grant(msgspec.Struct, frozen=True):
-    """A station that was allotted to a robot at `made_at`, by the request `request_id`.
+    """A station that was allotted to a robot.
 
-    `shown`: the station's state has shown the request. `started`: current has flowed. `over`: the robot
-    has lost the station, but no other robot gets it until the station releases the first. `sent_at`:
-    the time of the last request or cancel. `forgotten_at`: the time when the station's daemon last
-    forgot the request; the coordinator then sent the request again.
+    `request_id`: the request to the station. `made_at`: the time of the allotment. `shown`: the
+    station's state has shown the request. `started`: current has flowed. `over`: the robot has lost the
+    station, but no other robot gets the station until the station releases this robot. `sent_at`: the
+    time of the last request or cancel. `forgotten_at`: the time when the station's daemon last forgot
+    the request. The coordinator then sent the request again.
     """
 
     robot: RobotName
@@ -139,9 +141,11 @@ class Grant(msgspec.Struct, frozen=True):
 
 
 class Standing(msgspec.Struct, frozen=True):
-    """A robot as its fleet's state showed it at the time `at`. `since`: the robot's place, mode and
-    task have not changed since this time. `here_since`: its place has not changed since this time
-    (-inf: not since the first state)."""
+    """A robot, as its fleet's state showed the robot at the time `at`.
+
+    `since`: the robot's place, mode and task have not changed since this time. `here_since`: the
+    robot's place has not changed since this time; -inf if it has not changed since the first state.
+    """
 
     sighting: Sighting
     at: float
@@ -155,8 +159,11 @@ class Standing(msgspec.Struct, frozen=True):
 
 
 class StationSeen(msgspec.Struct, frozen=True):
-    """A station's last state, heard at `at`. `since`: state and error have not changed since this time.
-    `full_in_s`: the station's own estimate, at `at`, of the time until the robot is full (s)."""
+    """A station's last state, heard at `at`.
+
+    `since`: the station's state and error have not changed since this time. `full_in_s`: the time (s)
+    from `at` until the robot is full, as the station estimates.
+    """
 
     state: ChargerStateValue
     request_id: str
@@ -173,9 +180,12 @@ class StationSeen(msgspec.Struct, frozen=True):
 
 
 class Nudge(msgspec.Struct, frozen=True):
-    """Orders to a robot to leave a pad. `why`: the reason, which is the request for the robot's own
-    station, or the name of the station that the robot blocks. `count`: the number of orders. `at`:
-    the time of the last order."""
+    """The orders to a robot to leave a pad.
+
+    `why`: the reason for the orders. The reason is the request for the robot's own station, or the name
+    of the station that the robot blocks. `count`: the number of orders. `at`: the time of the last
+    order.
+    """
 
     why: str
     count: int
@@ -185,19 +195,21 @@ class Nudge(msgspec.Struct, frozen=True):
 class SiteMemory(msgspec.Struct, frozen=True):
     """The memory of the site from event to event.
 
-    `may_speak`: the coordinator may publish. `passive`: if it may not, the reason why requesters must
-    wait. `alone`: no other node publishes charging assignments.
+    Publishing: `may_speak`: the coordinator may publish. `passive`: if it may not publish, the reason
+    why requesters must wait. `alone`: no other node publishes charging assignments. `assigned`: the
+    assignments published last, at `assigned_at`. `alerts`: the faults already sent as alerts. `nudges`:
+    the orders to robots to leave a pad.
 
-    `wishes`: in the order of service. `grants`: by station. `strikes`: the stations where each robot
-    has failed. `served`: the task in which each robot was charged. `rested`: robots that the schedule
-    does not charge again in its present time. `absent`: a robot that did not leave its place when
-    called, and the time when it may be called again. `over`: the ids of the operators' requests that
-    ended last, whose late repeats are refused. `count`: the number of requests made. `robots`,
-    `stations`: their last states. `shunned`: a station that took no request, and the time until which
-    it is passed over. `preferred`: the station that another node has dedicated to each robot. `nudges`:
-    robots told to leave a pad. `receivers`: the error of each robot's own receiver. `when`: the local
-    time. `assigned`: the assignments published last, at `assigned_at`. `alerts`: the faults already
-    sent as alerts.
+    Wishes: `wishes`: in the order of service. `grants`: by station. `count`: the number of requests
+    made. `over`: the ids of the operators' requests that ended last. Their late repeats are refused.
+    `strikes`: the stations where each robot has failed. `served`: the task in which each robot was
+    charged. `rested`: robots that the schedule does not charge again in its present time. `absent` maps
+    a robot that did not leave its place when called to the time when it may be called again.
+    `preferred`: the station that another node has dedicated to each robot.
+
+    Readings: `robots`, `stations`: their last states. `shunned` maps a station that took no request to
+    the time until which the station is passed over. `receivers`: the error of each robot's own
+    receiver. `when`: the local time.
     """
 
     began_at: float = 0.0
@@ -232,13 +244,13 @@ class SiteMemory(msgspec.Struct, frozen=True):
         return next((s for s, g in self.grants.items() if g.robot == robot and not g.over), None)
 
     def place_of(self, robot: RobotName) -> str | None:
-        """Return the waypoint of our YAML where the fleet last saw the robot; None if the robot was at
-        none."""
+        """Return the waypoint of our YAML where the fleet last saw the robot; None for a robot
+        elsewhere."""
         standing = self.robots.get(robot)
         return standing.sighting.place if standing else None
 
     def stands_at(self, robot: RobotName, site: SiteLimits) -> str | None:
-        """Return the station where the fleet last saw the robot; None if the robot was at none."""
+        """Return the station where the fleet last saw the robot; None for a robot elsewhere."""
         return site.station_at(robot.fleet, self.place_of(robot))
 
     @property
@@ -247,8 +259,8 @@ class SiteMemory(msgspec.Struct, frozen=True):
         return self.may_speak and self.alone
 
     def faulty(self, robot: RobotName) -> bool:
-        """Return whether this robot has failed so often that it is not tried again before an operator's
-        reset."""
+        """Return whether this robot has failed too often. Such a robot is not tried again before an
+        operator's reset."""
         return len(self.strikes.get(robot, ())) >= STRIKES
 
     def speaks(self, station: str, now: float) -> bool:
@@ -256,7 +268,7 @@ class SiteMemory(msgspec.Struct, frozen=True):
         return station in self.stations and now < self.stations[station].at + STATION_SILENT_S
 
     def silent_since(self, station: str) -> float:
-        """Return the time when the station counts as silent, in the past or in the future."""
+        """Return the time from which the station counts as silent. The time may be past or future."""
         seen = self.stations.get(station)
         return STATION_SILENT_S + (self.began_at if seen is None else seen.at)
 
@@ -283,7 +295,7 @@ class SiteMemory(msgspec.Struct, frozen=True):
         return replace(self, wishes=(*(w for w in self.wishes if w is not wish), wish))
 
     def takes_back(self, robot: RobotName) -> "SiteMemory":
-        """Return the memory after taking this robot's station back: the station must release the
+        """Return the memory with this robot's station taken back. The station must then release the
         robot."""
         station = self.station_of(robot)
         if station is None:

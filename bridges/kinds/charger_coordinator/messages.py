@@ -136,8 +136,8 @@ def accept_withdrawal(
 def accept_assignments(
     message: d.ChargingAssignments, settings: CoordinatorSettings, wall: float
 ) -> Dedicated:
-    """Turn another node's charging assignments into an event. The event names a station for each of our
-    robots."""
+    """Turn another node's charging assignments into an event. The event names the station of each of
+    our robots, "" for none."""
     fleet, known = message.fleet_name, settings.robots()
     stations = {places.get(fleet): name for name, places in settings.places().items()}
     return Dedicated(
@@ -150,7 +150,7 @@ def accept_assignments(
 
 
 def subject(message: object) -> str:
-    """Return the site, whatever the message is about, because one queue spans all stations of the
+    """Return the site as the subject of every message, because one queue spans all stations of the
     site."""
     return SITE
 

@@ -1,8 +1,12 @@
 """The allotment of stations: the robot that came first gets the first suitable station.
 
-A station is free under four conditions: its last state is IDLE and no older than STATION_SILENT_S, no
-robot has the station, the station has not lately failed to take a request, and no other robot stands
-there. A robot may stand on a station's pad without a request, so that the station shows an error or an
+A station is free under four conditions:
+- Its last state is IDLE, and is no older than STATION_SILENT_S.
+- No robot has the station.
+- The station has not lately failed to take a request.
+- No other robot stands there.
+
+A robot may stand on a station's pad without a request, so that the station shows an error or an
 unrequested charge. Such a robot may have that very station. A released robot that still stands at a
 station may have that station too.
 
@@ -10,8 +14,8 @@ If a robot has failed at a station, the robot first tries every other suitable s
 station shows which side is at fault.
 
 If another node publishes a charging schedule, a robot gets the station that the schedule has dedicated
-to it, because RMF drives the robot to no other station. A robot without a dedicated station may have
-the station where it stands.
+to the robot. The reason is that RMF drives the robot to no other station. A robot without a dedicated
+station may have the station where it stands.
 """
 
 from collections.abc import Mapping, Sequence
@@ -34,7 +38,7 @@ from bridges.kinds.charger_coordinator.memory import (
 )
 
 REMEMBERED_S: Final = 30.0
-"""The time (s) after its fleet's last state for which a robot's place still counts."""
+"""The greatest age (s) of a fleet's state from which a robot's place counts."""
 Here = Mapping[str, Sequence[RobotName]]
 """The robots standing at each station."""
 
@@ -62,8 +66,11 @@ def _granted(
 
 
 def suiting(memory: SiteMemory, wish: Wish, site: SiteLimits) -> list[str]:
-    """List the stations to try, best first: the operator's choice, the station at the robot's place,
-    the dedicated station, then the other suitable stations in the YAML's order."""
+    """List the stations to try, best first.
+
+    The operator's choice comes first, then the station at the robot's place, then the dedicated
+    station. The other suitable stations follow in the YAML's order.
+    """
     here = memory.stands_at(wish.robot, site)
     dedicated = memory.preferred.get(wish.robot)
     if not memory.alone:

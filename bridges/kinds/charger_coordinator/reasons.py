@@ -2,8 +2,8 @@
 obstacles to its charge, and its waiting time.
 
 The waiting time is known only if the station reports when its present charge ends. Each robot is shown
-with its probable station. This is the suitable station that is free first and that goes to no robot
-ahead in the queue.
+with its probable station. Among the suitable stations this is the first to become free, without the
+stations of robots ahead in the queue.
 """
 
 from collections.abc import Iterator

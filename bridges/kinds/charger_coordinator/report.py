@@ -1,11 +1,12 @@
-"""Messages to stations, fleet adapters and technicians; the report to the log and the status file.
+"""Messages to stations, fleet adapters and technicians, and the report to the log and the status file.
 
-COORDINATOR-REPORT-1. A request is repeated each second until its station shows it. A cancel is repeated
-   each second while the station still shows the request.
-COORDINATOR-REPORT-2. Every robot is assigned one place of its own: its station (MODE_CHARGE), else its
-   waypoint for waiting (MODE_WAIT). When a place changes, the assignments of all fleets are published.
-   They are retained for fleet adapters that start later. RMF drives a robot with a charging task to its
-   assigned place (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart).
+COORDINATOR-REPORT-1. A request is repeated each second until its station shows the request. A cancel is
+   repeated each second while the station still shows the cancelled request.
+COORDINATOR-REPORT-2. Every robot is assigned one place of its own. That place is the robot's station
+   (MODE_CHARGE). A robot without a station is assigned its waypoint for waiting (MODE_WAIT). When a
+   place changes, the assignments of all fleets are published. They are retained for fleet adapters that
+   start later. RMF drives a robot with a charging task to its assigned place (rmf_ros2 9dedd0f,
+   ChargeBattery.cpp, _consider_restart).
 COORDINATOR-REPORT-3. Each fault is sent once as an Alert, which rmf-web shows to a person.
 """
 
@@ -54,18 +55,21 @@ TITLES: Final = {
     "REQUEST_NOT_TAKEN": "A charger takes no request",
 }
 ASKS_S: Final = 5.0
-"""The delay (s) after which a robot that came to a pad unannounced normally has a wish. Its fleet's
-state brings the wish, so a fault before this delay would be premature."""
+"""The delay (s) within which a robot that came to a pad unannounced normally has a wish. The fleet's
+next state brings the wish, so an earlier fault would be premature."""
 AGAIN_S: Final = 15.0
 ERRORS: Final = ("ROBOT_FAULTY", "STATION_OUT_OF_SERVICE")
 
 
 class SiteReport(msgspec.Struct, frozen=True):
-    """The site, as shown to a person. `read_at`: the time of the last state of any station (monotonic
-    s). `stations`: for each station its name, the text of its state, its robot, and the origin of
-    the robot's wish. `queue`: the waiting robots in order, with their reasons. `waiting`: the same
-    robots without reasons. `assigns`: do we assign the robots' places, or does another node?
-    `schedule`: the times of the schedule. `absent`: robots that did not come when called."""
+    """The site, as shown to a person.
+
+    `read_at`: the time of the last state of any station (monotonic s). `stations`: pairs of a station's
+    name and a text. The text has the station's state, its robot, and the origin of the robot's wish.
+    `queue`: the waiting robots in order, with their reasons. `waiting`: the waiting robots without
+    reasons. `assigns`: whether we or another node assign the robots' places. `schedule`: the times of
+    the schedule. `absent`: robots that did not come when called.
+    """
 
     read_at: float | None
     stations: tuple[tuple[str, str], ...] = ()
@@ -77,7 +81,7 @@ class SiteReport(msgspec.Struct, frozen=True):
     faults: tuple[Fault, ...] = ()
 
     def news(self) -> object:
-        """Return the facts whose change is logged: everything except times that run on."""
+        """Return the facts whose change is logged. Running times are left out."""
         return self.stations, self.waiting, self.assigns, self.schedule, self.absent
 
 
@@ -191,7 +195,8 @@ def messages(
 
 
 def _again_at(memory: SiteMemory, site: SiteLimits) -> Iterator[float]:
-    """Yield times to repeat the assignments of robots that stand elsewhere without a task.
+    """Yield the times at which the assignments of robots that stand elsewhere without a task are
+    repeated.
 
     An EasyFullControl adapter takes the retained assignment at its start. A moment later the adapter
     replaces that assignment by the charger of its own file (seen in Jazzy). No message shows this
@@ -235,8 +240,8 @@ def _to_station(name: str, grant: Grant) -> tuple[AnyTopic, d.Message]:
 def _assignments(
     memory: SiteMemory, now: float, site: SiteLimits
 ) -> Iterator[d.ChargingAssignments]:
-    """Assign every robot's place, fleet by fleet, in the order of names. A robot that is told to leave
-    a pad gets the other mode for TOLD_S (`wrong_pad.py`)."""
+    """Assign every robot's place, fleet by fleet, in the order of names. An order to leave a pad is the
+    other mode for TOLD_S (`wrong_pad.py`)."""
     fleets: dict[str, list[d.ChargingAssignment]] = {}
     for who in sorted(site.robots):
         station, told = memory.station_of(who), wrong_pad.is_nudged(memory, who, now)

@@ -1,8 +1,8 @@
 """The coordinator's own charging schedule: times of the week at which robots are charged to a target.
 
-The functions are pure: the local time of day and the day of the week are arguments. If the end is not
-later than the beginning, the end is on the next day. The whole time then belongs to the day on which it
-begins.
+The functions are pure. The day of the week and the local time of day are arguments. If an entry's end
+is not later than its beginning, the end is on the next day. The whole entry then belongs to the day on
+which it begins.
 """
 
 from collections.abc import Iterable
@@ -29,14 +29,15 @@ Target = Annotated[float, Meta(ge=1, le=100, extra={"unit": "%"})]
 
 
 class LocalTime(NamedTuple):
-    """A local time. `day`: 0 is Monday. `minute`: since local midnight."""
+    """A local time. `day`: the day of the week, 0 for Monday. `minute`: the minutes since local
+    midnight."""
 
     day: int
     minute: int
 
 
 class Charging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One time of the week at which robots without a task are charged."""
+    """One entry of the schedule: a time of the week at which robots without a task are charged."""
 
     at: Annotated[TimeOfDay, tells("when charging begins.")]
     until: Annotated[TimeOfDay, tells("when charging ends.")]
@@ -44,11 +45,13 @@ class Charging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         list[Day], tells("the days on which charging begins; every day when absent.")
     ] = msgspec.field(default_factory=lambda: list(DAYS))
     fleets: Annotated[
-        list[Name], tells("the fleets to be charged; all when `robots` is absent too.")
+        list[Name],
+        tells("the fleets to be charged. When this key and `robots` are absent, all fleets."),
     ] = []
     robots: Annotated[
         list[Name],
-        tells("the robots to be charged, as FLEET/ROBOT; all when `fleets` is absent too."),
+        tells("""the robots to be charged, as FLEET/ROBOT. When this key and `fleets` are absent, all
+        robots."""),
     ] = []
     percent: Annotated[
         Target, tells("the battery charge up to which these robots are charged.")
@@ -60,7 +63,7 @@ class Charging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return everybody or who.fleet in self.fleets or str(who) in self.robots
 
     def under_way(self, when: LocalTime) -> bool:
-        """Return whether `when` lies between the beginning and the end."""
+        """Return whether `when` lies between the beginning and the end of this entry."""
         begins, lasts = _minute(self.at), self.lasts_min()
         today, yesterday = DAYS[when.day], DAYS[when.day - 1]
         began_today = today in self.days and 0 <= when.minute - begins < lasts
@@ -79,7 +82,8 @@ class Charging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 def target(schedule: Iterable[Charging], who: RobotName, when: LocalTime | None) -> float:
-    """Return the schedule's target for this robot at this time (%); 0 for no charging."""
+    """Return the charge (%) up to which the schedule charges this robot at this time; 0 for no
+    charging."""
     if when is None:
         return 0.0
     found = (c.percent for c in schedule if c.concerns(who) and c.under_way(when))
@@ -93,8 +97,8 @@ def problems(
     least: float,
     most: float,
 ) -> Remarks:
-    """Yield the unknown names, and the targets that are not between `again_percent` and
-    `full_percent`."""
+    """Yield a problem for each unknown name, and for each target that is not between `again_percent`
+    and `full_percent`."""
     known = {"fleets": set(fleets), "robots": set(map(str, robots))}
     for i, one in enumerate(schedule):
         for key, named in (("fleets", one.fleets), ("robots", one.robots)):
@@ -105,7 +109,9 @@ def problems(
         if one.percent > most:
             yield (str(i), "percent"), f"is above full_percent ({most:g} %): it is never reached"
         elif one.percent <= least:
-            text = f"is not above again_percent ({least:g} %): below that they are charged anyway"
+            text = (
+                f"is not above again_percent ({least:g} %), below which robots are charged anyway"
+            )
             yield (str(i), "percent"), text
 
 

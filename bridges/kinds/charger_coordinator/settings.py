@@ -70,7 +70,8 @@ class FleetSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     waypoints: Annotated[
         dict[Name, Waypoint],
         tells("""the places of stations and waiting robots in the fleet's navigation graph. RMF's
-        fleet adapter crashes on a name that its graph lacks, so it is sent only these names."""),
+        fleet adapter crashes on a name that its graph lacks, so the coordinator sends only these
+        names."""),
     ]
     robots: Annotated[
         dict[Name, RobotSettings],
@@ -94,7 +95,9 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
     near_m: Annotated[
         Near, tells("the greatest distance from which a robot counts as standing at a waypoint.")
     ] = 1.0
-    full_percent: Annotated[Full, tells("the charge at which a robot leaves its station.")] = 100.0
+    full_percent: Annotated[
+        Full, tells("the battery's charge at which a robot leaves its station.")
+    ] = 100.0
     again_percent: Annotated[
         Low,
         tells("""a robot without a task is charged below this percentage. A robot that was charged
@@ -103,7 +106,7 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
     leaves_s: Annotated[
         Timeout,
         tells(
-            "how long a robot may stay on a pad without need if another robot waits for the pad."
+            "how long a robot that needs no charge may stay on a pad for which another robot waits."
         ),
     ] = 60.0
     schedule: Annotated[
@@ -127,7 +130,8 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
                 yield ("fleets", fleet, "waypoints", name), WAYPOINT, name
 
     def problems(self) -> Remarks:
-        """Yield unknown names, places given twice, and contradictory percentages."""
+        """Yield a problem for unknown names, for places given twice, and for contradictory
+        percentages."""
         for key in ("stations", "fleets"):
             if not getattr(self, key):
                 yield (key,), f"'{key}' is empty: there is nothing to coordinate"
@@ -180,8 +184,8 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
                     yield path, f"'{station}' is at '{place}', not in this fleet's list ({known})"
 
     def _doubles(self) -> Remarks:
-        """Yield each place or receiver that belongs to two robots, and each name that belongs to two
-        stations or receivers."""
+        """Yield a problem for each place or receiver of two robots, and for each place or name of two
+        stations."""
         taken: dict[tuple[str, str], str] = {}
         for station, places in self.places().items():
             for fleet, place in places.items():
@@ -220,19 +224,20 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
         }
 
     def places(self) -> dict[str, dict[str, str]]:
-        """Map each station, and then each fleet, to the station's waypoint."""
+        """Map each station to a table from fleet to the station's waypoint."""
         return {
             name: {fleet: at.waypoints.get(fleet, at.waypoint or name) for fleet in self.fleets}
             for name, at in self.stations.items()
         }
 
     def rcus(self) -> dict[str, RobotName]:
-        """Map the name under which a robot's receiver publishes to the robot."""
+        """Map each name under which a robot's receiver publishes to that robot."""
         return {robot.rcu: who for who, robot in self.robots().items() if robot.rcu}
 
 
 def tables(settings: CoordinatorSettings) -> Iterator[Table]:
-    """Yield tables of each robot and its places, each station and its waypoint, and the schedule."""
+    """Yield three tables: each robot with its places, each station with its waypoint, and the
+    schedule."""
     yield Table(
         "robots",
         ("robot", "charges at", "waits at", "receivers"),
@@ -261,13 +266,13 @@ def _named(places: dict[str, str]) -> str:
 
 
 def speaks_of(settings: CoordinatorSettings) -> Iterator[Place]:
-    """Yield the stations. Some daemon must define each station as a charger."""
+    """Yield the stations. Another file of the site must define each station as a charger."""
     for name in settings.stations:
         yield ("stations", name), CHARGER, name
 
 
 def warnings(settings: CoordinatorSettings) -> Remarks:
-    """Yield legal settings that may be mistakes."""
+    """Yield a warning for each legal setting that may be a mistake."""
     used = {name for robot in settings.robots().values() for name in robot.stations}
     for name in settings.stations:
         if name not in used:
@@ -284,7 +289,8 @@ def warnings(settings: CoordinatorSettings) -> Remarks:
 
 
 def _near(settings: CoordinatorSettings) -> Remarks:
-    """Yield places that are too close together for a robot's position to tell them apart."""
+    """Yield a warning for each two places that are too close together. A robot's position cannot tell
+    such places apart."""
     for fleet_name, fleet in settings.fleets.items():
         names = list(fleet.waypoints)
         for i, name in enumerate(names):

@@ -12,21 +12,23 @@ from bridges.kinds.shared.graph_kind import MaySpeak, Woken
 from bridges.messages.definitions import ChargerStateValue
 
 _DISPATCHED: Final = re.compile(r"(?!charge)[^.]+\.dispatch-")
-"""The beginning of a task id that RMF's dispatcher gave, CATEGORY.dispatch-NUMBER. A fleet adapter
-calls its own charging task Charge and a UUID. (rmf_ros2 jazzy 7eef65a, Dispatcher.cpp; rmf_task
-jazzy, ChargeBatteryFactory.cpp.)"""
+"""The beginning of a task id from RMF's dispatcher: CATEGORY.dispatch-NUMBER. A fleet adapter calls its
+own charging task Charge and a UUID. (rmf_ros2 jazzy 7eef65a, Dispatcher.cpp; rmf_task jazzy,
+ChargeBatteryFactory.cpp.)"""
 
 
 def is_dispatched(task_id: str) -> bool:
-    """Return whether RMF's dispatcher gave this task. Such a task is a patrol or a delivery, never a
-    charge."""
+    """Return whether this task came from RMF's dispatcher. Such a task is a patrol or a delivery, never
+    a charge."""
     return _DISPATCHED.match(task_id) is not None
 
 
 class Sighting(msgspec.Struct, frozen=True):
-    """One robot of a FleetState. `charges`: the robot's mode is CHARGING or DOCKING, and its task did
-    not come from RMF's dispatcher. `place`: the waypoint of our YAML where the robot stands; None
-    elsewhere."""
+    """One robot of a FleetState.
+
+    `charges`: the robot's mode is CHARGING or DOCKING, and its task did not come from RMF's dispatcher.
+    `place`: the waypoint of our YAML where the robot stands; None elsewhere.
+    """
 
     who: RobotName
     charges: bool
@@ -44,7 +46,8 @@ class FleetSeen(msgspec.Struct, frozen=True):
 
 
 class ChargerStateHeard(msgspec.Struct, frozen=True):
-    """A ChargerState. `robot`: None if the state names no robot. `full_in_s`: 0 if not known."""
+    """A ChargerState. `robot`: None if the state names no robot. `full_in_s`: the time (s) until the
+    robot is full; 0 if not known."""
 
     station: str
     state: ChargerStateValue

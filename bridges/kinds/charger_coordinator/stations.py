@@ -11,15 +11,16 @@ COORDINATOR-STATIONS-1. A station's state shows that a request has ended.
      as cut short.
 COORDINATOR-STATIONS-2. After an error of the station, the robot gets another station and keeps its
    place in the queue. If the robot is at fault, or the side at fault is unclear, the error also counts
-   as a failure of the robot. After a second failure the robot is not tried again, and a technician is
-   told. (If two stations suit the robot, the second failure is at the second station.)
+   as a failure of the robot. After a second failure the robot is not tried again, and the coordinator
+   alerts a technician. If two stations suit the robot, the second failure is at the second station.
 COORDINATOR-STATIONS-3. A failure of a robot is forgotten when the robot has been charged for PROVEN_S,
-   or fully. The failure is also forgotten when the station proves to be at fault. That is proven if the
-   station's error names the station, or if the error lasts for more than PROVEN_S after the robot has
-   left.
+   or fully. The failure is also forgotten when the station proves to be at fault. One proof is an error
+   that names the station. The other proof is an error that lasts for more than PROVEN_S after the robot
+   has left.
 COORDINATOR-STATIONS-4. If another robot is on the pad, the assigned robot keeps the station for its
-   start_timeout. A station out of reach says nothing about the charge. If a robot was charging there,
-   the robot keeps the station. If the robot is still on its way, it gets another station after LOST_S.
+   start_timeout. The error of a station out of reach says nothing about the charge. If a robot was
+   charging at that station, the robot keeps the station. If the robot is still on its way, it gets
+   another station after LOST_S.
 """
 
 from typing import Final
@@ -77,8 +78,11 @@ def heard(memory: SiteMemory, state: ChargerStateHeard, now: float, site: SiteLi
 
 
 def _forgot(memory: SiteMemory, name: str, grant: Grant, now: float, site: SiteLimits) -> bool:
-    """Return whether the station has forgotten the request that it has shown. An IDLE station may also
-    have released the robot without our notice. Then the robot has left, or did not come in time."""
+    """Return whether the station has forgotten the request that it has shown.
+
+    An IDLE station may instead have released the robot without our notice. In that case the robot has
+    left, or did not come in time.
+    """
     seen = memory.stations[name]
     if seen.state is not IDLE:
         return seen.request_id.startswith(UNREQUESTED)
@@ -88,7 +92,7 @@ def _forgot(memory: SiteMemory, name: str, grant: Grant, now: float, site: SiteL
 
 
 def _repeated(grant: Grant, seen: StationSeen, now: float) -> Grant | None:
-    """Return the grant as long as the station may still come to show its request; None if the station
+    """Return the grant as long as the station may still show the grant's request; None if the station
     will not take the request."""
     before = seen.state is RELEASED or seen.request_id.startswith(UNREQUESTED)
     may_come = seen.state is IDLE or (before and seen.robot == grant.robot)
@@ -139,7 +143,7 @@ def _struck(memory: SiteMemory, name: str, who: RobotName) -> SiteMemory:
 
 
 def adopted(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
-    """Adopt the charges that other nodes requested for our robots, and the charges that nobody
+    """Adopt the charges that other nodes requested for our robots. Also adopt the charges that nobody
     requested."""
     for name, seen in memory.stations.items():
         if name not in memory.grants and seen.state in (ASSIGNED, CHARGING):
@@ -167,7 +171,7 @@ def _adopt(
 
 
 def _waits_at(memory: SiteMemory, station: str, site: SiteLimits) -> RobotName | None:
-    """Find the robot of a charge whose state names no robot: a robot with a wish that stands at this
+    """Find the robot of a charge whose state names no robot. That robot has a wish and stands at this
     station."""
     here = (w.robot for w in memory.wishes if memory.stands_at(w.robot, site) == station)
     return next((who for who in here if memory.station_of(who) is None), None)
@@ -198,9 +202,11 @@ def not_taken_at(grant: Grant) -> float:
 
 
 def hopeless_at(memory: SiteMemory, name: str, grant: Grant) -> float:
-    """Return the time when a robot on its way should get another station. The reason is a silent daemon
-    of the station, a station out of the daemon's reach, or another robot that does not leave the
-    pad."""
+    """Return the time when a robot on its way should get another station.
+
+    The reason is a silent daemon of the station, a station out of the daemon's reach, or another robot
+    that does not leave the pad.
+    """
     seen, at = memory.stations.get(name), memory.silent_since(name) + LOST_S
     if seen is not None and seen.diagnosis is FaultCause.LOST:
         at = min(at, seen.since + LOST_S)
@@ -238,8 +244,8 @@ def _was_the_stations(
     now: float,
     site: SiteLimits,
 ) -> bool:
-    """Return whether the station was at fault: its error names the station, or lasted after the robot
-    had left."""
+    """Return whether the station was at fault. The station was at fault if its error names the station,
+    or if the error lasted after the robot had left."""
     seen, standing = memory.stations[name], memory.robots.get(who)
     if seen.state is ERROR:
         return diagnosis(seen.error.removeprefix(OUT_OF_SERVICE)) is FaultCause.STATION

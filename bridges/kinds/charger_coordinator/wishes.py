@@ -1,26 +1,27 @@
 """Robots that want to be charged. Place, battery and task decide this; the mode is only a hint.
 
-From a robot's first charge on, RMF's fleet adapter shows the mode CHARGING in every later task too, and
-it never shows IDLE in a task. (See rmf_ros2 9dedd0f: TaskManager::robot_mode;
+From a robot's first charge on, RMF's fleet adapter shows the mode CHARGING in every later task too. The
+adapter never shows IDLE in a task. (See rmf_ros2 9dedd0f: TaskManager::robot_mode;
 RobotContext::current_mode, which only WaitForCharge and DockRobot set.) The id of a task shows whether
-the task came from RMF's dispatcher; such a task is no charge.
-For a robot that has stood at one of our waypoints for SETTLES_S:
+the task came from RMF's dispatcher. Such a task is no charge.
+
+Rules for a robot that has stood at one of our waypoints for SETTLES_S:
 COORDINATOR-WISHES-1. Below `again_percent` the robot wants to be charged if it has no task, or if its
    mode is CHARGING or DOCKING.
 COORDINATOR-WISHES-2. Between `again_percent` and `full_percent` the robot wants to be charged only if
    it shows CHARGING or DOCKING in its present task. A robot that was already charged in that task is
    not charged again. A robot that has not left our waypoints since its charge may only be waiting for
-   traffic on its pad, so its wish counts after LINGERS_S.
+   traffic on its pad. The wish of such a robot counts after LINGERS_S.
 COORDINATOR-WISHES-3. A robot without a task wants to be charged when the schedule says so. The schedule
-   charges the robot only once in the same time of the schedule, unless the robot has worked in between.
+   charges the robot only once in the same entry's time, unless the robot has worked in between.
 COORDINATOR-WISHES-4. A wish lasts as long as these rules hold, and also during the robot's drive to its
-   station. The robot drives there in the same task, or without a task after a station was assigned to
-   it. If a task begins within COMES_S of the assignment, that task is the drive (RMF's automatic
-   retreat, or its restarted ChargeBattery), unless RMF's dispatcher gave the task.
+   station. The robot drives to the station in the same task, or without a task after a station was
+   assigned to it. A task that begins within COMES_S of the assignment is that drive: RMF's automatic
+   retreat, or its restarted ChargeBattery. A task from RMF's dispatcher is no such drive.
 COORDINATOR-WISHES-5. Under `finishing_request: nothing` RMF moves no robot without a task until its
-   battery is very low. The same holds under `park`, but Jazzy's RMF does drive such a robot to its
-   assigned place. A robot that RMF does not move stays where it is when a station is assigned. After
-   COMES_S the robot loses the station, and ABSENT_S later it is called again.
+   battery is very low. Under `park` RMF does not move such a robot either, but Jazzy's RMF does drive
+   it to its assigned place. A robot that RMF does not move stays where it is when a station is
+   assigned. After COMES_S the robot loses the station, and ABSENT_S later it is called again.
 """
 
 from typing import Final
@@ -41,10 +42,10 @@ from bridges.kinds.charger_coordinator.memory import (
 from bridges.kinds.charger_coordinator.signals import ChargeWanted, Sighting, is_dispatched
 
 SETTLES_S: Final = 2.0
-"""The time (s) for which a robot must stay, because a robot that only passes may also show the mode
-CHARGING."""
+"""The time (s) for which a robot must stand still before it can have a wish. A robot that only passes
+may also show the mode CHARGING."""
 LINGERS_S: Final = 300.0
-"""The time (s) after which a robot that stays on its pad wants to be charged: no traffic jam lasts as
+"""The time (s) after which a robot that stays on its pad wants to be charged. No traffic jam lasts that
 long."""
 COMES_S: Final = 60.0
 """The time (s) within which RMF acts on a charging assignment, if it acts at all."""
@@ -140,7 +141,7 @@ def _standing(before: Standing | None, sighting: Sighting, now: float) -> Standi
 
 
 def _served(memory: SiteMemory, sighting: Sighting) -> SiteMemory:
-    """Forget the task in which a robot was charged, when the robot has left its place in another
+    """Forget the task in which a robot was charged, when the robot has left its place in a later
     task."""
     who, task = sighting.who, sighting.task_id
     if sighting.place is None and task and memory.served.get(who, task) != task:
@@ -162,8 +163,8 @@ def _rested(memory: SiteMemory, sighting: Sighting, site: SiteLimits) -> SiteMem
 
 
 def _called(memory: SiteMemory, sighting: Sighting, now: float) -> SiteMemory:
-    """Note the task that begins after the call as the robot's drive to the station, unless RMF's
-    dispatcher gave that task."""
+    """Note the first task after the call as the robot's drive to the station, unless RMF's dispatcher
+    gave that task."""
     who, task = sighting.who, sighting.task_id
     wish, station = memory.wish(who), memory.station_of(who)
     if wish is None or wish.by == "operator" or wish.task_id or not task or station is None:
@@ -214,7 +215,7 @@ def _believed(memory: SiteMemory, standing: Standing, now: float) -> bool:
 
 
 def _lasts(memory: SiteMemory, wish: Wish, s: Sighting, site: SiteLimits) -> bool:
-    """Return whether the robot still wants to be charged, and stands at one of our waypoints or drives
+    """Return whether the robot's wish goes on. The robot must stand at one of our waypoints, or drive
     to its station."""
     if s.battery_percent >= _goal(memory, wish, site):
         return False

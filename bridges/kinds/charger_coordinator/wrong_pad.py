@@ -1,19 +1,22 @@
 """Robots on a wrong pad, and the orders that make them leave.
 
-RMF's fleet adapter starts a robot's ChargeBattery again when the waypoint or the mode of its charging
-assignment changes (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart). Such a change moves
-a robot only during its ChargeBattery: as a task, or by `finishing_request: charge`. Rules:
+An order is a change of the robot's charging assignment. RMF's fleet adapter starts a robot's
+ChargeBattery again when the assignment's waypoint or mode changes (rmf_ros2 9dedd0f, ChargeBattery.cpp,
+_consider_restart). Such a change moves a robot only during its ChargeBattery, as a task or by
+`finishing_request: charge`. A robot's place is known from its fleet (FleetState's position), or from a
+station that reads receivers.
+
+Rules:
 COORDINATOR-WRONG-PAD-1. A robot with a station may come to another station, or stay at another station
    for LEAVES_S. The coordinator then tells the robot to wait, and TOLD_S later to charge at its own
    station. The coordinator does so at most twice for one request.
 COORDINATOR-WRONG-PAD-2. A robot without a station may stand on a pad for which another robot waits. The
-   coordinator then tells the robot again to wait: for TOLD_S its assignment shows the other mode. The
-   order comes `leaves_s` after the robot arrived or the station released it.
-COORDINATOR-WRONG-PAD-3. The coordinator gives no such order if it may not assign places, or if the
-   robot is in another task, because RMF would not move the robot.
-COORDINATOR-WRONG-PAD-4. A person is alerted if the robot still stands there OBEYS_S after the last
-   order, or if the coordinator cannot order it to leave.
-A robot's place is known from its fleet (FleetState's position), or from a station that reads receivers.
+   coordinator then tells the robot to wait once more: for TOLD_S the robot's assignment shows the other
+   mode. The order comes `leaves_s` after the robot arrived or the station released the robot.
+COORDINATOR-WRONG-PAD-3. The coordinator gives no such order if it may not assign places. It gives no
+   order to a robot in another task either, because RMF would not move the robot.
+COORDINATOR-WRONG-PAD-4. A person is alerted if the robot still stands on the wrong pad OBEYS_S after
+   the last order, or if the coordinator cannot order the robot to leave.
 """
 
 from collections.abc import Iterator, Mapping
@@ -36,9 +39,12 @@ TRIES: Final = 2
 
 
 class OnWrongPad(NamedTuple):
-    """A robot `who` that has stood at a wrong `station` since `since`. `expected`: the robot's own
-    station; None if the robot has no station and is in the way of the robot `waiter`. `tries`: the
-    greatest number of orders to leave."""
+    """A robot `who` that has stood at a wrong `station` since `since`.
+
+    `why`: see `Nudge`. `tries`: the greatest number of orders to leave. `expected`: the robot's own
+    station; None if the robot has no station. `waiter`: the robot that waits for the station; None if
+    no robot waits.
+    """
 
     who: RobotName
     station: str
@@ -51,7 +57,7 @@ class OnWrongPad(NamedTuple):
 
 def found(memory: SiteMemory, now: float, site: SiteLimits) -> dict[RobotName, OnWrongPad]:
     """Find every robot at the wrong station or in another robot's way. With `now` = NEVER, also find
-    the robots that would be found later if no robot moved."""
+    the robots that will count as such later if no robot moves."""
     astray: dict[RobotName, OnWrongPad] = {}
     for one in (*_strayed(memory, now, site), *_blocking(memory, now, site)):
         astray.setdefault(one.who, one)
@@ -71,7 +77,7 @@ def nudged(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
 
 
 def is_nudged(memory: SiteMemory, who: RobotName, now: float) -> bool:
-    """Return whether a changed assignment tells the robot to leave now."""
+    """Return whether a changed assignment now tells the robot to leave."""
     return who in memory.nudges and now < memory.nudges[who].at + TOLD_S
 
 
@@ -94,8 +100,8 @@ def due(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[float]:
 
 
 def _strayed(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWrongPad]:
-    """Yield robots that have a station, but stand at another one and have not been charged at their own
-    yet."""
+    """Yield robots that have a station, stand at another station, and have not been charged at their
+    own yet."""
     for name, grant in memory.grants.items():
         if grant.over or grant.started:
             continue
@@ -135,7 +141,7 @@ def _blocking(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWr
 
 
 def _idle_at(memory: SiteMemory, station: str, here: Here) -> RobotName | None:
-    """Find a robot that stands at this free station without being allotted any station."""
+    """Find a robot that stands at this free station and has no station allotted."""
     grant, seen = memory.grants.get(station), memory.stations.get(station)
     if seen is None or seen.state is CHARGING or (grant is not None and not grant.over):
         return None
@@ -145,7 +151,7 @@ def _idle_at(memory: SiteMemory, station: str, here: Here) -> RobotName | None:
 def _matters(
     memory: SiteMemory, who: RobotName, nudge: Nudge, astray: Mapping[RobotName, OnWrongPad]
 ) -> bool:
-    """Return whether these orders still count. For a robot with a station they count until the robot's
+    """Return whether these orders still count. Orders to a robot with a station count until the robot's
     next request, even if the robot goes to a wrong pad twice."""
     station = memory.station_of(who)
     if station is not None:
@@ -159,8 +165,8 @@ def _can_be_nudged(memory: SiteMemory, who: RobotName) -> bool:
 
 
 def _next_at(memory: SiteMemory, one: OnWrongPad) -> float:
-    """Return the time of the next order to leave. Return NEVER if the robot was told often enough, or
-    if the coordinator cannot order it to leave."""
+    """Return the time of the next order to leave. Return NEVER if the robot had enough orders, or if
+    the coordinator cannot order the robot to leave."""
     nudge = memory.nudges.get(one.who)
     if not _can_be_nudged(memory, one.who):
         return NEVER

@@ -133,7 +133,7 @@ def test_every_problem_of_a_schedule_is_named_with_its_place() -> None:
         ),
         (
             ("schedule", "2", "percent"),
-            "is not above again_percent (90 %): below that they are charged anyway",
+            "is not above again_percent (90 %), below which robots are charged anyway",
         ),
     ]
 
