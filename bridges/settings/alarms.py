@@ -1,4 +1,4 @@
-"""Checks that the devices of a file raise only one sort of alarm, and that other daemons can see it."""
+"""Checks that the devices of a file raise one and the same alarm, and that other daemons can see it."""
 
 from collections.abc import Mapping
 
@@ -9,16 +9,19 @@ from bridges.yaml.parsing import YamlFile
 from bridges.yaml.positions import Spot, locate
 
 UNSEEN = (
-    "an alarm needs diagnostics: daemons state their alarms there, so that the end of one alarm does"
-    " not end another's; delete diagnostics: false"
+    "an alarm needs diagnostics: daemons state their alarms on /diagnostics, so that the end of one"
+    " alarm does not end another alarm. Delete diagnostics: false"
 )
 
 
 def note_alarms(
     page: YamlFile, devices: Mapping[str, DeviceSettings], rmf: Rmf, spot: Spot, of_rmf: Spot | None
 ) -> None:
-    """Note each alarm that contradicts another, and each alarm that other daemons cannot see. `spot`
-    and `of_rmf` are the devices' section and the section `rmf`."""
+    """Note each alarm that contradicts another alarm of the file, and each alarm that other daemons
+    cannot see.
+
+    `spot`: the section of the devices. `of_rmf`: the section `rmf`.
+    """
     found = {n: one for n, one in devices.items() if isinstance(one, AlarmingSettings)}
     for name, text in disagreements(found):
         page.note(locate(spot, (name, "alarm")).where(), text)

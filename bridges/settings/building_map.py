@@ -25,7 +25,7 @@ from bridges.kinds.shared.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT
 from bridges.yaml.parsing import Sort, YamlFile, compose, read
 
 MAP = Sort("building map or navigation graph", "levels: ...", 1024 * 1024, 100_000)
-"""The limits of such a file. A file of this size takes some seconds to read. Larger files are
+"""The limits of such a file. A file of the greatest size takes some seconds to read. Larger files are
 refused."""
 
 Lines = dict[str, int]
@@ -35,10 +35,10 @@ Place = tuple[str, float, float]
 
 
 class BuildingMap(Struct, frozen=True):
-    """The names of one file. `named`: sort -> name -> line. `stops`: lift -> its floors.
+    """The names of one file.
 
-    `places`: waypoint -> level, x, y (m). Only a navigation graph fills `places`, because
-    traffic-editor's file has pixels.
+    `named`: sort of name -> name -> line. `stops`: lift -> its floors. `places`: waypoint -> its level,
+    x and y (m). Only a navigation graph fills `places`, because traffic-editor's file has pixels.
     """
 
     file: str
@@ -105,7 +105,8 @@ class _MapReading:
             self._add_stop(lift, level)
 
     def _add(self, what: str, name: ScalarNode | None) -> None:
-        """Add a name. Leave out the name "", which vertices and doors without a name have."""
+        """Add a name. The empty name "" is left out, because vertices and doors without a name have
+        it."""
         if name is not None and name.value:
             self.named[what].setdefault(name.value, _line(name))
 
@@ -113,8 +114,7 @@ class _MapReading:
         self.stops.setdefault(lift.value, {}).setdefault(level.value, _line(level))
 
     def _entries(self, node: Node, key: str) -> Iterator[tuple[ScalarNode, Node]]:
-        """Yield the entries of the mapping below `key`. Yield nothing if the mapping is missing or
-        empty."""
+        """Yield the entries of the mapping below `key`; nothing if that mapping is missing or empty."""
         for name, value in self._section(node, key, MappingNode, "a mapping (name: ...)"):
             if isinstance(name, ScalarNode):
                 yield name, value
@@ -122,7 +122,7 @@ class _MapReading:
                 self._page.note(name, f"a name in '{key}' must be text")
 
     def _items(self, node: Node, key: str, what: str) -> Iterator[SequenceNode]:
-        """Yield the lists in the list below `key`. Yield nothing if the outer list is missing or
+        """Yield the inner lists of the list below `key`; nothing if the outer list is missing or
         empty."""
         for item in self._section(node, key, SequenceNode, "a list"):
             if isinstance(item, SequenceNode):
@@ -131,8 +131,7 @@ class _MapReading:
                 self._page.note(item, f"{what} must be a list ([x, y, ...]), as RMF has it")
 
     def _section(self, node: Node, key: str, kind: type[CollectionNode], what: str) -> list[Any]:
-        """Return the content of the section below `key`. Return [] if the section is missing or
-        empty."""
+        """Return the content of the section below `key`; [] if the section is missing or empty."""
         section = _below(node, key)
         if section is None or _is_empty(section):
             return []
@@ -151,8 +150,8 @@ def _below(node: Node, key: str) -> Node | None:
 
 
 def _param(item: SequenceNode, key: str) -> ScalarNode | None:
-    """Return a parameter of a vertex or an edge. The parameters are in its last item, as `V` or `[type,
-    V]`."""
+    """Return a parameter of a vertex or an edge. The last item of `item` has the parameters, as `V` or
+    `[type, V]`."""
     found = _below(item.value[-1], key) if item.value else None
     if isinstance(found, SequenceNode) and len(found.value) == 2:
         found = found.value[1]

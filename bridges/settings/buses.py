@@ -54,8 +54,8 @@ def read_bus(
 
 
 def _note_untyped(bus: MappingEntry, allowed: list[str], values: Values, page: YamlFile) -> None:
-    """Note that a bus has no `type`, or a misspelt `type`. Without a type the bus's other keys have no
-    meaning."""
+    """Note that a bus has no `type`, or a misspelt `type`. The bus's other keys have no meaning without
+    a type."""
     entries = {e.name: e for e in values.entries(bus.spot())}
     near = nearest("type", entries)
     if near is None:
@@ -65,6 +65,6 @@ def _note_untyped(bus: MappingEntry, allowed: list[str], values: Values, page: Y
 
 
 def _is_other_type(kind: MappingEntry, allowed: list[str]) -> bool:
-    """Does this bus type exist, although no driver of the file can use it?"""
+    """Return whether this bus type exists, although no driver of the file can use it."""
     others = set(named.bus_types()).difference(allowed)
     return isinstance(kind.value, ScalarNode) and kind.value.value in others

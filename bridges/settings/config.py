@@ -18,18 +18,20 @@ from drivers.hal import AnyBus, Bus
 from drivers.hal.points import Wire
 
 LATE_S: Final = 0.1
-"""How late (s) a reading of another bus may be before it no longer counts as present."""
+"""The allowed delay (s) of a reading of another bus, beyond one scan of that bus. A later reading no
+longer counts."""
 
 
 class Config(Struct, frozen=True):
     """A valid file.
 
-    `text`: the file's bytes. `bus_types`: name -> `type:`. `buses` and `devices`: name -> settings.
-    Only the record of the bus type or driver knows the type of these settings. `warnings`: remarks on
-    valid settings that may be a mistake. `old_keys`: warnings about keys that have a new name. `notes`:
-    remarks on intended settings whose effects the user should know. `section`: the settings of a kind
-    without devices (`bridges/kinds/shared/graph_kind.py`). Such a kind has no driver and
-    no buses. For any other kind, `section` holds the settings that its devices share, if there are any.
+    `text`: the file's bytes. `buses` and `devices`: name -> settings. Only the record of the bus type
+    or driver knows the type of these settings. `bus_types`: name of the bus -> its `type:`. `warnings`:
+    remarks on valid settings that may be a mistake. `old_keys`: warnings about keys that have a new
+    name. `notes`: remarks on intended settings whose effects the user should know. `section`: the
+    settings of a kind without devices (`bridges/kinds/shared/graph_kind.py`). Such a kind has no driver
+    and no buses. For any other kind, `section` holds the settings that its devices share, if there are
+    any.
     """
 
     path: Path
@@ -48,7 +50,7 @@ class Config(Struct, frozen=True):
 
     @property
     def drives(self) -> bool:
-        """Does this file have outputs that must be off when its daemon is dead?"""
+        """Return whether this file has outputs that must be off when its daemon is dead."""
         kind = kind_called(self.kind)
         return not isinstance(kind, GraphKind) and kind.drives
 
@@ -62,12 +64,12 @@ class Config(Struct, frozen=True):
         return [name for name in self.devices if self.bus_of(name) == bus]
 
     def devices_at(self, bus: str) -> list[str]:
-        """Return the names of the devices on this bus, and of devices that have inputs there."""
+        """Return the names of the devices on this bus, and of devices that have inputs on it."""
         guests = [name for name in self.devices if bus in self.other_buses(name)]
         return [*self.devices_on(bus), *guests]
 
     def driver_type(self, device_name: str) -> AnyDriver:
-        """Return the driver of a device. It is the device's own driver, or else the file's."""
+        """Return the driver of a device: its own driver if it has one, else the file's driver."""
         own: str | None = self.devices[device_name].driver
         return named.driver_called(self.kind, own or self.driver)
 
@@ -76,24 +78,27 @@ class Config(Struct, frozen=True):
         return list(self.driver_type(device_name).wires(self.devices[device_name]))
 
     def wires_on(self, bus: str, device_name: str) -> list[Wire]:
-        """Return the part of a device's wiring table that is on this bus, as a table for this bus."""
+        """Return the part of a device's wiring table that is on this bus. The rows no longer name the
+        bus."""
         wires = ((wire, wire.bus or self.bus_of(device_name)) for wire in self.wires(device_name))
         return [replace(wire, bus="") for wire, name in wires if name == bus]
 
     def other_buses(self, device_name: str) -> list[str]:
-        """Return the buses, beside the device's own, that have inputs of the device."""
+        """Return the buses that have inputs of the device, without the device's own bus."""
         return list(dict.fromkeys(wire.bus for wire in self.wires(device_name) if wire.bus))
 
     def lasts_s(self, bus: str) -> float:
-        """Return the greatest age (s) at which a reading of a device's other bus counts as present."""
+        """Return the greatest age (s) at which a reading of this bus counts for a device on another
+        bus."""
         scan_s: float = self.buses[bus].scan_s
         return scan_s + LATE_S
 
     def debounce(self, device_name: str) -> dict[str, float]:
         """Return signal or group -> how long a change must last (s).
 
-        The inputs of two buses fit together only to within the age of a reading of the other bus. The
-        debounce of every input is longer by that age, so no single reading passes for two.
+        A device may have inputs on two buses. A reading of the other bus may be older by `lasts_s`.
+        Therefore the debounce of every input is longer by that age, so that no single reading counts
+        twice.
         """
         late_s = max(map(self.lasts_s, self.other_buses(device_name)), default=0.0)
         found = self.driver_type(device_name).debounce(self.devices[device_name])

@@ -1,6 +1,6 @@
-"""Checks files against each other for places or names used twice, different domains, and unknown names.
+"""Checks files against each other: places or names used twice, different domains, unknown names.
 
-Files that are checked together belong to one site. They run on one machine, unless the user says
+Files that are checked together belong to one site. They are for one machine, unless the user says
 otherwise.
 """
 
@@ -27,8 +27,10 @@ class Found(Struct, frozen=True):
 
 
 class ExclusiveUse(Struct, frozen=True):
-    """A use of hardware or a name that only one file may use. `what`: its name. `path`: the path of the
-    key that uses it."""
+    """A use of hardware, or of a name, that only one file may use.
+
+    `what`: the name of the used thing. `path`: the path of the key that uses it.
+    """
 
     config: Config
     what: str
@@ -51,8 +53,8 @@ def across(configs: Sequence[Config], one_machine: bool = True) -> Found:
 
 
 def taken(configs: Sequence[Config], one_machine: bool = True) -> Iterator[Problem]:
-    """Yield a problem for each port, pin, point of a unit or RMF name that two files use, although only
-    one may."""
+    """Yield a problem for each thing that two files use, although only one may. Such things are ports,
+    pins, points of a unit and RMF names."""
     lines = list(_twice(c for config in configs for c in _lines(config, one_machine)))
     busy = {claim.what for claim, _ in lines}
     claims = (c for config in configs for c in _claims(config, one_machine))
@@ -61,7 +63,7 @@ def taken(configs: Sequence[Config], one_machine: bool = True) -> Iterator[Probl
 
 
 def _twice(claims: Iterable[ExclusiveUse]) -> Iterator[tuple[ExclusiveUse, ExclusiveUse]]:
-    """Yield (later use, first use) for each thing that two files use. Uses within one file are left
+    """Yield (later use, first use) for each thing that two files use. Two uses within one file are left
     out, because the loader has checked them."""
     first: dict[str, ExclusiveUse] = {}
     for claim in claims:
@@ -96,8 +98,7 @@ def _lines(config: Config, one_machine: bool) -> Iterator[ExclusiveUse]:
 
 
 def _gateways(config: Config) -> Iterator[ExclusiveUse]:
-    """Yield the use of each gateway's address. The make of a gateway decides how many clients may
-    connect."""
+    """Yield the use of each gateway's address. Some makes of gateway accept only one client."""
     for name, where in _buses(config):
         if where.clients is None:
             yield ExclusiveUse(config, where.text, ("buses", name))
@@ -122,7 +123,7 @@ def _claims(config: Config, one_machine: bool) -> Iterator[ExclusiveUse]:
 
 
 def _places(config: Config, bus: str, device: str) -> Iterator[tuple[str, Path]]:
-    """Yield every point and exclusive place of a device on this bus, as the bus spells it."""
+    """Yield every point and exclusive place of a device on this bus, in the bus's spelling."""
     hal = config.bus_type(bus)
     for wire in config.wires_on(bus, device):
         flash = [("flash", wire.flash.point)] if wire.flash is not None else []
@@ -134,7 +135,8 @@ def _places(config: Config, bus: str, device: str) -> Iterator[tuple[str, Path]]
 
 
 def _shared(pair: tuple[ExclusiveUse, ExclusiveUse], claims: Sequence[ExclusiveUse]) -> Problem:
-    """Return the warning about a gateway in two files. It names the units that both files ask."""
+    """Return the warning about a gateway in two files. The warning names the units that both files
+    read."""
     claim, other = pair
     both = _units(claim.config, claim.what, claims) & _units(other.config, claim.what, claims)
     units = f" for unit {', '.join(sorted(both))}" if both else ""
@@ -156,7 +158,7 @@ def _domains(configs: Sequence[Config]) -> Iterator[Problem]:
             text = f"DDS domain {ours}, but {configs[0].path} is in domain {first}"
             yield _said(
                 ExclusiveUse(config, "", ("rmf", "domain_id")),
-                f"{text}: they cannot hear each other",
+                f"{text}: the daemons cannot hear each other",
             )
 
 
@@ -165,8 +167,7 @@ def _devices(configs: Sequence[Config], kind: str) -> dict[str, Config]:
 
 
 def _nowhere(configs: Sequence[Config]) -> Iterator[Problem]:
-    """Yield a problem for each device that no file defines, although the file of a kind without
-    hardware names the device."""
+    """Yield a problem for each device that a supervisor or coordinator names and no file defines."""
     for claim, kind, name in _spoken(configs):
         known = _devices(configs, kind)
         if known and name not in known:
@@ -174,8 +175,8 @@ def _nowhere(configs: Sequence[Config]) -> Iterator[Problem]:
 
 
 def _unspoken(configs: Sequence[Config]) -> Iterator[Problem]:
-    """Yield a warning for each device that the file of a kind without hardware leaves out, although the
-    file names other devices of its kind."""
+    """Yield a warning for each device that a supervisor or coordinator does not name, although it names
+    other devices of that kind."""
     spoken = [(kind, name, claim) for claim, kind, name in _spoken(configs)]
     for kind in sorted({kind for kind, _, _ in spoken}):
         names = {name for k, name, _ in spoken if k == kind}

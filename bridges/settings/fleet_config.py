@@ -2,8 +2,8 @@
 
     rmf_fleet:
       name: tiny
-      recharge_threshold: 0.2           # below it RMF gives a robot no task
-      recharge_soc: 1.0                 # RMF's ChargeBattery ends there
+      recharge_threshold: 0.2           # below this charge RMF gives a robot no task
+      recharge_soc: 1.0                 # at this charge RMF's ChargeBattery ends
       finishing_request: charge         # charge, park or nothing
       publish_fleet_state: 10.0         # Hz
       account_for_battery_drain: true
@@ -11,9 +11,9 @@
       robots: {AMR01: {charger: charger_a}}
     reference_coordinates: {L1: {rmf: [[x, y], ...], robot: [[x, y], ...]}}
 
-Older files have `robots:` beside `rmf_fleet:`, with `rmf_config: {charger: {waypoint: charger_a}}`, and
-one pair of lists for all levels; rmf_demos has them below `fleet_manager`. All other keys are ignored.
-Source: open-rmf/fleet_adapter_template, config.yaml and fleet_adapter.py.
+Older files have `robots:` beside `rmf_fleet:`, with `rmf_config: {charger: {waypoint: charger_a}}`.
+They have one pair of lists for all levels. rmf_demos has this pair below `fleet_manager`. All other
+keys are ignored. Source: open-rmf/fleet_adapter_template, config.yaml and fleet_adapter.py.
 """
 
 import cmath
@@ -39,7 +39,7 @@ T = TypeVar("T")
 
 
 class Charger(msgspec.Struct, frozen=True):
-    """A robot's charger. `waypoint` is the charger's name in the navigation graph."""
+    """A robot's charger, in a mapping. `waypoint`: the charger's name in the navigation graph."""
 
     waypoint: str | None = None
 
@@ -81,7 +81,7 @@ class FootprintProfile(msgspec.Struct, frozen=True):
 
 
 class MapTransform(msgspec.Struct, frozen=True):
-    """RMF's own form of a transform, from RMF's map to the robot's map (m, rad)."""
+    """A transform from RMF's map to the robot's map (m, rad), as RMF writes it."""
 
     translation: Point = (0.0, 0.0)
     rotation: float = 0.0
@@ -93,7 +93,7 @@ class MapTransform(msgspec.Struct, frozen=True):
 
 
 class RmfFleet(msgspec.Struct, frozen=True):
-    """The fleet. In this file a percentage is a fraction of 1."""
+    """The section `rmf_fleet`. Its percentages are fractions of 1."""
 
     name: str
     limits: Limits | None = None
@@ -110,7 +110,8 @@ class RmfFleet(msgspec.Struct, frozen=True):
 
 
 class Pairs(msgspec.Struct, frozen=True):
-    """Pairs of points. The two points of a pair are one place, on RMF's map and on the robot's map."""
+    """Pairs of points. A pair is one place, as a point on RMF's map and as a point on the robot's
+    map."""
 
     rmf: list[Point]
     robot: list[Point]
@@ -140,7 +141,7 @@ class FleetFile(msgspec.Struct, frozen=True):
 
     @property
     def fleet(self) -> RmfFleet:
-        """The fleet."""
+        """The section `rmf_fleet`."""
         return self.contents.rmf_fleet
 
     def robots(self) -> Iterator[tuple[Path, str, RobotConfig]]:
@@ -153,7 +154,7 @@ class FleetFile(msgspec.Struct, frozen=True):
                 yield (*top, name), name, robot or RobotConfig()
 
     def references(self) -> Mapping[str, Pairs]:
-        """Return level -> pairs; the level is EVERY_LEVEL if the file has one list for all levels."""
+        """Return level -> pairs. If the file has one list for all levels, the level is EVERY_LEVEL."""
         manager = self.contents.fleet_manager
         if manager and manager.reference_coordinates:
             return {EVERY_LEVEL: manager.reference_coordinates}
@@ -165,8 +166,10 @@ class FleetFile(msgspec.Struct, frozen=True):
 
 
 def load_fleet(file: str, text: bytes | None = None) -> FleetFile:
-    """Read a fleet configuration. `text`: its text, if it is known. Raises SettingsError with its
-    problems."""
+    """Read a fleet configuration. Raises SettingsError with its problems.
+
+    `text`: the file's bytes, if the caller has them already.
+    """
     page = YamlFile(file)
     root = compose(page, read(file, FLEET) if text is None else text, FLEET)
     page.check()
@@ -187,7 +190,10 @@ def plain_values(page: YamlFile, root: MappingNode) -> dict[str, Any]:
 
 
 def converted(file: str, root: MappingNode, plain: dict[str, Any], wanted: type[T], asks: str) -> T:
-    """Convert plain values to a struct. `asks`: the question after a problem. Raises SettingsError."""
+    """Convert plain values to a struct. Raises SettingsError.
+
+    `asks`: the question to the user at the end of the problem's text.
+    """
     try:
         return msgspec.convert(plain, wanted, strict=False)
     except msgspec.ValidationError as error:

@@ -1,7 +1,7 @@
 """Compares a coordinator's YAML with the configuration of a fleet's adapter, and with RMF's map.
 
 Different people write these files, and RMF reports no mismatch. A robot with a mismatch waits for ever,
-or stays on a pad. This file reports each mismatch with its file, its line and the remedy.
+or stays on a pad. This module reports each mismatch with its file, its line and the remedy.
 """
 
 import math
@@ -23,8 +23,8 @@ from bridges.yaml.positions import Spot, locate
 from bridges.yaml.spelling import unknown
 
 Transforms = Mapping[str, Similarity]
-"""Level -> transform from RMF's map to the robot's map. The level is EVERY_LEVEL if one transform holds
-for all."""
+"""Level -> transform from RMF's map to the robot's map. If one transform holds for all levels, the
+level is EVERY_LEVEL."""
 LEAST_HZ = 1.0
 FINISHING = ("charge", "park", "nothing")
 
@@ -38,8 +38,8 @@ class Compared(Struct):
 
 
 def compared(config: Config, fleet: FleetFile, building: BuildingMap | None) -> Compared:
-    """Compare a coordinator's file with one fleet's configuration. If `building` is given, compare
-    positions too."""
+    """Compare a coordinator's file with one fleet's configuration. With `building`, compare positions
+    too."""
     found = _Comparing(config, fleet)
     found.names()
     found.percentages()
@@ -145,7 +145,7 @@ class _Comparing:
             self._theirs("errors", ("rmf_fleet", "recharge_threshold"), text)
 
     def finishing(self) -> None:
-        """Check the fleet's finishing request, which a robot follows after a task."""
+        """Check the fleet's `finishing_request`, which tells a robot what to do after a task."""
         request = self._fleet.fleet.finishing_request
         path = ("rmf_fleet", "finishing_request")
         if request is not None and request not in FINISHING:
@@ -204,7 +204,7 @@ class _Comparing:
                     f" {self._settings.near_m:g} m: a robot would not be seen at its waypoint"
                 )
                 if estimate(pairs.rmf, _mirrored(pairs.robot)).error <= self._settings.near_m:
-                    text = "one map is the other's mirror image: turn the sign of every robot's y"
+                    text = "one map is the other's mirror image: change the sign of every robot's y"
                 self._theirs("errors", path, text)
 
     def _waypoint(

@@ -1,7 +1,8 @@
-"""Reads the two files of RMF that a fleet's YAML names, and compares them with it.
+"""Reads the two RMF files that a fleet's YAML names, and compares them with that YAML.
 
-RMF's adapter stops or dies at many mistakes in these files, so they are refused before it starts. The
-files' texts are stored with the daemon's claims, so that a recording can be decided again.
+RMF's adapter stops or dies at many mistakes in these files. Therefore the daemon refuses such files
+before the adapter starts. The files' texts are stored with the daemon's claims, so that a recording can
+be decided again.
 """
 
 from collections.abc import Iterator, Mapping
@@ -43,12 +44,16 @@ NEEDED: Final = (
 """Keys below `rmf_fleet` without which RMF's adapter does not read the file (EasyFullControl.cpp,
 `from_config_files`)."""
 OFF_M: Final = 0.5
-"""Pairs of coordinates that fit worse are an error: a robot would be seen beside its lane."""
+"""The greatest error (m) of fitting pairs of coordinates. With a greater error, a robot would be seen
+beside its lane."""
 
 
 class FleetSite(Struct, frozen=True):
-    """A fleet's two files. `transforms`: level -> from RMF's map to the robots' map. `estimated`: the
-    levels whose transform comes from pairs, and must be given to RMF."""
+    """A fleet's two files.
+
+    `transforms`: level -> transform from RMF's map to the robots' map. `estimated`: the levels whose
+    transform comes from pairs, and must be given to RMF.
+    """
 
     fleet: FleetFile
     graph: NavGraph
@@ -66,7 +71,7 @@ class FleetSite(Struct, frozen=True):
         return {name: robot.waypoint()[1] for _, name, robot in self.fleet.robots()}
 
     def notes(self) -> Iterator[str]:
-        """Yield the transforms and their errors, for people."""
+        """Yield texts about the transforms and their errors, for a person."""
         name = Path(self.config_file).name
         for level, found in self.transforms.items():
             of = f" for {level}" if level else ""
@@ -77,7 +82,7 @@ class FleetSite(Struct, frozen=True):
 
 
 def limits_of(config: Config, robot: str, debounce: Mapping[str, float]) -> RobotLimits:
-    """Return the limits of a robot's core, with its site. Raises SettingsError."""
+    """Return the limits of a robot's core, with the facts about its site. Raises SettingsError."""
     limits = RobotLimits.of(config.devices[robot], debounce)
     return replace(limits, site=read_site(config).of(robot))
 
@@ -107,7 +112,8 @@ def _file(config: Config, path: str) -> Path:
 
 @cache
 def _folder(folder: str) -> Path:
-    """Return the whole path of a folder, which stays when the daemon changes its working directory."""
+    """Return the absolute path of a folder. The cache keeps this path if the daemon changes its working
+    directory later."""
     return Path(folder).absolute()
 
 
@@ -119,7 +125,7 @@ class _Comparing:
         self._root = compose(self._page, config.text)
 
     def read(self, path: str, key: str, sort: Sort, load: Any) -> Any:
-        """Read one of the two files; None, with a problem, if that fails."""
+        """Read one of the two files. If that fails, note a problem and return None."""
         file = _file(self._config, path)
         try:
             return load(str(file), texts.text(file, lambda: read(str(file), sort)))
@@ -144,7 +150,7 @@ class _Comparing:
             self.problems.append(fleet.problem(("rmf_fleet", "finishing_request"), text))
 
     def transforms(self, fleet: FleetFile, graph: NavGraph) -> dict[str, Similarity]:
-        """Return the transforms of both forms."""
+        """Return level -> transform, from RMF's own transforms and from pairs of points."""
         found = {level: t.similarity() for level, t in fleet.fleet.transforms.items()}
         for level, pairs in fleet.references().items():
             path = ("reference_coordinates", *([level] if level else []))

@@ -10,8 +10,9 @@
 
 A kind without hardware has only `kind`, `rmf`, `recording` and one section of its own.
 
-Structs define the content of a section (`bridges/yaml/values.py`); this file and `wiring.py` check
-sections against each other. The daemon takes nothing else from the file, and checks nothing again.
+Structs define the content of each section, and `bridges/yaml/values.py` reads them. This module and
+`wiring.py` check the sections against each other. The daemon uses only the Config, and checks nothing
+again.
 """
 
 from functools import partial
@@ -51,7 +52,7 @@ OF_RMF: Final = {
     "rmf_fleet": ("a fleet adapter's configuration", "--fleet-config"),
     "levels": ("RMF's building map or navigation graph", "--building-map"),
 }
-"""Top key of an RMF file -> (the sort of file, the option of `check` for such a file)."""
+"""Top key of an RMF file -> (the sort of file, the option of `check` for this sort)."""
 
 
 def load(path: Path | str) -> Config:
@@ -60,8 +61,7 @@ def load(path: Path | str) -> Config:
 
 
 def understood(path: Path | str, text: bytes) -> Config:
-    """Return the Config of a device YAML's text. `path` is the file of the text. Raises
-    SettingsError."""
+    """Return the Config of a device YAML's text. `path`: the file of the text. Raises SettingsError."""
     page = YamlFile(str(path))
     root = compose(page, text)
     _note_rmfs(page, root)
@@ -73,7 +73,7 @@ def understood(path: Path | str, text: bytes) -> Config:
 
 
 def _note_rmfs(page: YamlFile, root: MappingNode) -> None:
-    """Refuse an RMF file as a whole, so that its keys do not cause an error each."""
+    """Refuse an RMF file as a whole. Otherwise each of its keys would cause an error."""
     for key, (what, option) in OF_RMF.items():
         entry = below(root, key)
         if entry and not below(root, "kind"):
@@ -106,8 +106,8 @@ class _DeviceReading:
         self._notes: list[Problem] = []
 
     def config(self, path: Path, text: bytes, old: list[Problem]) -> Config:
-        """Return the Config of the sections that `all` has read. `old` holds the warnings about the
-        file's old keys."""
+        """Return the Config of the sections that `all` has read. `old`: the warnings about the file's
+        old keys."""
         return Config(
             path=path,
             text=text,
@@ -125,7 +125,8 @@ class _DeviceReading:
         )
 
     def all(self) -> None:
-        """Read every section. A section whose meaning depends on a wrong earlier section is skipped."""
+        """Read every section. A section is skipped if its meaning depends on an earlier section that is
+        wrong."""
         entries = self._values.entries(self._top)
         self._read_kind(below(self._top.node, "kind"))
         if not isinstance(self._kind, GraphKind):
@@ -170,7 +171,7 @@ class _DeviceReading:
             self._driver = named.driver_called(self._kind_name, name)
 
     def _read_own_drivers(self, devices: Node) -> None:
-        """Read the driver of each device that names its own. The entry is None for a driver that does
+        """Read the driver of each device that names its own driver. None stands for a driver that does
         not exist."""
         for key, value in devices.value if isinstance(devices, MappingNode) else ():
             own = below(value, "driver")
@@ -195,8 +196,8 @@ class _DeviceReading:
             self._warn(locate(spot, path).where(), text)
 
     def _read_section(self, entry: MappingEntry | None, kind: AnyGraphKind) -> None:
-        """Read the settings of a kind without devices. The section may be missing if all its keys are
-        optional."""
+        """Read the settings of a kind without devices. If all keys are optional, the section may be
+        missing."""
         if entry:
             self._section = self._values.make(kind.settings, entry.spot())
             spot = Spot(entry.value, entry.key, entry.spot().label)
@@ -212,7 +213,7 @@ class _DeviceReading:
         return self._section is BROKEN or bool(self._page.problems)
 
     def _names(self, spot: Spot, of: str) -> list[MappingEntry]:
-        """Return the entries of a section whose keys are names."""
+        """Return the entries of a section, and check their keys as names."""
         entries = self._values.entries(spot)
         if isinstance(spot.node, MappingNode) and not spot.node.value:
             self._page.note(spot.at, f"{spot.label} is empty: it needs at least one {of}")
@@ -229,7 +230,8 @@ class _DeviceReading:
                 self._warn(locate(entry.spot(), path).where(), f"bus '{entry.name}': {text}")
 
     def _allowed_types(self) -> list[str]:
-        """Return the bus types that the drivers can use. If a driver is unknown, return every type."""
+        """Return the bus types that at least one driver of the file can use. If a driver is unknown,
+        return every type."""
         types, drivers = named.bus_types(), [self._driver, *self._own_drivers.values()]
         return [t for t in types if not all(d and t not in d.buses for d in drivers)]
 
@@ -252,8 +254,8 @@ class _DeviceReading:
                 self._page.note(self._buses[name].entry.key, text)
 
     def _without_sections(self, entries: list[MappingEntry]) -> list[MappingEntry]:
-        """Return the devices. Note each section that stands beside a device, but belongs into the
-        device."""
+        """Return the devices of the section. Note each key that stands beside a device, but belongs
+        into the device."""
         keys = field_names(self._driver.settings) if self._driver else set()
         devices = [entry for entry in entries if entry.name not in keys]
         for entry in entries if devices else ():
@@ -262,13 +264,13 @@ class _DeviceReading:
                 self._page.note(entry.key, f"{text} '{devices[0].name}'")
         if entries and not devices:
             one = f"'{entries[0].name}' belongs to one {self._kind_name}"
-            text = f"{one}: write its name in a line above, and indent what belongs to it"
+            text = f"{one}: write the {self._kind_name}'s name in a line above, and indent its keys"
             self._page.note(entries[0].key, text)
         return devices
 
     def _can_stand(self, device: MappingEntry, bus: str | None, driver: AnyDriver) -> bool:
-        """Can the device's driver use the device's bus? The file's own driver always can, because it
-        was checked with the bus."""
+        """Return whether the device's driver can use the device's bus. The file's own driver was
+        checked with the bus already."""
         kind = self._buses[bus].type if bus else None
         if kind is None or kind in driver.buses:
             return True
@@ -278,7 +280,7 @@ class _DeviceReading:
         return False
 
     def _bus_name(self, device: MappingEntry) -> str | None:
-        """Return the name of a device's bus. Return None if the name cannot be determined."""
+        """Return the name of a device's bus; None if the name is missing or wrong."""
         entry = below(device.value, "bus")
         if entry is None or is_none(entry.value):
             if len(self._buses) > 1 and isinstance(device.value, MappingNode):
@@ -344,8 +346,8 @@ class _DeviceReading:
             self._notes.append(self._page.problem(node, f"note: {spot.label}: {text}"))
 
     def _collect_bus_remarks(self) -> None:
-        """Collect remarks once for each bus: about outputs that stay on when this machine fails, and
-        about a pace that is too slow."""
+        """Collect remarks once for each bus. They are about outputs that stay on when this machine
+        fails, and about a pace that is too slow."""
         for name, bus in () if self._page.problems else self._buses.items():
             assert bus.hal
             unwatched = bus.hal.unwatched(bus.settings, self._written.get(name, ()))

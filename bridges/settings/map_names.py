@@ -1,7 +1,7 @@
 """Compares the names in a device YAML with the names on RMF's map of the building.
 
-RMF finds a lift, floor, door or charger only by its name. A wrong name causes no error; instead a robot
-waits for ever.
+RMF finds a lift, floor, door or charger only by its name. A wrong name causes no error in RMF. Instead
+a robot waits for ever.
 """
 
 from collections.abc import Iterator
@@ -53,7 +53,7 @@ def mismatches(config: Config, building: BuildingMap) -> list[Problem]:
 
 
 def _missing(building: BuildingMap, what: str, name: str, lift: str) -> str:
-    """Return a problem with a suggestion if the map lacks the name. Return "" if the map has it."""
+    """Return a problem with a suggestion if the map lacks the name; "" if the map has the name."""
     stops = building.stops.get(lift)
     known = building.named[what] if stops is None else stops
     if name in known:
@@ -62,7 +62,7 @@ def _missing(building: BuildingMap, what: str, name: str, lift: str) -> str:
     if stops is not None:
         has = f"the lift '{short(lift)}' does not stop at '{short(name)}' on {where}"
         if name in building.named[FLOOR]:
-            return f"{has}, though the level is there (line {building.named[FLOOR][name]})"
+            return f"{has}, though the map has that level (line {building.named[FLOOR][name]})"
     elif what == CHARGER and name in building.named[WAYPOINT]:
         line = building.named[WAYPOINT][name]
         return (

@@ -7,9 +7,10 @@
     lifts: {Lift1: {...}}
     doors: {D1: {...}}
 
-A lane names its vertices by their place in its level's list. RMF's adapter ends with an exception if a
-name occurs twice, if a lane joins two lifts, or if a vertex names a lift that `lifts` lacks. Source:
-open-rmf/rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/agv/parse_graph.cpp.
+A lane names its vertices by their places (from 0) in its level's list. RMF's adapter ends with an
+exception if a name occurs twice, if a lane joins two lifts, or if a vertex names a lift that `lifts`
+lacks. Source: open-rmf/rmf_ros2 9dedd0f,
+rmf_fleet_adapter/src/rmf_fleet_adapter/agv/parse_graph.cpp.
 """
 
 import math
@@ -59,8 +60,10 @@ class GraphContents(msgspec.Struct, frozen=True):
 
 
 def load_graph(file: str, text: bytes | None = None) -> NavGraph:
-    """Read a navigation graph. `text`: its text, if it is known. Raises SettingsError with every
-    problem."""
+    """Read a navigation graph. Raises SettingsError with every problem.
+
+    `text`: the file's bytes, if the caller has them already.
+    """
     page = YamlFile(file)
     root = compose(page, read(file, MAP) if text is None else text, MAP)
     page.check()
@@ -90,7 +93,7 @@ def _problems(contents: GraphContents) -> Iterator[tuple[Path, str]]:
         for i, (x, y, has) in enumerate(level.vertices):
             path = ("levels", name, "vertices", str(i))
             if not (math.isfinite(x) and math.isfinite(y)):
-                yield path, "its place is no number"
+                yield path, "its x or y is no number"
             if has.name and seen.setdefault(has.name, f"{name} {i}") != f"{name} {i}":
                 yield path, f"a second waypoint '{has.name}': RMF's adapter ends at this graph"
             if has.lift and contents.lifts is not None and has.lift not in contents.lifts:

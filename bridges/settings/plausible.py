@@ -10,9 +10,9 @@ from bridges.kinds.shared.remarks import Remarks
 from bridges.yaml.values import described
 
 RENEWED: Final = 3
-"""The least number of scans that the timer of an output must last."""
+"""The least number of scans for which an output's timer must last."""
 LONG_S: Final = 1000.0
-"""The least duration (s) that counts as suspiciously long. Milliseconds are often meant."""
+"""The least duration (s) that is suspiciously long. Its author often meant milliseconds."""
 
 
 def milliseconds(structs: Iterable[tuple[tuple[str, ...], object]]) -> Remarks:
@@ -39,9 +39,10 @@ def _clock(seconds: float) -> str:
 
 
 def out_of_step(device: DeviceSettings, bus: object, others: Iterable[object] = ()) -> Remarks:
-    """Yield the problems of a device whose bus is too slow: late readings and late commands.
+    """Yield a problem for readings or commands that come too late, because the device's bus is too
+    slow.
 
-    `others`: the settings of its other buses. Settings that are no valid struct count as fast.
+    `others`: the settings of the device's other buses. Settings that are no valid struct count as fast.
     """
     scan_s = getattr(bus, "scan_s", 0.0)
     slowest_s = max(scan_s, *(getattr(other, "scan_s", 0.0) for other in others), 0.0)

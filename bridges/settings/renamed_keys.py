@@ -1,9 +1,8 @@
-"""Keys that had another name in an earlier version. One table serves to read, to warn and to rewrite
-them.
+"""Keys that had another name in an earlier version. One table serves to read, to warn and to rewrite.
 
-A renamed key is read in every version with the major number in which the key was renamed. It is also
-read in every version with the next major number (docs/reference/promises.md). `check`, `enable` and
-`run` read such a file; `rmf-bridge migrate` rewrites it (`rewritten.py`).
+Suppose that version 1.4 renames a key. Every version 1.x and 2.x then still reads the old name
+(docs/reference/promises.md). `check`, `enable` and `run` read such a file, and `rmf-bridge migrate`
+rewrites it (`rewritten.py`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,8 +18,8 @@ from bridges.yaml.positions import MappingEntry, below
 class RenamedKey(Struct, frozen=True):
     """One key that was renamed or moved.
 
-    `was` and `now` are its old and new path from the top of the file. A `*` stands for any name, which
-    is the same in both. `since`: the version that renamed the key.
+    `was`: the old path from the top of the file. `now`: the new path. A `*` stands for any name, which
+    is the same in both paths. `since`: the version that renamed the key.
     """
 
     was: str
@@ -36,15 +35,17 @@ RENAMED: Final = (
 
 
 class OldKey(Struct, frozen=True):
-    """A renamed key in one file. It has the mapping around the key, the key's entry, and its new
-    path."""
+    """A renamed key in one file.
+
+    `parent`: the mapping around the key. `entry`: the key and its value. `path`: the key's new path.
+    """
 
     parent: MappingNode
     entry: MappingEntry
     path: tuple[str, ...]
 
     def remark(self, file: str) -> str:
-        """Return the text that says how to write the key now."""
+        """Return the text that tells the key's new spelling."""
         value = self.entry.value.value if isinstance(self.entry.value, ScalarNode) else "…"
         *sections, key = self.path
         opened = "".join(f"{{{name}: " for name in sections)
@@ -58,7 +59,7 @@ def old_keys(root: MappingNode) -> list[OldKey]:
 
 
 def read_as_renamed(page: YamlFile, root: MappingNode) -> list[Problem]:
-    """Move renamed keys to their new places, and return a warning for each.
+    """Move renamed keys to their new places, and return a warning for each of them.
 
     If a file has both the old and the new name, note a problem.
     """
@@ -84,7 +85,7 @@ def _matches(root: MappingNode, row: RenamedKey) -> Iterator[OldKey]:
 def _below(
     node: Node, sections: Sequence[str], names: tuple[str, ...]
 ) -> Iterator[tuple[MappingNode, tuple[str, ...]]]:
-    """Yield (mapping, names) for each mapping at the path. The names are those for which the path's `*`
+    """Yield (mapping, names) for each mapping at the path. `names`: the names for which the path's `*`
     stand."""
     if not isinstance(node, MappingNode):
         return
@@ -99,7 +100,7 @@ def _below(
 
 def _put(page: YamlFile, root: MappingNode, old: OldKey) -> None:
     """Put the value at its new place, with the line and column of the old key. A section that is no
-    mapping stays unchanged, because its reader reports it."""
+    mapping stays unchanged, because the section's reader reports it."""
     node: Node = root
     *sections, key = old.path
     for part in sections:
@@ -109,7 +110,7 @@ def _put(page: YamlFile, root: MappingNode, old: OldKey) -> None:
     present = below(node, key)
     if present is None:
         node.value.append((_key(key, old), old.entry.value))
-    elif present.value is not old.entry.value:  # if it is, an alias repeats the section
+    elif present.value is not old.entry.value:  # an alias may repeat the same value
         text = f"'{old.entry.name}' is the old name of '{key}', which the file has too: delete it"
         page.note(old.entry.key, text)
 

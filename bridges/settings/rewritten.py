@@ -1,8 +1,8 @@
 """Rewrites the renamed keys in the text of a device YAML. Comments, order and layout stay.
 
-Only the text of a renamed key changes. A key that has moved to another section is cut out, with the
-comment on its line, and written as the first key of that section. The result counts only if it has the
-same meaning as the original. `rewritten` compares the two.
+Only the text of a renamed key changes. A key that has moved to another section is cut out with the
+comment on its line. It becomes the first key of that section. `rewritten` accepts the result only if it
+has the same meaning as the original.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,8 +19,8 @@ from bridges.yaml.positions import below
 
 
 class NeedsHand(Exception):
-    """The error of a text that cannot be rewritten without a change of meaning. A person must rewrite
-    it."""
+    """The error of a text that a program cannot rewrite without a change of meaning. A person must
+    rewrite it."""
 
 
 class _Edit(Struct, frozen=True, order=True):

@@ -1,4 +1,4 @@
-"""Shows a struct's plain settings as text: numbers with their units, and defaults of changed values.
+"""Shows the plain settings of a struct as text, with units, and with the default of each changed value.
 
 Wires, maps and code tables are left out, because their drivers describe them
 (`drivers/driver_type.py`).
@@ -10,7 +10,8 @@ import msgspec
 from msgspec import inspect as mi
 
 Row = tuple[str, str, str]
-"""(key with dots, value with its unit, default). The default is "" if the value equals it."""
+"""A setting: its key with dots, its value with the unit, and its default. The default is "" if the
+value equals it."""
 
 _LEAVES = (str, int, float, bool, type(None))
 
@@ -21,7 +22,7 @@ def plain(struct: object) -> list[Row]:
 
 
 def choices_of(device: object) -> list[Row]:
-    """Return the plain settings of a device, and of each of its sections that has no further sections
+    """Return the plain settings of a device. A section of the device counts too, unless it has sections
     inside."""
     return list(_rows(device, (), deep=False))
 
@@ -45,7 +46,7 @@ def _fields(struct: type) -> tuple[mi.Field, ...]:
 
 
 def is_section(info: mi.Type) -> bool:
-    """Does a field hold a struct, or a list or mapping of structs?"""
+    """Return whether a field holds a struct, or a list or mapping of structs."""
     match info:
         case mi.UnionType(types=types):
             return all(is_section(t) for t in types if not isinstance(t, mi.NoneType))
@@ -57,7 +58,7 @@ def is_section(info: mi.Type) -> bool:
 
 
 def _is_plain(value: object) -> bool:
-    """Is the value a word or a number, or a list or mapping of words or numbers?"""
+    """Return whether the value is a word or a number, or a list or mapping of words or numbers."""
     value = getattr(value, "value", value)
     if isinstance(value, dict):
         value = list(value.values())

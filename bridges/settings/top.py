@@ -1,5 +1,5 @@
-"""The top of a device YAML. This file knows the top keys of each kind, and the values that are one word
-(`kind`, `driver`)."""
+"""The top of a device YAML: the top keys of each kind, and the values that are one word (`kind`,
+`driver`)."""
 
 from typing import Final
 
@@ -20,7 +20,7 @@ MAPPING: Final = "a mapping (key: value)"
 
 
 def top_keys(kind: AnyKind | None) -> dict[str, str | None]:
-    """Return key -> the form of its value; None for an optional key. `kind` is None if it is
+    """Return top key -> the form of its value; None for an optional key. `kind`: None if it is
     unknown."""
     first = {"kind": either(kind_names())}
     if isinstance(kind, GraphKind):
@@ -59,7 +59,7 @@ def word(values: Values, entry: MappingEntry | None, words: list[str]) -> str | 
 
 
 def keys_below(kind: AnyKind | None, driver: AnyDriver | None) -> dict[str, str]:
-    """Return key -> its section, for each key that belongs into a section."""
+    """Return key -> its section, for each key that belongs into a section and not to the top."""
     below_top = {field.encode_name: "rmf" for field in fields(Rmf)}
     below_top |= {field.encode_name: "recording" for field in fields(RecordingSettings)}
     if isinstance(kind, GraphKind):
@@ -74,7 +74,8 @@ def keys_below(kind: AnyKind | None, driver: AnyDriver | None) -> dict[str, str]
 
 
 def owner(kind: str, key: str) -> str:
-    """Describe which other drivers of the kind have this key; "" if none has it."""
+    """Return a text that names the other drivers of the kind with this key; "" if no driver has the
+    key."""
     found = [
         name
         for name in named.driver_names(kind)

@@ -1,8 +1,8 @@
 """Checks the wires of a file against each other. It finds invalid points, points used twice, and unsafe
 wires.
 
-The bus type knows how its points are spelt, and which wires are impossible (`canonical` and
-`wire_problems` of its `BUS` in `drivers/hal/`).
+The bus type knows the spelling of its points and the impossible wires (`canonical` and `wire_problems`
+of its `BUS` in `drivers/hal/`).
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -24,8 +24,8 @@ from drivers.hal.points import Input, Output, Wire
 
 
 class Use(Struct, frozen=True):
-    """A point of a bus that a device uses. `point` is its canonical spelling, and `written` the YAML's
-    spelling."""
+    """A device's use of a point of a bus. `point`: the bus's spelling of the point. `written`: the
+    YAML's spelling."""
 
     bus: str
     point: str
@@ -36,12 +36,11 @@ class Use(Struct, frozen=True):
 
 
 class WiringCheck:
-    """Collects and checks a device's points, first during the reading of its settings, and again as
-    wires.
+    """Collects and checks a device's points: first while the settings are read, and again as wires.
 
-    `bus`: the device's own; "" if unknown. `buses`: all buses of the file. `usable`: the types that the
-    device's driver can use. `others`: the other buses that have inputs of the device. `written`: the
-    points that the daemon itself must switch off again.
+    `bus`: the device's own bus; "" if unknown. `buses`: all buses of the file. `usable`: the bus types
+    that the device's driver can use. `others`: the other buses that have inputs of the device.
+    `written`: the points that the daemon itself must switch off again.
     """
 
     def __init__(
@@ -64,7 +63,8 @@ class WiringCheck:
         self.checks: dict[str, Check] = {"point": self._point, "other bus": self._other_bus}
 
     def _hal(self, bus: str) -> AnyBus | None:
-        """Return the type of a wire's bus, or of the device's own for ""; None if unknown."""
+        """Return the type of a wire's bus; None if unknown. For "" return the type of the device's own
+        bus."""
         found = self._buses.get(bus or self._bus)
         return found.hal if found else None
 
@@ -75,7 +75,7 @@ class WiringCheck:
         return self._use(text, path, spot.node, named) if named in self._buses else None
 
     def _other_bus(self, name: str, spot: Spot) -> str | None:
-        """Return the problem of the name after an input's `bus:`; None if there is none."""
+        """Return the problem with the name after an input's `bus:`; None without a problem."""
         if name not in self._buses:
             return unknown("bus", name, self._buses)
         if name == self._bus:
@@ -107,7 +107,7 @@ class WiringCheck:
         return None
 
     def _where(self, point: str) -> str:
-        """Return a hint at another bus of the file that could have this point; "" if there is none."""
+        """Return a hint at another bus of the file that could have this point; "" if no bus could."""
         for name, bus in self._buses.items():
             if name != self._bus and bus.hal and bus.type in self._usable:
                 with suppress(ValueError):
@@ -116,7 +116,8 @@ class WiringCheck:
         return ""
 
     def wires(self, wires: Iterable[Wire], spot: Spot) -> None:
-        """Check a driver's wires. They replace the points that were collected from the settings."""
+        """Check a driver's wires. The wires replace the points that were collected while the settings
+        were read."""
         self.uses.clear()
         for wire in wires:
             places = [("point", wire.point)]
@@ -130,7 +131,8 @@ class WiringCheck:
                     self.written.append(hal.canonical(wire.point))
 
     def _stands(self, wire: Wire, key: str, text: str, spot: Spot) -> bool:
-        """Record the wire's use of this point. Return False if the point is invalid."""
+        """Record the wire's use of this point. Return False, and note a problem, if the point is
+        invalid."""
         entry = locate(spot, wire.path)
         point = below(entry.value, key)
         node = point.value if point else entry.where()
@@ -147,7 +149,7 @@ class WiringCheck:
                 yield locate(spot, wire.path).where(), f"'{wire.signal}': {text}"
 
     def claims(self, places: Iterable[tuple[str, tuple[str, ...]]], spot: Spot) -> None:
-        """Record the exclusive places of a device without wires. A place comes with its path in the
+        """Record the exclusive places of a device without wires. Each place comes with its path in the
         YAML."""
         for text, path in places:
             user = f"{self._device} {'.'.join(path)}"
@@ -155,7 +157,7 @@ class WiringCheck:
             self.written.append(text)
 
     def reach(self) -> None:
-        """Note the points that a bus with these settings does not have."""
+        """Note each point that the bus does not have with its present settings."""
         for use in self.uses:
             bus = self._buses.get(use.bus)
             if bus is None or bus.hal is None or bus.settings is BROKEN:
@@ -167,15 +169,15 @@ class WiringCheck:
                 self._page.note(use.node, reason)
 
     def pace(self, settings: DeviceSettings, spot: Spot) -> None:
-        """Note limits of the device that are too short for its buses."""
+        """Note each limit of the device that is too short for its buses."""
         others = [self._buses[name].settings for name in self.others]
         own = self._buses[self._bus].settings if self._bus else BROKEN
         for path, text in out_of_step(settings, own, others):
             self._page.note(locate(spot, path).where(), text)
 
     def parts(self, structs: Iterable[tuple[tuple[str, ...], object]], spot: Spot) -> None:
-        """Check the wires of a device that has no wiring table, because its other settings are
-        invalid."""
+        """Check the inputs and outputs one by one, for a device with invalid other settings. Such a
+        device has no wiring table."""
         for path, struct in structs:
             if isinstance(struct, Input):
                 wire = struct.wire(path[-1], path, struct.debounce_s)
@@ -192,7 +194,7 @@ class WiringCheck:
 
 
 def note_conflicts(page: YamlFile, uses: Iterable[Use]) -> None:
-    """Note each point that two signals use. The note is at the second use in the file."""
+    """Note each point that two signals use. The note stands at the second use in the file."""
     first: dict[tuple[str, str], Use] = {}
     for use in sorted(uses, key=lambda u: (u.node.start_mark.line, u.node.start_mark.column)):
         other = first.setdefault((use.bus, use.point), use)

@@ -16,8 +16,8 @@ def bare(wanted: Type) -> Type:
 
 
 def sections_of(wanted: StructType) -> dict[str, str]:
-    """Return key -> the name of its section, for the keys of a struct's sections; "" for the struct's
-    own keys."""
+    """Return key -> the name of its section, for the keys in the sections of a struct. A key of the
+    struct itself has the section ""."""
     own = {field.encode_name for field in wanted.fields}
     types = [(f.encode_name, bare(f.type)) for f in wanted.fields]
     inner = [
@@ -38,26 +38,26 @@ def misplaced(
     empty = before is not None and _is_empty(before.value)
     if before is not None and empty and not _is_empty(entry.value):
         return (
-            f"'{short(entry.name)}' stands beside '{before.name}', which is empty: indent it below"
+            f"'{short(entry.name)}' stands beside '{before.name}', which is empty: indent"
+            f" '{short(entry.name)}'"
         )
     if before is not None and is_decimals(entry, before):
         return f"a comma inside a number: write {before.value.value}.{entry.name}"
     if slip := glued(entry):
         return slip
     if section := elsewhere.get(entry.name):
-        return f"'{short(entry.name)}' does not belong here: it stands below '{section}'"
+        return f"'{short(entry.name)}' does not belong here: write it below '{section}'"
     return ""
 
 
 def is_decimals(entry: MappingEntry, before: MappingEntry) -> bool:
-    """Is this key the decimals of the number before it, as in `{scan_s: 0,5}`?"""
+    """Return whether this key is the decimals of the number before it, as in `{scan_s: 0,5}`."""
     whole = isinstance(before.value, ScalarNode) and before.value.value.isdecimal()
     return whole and entry.name.isdecimal() and _is_empty(entry.value)
 
 
 def glued(entry: MappingEntry) -> str:
-    """Describe a key that has its value glued to it, as in `active:high`. Return "" for any other
-    key."""
+    """Describe a key that is glued to its value, as in `active:high`; "" for any other key."""
     key, colon, value = entry.name.partition(":")
     if not (colon and value and _is_empty(entry.value)):
         return ""

@@ -1,8 +1,9 @@
 """Parses YAML text to nodes with line and column. It refuses invalid YAML, and some features of valid
 YAML.
 
-PyYAML's pure Python loader is used, for two reasons. Its messages say more. libyaml's composer recurses
-in C without a limit, so a deeply nested file would crash the interpreter.
+PyYAML's pure Python loader is used for two reasons. Its messages say more than libyaml's. Its recursion
+has a limit, while libyaml's composer recurses in C without a limit, so that a deeply nested file would
+crash the interpreter.
 """
 
 import re
@@ -23,11 +24,16 @@ from bridges.yaml.problems import SettingsError as SettingsError
 
 MAX_DEPTH = 32
 HALVES = re.compile("[\ud800-\udfff]")
-"""A pattern for surrogates. A surrogate is half of a UTF-16 pair, and cannot be encoded alone."""
+"""A pattern for surrogates. A surrogate is one half of a UTF-16 pair, and no UTF-8 text can hold
+one."""
 
 
 class Sort(Struct, frozen=True):
-    """One sort of file: its name, its first line as an example, and its maximum size."""
+    """One sort of file.
+
+    `name`: the sort's name in messages. `begins`: an example of the first line. `max_bytes`: the
+    greatest size. `max_values`: the greatest number of values.
+    """
 
     name: str
     begins: str
@@ -46,14 +52,14 @@ class YamlFile:
         self.problems: list[Problem] = []
 
     def problem(self, where: Node | Mark | None, text: str) -> Problem:
-        """Return a problem at the start of a node. The text may quote anything from the file."""
+        """Return a problem at the start of a node. The text may quote any part of the file."""
         mark = where.start_mark if isinstance(where, Node) else where
         if mark is None:
             return Problem(self.file, 1, 1, printable(text))
         return Problem(self.file, mark.line + 1, mark.column + 1, printable(text))
 
     def note(self, where: Node | Mark, text: str) -> None:
-        """Record a problem and continue."""
+        """Record a problem, so that the reading can continue."""
         self.problems.append(self.problem(where, text))
 
     def check(self) -> None:
@@ -174,8 +180,8 @@ def _root(page: YamlFile, text: str, sort: Sort) -> Node | None:
         told = str(error.problem) if isinstance(error, _Refused) else typo_hints.reason(error, text)
         raise SettingsError([*page.problems, page.problem(mark, told)]) from None
     except (ValueError, OverflowError):
-        # PyYAML raises these errors for the number of a character or YAML version that does not exist,
-        # as in "\U00110000".
+        # PyYAML raises these errors if the number of a character, as in "\U00110000", or of a YAML
+        # version does not exist.
         assert composer is not None
         reason = "not YAML: a number too large, in an escape ('\\U...') or a directive ('%YAML')"
         raise SettingsError([page.problem(composer.get_mark(), reason)]) from None
@@ -187,5 +193,5 @@ def _problem_after(page: YamlFile, before: str, text: str) -> Problem:
 
 
 def is_plain(node: ScalarNode) -> bool:
-    """Is the scalar written without quotes? If so, its text decides its type."""
+    """Return whether the scalar is written without quotes. If so, its text decides its type."""
     return node.style is None

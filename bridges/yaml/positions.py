@@ -1,4 +1,5 @@
-"""Places in a YAML file. They belong to values, and to errors about the values."""
+"""Places in a YAML file: the places of values, and the places at which errors about values are
+shown."""
 
 from collections.abc import Iterable
 
@@ -11,10 +12,10 @@ from bridges.yaml.spelling import short
 
 
 class Spot(Struct, frozen=True):
-    """A node that is to be converted to a value.
+    """A node that will become a value.
 
-    `at`: the place for errors about the whole value, which is its key. `label`: the value's name in
-    errors. `path`: the value's path below the top struct.
+    `at`: the place for errors about the whole value. This place is the value's key. `label`: the
+    value's name in errors. `path`: the value's path below the top struct.
     """
 
     node: Node
@@ -31,12 +32,12 @@ class MappingEntry(Struct, frozen=True):
     value: Node
 
     def spot(self, path: tuple[str, ...] = ()) -> Spot:
-        """Return the Spot of the value, below `path`."""
+        """Return the Spot of the value. `path`: the path of the mapping."""
         return Spot(self.value, self.key, f"'{short(self.name)}'", (*path, self.name))
 
     def where(self) -> Node:
-        """Return the place for errors about the value. It is the value itself if this is a scalar,
-        otherwise its key."""
+        """Return the place for errors about the value. This place is the value itself for a scalar,
+        else the key."""
         node = self.value
         if isinstance(node, ScalarNode) and (node.value or not is_plain(node)):
             return node
@@ -55,7 +56,7 @@ def below(node: Node, part: str) -> MappingEntry | None:
 
 
 def locate(spot: Spot, path: Iterable[object]) -> MappingEntry:
-    """Return the entry at `path` below a value. If the entry does not exist, return its nearest
+    """Return the entry at `path` below a value. If that entry does not exist, return its nearest
     existing parent."""
     found = MappingEntry("", spot.at, spot.node)
     for part in path:
@@ -67,6 +68,6 @@ def locate(spot: Spot, path: Iterable[object]) -> MappingEntry:
 
 
 def is_none(node: Node) -> bool:
-    """Is the value `null` or `~`? An empty value does not count, because somebody has probably
-    forgotten the value."""
+    """Return whether the value is `null` or `~`. An empty value does not count, because somebody has
+    probably forgotten it."""
     return isinstance(node, ScalarNode) and is_plain(node) and is_null_word(node.value)

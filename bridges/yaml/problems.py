@@ -1,4 +1,4 @@
-"""Problems in a file, with their places. This file loads no YAML library, because some code only
+"""Problems in a file, with their places. This module loads no YAML library, because some code only
 reports problems."""
 
 from collections.abc import Iterable

@@ -1,5 +1,5 @@
-"""Converts one YAML scalar to a text, number, boolean or choice. If this fails, it raises an error with
-the reason.
+"""Converts one YAML scalar to a text, number, boolean or choice. A scalar that does not fit raises
+WrongScalar with the reason.
 
 msgspec decides whether the type allows the value. A text must be a text in every version of YAML. A
 number must be written unambiguously (`scalars.py`).
@@ -33,17 +33,17 @@ from bridges.yaml.spelling import either, nearest, short
 from bridges.yaml.typo_hints import has_unit, number_meant
 
 Extra = Mapping[str, str]
-"""The `Meta(extra=…)` of a field. It has the field's `unit`, its `pattern` in words, the reason for its
-`least` value, and its `check`."""
+"""The `Meta(extra=…)` of a field: its `unit`, its `pattern` in words, the reason for its `least` value,
+and the name of its `check`."""
 
 
 class WrongScalar(Exception):
-    """The error of a scalar that does not fit its type. Its text follows the value's name ("is …"), and
-    has no full stop."""
+    """The error of a scalar that does not fit its type. The error's text continues a sentence that
+    begins with the value's name ("is …"). The text has no full stop."""
 
 
 def looks(node: Node) -> str:
-    """Describe the node in words."""
+    """Describe the node in words, such as `the number 5`."""
     if isinstance(node, SequenceNode):
         return "a list"
     if not isinstance(node, ScalarNode):
@@ -107,7 +107,8 @@ def _rank(wanted: Type) -> int:
 
 
 def _annotation(wanted: Type) -> object:
-    """Rebuild a type, with its bounds, from msgspec's description, for `convert`."""
+    """Return the type, with its bounds, in the form that `convert` needs. msgspec's description has
+    another form."""
     if isinstance(wanted, EnumType):
         return wanted.cls
     if isinstance(wanted, LiteralType):
@@ -120,7 +121,7 @@ _PLAIN: dict[type[Type], type] = {StrType: str, IntType: int, FloatType: float, 
 
 def _read(wanted: Type, node: ScalarNode, extra: Extra) -> object:
     """Return the value if its spelling is unambiguous. Raises WrongScalar."""
-    if isinstance(wanted, LiteralType | EnumType):  # the text counts, whatever YAML would read
+    if isinstance(wanted, LiteralType | EnumType):  # the text counts as it is written
         return choices(wanted).get(node.value, node.value)
     if isinstance(wanted, StrType):
         _check_text(node, extra)
@@ -139,8 +140,8 @@ _READINGS: dict[type[Type], Callable[[str], object]] = {
 
 
 def _reason(wanted: Type, node: ScalarNode, extra: Extra, length: bool) -> str:
-    """Return the reason why `convert` refused. `length` is True if the length of a text is the
-    reason."""
+    """Return the reason why `convert` refused the value. `length`: the text is too short or too
+    long."""
     written = short(node.value)
     if isinstance(wanted, LiteralType | EnumType):
         near = nearest(node.value, choices(wanted))
@@ -158,15 +159,14 @@ def _reason(wanted: Type, node: ScalarNode, extra: Extra, length: bool) -> str:
 
 
 def _too_little(wanted: Type, node: ScalarNode, extra: Extra) -> str:
-    """Return why the least value is needed, if the type has a least value and the value is below it."""
+    """Return why the type has its least value, if the value is below it; otherwise ""."""
     value, least = number(node.value), getattr(wanted, "ge", None)
     small = value is not None and least is not None and value < least
     return f"; {extra['least']}" if small and "least" in extra else ""
 
 
 def _milliseconds(wanted: Type, node: ScalarNode, extra: Extra) -> str:
-    """Return how to write a duration in seconds that was given in milliseconds; "" if the result does
-    not fit."""
+    """Return a hint in seconds if a duration was probably given in milliseconds; otherwise ""."""
     if extra.get("unit") != "s" or not isinstance(wanted, FloatType):
         return ""
     value, least, most = number(node.value), wanted.ge, wanted.le
@@ -188,7 +188,7 @@ def _check_text(node: ScalarNode, extra: Extra) -> None:
 
 
 def _misread(wanted: Type, node: ScalarNode, extra: Extra) -> WrongScalar:
-    """Return the error for a text that is no plain number or boolean. The error has the right
+    """Return the error for a text that is no plain number or boolean. The error's text shows the right
     spelling."""
     text, asked = short(node.value), wanted_text(wanted, extra)
     whole = isinstance(wanted, IntType)
@@ -215,7 +215,7 @@ def _misread(wanted: Type, node: ScalarNode, extra: Extra) -> WrongScalar:
 
 
 def _span(wanted: IntType | FloatType, extra: Extra) -> str:
-    """Return the bounds with their unit: ` from 0 to 10 s`."""
+    """Return the bounds with their unit, such as ` from 0 to 10 s`."""
     words = []
     if wanted.ge is not None and wanted.le is not None:
         words += [f"from {_digits(wanted.ge)} to {_digits(wanted.le)}"]
@@ -234,11 +234,11 @@ def _span(wanted: IntType | FloatType, extra: Extra) -> str:
 
 
 def _digits(bound: float) -> str:
-    """Return the bound as a person writes it: 1000000, 0.05."""
+    """Return the bound as a person writes it, such as 1000000 or 0.05."""
     return str(int(bound)) if bound == int(bound) else f"{bound:g}"
 
 
 def choices(wanted: LiteralType | EnumType) -> dict[str, object]:
-    """Return allowed text -> its value."""
+    """Map each allowed text to its value."""
     values = wanted.values if isinstance(wanted, LiteralType) else [m.value for m in wanted.cls]
     return {str(value): value for value in values}

@@ -1,7 +1,7 @@
 """Finds texts without quotes that YAML reads as other values. Accepts only unambiguous numbers.
 
-YAML 1.1 (PyYAML), YAML 1.2 and people read `017`, `1:30`, `no` or `1e3` differently. A name without
-quotes must be the same text for all three. A number must mean the same for all three.
+YAML 1.1 (PyYAML), YAML 1.2 and people read `017`, `1:30`, `no` or `1e3` differently. Therefore a name
+without quotes must be the same text for all three. A number must have the same value for all three.
 """
 
 import math
@@ -39,17 +39,18 @@ def _base_60(text: str) -> float:
 
 
 def is_null(text: str) -> bool:
-    """Does YAML read the text as null?"""
+    """Return whether YAML reads the text as null."""
     return text in _NULLS
 
 
 def is_null_word(text: str) -> bool:
-    """Is the text a word for null? An empty text is not a word."""
+    """Return whether the text is a word for null. An empty text is no word."""
     return text in _NULL_WORDS
 
 
 def reads_as(text: str) -> str | None:
-    """Describe how YAML 1.1 or 1.2 reads a plain text. Return None if both read the text unchanged.
+    """Describe how YAML 1.1 or 1.2 reads a text without quotes. Return None if both read the text
+    unchanged.
 
     >>> reads_as("017"), reads_as("no"), reads_as("L1") ('the number 15', 'false', None)
     """
@@ -83,15 +84,15 @@ def _short(value: object) -> str:
 
 
 def whole_number(text: str) -> int | None:
-    """Return the whole number that a text such as `12`, `-3` or `0x2000` stands for. Return None for an
-    ambiguous spelling."""
+    """Return the whole number that is written as a text such as `12`, `-3` or `0x2000`. Return None for
+    an ambiguous spelling."""
     if not _INT.fullmatch(text) or len(text) > 20:
         return None
     return int(text, 16 if "x" in text else 10)
 
 
 def number(text: str) -> float | None:
-    """Return the number that a text such as `5`, `0.05` or `1e3` stands for. Return None for an
+    """Return the number that is written as a text such as `5`, `0.05` or `1e3`. Return None for an
     ambiguous spelling, and for infinity."""
     if not _FLOAT.fullmatch(text):
         return None

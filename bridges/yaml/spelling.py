@@ -1,5 +1,5 @@
-"""Formats names for error texts. It shortens names, lists them, and finds the most similar known
-name."""
+"""Formats names for error texts: it shortens and lists names, and finds the known name that is most
+similar."""
 
 from collections.abc import Iterable
 
@@ -10,14 +10,14 @@ def short(text: str) -> str:
 
 
 def either(names: Iterable[str]) -> str:
-    """Return `a, b or c`."""
+    """Join the names as `a, b or c`."""
     *others, last = list(names) or ["nothing"]
     return f"{', '.join(others)} or {last}" if others else last
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
     """Return the most similar known name; None if no name is similar."""
-    from difflib import get_close_matches  # imported late, because only misspelt names need this
+    from difflib import get_close_matches  # imported late, because only misspelt names need it
 
     return next(iter(get_close_matches(name, list(known), n=1)), None)
 

@@ -1,7 +1,7 @@
 """Gives hints at typing slips that PyYAML does not name, such as wrong indents, commas and invisible
 spaces.
 
-`reason` rephrases PyYAML's error for a file that is not YAML. Every other function judges one scalar.
+`reason` rephrases PyYAML's error for a file that is not YAML. The other functions judge one text each.
 """
 
 import re
@@ -16,13 +16,13 @@ FIXES = {
     "could not find expected ':'": "a key without ': ' after it, or a line indented wrongly",
     "found unexpected end of stream": "the file ends inside a text: its closing quote is missing",
     "but found another document": (
-        "a second document ('---') starts here: a file describes one daemon, so split it"
+        "a second document ('---') starts here: a file describes one daemon, so split the file"
     ),
     "found duplicate anchor": "an anchor ('&name') whose name is already used",
     "expected <block end>, but found '}'": "a '}' without a '{' before it",
     "expected <block end>, but found ']'": "a ']' without a '[' before it",
     "expected <block end>, but found '<scalar>'": (
-        "more text after a text that has ended: put all of it in one pair of quotes"
+        "more text after a text that has ended: put the whole text in one pair of quotes"
     ),
 }
 FIXES |= {
@@ -35,12 +35,14 @@ _INDENT = re.compile(r"expected <block end>, but found '<block (mapping|sequence
 _ODD = re.compile("[\u00a0\u00ad\u1680\u2000-\u200f\u2028-\u202f\u205f\u2060\u3000\ufeff]")
 _GLUED = re.compile(r"\s*(?:- )?([A-Za-z_][\w.-]*):(?=[^\s/:])(.*)")
 _QUOTED = re.compile(r'[:,\[{] *"[^"\n]*"\w+"')
-"""A pattern for a text in double quotes that goes on with a word and a third double quote."""
+"""A pattern for double quotes inside a text in double quotes: a closing quote, a word, and a third
+quote."""
 _CURLY = ("\u201c", "\u201d", "\u201e", "\u2018", "\u2019", "\u201a", "\u00ab", "\u00bb")
 
 
 def reason(error: MarkedYAMLError, text: str) -> str:
-    """Return PyYAML's error on one line. If a common slip is the cause, add the remedy."""
+    """Return the reason for PyYAML's error, in one line. If a common slip is the cause, return the
+    remedy."""
     problem, where = str(error.problem), error.problem_mark or error.context_mark
     lines = text.splitlines()
     since = error.context_mark or where
@@ -53,7 +55,7 @@ def reason(error: MarkedYAMLError, text: str) -> str:
             f"a key beside the '- ' of line {since.line + 1}: delete that '- ', or indent this line"
         )
     if where and (_INDENT.search(problem) or _SECOND in problem) and _follows_no_key(lines, where):
-        return "the line above has no ': ': a key is followed by a colon and a space"
+        return "the line above has no ': ': write a colon and a space after its key"
     if where and _INDENT.search(problem):
         return _indent(lines, where, since or where)
     if where and since and _QUOTED.search("\n".join(lines[since.line : where.line + 1])):
@@ -61,7 +63,7 @@ def reason(error: MarkedYAMLError, text: str) -> str:
     for expected, bracket in _OPEN.items():
         if problem.startswith(expected) and since:
             return (
-                f"a ',' is missing before this, or the '{bracket}' of line {since.line + 1} is open"
+                f"a ',' is missing here, or the '{bracket}' of line {since.line + 1} is not closed"
             )
     for usual, fix in FIXES.items():
         if usual in (problem, (error.context or "").partition(" '")[0]):
@@ -94,8 +96,8 @@ def _indent(lines: list[str], where: Mark, since: Mark) -> str:
             first.setdefault(_spaces(line), number)
     above = " or ".join(f"{spaces} (line {first[spaces]})" for spaces in sorted(first))
     return (
-        f"wrong indent: {_spaces(lines[where.line])} spaces before this line, {above} before those"
-        " above: keys of one section have the same indent"
+        f"wrong indent: {_spaces(lines[where.line])} spaces before this line, {above} before the"
+        " lines above: keys of one section have the same indent"
     )
 
 
@@ -104,7 +106,7 @@ def _spaces(line: str) -> int:
 
 
 def _follows_no_key(lines: list[str], where: Mark) -> bool:
-    """Has the line above the same indent, but no key?"""
+    """Return whether the line above has the same indent, but no key."""
     above, line = lines[max(where.line - 1, 0)], lines[where.line]
     return _spaces(above) == _spaces(line) and ": " not in f"{above} " and where.line > 0
 
@@ -119,22 +121,20 @@ def named(character: str) -> str:
 def odd_space(text: str) -> str:
     """Describe an unusual space or quotation mark in a text without quotes; "" if there is none."""
     if found := _ODD.search(text):
-        return (
-            f"{named(found[0])}: write an ordinary space, or put the text in quotes if it is meant"
-        )
+        return f"{named(found[0])}: write an ordinary space, or put the text in quotes to keep it"
     if text.startswith(_CURLY):
         return f"YAML does not read {text[0]} as a quote: write \" or '"
     return ""
 
 
 def cleaned(text: str) -> str:
-    """Return the text without its unusual spaces or quotes."""
+    """Return the text without unusual spaces and quotation marks."""
     joined = re.sub(f"(?<=[0-9]){_ODD.pattern}(?=[0-9])", "", text)
     return _ODD.sub(" ", joined).strip("".join((" ", *_CURLY)))
 
 
 def number_meant(text: str, whole: bool) -> str:
-    """Return how YAML writes a number that only a person can read; "" if the text is no number."""
+    """Return YAML's spelling of a number that only a person can read; "" if the text is no number."""
     digits = "".join(str(unicodedata.digit(c, c)) for c in text)
     plain = re.sub(r"(?<=\d)['\u2019 ](?=\d{3}(\D|$))", "", digits)
     grouped = re.fullmatch(r"[-+]?\d{1,3}([.,]\d{3})+", plain)
@@ -146,5 +146,5 @@ def number_meant(text: str, whole: bool) -> str:
 
 
 def has_unit(text: str) -> bool:
-    """Is the text a number with its unit, such as `10 s`, `10ms` or `80%`?"""
+    """Return whether the text is a number with its unit, such as `10 s`, `10ms` or `80%`."""
     return bool(re.fullmatch(r"[-+]?\d+([.,]\d+)? ?[A-Za-z%\u00b0\u00b5\u03a9/]+", text))

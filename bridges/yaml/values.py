@@ -1,8 +1,8 @@
 """Converts YAML nodes to msgspec structs. It reports all independent problems, such as unknown and
 duplicate keys, with line and column.
 
-This module walks the nodes itself, because `msgspec.convert` stops at the first problem and knows no
-lines. The structs, with their bounds and units, are the only description of a file's contents.
+This module itself walks through the nodes, because `msgspec.convert` stops at the first problem and
+knows no lines. The structs, with their bounds and units, are the only description of a file's contents.
 """
 
 from collections.abc import Callable, Hashable, Mapping
@@ -33,14 +33,14 @@ from bridges.yaml.scalars import is_null
 from bridges.yaml.spelling import either, nearest, short, unknown
 
 VERBS = ("is", "has", "needs", "must", "says")
-"""The first words of problem texts whose subject is the key."""
+"""The first words of problem texts that lack a subject. Their subject is the key."""
 
 T = TypeVar("T")
 
 
 @cache
 def described(cls: Hashable) -> Type:
-    """Return msgspec's description of a type. It comes from a cache, because making it takes a
+    """Return msgspec's description of a type. A cache keeps it, because making it takes a
     millisecond."""
     return inspect.type_info(cls)
 
@@ -51,7 +51,7 @@ def field_names(struct: type[msgspec.Struct]) -> set[str]:
 
 
 class Broken(Enum):
-    """The type of BROKEN. BROKEN stands for an invalid value."""
+    """The type of BROKEN, which stands for an invalid value."""
 
     BROKEN = "broken"
 
@@ -70,8 +70,11 @@ def _node_of(wanted: Type) -> type[Node]:
 
 
 class _Around(NamedTuple):
-    """A section of the YAML that is being read: its fields, as `known` lists them, and the column at
-    which its keys begin."""
+    """A section of the YAML that is being read.
+
+    `fields`: the section's keys, in the form that `known` takes. `column`: the column at which its keys
+    begin.
+    """
 
     spot: Spot
     fields: Mapping[str, str | None]
@@ -79,16 +82,16 @@ class _Around(NamedTuple):
 
 
 Check = Callable[[str, Spot], str | None]
-"""A function that checks a text at its place. It returns the problem, or None."""
+"""A function that checks a text at its place. It returns the problem's text; None without a problem."""
 
 
 class Values:
     """Converts one file's nodes to values, and notes problems on its page.
 
     `checks`: name -> check, for texts whose type has `Meta(extra={"check": name})`. Such a text is
-    taken as written, and only its check accepts or refuses it. `structs`: every struct made so far,
-    with its path. `owner(key)`: returns where a key belongs that the outermost struct does not have; ""
-    if nobody knows the key.
+    taken as written, and only its check accepts or refuses it. `owner(key)`: tells where a key belongs
+    that the outermost struct does not have; "" if nobody knows the key. `structs`: every struct made so
+    far, with its path.
     """
 
     def __init__(
@@ -110,10 +113,9 @@ class Values:
     def make(self, cls: object, spot: Spot, besides: tuple[str, ...] = ()) -> object: ...
 
     def make(self, cls: object, spot: Spot, besides: tuple[str, ...] = ()) -> object:
-        """Convert a node to a `cls`, which is a type or msgspec's description of a type. Return BROKEN
-        if this fails.
+        """Convert a node to a `cls`. Return BROKEN if this fails.
 
-        `besides`: keys that the caller itself reads.
+        `cls`: a type, or msgspec's description of a type. `besides`: keys that the caller itself reads.
         """
         wanted = cls if isinstance(cls, Type) else described(cls)
         if isinstance(wanted, StructType):
@@ -121,8 +123,8 @@ class Values:
         return self._value(wanted, spot)
 
     def entries(self, spot: Spot) -> list[MappingEntry]:
-        """Return a mapping's valid entries. Note duplicate keys, merge keys and keys that are no
-        text."""
+        """Return a mapping's valid entries. Note each duplicate key, each merge key and each key that
+        is no text."""
         if not isinstance(spot.node, MappingNode):
             self._mismatch(spot, "a mapping (key: value)")
             return []
@@ -146,12 +148,12 @@ class Values:
         elsewhere: Mapping[str, str] | None = None,
         refused: Mapping[str, str] = MappingProxyType({}),
     ) -> dict[str, MappingEntry]:
-        """Return the entries of `fields`, which is key -> form of its value, or None for an optional
-        key.
+        """Return the entries whose keys are in `fields`, and note the other entries.
 
-        A key that is missing is not reported if an unknown key resembles it, so that one slip is one
-        problem. `elsewhere`: key of another place -> the section to which it belongs. `refused`: key ->
-        the reason why it cannot stand here.
+        `fields`: key -> form of its value; None for an optional key. `elsewhere`: key -> the section to
+        which the key belongs. `refused`: key -> the reason why the key cannot stand here.
+
+        A missing key is not reported if an unknown key resembles it, so that one slip is one problem.
         """
         found = {e.name: e for e in entries}
         near = {nearest(name, fields) for name in found if name not in fields}
@@ -174,15 +176,15 @@ class Values:
         return {name: entry for name, entry in found.items() if name in fields and name not in cut}
 
     def _owned(self, entry: MappingEntry, spot: Spot, fields: Mapping[str, str | None]) -> str:
-        """Describe where a key belongs that belongs nowhere in this section and resembles no key of it;
-        "" if unknown."""
+        """Return where an unknown key belongs, as `owner` tells; "" if it does not know. Keys that
+        resemble a key of this section are left out."""
         if spot.path or nearest(entry.name, fields):
             return ""
         return self._owner(entry.name)
 
     def _too_deep(self, entry: MappingEntry) -> str:
-        """Describe a key that belongs to a section around the present section. Then that section no
-        longer lacks the key."""
+        """Describe a key that belongs to a section around the present section; "" for any other key.
+        Delete the problem that the outer section lacks this key."""
         for around in reversed(self._around):
             if entry.name in around.fields:
                 missing = _missing(around.spot, entry.name, around.fields[entry.name] or "")
@@ -207,8 +209,8 @@ class Values:
         return self._leaf([wanted], spot, extra or {})
 
     def _union(self, wanted: UnionType, spot: Spot, extra: Extra | None) -> object:
-        """Convert to the member of the union that fits this kind of node. Of several scalar types, take
-        the first that fits."""
+        """Convert the node to the member of the union that fits its form. Among several scalar types,
+        the first that accepts the scalar counts."""
         members = [t for t in wanted.types if not isinstance(t, NoneType)]
         if len(members) < len(wanted.types) and is_none(spot.node):
             return None
@@ -335,8 +337,8 @@ def _missing(spot: Spot, name: str, wanted: str) -> str:
 
 
 def _of_subject(path: tuple[str, ...], name: str, label: str, text: str) -> str:
-    """Return the text with its key as the subject. If the text has a subject, return the text
-    unchanged."""
+    """Return the text with its key as the subject. Return the text unchanged if it names the key
+    already."""
     if text.partition(" ")[0] in VERBS:
         return f"'{short(name)}' {text}" if name else f"{label} {text}"
     key = name

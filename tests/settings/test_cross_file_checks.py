@@ -102,14 +102,14 @@ def test_domains_that_differ_are_an_error(capsys: pytest.CaptureFixture[str]) ->
     assert said(capsys, DOOR, second.replace("domain_id: 3", "domain_id: 4")) == (
         78,
         [
-            "b.yaml:3:18: DDS domain 4, but a.yaml is in domain 3: they cannot hear each other",
+            "b.yaml:3:18: DDS domain 4, but a.yaml is in domain 3: the daemons cannot hear each other",
             "1 error",
         ],
     )
     assert said(capsys, DOOR, second.replace("{domain_id: 3}", "{}")) == (
         78,
         [
-            "b.yaml:3:1: DDS domain 0, but a.yaml is in domain 3: they cannot hear each other",
+            "b.yaml:3:1: DDS domain 0, but a.yaml is in domain 3: the daemons cannot hear each other",
             "1 error",
         ],
     )

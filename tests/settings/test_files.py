@@ -85,9 +85,9 @@ SYNTAX = {
     ),
     "kind: 'gate\n": "2:1: the file ends inside a text: its closing quote is missing",
     "kind: gate\n---\nkind: gate\n": (
-        "2:1: a second document ('---') starts here: a file describes one daemon, so split it"
+        "2:1: a second document ('---') starts here: a file describes one daemon, so split the file"
     ),
-    "kind: [a, b\nc: d\n": ("2:2: a ',' is missing before this, or the '[' of line 1 is open"),
+    "kind: [a, b\nc: d\n": ("2:2: a ',' is missing here, or the '[' of line 1 is not closed"),
     "kind: gate\n- a\n": (
         "2:1: not YAML: expected <block end>, but found '-' (while parsing a block mapping, "
         "from line 1)"

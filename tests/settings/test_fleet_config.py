@@ -146,7 +146,7 @@ def test_two_files_that_agree_are_right_and_the_transforms_error_is_reported(sit
         (
             "robot: [[7, -5], [4, -5], [7, -11], [3, -11]]",
             "robot: [[7, 5], [4, 5], [7, 11], [3, 11]]",
-            "config.yaml:10:3: one map is the other's mirror image: turn the sign of every robot's y",
+            "config.yaml:10:3: one map is the other's mirror image: change the sign of every robot's y",
         ),
         (
             "robot: [[7, -5], [4, -5], [7, -11], [3, -11]]",

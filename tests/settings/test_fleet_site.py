@@ -144,7 +144,7 @@ def test_the_shipped_files_are_one_site(write: Write) -> None:
         ),
         (
             (GRAPH, "- [7.0, 9.0, {name: pharmacy}]", "- [7.0, .nan, {name: pharmacy}]"),
-            ["fleet_tiny_graph.yaml:16:9: its place is no number"],
+            ["fleet_tiny_graph.yaml:16:9: its x or y is no number"],
         ),
     ],
 )

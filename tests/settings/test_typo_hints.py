@@ -31,24 +31,24 @@ SLIPS = {
     "a line that is too far to the right": (
         changed("      closed:", "       closed:"),
         [
-            "11:8: wrong indent: 7 spaces before this line, 6 (line 10) before those above: keys of one"
-            " section have the same indent"
+            "11:8: wrong indent: 7 spaces before this line, 6 (line 10) before the lines above: keys of"
+            " one section have the same indent"
         ],
     ),
     "a line that is too far to the left": (
         changed("    inputs:", "   inputs:"),
         [
-            "9:4: wrong indent: 3 spaces before this line, 2 (line 7) or 4 (line 8) before those above:"
-            " keys of one section have the same indent"
+            "9:4: wrong indent: 3 spaces before this line, 2 (line 7) or 4 (line 8) before the lines"
+            " above: keys of one section have the same indent"
         ],
     ),
     "a key without a space after its colon": (
         changed("{transport: dds, domain_id: 7}", "\n  transport:dds\n  domain_id: 7"),
-        ["5:12: the line above has no ': ': a key is followed by a colon and a space"],
+        ["5:12: the line above has no ': ': write a colon and a space after its key"],
     ),
     "a bracket that is never closed": (
         changed("lanes: [in, out]", "lanes: [in, out"),
-        ["9:11: a ',' is missing before this, or the '[' of line 8 is open"],
+        ["9:11: a ',' is missing here, or the '[' of line 8 is not closed"],
     ),
     "a bracket too many": (
         changed(LIMIT, f"{LIMIT}}}"),
@@ -58,20 +58,20 @@ SLIPS = {
         changed("  north:\n", "north:\n").replace("\n    ", "\n  "),
         [
             "6:1: 'gates' has no value: write a mapping (key: value)",
-            "7:1: 'north' stands beside 'gates', which is empty: indent it below",
+            "7:1: 'north' stands beside 'gates', which is empty: indent 'north'",
         ],
     ),
     "a device's section at the top": (
         changed("    limits:", "limits:"),
-        ["15:1: 'limits' does not belong here: it stands below 'gates: <name>'"],
+        ["15:1: 'limits' does not belong here: write it below 'gates: <name>'"],
     ),
     "a limit beside the limits": (
         changed("    limits:", "    open_s: 3\n    limits:"),
-        ["15:5: 'open_s' does not belong here: it stands below 'limits'"],
+        ["15:5: 'open_s' does not belong here: write it below 'limits'"],
     ),
     "a setting of RMF's at the top": (
         changed("driver: contact", "driver: contact\ndomain_id: 3"),
-        ["3:1: 'domain_id' does not belong here: it stands below 'rmf'"],
+        ["3:1: 'domain_id' does not belong here: write it below 'rmf'"],
     ),
     "a decimal comma": (
         changed(LIMIT, "limits:\n      open_s: 3,5"),
@@ -116,7 +116,7 @@ SLIPS = {
         [
             "1:1: a no-break space (U+00A0): write an ordinary space, or put the text in quotes if it"
             " is meant",
-            "2:7: the line above has no ': ': a key is followed by a colon and a space",
+            "2:7: the line above has no ': ': write a colon and a space after its key",
         ],
     ),
     "a no-break space as an indent": (

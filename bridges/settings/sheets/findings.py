@@ -1,5 +1,5 @@
-"""The findings of `check` about one file, as tables. Text, JSON and the commissioning sheet are made
-from them."""
+"""The findings of `check` about one file, as tables. They become text, JSON and the commissioning
+sheet."""
 
 import hashlib
 from collections.abc import Sequence
@@ -28,8 +28,9 @@ SETTINGS = ("setting", "value", "not the default")
 class Part(msgspec.Struct, frozen=True, kw_only=True):
     """One controller: its name, its bus and its tables.
 
-    `device`: the device's name, or the kind's name if the kind has no devices. `bus`: the name of its
-    bus, or "". `tables`: first the wires, or the commands and readings; then all other tables.
+    `device`: the device's name, or the kind's name if the kind has no devices. `bus`: the name of the
+    device's bus, "" without a bus. `tables`: first the wires, or the commands and readings, then all
+    other tables.
     """
 
     device: str
@@ -49,7 +50,7 @@ class BusShown(msgspec.Struct, frozen=True, kw_only=True):
 class Findings(msgspec.Struct, frozen=True, kw_only=True):
     """One file: its contents if the file is valid, and its errors and warnings.
 
-    `sha256`: the hash of the file's bytes, with which a signed sheet identifies the file. `rmf`: the
+    `sha256`: the hash of the file's bytes. A signed sheet identifies the file by this hash. `rmf`: the
     domain, transport and release, and the names of the topics. `notes`: further facts for the user.
     """
 
@@ -71,7 +72,7 @@ def wrong(file: str, errors: Sequence[Problem]) -> Findings:
 
 
 def findings(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str] = ()) -> Findings:
-    """Return the findings about a valid file. `errors` come from a comparison with RMF's map."""
+    """Return the findings about a valid file. `errors`: the mismatches with RMF's map."""
     return Findings(
         file=str(config.path),
         kind=config.kind,
@@ -87,8 +88,7 @@ def findings(config: Config, errors: Sequence[Problem] = (), notes: Sequence[str
 
 
 def _rmf(config: Config) -> dict[str, str]:
-    """Return the settings to compare with RMF's settings, and the topics by their names on this
-    site."""
+    """Return the settings that must fit RMF's settings, and the site's names of the topics."""
     rmf, kind = config.rmf, kind_called(config.kind)
     spoken = [*(() if isinstance(kind, GraphKind) else kind.stated_on), *_published(config)]
     alarms = any(map(alarm_topics, config.devices.values()))
@@ -160,8 +160,8 @@ def _device(config: Config, name: str) -> Part:
 
 
 def _settings(settings: object) -> Table:
-    """Return a table of durations and choices. The bus and the accepted wires are left out, because
-    other tables show them."""
+    """Return a table of durations and choices. `bus`, `driver` and `accept_unsafe` are left out,
+    because other tables show them."""
     rows = (row for row in choices_of(settings) if row[0] not in ("bus", "driver", "accept_unsafe"))
     return Table("settings", SETTINGS, tuple(rows))
 
@@ -169,7 +169,8 @@ def _settings(settings: object) -> Table:
 def _row(config: Config, bus: str, wire: Wire, late_s: float) -> tuple[str, ...]:
     """Return a wire's row: the bus's description of the point, the YAML's spelling, and the meaning.
 
-    `bus`: the device's own. `late_s`: the time (s) by which the debounce of each input is longer.
+    `bus`: the device's own bus. `late_s`: the time (s) by which the debounce of each input is longer
+    (`Config.debounce`).
     """
     point = config.bus_type(wire.bus or bus).describe(wire.point)
     spelled = point if f" {wire.point} " in f" {point} " else f"{wire.point} = {point}"

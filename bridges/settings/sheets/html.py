@@ -1,6 +1,6 @@
-"""The commissioning sheet: an HTML file to print, tick and sign. Each controller has a page.
+"""The commissioning sheet: an HTML file to print, tick and sign. Each controller has its own page.
 
-The file needs no other file. Texts from a YAML are escaped, so they cannot be markup.
+The HTML file loads no other file. Texts from a YAML are escaped, so they cannot be markup.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,9 +29,9 @@ th { background: #eee; } .box { width: 2.2em; text-align: center; } .seen { min-
 """
 BOX = '<td class="box">&#9744;</td>'
 SHORT = 12
-"""The maximum length (characters) of a cell that is not broken into lines."""
+"""The greatest length (characters) of a cell that is not broken into lines."""
 NARROW = 60
-"""The maximum length (characters) of a row in a table that fits in half the page's width."""
+"""The greatest length (characters) of a row in a table that fits in half the page's width."""
 TO_TRY = (
     "every output is off while the unit is off, and after the machine has started",
     "every output is off 10 s after the daemon was killed (kill -9)",
@@ -82,7 +82,7 @@ def _settings(title: str, settings: Mapping[str, str]) -> Table:
 
 
 def _is_wide(table: Table) -> bool:
-    """Does the table need the page's whole width?"""
+    """Return whether the table needs the page's whole width."""
     return table.title in (WIRES, MEANINGS) or max(map(_letters, table.rows), default=0) > NARROW
 
 
@@ -92,7 +92,7 @@ def _letters(row: Sequence[str]) -> int:
 
 def _remarks(findings: Findings) -> Iterator[str]:
     """Yield all warnings and notes of the file. Each controller's page repeats them, because each page
-    is signed by itself."""
+    is signed on its own."""
     warnings = (f"line {w.line}: {w.text.removeprefix('warning: ')}" for w in findings.warnings)
     for text in (*warnings, *(note.removeprefix(f"{findings.file}:") for note in findings.notes)):
         yield f'<p class="warning">&#9744; {escape(text)}</p>'
@@ -123,7 +123,7 @@ def _cell(text: str) -> str:
 
 
 def _trials(part: Part) -> Iterator[str]:
-    """Yield the trials to make on the controller itself."""
+    """Yield the trials that a person makes on the controller."""
     if part.bus:
         trials = Table("to be tried", ("trial",), tuple((trial,) for trial in TO_TRY))
         yield from _table(trials, seen=True)

@@ -8,8 +8,8 @@ from bridges.system.columns import aligned, hanging
 
 
 def lines(findings: Findings, columns: int) -> list[str]:
-    """Return a valid file's findings as lines of at most `columns` characters: kind and driver, wiring
-    or messages, and a blank line."""
+    """Return a valid file's findings as lines of at most `columns` characters. They show kind and
+    driver, and then the wiring or the messages."""
     driver = f", driver {findings.driver}" if findings.driver else ""
     return [
         f"{findings.file}: {findings.kind}{driver}",
@@ -37,8 +37,8 @@ def _pairs(settings: Mapping[str, str], between: str = ", ") -> str:
 
 
 def _wiring(parts: Sequence[Part], columns: int) -> Iterator[str]:
-    """Yield the wires of all devices of a bus in one table. Then yield the messages of devices without
-    wires."""
+    """Yield the wires of all devices of a bus in one table. A second table has the messages of devices
+    without wires."""
     for title in (WIRES, MEANINGS):
         found = [(p.device, table) for p in parts for table in p.tables if table.title == title]
         headings = [("device", *table.headings) for _, table in found[:1]]
@@ -47,7 +47,7 @@ def _wiring(parts: Sequence[Part], columns: int) -> Iterator[str]:
 
 
 def _tables(parts: Sequence[Part], columns: int) -> Iterator[str]:
-    """Yield all other tables. If several devices have equal tables, print the table once."""
+    """Yield all other tables. A table that several devices share appears once."""
     alike: dict[Table, list[str]] = {}
     for part in parts:
         for table in part.tables:
