@@ -186,8 +186,8 @@ def test_a_floor_without_a_level_of_that_name_is_named(capsys: pytest.CaptureFix
 def test_a_level_where_the_lift_does_not_stop_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     said = complaints(capsys, LIFT.replace("L2", "L10"), "graph.yaml")
     assert said[1:] == [
-        "device.yaml:6:18: the lift 'Lift1' does not stop at 'L10' on graph.yaml, though the level"
-        " is there (line 14)"
+        "device.yaml:6:18: the lift 'Lift1' does not stop at 'L10' on graph.yaml, though the map"
+        " has that level (line 14)"
     ]
 
 

@@ -100,22 +100,22 @@ SLIPS = {
     "a no-break space within a number": (
         changed("tries: 2", f"tries: 1{NBSP}000"),
         [
-            "15:32: a no-break space (U+00A0): write an ordinary space, or put the text in quotes if it"
-            " is meant"
+            "15:32: a no-break space (U+00A0): write an ordinary space, or put the text in quotes to"
+            " keep it"
         ],
     ),
     "a no-break space in a key": (
         changed("driver:", f"driver{NBSP}:"),
         [
-            "2:1: a no-break space (U+00A0): write an ordinary space, or put the text in quotes if it"
-            " is meant"
+            "2:1: a no-break space (U+00A0): write an ordinary space, or put the text in quotes to"
+            " keep it"
         ],
     ),
     "a no-break space after a colon": (
         changed("kind: gate", f"kind:{NBSP}gate"),
         [
-            "1:1: a no-break space (U+00A0): write an ordinary space, or put the text in quotes if it"
-            " is meant",
+            "1:1: a no-break space (U+00A0): write an ordinary space, or put the text in quotes to"
+            " keep it",
             "2:7: the line above has no ': ': write a colon and a space after its key",
         ],
     ),
