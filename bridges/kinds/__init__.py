@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 
 def kind_names() -> list[str]:
-    """List the values that `kind:` may have: the folders here whose `__init__.py` defines a `KIND`."""
+    """List the values that `kind:` may have. They are the names of the folders whose `__init__.py`
+    defines `KIND`."""
     return holding(__path__, "*/__init__.py", "KIND", lambda path: path.parent.name)
 
 

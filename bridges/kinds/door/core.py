@@ -136,8 +136,8 @@ def _look(memory: DoorMemory, now: float, limits: DoorLimits) -> BelievedDoor:
 
 
 def _hold(memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits) -> DoorMemory:
-    """Switch the hold on or off, and note the time since which the door has been in its present
-    state."""
+    """Switch the hold on or off. Also note since when the door has been between its end positions, and
+    since when it has not been open."""
     if released_by_fire(view, limits):
         memory = replace(memory, latched_at=None, close_at=None)
     able = view.fresh and not rivalled(memory, now)

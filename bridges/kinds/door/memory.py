@@ -61,9 +61,9 @@ class DoorMemory(msgspec.Struct, frozen=True):
 
     `latched_at`: RMF has wanted the door open since this time. `close_at`: the time when a CLOSE
     releases the hold. `held`: the hold is on. `held_since`: the time when the hold was last switched.
-    `closing`: the hold has ended, and the door has not been seen closed since. `between_since`: the
-    door has been between its end positions since this time. `shut_since`: the door has not been fully
-    open since this time. `rival_at`: the time when another node for this door was last heard.
+    `closing`: since the end of the hold, the door has not been seen closed. `between_since`: the door
+    has been between its end positions since this time. `shut_since`: the door has not been fully open
+    since this time. `rival_at`: the time when another node for this door was last heard.
     `unattended_since`: no node has published requests since this time.
     """
 
@@ -97,24 +97,23 @@ def travel_ends_at(memory: DoorMemory, limits: DoorLimits) -> float:
 
 
 def opening_ends_at(memory: DoorMemory, limits: DoorLimits) -> float:
-    """Return the time by which a held door must be open; NEVER if the door is open or nobody holds
-    it."""
+    """Return the time by which a held door must be open; NEVER for an open door, and without a hold."""
     if memory.shut_since is None or not memory.held:
         return NEVER
     return max(memory.shut_since, memory.held_since) + limits.t.open_timeout_s
 
 
 def too_long_at(memory: DoorMemory, limits: DoorLimits) -> float:
-    """Return the time when RMF will have held the door for `max_hold_s`; NEVER if there is no limit or
-    no hold."""
+    """Return the time when RMF will have held the door for `max_hold_s`; NEVER without a limit or a
+    hold."""
     if memory.latched_at is None or limits.t.max_hold_s is None:
         return NEVER
     return memory.latched_at + limits.t.max_hold_s
 
 
 def lost_at(memory: DoorMemory, limits: DoorLimits) -> float:
-    """Return the time when the door will have had no supervisor for `supervisor_lost_s`; NEVER if a
-    supervisor is present or the limit is not set."""
+    """Return the time when the hold ends because no supervisor is present. Return NEVER if a supervisor
+    is present, or without `supervisor_lost_s`."""
     if memory.unattended_since is None or limits.t.supervisor_lost_s is None:
         return NEVER
     return memory.unattended_since + limits.t.supervisor_lost_s

@@ -11,10 +11,10 @@ from bridges.messages.definitions import DoorMode, DoorModeValue, DoorRequest, D
 
 
 def accept(message: DoorRequest, settings: DoorSettings) -> OpenRequested | CloseRequested:
-    """Turn a request into an event. Raises RequestRefused if it is malformed.
+    """Turn a request into an event. Raises RequestRefused if the request is malformed.
 
-    A door obeys every requester. But a request without a requester_id is refused, because nobody filled
-    in its fields, and its default mode, 0, would mean CLOSE.
+    A door obeys every requester. But a request without a requester_id is refused. Nobody filled in the
+    fields of such a request, and its default mode, 0, would mean CLOSE.
     """
     if not message.requester_id:
         raise RequestRefused("no requester", "requester_id is empty")

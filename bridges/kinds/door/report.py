@@ -19,11 +19,11 @@ from bridges.messages.definitions import DoorModeValue
 
 
 class DoorReport(msgspec.Struct, frozen=True):
-    """The door's state for RMF and the status file. `hold`: we hold the door open, even if the relay is
-    off between two pulses.
+    """The door's state for RMF and the status file.
 
-    `estimated`: no contact proves `mode`. `waits`: the reason why RMF's OPEN is not yet fulfilled; ""
-    if RMF does not want the door open, or if the door is OPEN. `alarm`: the fire input, for the fleets.
+    `hold`: we hold the door open, even if the relay is off between two pulses. `estimated`: no contact
+    proves `mode`. `waits`: the reason why the door is not open although RMF wants the door open;
+    otherwise "". `alarm`: the fire input, for the fleets.
     """
 
     mode: DoorModeValue

@@ -131,7 +131,8 @@ def _believed(contact: Contact | None) -> bool:
 
 
 def _feared(contact: Contact | None) -> bool:
-    """Return whether the hazard is present. If its input has never settled, a single reading counts."""
+    """Return whether the hazard is present. If the hazard's input has never settled, a single reading
+    counts."""
     if contact is None:
         return False
     return bool(contact.value if _settled(contact) else contact.candidate)
@@ -140,8 +141,8 @@ def _feared(contact: Contact | None) -> bool:
 def _estimates(
     senses: DoorSenses, held: bool, held_since: float, limits: DoorLimits
 ) -> tuple[float, float]:
-    """Return the times at which a door without contacts counts as open and as closed; NEVER for a
-    position in which it will not count."""
+    """Return the times from which a door without contacts counts as open, and as closed. A held door
+    never counts as closed, and a released door never counts as open (NEVER)."""
     if not limits.estimated or senses.linked_since is None:
         return NEVER, NEVER
     since = max(held_since, senses.linked_since)

@@ -1,4 +1,4 @@
-"""The door supervisor, which replaces RMF's. It stands between the fleet adapters and all doors."""
+"""The door supervisor between the fleet adapters and all doors. This supervisor replaces RMF's."""
 
 from bridges.kinds.door_supervisor import core, keep, memory, messages, report, signals
 from bridges.kinds.door_supervisor.memory import DoorSupervisorLimits, SupervisedDoor

@@ -81,8 +81,8 @@ class SupervisedDoor(msgspec.Struct, frozen=True):
 
     @property
     def may_send(self) -> bool:
-        """Return whether we may send to the door's node now. During the quiet start we may only if
-        restored holders hold a door that is not closed, because a robot may stand in its doorway."""
+        """Return whether we may send to the door's node now. During the quiet start this needs a
+        restored holder and a door that is not closed, because a robot may stand in the doorway."""
         stands_open = self.mode not in (None, CLOSED)
         return self.may_speak or (self.at_once and stands_open and self.holds_restored)
 
@@ -104,8 +104,7 @@ class SupervisedDoor(msgspec.Struct, frozen=True):
 
     @property
     def silent_at(self) -> float:
-        """The time when a held door will have been silent for too long; NEVER if nobody holds the
-        door."""
+        """The time when a held door counts as silent; NEVER without a holder."""
         if not self.holders:
             return NEVER
         return max(self.shown_at, self.holders[0].since) + SILENT_S

@@ -26,9 +26,9 @@ def accept_request(
     """Turn an adapter's request into an event. Raises RequestRefused. `wall` is not used, because
     stamps are compared only with stamps of the same requester.
 
-    A request without a requester_id is refused, because nobody filled in its fields, and its default
-    mode, 0, would mean CLOSE. A request with our own requester_id is refused too. Such a request is our
-    own request to a door, which a renamed topic has brought back to us.
+    A request without a requester_id is refused. Nobody filled in the fields of such a request, and its
+    default mode, 0, would mean CLOSE. A request with our own requester_id is refused too, because it is
+    our own request to a door. A renamed topic has brought it back to us.
     """
     check_listed("door", request.door_name, settings.doors)
     who = request.requester_id

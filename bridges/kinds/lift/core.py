@@ -13,8 +13,9 @@ LIFT-2. An END ends the session at once. An END that is older than the session d
    - An END on `lift_requests` does not end the session of a robot that may be inside and goes on
      asking. Such a session ends at the robot's own END, at a person's END, or after the robot's
      silence.
-   - If RMF's supervisor asks for another session, or has ended the present session, the present robot
-     is heard directly. The requests and the END of its own fleet adapter then count too.
+   - If RMF's supervisor asks for another session, or has ended the present session, this node listens
+     to the session's robot directly. The requests and the END of the robot's own fleet adapter then
+     count too.
    - A restarted fleet adapter sends END in mid-ride. The lift then waits longer for that robot: until
      IN_CAR_S after the robot's last message. After `release_grace_s` every output is off.
 LIFT-3. A request sets the destination and the mode. If the door is held, a request for another
@@ -107,8 +108,8 @@ def decide(
 
 
 def published(memory: LiftMemory, shown: LiftReport) -> LiftMemory:
-    """Note that this report was sent. If it shows OPEN at the destination, a robot may be inside from
-    now on."""
+    """Note in the memory that this report was sent. After a report with OPEN at the destination, a
+    robot may be inside."""
     session = memory.session
     if session is None or not shown.open_at:
         return memory
@@ -226,8 +227,8 @@ def _reset(memory: LiftMemory, now: float, limits: LiftLimits) -> LiftMemory:
 
 
 def _latch(memory: LiftMemory, view: BelievedLift, now: float, limits: LiftLimits) -> LiftMemory:
-    """Latch a fire if `fire_reset` is `manual`. Forget a rival (a second node for this lift) that has
-    been silent for RIVAL_QUIET_S."""
+    """Latch a fire if `fire_reset` is `manual`. Forget a rival, which is a second node for this lift,
+    after its silence of RIVAL_QUIET_S."""
     burning = Hazard.FIRE in view.hazards
     manual = limits.fire_reset == "manual"
     rival_at = memory.rival_at

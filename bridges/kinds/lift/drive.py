@@ -190,7 +190,7 @@ def _trip(session: LiftSession, fault: Fault, now: float) -> LiftSession:
 
 
 def _pulse_ends_at(session: LiftSession, limits: LiftLimits) -> float:
-    """Return the end of a call that is a pulse; NEVER for a held call."""
+    """Return the time when a call's pulse ends; NEVER for a held call."""
     if session.call_at is None or limits.t.call_pulse_s is None:
         return NEVER
     return session.call_at + limits.t.call_pulse_s

@@ -73,9 +73,9 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
 class CarPosition(msgspec.Struct, frozen=True):
     """The car's position, as far as the floor code is believed.
 
-    `trusted`: the last landing that was believed. `seen_at`: the time when the car was last seen there.
-    `suspect`: a landing that the floor code shows, but that the car cannot have reached. `moved_at`:
-    the time of the last reading in which the car did not stand.
+    `trusted`: the last landing that was believed. `seen_at`: the time when the car was last seen at
+    that landing. `suspect`: a landing that the floor code shows, but that the car cannot have reached.
+    `moved_at`: the time of the last reading in which the car did not stand.
     """
 
     trusted: str | None = None
@@ -118,8 +118,8 @@ class OwnWords(msgspec.Struct, frozen=True):
 
     `stamp`: the newest stamp (ns), by the adapter's clock. `asked_at`: the time of the last request for
     the lift. `ended_at`: the time of the first END after that request. `floor`: the destination of that
-    request. `opened`: OPEN has been published at `floor` since. `told`: the adapter has sent a request
-    after that OPEN.
+    request. `opened`: since that request, OPEN has been published at `floor`. `told`: the adapter has
+    sent a request after that OPEN.
     """
 
     stamp: int = 0
@@ -187,8 +187,8 @@ class LiftMemory(msgspec.Struct, frozen=True):
 
     `rival_at`: the time when another node for this lift was last heard. `io_fault`: the error of the
     last read or write; "" if both succeeded. `unwritten_since`: no write has succeeded since this time.
-    `write_failed`: the last scan's write failed. `own` maps a session to the destination that its robot
-    itself last requested.
+    `write_failed`: the last scan's write failed. `own` maps a session to the destination that the
+    session's robot itself last requested.
     """
 
     senses: LiftSenses = LiftSenses()

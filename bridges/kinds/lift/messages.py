@@ -19,13 +19,13 @@ from bridges.messages.definitions import (
 from bridges.messages.topics import ADAPTER_LIFT_REQUESTS
 
 OWN_REQUESTS = ADAPTER_LIFT_REQUESTS.live()
-"""The topic on which fleet adapters send requests to RMF's supervisor. This node listens there for the
+"""The topic on which fleet adapters send requests to RMF's supervisor. On this topic our node hears the
 robot that has the lift."""
 AVAILABLE_MODES = (int(LiftMode.MODE_HUMAN), int(LiftMode.MODE_AGV))
 
 
 def accept(request: LiftRequest, settings: LiftSettings) -> LiftRequested | EndRequested:
-    """Turn a request into an event. Raises RequestRefused if it is malformed or impossible.
+    """Turn a request into an event. Raises RequestRefused if the request is malformed or impossible.
 
     An END_SESSION counts with any floor and door, because fleet adapters send "" and 0
     (rmf_fleet_adapter RobotContext.cpp). At each state of a free lift, Jazzy's supervisor sends an

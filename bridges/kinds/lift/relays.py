@@ -86,8 +86,10 @@ class Relays(msgspec.Struct, frozen=True):
     def _still_off(
         self, wanted: LiftOutputs, now: float, t: LiftDurations
     ) -> Iterator[tuple[str, Channel[Any], float]]:
-        """Yield (name, channel, ready_at) of each wanted output that is off. The other outputs allow it
-        from `ready_at` on."""
+        """Yield (name, channel, ready_at) of each wanted output that is off.
+
+        `ready_at`: the time from which the other outputs allow this output.
+        """
         agv_at = now if self.agv.on else self.agv.may_switch_on_at(now, AGES_AGO, t)
         ready_at = max(agv_at, self._rested_at(t))
         if wanted.agv_request and not self.agv.on:

@@ -8,7 +8,7 @@ requests that each robot sends now.
 Rules:
 LIFT-REPLAYED-1. While the door is held, a request for another destination is doubted if the robot's own
    last request was for the present destination. That own request may be older than the session, because
-   the robot may have been cut off since.
+   the robot may have lost its connection after that request.
 LIFT-REPLAYED-2. The doubted request counts when the robot itself asks for that destination too. It also
    counts when LASTS_S have passed and no other destination was requested in that time.
 LIFT-REPLAYED-3. An END is never doubted. A request within the grace first restores the session as it

@@ -45,8 +45,8 @@ class LiftReport(msgspec.Struct, frozen=True):
         return self.floor if self.door is LiftDoor.DOOR_OPEN else ""
 
     def news(self) -> object:
-        """Return everything except the age and the faults' details. Both may change at each reading,
-        and such a change is no news."""
+        """Return the facts whose change is news. The age and the faults' details are left out, because
+        they may change at each reading."""
         shown = (self.floor, self.destination, self.door, self.motion, self.mode, self.session)
         return *shown, self.estimated, tuple(fault.code for fault in self.faults)
 
@@ -134,8 +134,8 @@ def _may_enter(
       door, so it would close on the robot.
     - The door is not shown OPEN if a served session is about to send the car away from the floor that
       its robot itself last requested. RMF's supervisor may be passing on an earlier ride.
-    - Before a robot has boarded, its session must also be served, in AGV mode, and without a fault. The
-      fault FORGOTTEN_BY_SUPERVISOR does not matter.
+    - Before a robot has boarded, the lift must also serve the robot's session in AGV mode, without a
+      fault. The fault FORGOTTEN_BY_SUPERVISOR does not matter.
     """
     session, held = memory.session, memory.relays.hold.on is not None
     if wanted.hold_door is not None and not held:

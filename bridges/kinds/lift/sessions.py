@@ -102,7 +102,7 @@ def _refresh(session: LiftSession, request: LiftRequested, now: float) -> LiftSe
 
 
 def _anew(session: LiftSession, now: float) -> LiftSession:
-    """Return the session as if the lift were granted to it now. The facts about its robot stay."""
+    """Return the session as if it were granted now. The facts about its robot stay."""
     return LiftSession(
         session.id,
         session.agv,

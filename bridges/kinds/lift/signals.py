@@ -116,7 +116,7 @@ class EndRequested(msgspec.Struct, frozen=True):
 
 
 class FromAdapter(msgspec.Struct, frozen=True):
-    """A robot's own request, as its fleet adapter sends it to RMF's supervisor."""
+    """A robot's own request, which its fleet adapter has sent to RMF's supervisor."""
 
     asked: LiftRequested | EndRequested
 

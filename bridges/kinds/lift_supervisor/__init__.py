@@ -1,4 +1,4 @@
-"""The lift supervisor, which replaces RMF's. It stands between the fleet adapters and all lifts."""
+"""The lift supervisor between the fleet adapters and all lifts. This supervisor replaces RMF's."""
 
 from bridges.kinds.lift_supervisor import core, memory, messages, report, signals
 from bridges.kinds.lift_supervisor.memory import LiftSupervisorLimits, SupervisedLift

@@ -171,7 +171,8 @@ def _with(
 
 
 def _end(memory: SupervisedLift, ended: RideEnded, now: float) -> SupervisedLift:
-    """Remove the session from the queue. If it has the lift or the turn, send END to the node."""
+    """Remove the session from the queue. If the session has the lift or the turn, send END to the
+    lift's node."""
     session = ended.session
     memory, turn = _without(memory, session), memory.turn
     has_it = session in (memory.session_shown, turn.session if turn else "")
