@@ -1,4 +1,5 @@
-"""Checks that the devices of a file raise one and the same alarm, and that other daemons can see it."""
+"""Checks that the devices of a file raise one common alarm, and that other daemons can see this
+alarm."""
 
 from collections.abc import Mapping
 

@@ -1,14 +1,19 @@
 """The names on RMF's map of a building: levels, lifts, doors, waypoints. Our files must use these
 names.
 
-Two sorts of file hold the map, and both are accepted:
+Two sorts of file hold the map, and both are accepted. The traffic editor writes `*.building.yaml`. A
+parameter is a pair in this file: [number of the type, value].
 
-    *.building.yaml   traffic-editor's: `levels: {L1: {vertices: [[x, y, z, name, {is_charger: [4,
-                      true]}]], doors: [[from, to, {name: [1, D1]}]]}}`, where a parameter is [its
-                      type's number, its value]; `lifts: {Lift1: {level_doors: {L1: [door]}}}`
-    a nav graph       generated from the first: `levels: {L1: {vertices: [[x, y, {name: A, lift: Lift1,
-                      is_charger: true}]], lanes: [[from, to, {door_name: D1}]]}}`, `lifts: {Lift1:
-                      …}`, `doors: {D1: …}`; older graphs lack `lifts` and `doors`
+    levels: {L1: {vertices: [[x, y, z, name, {is_charger: [4, true]}]],
+                  doors: [[from, to, {name: [1, D1]}]]}}
+    lifts: {Lift1: {level_doors: {L1: [door]}}}
+
+RMF generates a navigation graph from that file. Older graphs lack `lifts` and `doors`.
+
+    levels: {L1: {vertices: [[x, y, {name: A, lift: Lift1, is_charger: true}]],
+                  lanes: [[from, to, {door_name: D1}]]}}
+    lifts: {Lift1: …}
+    doors: {D1: …}
 
 Source: open-rmf/rmf_traffic_editor 65437ea, rmf_building_map_tools/building_map (vertex.py, edge.py,
 lift.py, building.py), and rmf_ros2's parse_graph.cpp, which reads the graph.

@@ -18,8 +18,8 @@ from drivers.hal import AnyBus, Bus
 from drivers.hal.points import Wire
 
 LATE_S: Final = 0.1
-"""The allowed delay (s) of a reading of another bus, beyond one scan of that bus. A later reading no
-longer counts."""
+"""The time (s), on top of one scan of another bus, after which a reading of that bus no longer
+counts."""
 
 
 class Config(Struct, frozen=True):
@@ -96,9 +96,8 @@ class Config(Struct, frozen=True):
     def debounce(self, device_name: str) -> dict[str, float]:
         """Return signal or group -> how long a change must last (s).
 
-        A device may have inputs on two buses. A reading of the other bus may be older by `lasts_s`.
-        Therefore the debounce of every input is longer by that age, so that no single reading counts
-        twice.
+        A device may have inputs on two buses. A reading of the other bus may be older by `lasts_s`. The
+        debounce of every input is longer by that age. Therefore no single reading counts twice.
         """
         late_s = max(map(self.lasts_s, self.other_buses(device_name)), default=0.0)
         found = self.driver_type(device_name).debounce(self.devices[device_name])

@@ -57,7 +57,7 @@ class RobotConfig(msgspec.Struct, frozen=True):
     rmf_config: OlderRobot | None = None
 
     def waypoint(self) -> tuple[Path, str | None]:
-        """Return the waypoint's path below the robot, and its name."""
+        """Return the path of the charger's waypoint below the robot, and the waypoint's name."""
         if isinstance(self.charger, str):
             return ("charger",), self.charger
         if self.charger is not None:
@@ -67,7 +67,8 @@ class RobotConfig(msgspec.Struct, frozen=True):
 
 
 class Limits(msgspec.Struct, frozen=True):
-    """The robots' limits: velocity and acceleration (m/s, m/s²; rad/s, rad/s²)."""
+    """The robots' greatest velocity and acceleration: linear (m/s, m/s²) and angular (rad/s,
+    rad/s²)."""
 
     linear: tuple[float, float]
     angular: tuple[float, float]

@@ -159,8 +159,8 @@ class _Comparing:
             self._theirs("warnings", path if request else ("rmf_fleet",), text)
 
     def needed(self) -> None:
-        """Check the keys that charging needs. Without them the coordinator sees no robot, or RMF
-        charges none."""
+        """Check the keys that charging needs. Without these keys the coordinator sees no robot, or RMF
+        charges no robot."""
         hz = self._fleet.fleet.publish_fleet_state
         if hz is not None and hz < LEAST_HZ:
             text = f"{hz:g} Hz is too seldom for the coordinator to see the robots: write 1 or more"

@@ -44,7 +44,7 @@ NEEDED: Final = (
 """Keys below `rmf_fleet` without which RMF's adapter does not read the file (EasyFullControl.cpp,
 `from_config_files`)."""
 OFF_M: Final = 0.5
-"""The greatest error (m) of fitting pairs of coordinates. With a greater error, a robot would be seen
+"""The greatest error (m) of the pairs of coordinates. With a greater error, RMF would see a robot
 beside its lane."""
 
 
@@ -52,7 +52,7 @@ class FleetSite(Struct, frozen=True):
     """A fleet's two files.
 
     `transforms`: level -> transform from RMF's map to the robots' map. `estimated`: the levels whose
-    transform comes from pairs, and must be given to RMF.
+    transform comes from pairs. The daemon must give these transforms to RMF.
     """
 
     fleet: FleetFile
@@ -112,8 +112,8 @@ def _file(config: Config, path: str) -> Path:
 
 @cache
 def _folder(folder: str) -> Path:
-    """Return the absolute path of a folder. The cache keeps this path if the daemon changes its working
-    directory later."""
+    """Return the absolute path of a folder. The cache keeps this path, even if the daemon later changes
+    its working directory."""
     return Path(folder).absolute()
 
 

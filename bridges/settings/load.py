@@ -346,8 +346,8 @@ class _DeviceReading:
             self._notes.append(self._page.problem(node, f"note: {spot.label}: {text}"))
 
     def _collect_bus_remarks(self) -> None:
-        """Collect remarks once for each bus. They are about outputs that stay on when this machine
-        fails, and about a pace that is too slow."""
+        """Collect remarks once for each bus. The subjects are outputs that stay on when this machine
+        fails, and a pace that is too slow."""
         for name, bus in () if self._page.problems else self._buses.items():
             assert bus.hal
             unwatched = bus.hal.unwatched(bus.settings, self._written.get(name, ()))

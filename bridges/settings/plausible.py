@@ -12,7 +12,7 @@ from bridges.yaml.values import described
 RENEWED: Final = 3
 """The least number of scans for which an output's timer must last."""
 LONG_S: Final = 1000.0
-"""The least duration (s) that is suspiciously long. Its author often meant milliseconds."""
+"""The least duration (s) that is suspiciously long. Often milliseconds are meant."""
 
 
 def milliseconds(structs: Iterable[tuple[tuple[str, ...], object]]) -> Remarks:

@@ -1,8 +1,8 @@
 """Rewrites the renamed keys in the text of a device YAML. Comments, order and layout stay.
 
 Only the text of a renamed key changes. A key that has moved to another section is cut out with the
-comment on its line. It becomes the first key of that section. `rewritten` accepts the result only if it
-has the same meaning as the original.
+comment on its line. The key then becomes the first key of its new section. `rewritten` accepts the
+result only if the result has the same meaning as the original.
 """
 
 from collections.abc import Iterator, Sequence

@@ -17,13 +17,13 @@ _LEAVES = (str, int, float, bool, type(None))
 
 
 def plain(struct: object) -> list[Row]:
-    """Return every setting, at any depth, that is a number, a word, or a list of these."""
+    """Return every plain setting at any depth: numbers, words, and lists of numbers or words."""
     return list(_rows(struct, (), deep=True))
 
 
 def choices_of(device: object) -> list[Row]:
-    """Return the plain settings of a device. A section of the device counts too, unless it has sections
-    inside."""
+    """Return the plain settings of a device and of its sections. A section with further sections inside
+    is left out."""
     return list(_rows(device, (), deep=False))
 
 

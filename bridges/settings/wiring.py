@@ -176,8 +176,8 @@ class WiringCheck:
             self._page.note(locate(spot, path).where(), text)
 
     def parts(self, structs: Iterable[tuple[tuple[str, ...], object]], spot: Spot) -> None:
-        """Check the inputs and outputs one by one, for a device with invalid other settings. Such a
-        device has no wiring table."""
+        """Check the inputs and outputs of a device one by one. The device has no wiring table, because
+        its other settings are invalid."""
         for path, struct in structs:
             if isinstance(struct, Input):
                 wire = struct.wire(path[-1], path, struct.debounce_s)

@@ -1,9 +1,8 @@
 """Parses YAML text to nodes with line and column. It refuses invalid YAML, and some features of valid
 YAML.
 
-PyYAML's pure Python loader is used for two reasons. Its messages say more than libyaml's. Its recursion
-has a limit, while libyaml's composer recurses in C without a limit, so that a deeply nested file would
-crash the interpreter.
+PyYAML's pure Python loader is used for two reasons. Its messages say more than libyaml's. A deeply
+nested file would crash libyaml, because libyaml's composer recurses in C without a limit.
 """
 
 import re

@@ -107,8 +107,7 @@ def _rank(wanted: Type) -> int:
 
 
 def _annotation(wanted: Type) -> object:
-    """Return the type, with its bounds, in the form that `convert` needs. msgspec's description has
-    another form."""
+    """Return a type that `convert` accepts, with the bounds of msgspec's description."""
     if isinstance(wanted, EnumType):
         return wanted.cls
     if isinstance(wanted, LiteralType):
@@ -159,14 +158,16 @@ def _reason(wanted: Type, node: ScalarNode, extra: Extra, length: bool) -> str:
 
 
 def _too_little(wanted: Type, node: ScalarNode, extra: Extra) -> str:
-    """Return why the type has its least value, if the value is below it; otherwise ""."""
+    """Return the reason for the type's least value, if the value is below the least value; otherwise
+    ""."""
     value, least = number(node.value), getattr(wanted, "ge", None)
     small = value is not None and least is not None and value < least
     return f"; {extra['least']}" if small and "least" in extra else ""
 
 
 def _milliseconds(wanted: Type, node: ScalarNode, extra: Extra) -> str:
-    """Return a hint in seconds if a duration was probably given in milliseconds; otherwise ""."""
+    """Return a hint with the duration in seconds, if the duration was probably given in milliseconds;
+    otherwise ""."""
     if extra.get("unit") != "s" or not isinstance(wanted, FloatType):
         return ""
     value, least, most = number(node.value), wanted.ge, wanted.le

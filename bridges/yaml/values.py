@@ -40,7 +40,7 @@ T = TypeVar("T")
 
 @cache
 def described(cls: Hashable) -> Type:
-    """Return msgspec's description of a type. A cache keeps it, because making it takes a
+    """Return msgspec's description of a type. The description is cached, because making one takes a
     millisecond."""
     return inspect.type_info(cls)
 
@@ -176,8 +176,8 @@ class Values:
         return {name: entry for name, entry in found.items() if name in fields and name not in cut}
 
     def _owned(self, entry: MappingEntry, spot: Spot, fields: Mapping[str, str | None]) -> str:
-        """Return where an unknown key belongs, as `owner` tells; "" if it does not know. Keys that
-        resemble a key of this section are left out."""
+        """Return the text of `owner` about an unknown key. Return "" inside a section, and for a key
+        that resembles a key of the struct."""
         if spot.path or nearest(entry.name, fields):
             return ""
         return self._owner(entry.name)
@@ -209,8 +209,8 @@ class Values:
         return self._leaf([wanted], spot, extra or {})
 
     def _union(self, wanted: UnionType, spot: Spot, extra: Extra | None) -> object:
-        """Convert the node to the member of the union that fits its form. Among several scalar types,
-        the first that accepts the scalar counts."""
+        """Convert the node to the member of the union that fits the node's form. Among several scalar
+        types, the first that accepts the scalar counts."""
         members = [t for t in wanted.types if not isinstance(t, NoneType)]
         if len(members) < len(wanted.types) and is_none(spot.node):
             return None

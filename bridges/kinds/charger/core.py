@@ -67,9 +67,10 @@ from bridges.kinds.shared.decision import (
 from bridges.kinds.shared.durations import AGES_AGO, NEVER, RIVAL_QUIET_S
 
 REMEMBERED = 8
-"""The number of ended requests that a charger remembers, so that it refuses their late repeats."""
+"""The number of ended requests that a charger remembers, in order to refuse late repeats."""
 CLEARED_WITHIN_S = 30.0
-"""A good reading within this time after the errors were cleared proves that clearing succeeded."""
+"""The time (s) after the clearing of errors within which a good reading proves that the clearing
+succeeded."""
 
 
 def initial(limits: ChargerLimits, now: float) -> ChargerMemory:
@@ -147,7 +148,7 @@ def _held(memory: ChargerMemory, holder: ChargeSession | None) -> ChargerMemory:
 
 
 def _watched(memory: ChargerMemory, now: float) -> ChargerMemory:
-    """Note the time since which the station has charged although it was ordered to stop."""
+    """Note since when the station has charged in spite of an order to stop."""
     sample = memory.sample
     charges = sample and (sample.activity is Activity.CHARGING or sample.charges)
     if memory.power is not False or not charges:
@@ -157,8 +158,8 @@ def _watched(memory: ChargerMemory, now: float) -> ChargerMemory:
 
 
 def _protected(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
-    """Put the station out of service at a fault of the station. Put it back into service at a good
-    reading after its errors were cleared."""
+    """Put the station out of service at the station's own fault. A good reading after the errors were
+    cleared puts the station back into service."""
     sample, since = memory.sample, memory.disobeyed_since
     assert sample
     if not limits.can_stop:
@@ -284,7 +285,7 @@ def _clear(memory: ChargerMemory, now: float) -> ChargerMemory:
 
 
 def _power(memory: ChargerMemory, now: float, limits: ChargerLimits) -> bool | None:
-    """Return whether the station may energise its pad; None: send the station no order."""
+    """Return whether the station may energise its pad. Return None if the station gets no order."""
     holder = memory.holder
     if rivalled(memory, now) or memory.protection or (holder and holder.over):
         return False

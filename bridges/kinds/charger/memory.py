@@ -57,7 +57,7 @@ class ChargeSession(msgspec.Struct, frozen=True):
 
     @property
     def over(self) -> bool:
-        """Will this request get no more power?"""
+        """Return whether this request gets no more power."""
         return self.failed or bool(self.ended) or self.released_at is not None
 
 
@@ -67,10 +67,10 @@ class ChargerMemory(msgspec.Struct, frozen=True):
     `sample`: the last good reading, at `read_at`. `misses`: the number of failed polls in a row.
     `write_misses`: the number of scans in a row with failed commands. `write_failed`: a command failed
     in this scan. `over`: the ids of the requests that ended last. `adopted`: the station was charging
-    when we reached it, and we leave that charge alone. `power`: the last decision about the power.
-    `disobeyed_since`: the station has charged since this time although `power` is off. `protection`:
-    the reason why the station is out of service, "" in service. `clear_by`: a good reading up to this
-    time proves that the errors were cleared.
+    when the daemon reached it, and the daemon leaves that charge alone. `power`: the last decision
+    about the power. `disobeyed_since`: the station has charged since this time although `power` is off.
+    `protection`: the reason why the station is out of service, "" in service. `clear_by`: a good
+    reading up to this time proves that the errors were cleared.
     """
 
     sample: ChargerSample | None = None
@@ -99,6 +99,6 @@ def rivalled(memory: ChargerMemory, now: float) -> bool:
 
 
 def unreachable(memory: ChargerMemory, limits: ChargerLimits) -> bool:
-    """Return whether there has been no reading yet, or `misses` polls have failed since the last good
-    reading."""
+    """Return whether the station cannot be reached. That is so before the first reading, and after
+    `misses` failed polls in a row."""
     return memory.sample is None or memory.misses >= limits.t.misses

@@ -18,7 +18,7 @@ from bridges.messages.definitions import (
 from bridges.messages.stamps import duration, in_seconds
 
 LONGEST_TIMEOUT_S = 86400.0
-"""One day. A longer timeout was probably given in a wrong unit."""
+"""The longest accepted timeout (s): one day. A longer timeout was probably given in a wrong unit."""
 
 
 def accept_request(request: ChargerRequest, settings: ChargerSettings) -> ChargeRequested:
@@ -42,7 +42,7 @@ def accept_request(request: ChargerRequest, settings: ChargerSettings) -> Charge
 
 
 def accept_cancel(cancel: ChargerCancel, settings: ChargerSettings) -> Cancelled:
-    """Turn a ChargerCancel into an event. Raises RequestRefused if it is malformed.
+    """Turn a ChargerCancel into an event. Raises RequestRefused if the cancel is malformed.
 
     A charge that nobody requested can be cancelled too. The cancel must name the request id in the
     charger's published state.

@@ -79,7 +79,7 @@ def seen(sample: ChargerSample | None, limits: ChargerLimits) -> PadOccupant:
 
 
 def not_ready(sample: ChargerSample) -> str:
-    """Explain why the pad must not be energised for any robot; "" if the reading does not forbid it."""
+    """Return why the reading forbids power for every robot; "" if the reading allows power."""
     if sample.measured.at_height is False:
         return "the pad is not at its height"
     return "the robot is not in range" if sample.measured.range_ok is False else ""

@@ -1,8 +1,9 @@
 """The published answer to a refused ChargerRequest, and the function that reads the answer.
 
-ChargerState shows only the station's true state, and RMF has no message for a refusal. So the daemon
-publishes a refusal as a diagnostic_msgs/DiagnosticStatus on a topic of its own, `charger_refusals`.
-Every ROS machine has this type, and `ros2 topic echo` shows its fields by their names.
+ChargerState shows only the station's true state, and RMF has no message for a refusal. Therefore the
+daemon publishes a refusal as a diagnostic_msgs/DiagnosticStatus on a separate topic,
+`charger_refusals`. Every ROS machine has this type, and `ros2 topic echo` shows its fields by their
+names.
 """
 
 from collections.abc import Mapping

@@ -42,9 +42,9 @@ OUT_OF_SERVICE = "out of service after: "
 class FaultCause(StrEnum):
     """The side at fault.
 
-    PAD: a wrong robot or receiver is on the pad. LOST: the station cannot be reached or commanded, so
-    neither the station nor the robot is known to be at fault. UNCLEAR: the text names no side. The
-    robot then tries a second station. A robot that fails at both stations is at fault.
+    PAD: a wrong robot or receiver is on the pad. LOST: the station cannot be reached or commanded. That
+    says nothing about a fault of the robot or the station. UNCLEAR: the text names no side. The robot
+    then tries a second station. A robot that fails at both stations is at fault.
     """
 
     NONE = ""
@@ -81,11 +81,12 @@ def diagnosis(message: str) -> FaultCause:
 class ChargerReport(msgspec.Struct, frozen=True):
     """The content of ChargerState, except its name and stamp.
 
-    `read_at`: monotonic seconds of the last good reading, None before the first. `error_message`: blank
-    unless `state` is CHARGER_ERROR. `request_id`: blank if no request holds the station. `fleet`,
-    `robot`: the request's robot. Without a request, `fleet` and `robot` name the robot on the pad if
-    the station is not idle. `verified`: the station sees that robot's receiver. `waits`: the reason why
-    the robot is not charged yet; "" without a request, during and after the charge, and in ERROR.
+    `read_at`: monotonic seconds of the last good reading, None before the first. `error_message`:
+    filled only in the state CHARGER_ERROR. `request_id`: blank if no request holds the station.
+    `fleet`, `robot`: the request's robot. Without a request, `fleet` and `robot` name the robot on the
+    pad if the station is not idle. `verified`: the station sees that robot's receiver. `waits`: the
+    reason why the robot is not charged yet; "" without a request, during and after the charge, and in
+    ERROR.
     """
 
     read_at: float | None
@@ -100,7 +101,7 @@ class ChargerReport(msgspec.Struct, frozen=True):
     waits: str = ""
 
     def news(self) -> object:
-        """Return everything except the age, the measurements and `waits`, because their changes alone
+        """Return everything except the age, the measurements and `waits`. Changes of these three alone
         need no new message to RMF."""
         measured = Measured(receiver_id=self.measured.receiver_id)
         return replace(self, read_at=None, measured=measured, waits="")

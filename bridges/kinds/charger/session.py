@@ -17,14 +17,14 @@ RANGE_EVERY_S = 5.0
 
 
 def granted(request: ChargeRequested, now: float, limits: ChargerLimits) -> ChargeSession:
-    """Grant the station to a request; its `start_timeout` counts from now."""
+    """Grant the station to a request. The request's `start_timeout` counts from now."""
     return ChargeSession(request, now + _patience_s(request, limits))
 
 
 def taken_over(
     holder: ChargeSession, request: ChargeRequested, now: float, limits: ChargerLimits
 ) -> ChargeSession:
-    """Give a session that began without a request to the robot's new request, and continue it."""
+    """Continue a session that began without a request, and give it the robot's new request."""
     return replace(holder, request=request, start_by=now + _patience_s(request, limits))
 
 
@@ -87,8 +87,8 @@ def _flowing(holder: ChargeSession, sample: ChargerSample, limits: ChargerLimits
 
 
 def _sought_again(holder: ChargeSession, now: float, limits: ChargerLimits) -> ChargeSession:
-    """Let the session wait for the start again, because the station has lost the receiver and looks for
-    it."""
+    """Let the session wait for the start again, because the station has lost the receiver and searches
+    again."""
     by = now + _patience_s(holder.request, limits)
     return replace(holder, started=False, start_by=by, checked_at=None)
 

@@ -1,7 +1,7 @@
 """A charger's sample, outputs and events: the interface of its core.
 
 The simplest stations on HTTP give only their activity and an error text. Other controllers (CANopen,
-Modbus, another maker's JSON) also give measurements, which are in `measured`, and obey `power`.
+Modbus, another maker's JSON) also obey `power`, and give measurements in `measured`.
 """
 
 from enum import StrEnum
@@ -43,8 +43,8 @@ class Measured(msgspec.Struct, frozen=True):
     `receiver_id`: the receiver on the pad, "" for none. `in_range`: a range check has found the robot's
     coil in range for charging; False before the check. `range_ok`: the robot's coil is in range, from a
     station that reports the range all the time, without a check. `at_height`: a movable pad is at its
-    height for charging. `volts`, `amps`: at the battery. `battery_percent`: the battery's charge.
-    `temperatures`: pairs of a name and °C.
+    height for charging. `volts`, `amps`: the battery's voltage and current. `battery_percent`: the
+    battery's charge. `temperatures`: pairs of a name and °C.
     """
 
     receiver_id: str | None = None

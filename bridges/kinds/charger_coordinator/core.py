@@ -93,7 +93,7 @@ def _take(memory: SiteMemory, event: Event, now: float, site: SiteLimits) -> tup
 
 
 def _may_speak(memory: SiteMemory, yes: bool, alone: bool, now: float) -> SiteMemory:
-    """Start or stop publishing. Every station gets its full time again to show a request, and all
+    """Start or stop publishing. The time in which a station must show its request starts again, and all
     assignments are sent again."""
     grants = {
         name: grant if grant.shown else replace(grant, made_at=now)
@@ -103,8 +103,8 @@ def _may_speak(memory: SiteMemory, yes: bool, alone: bool, now: float) -> SiteMe
 
 
 def _as_dedicated(memory: SiteMemory, site: SiteLimits) -> SiteMemory:
-    """Take a station back from a robot if RMF will not bring the robot there. This is so if another
-    node's schedule dedicates another station to the robot."""
+    """Take a station back from a robot if another node's schedule has dedicated another station to the
+    robot. RMF would not bring the robot to the first station."""
     if memory.alone:
         return memory
     for name, grant in memory.grants.items():

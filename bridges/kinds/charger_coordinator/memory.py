@@ -23,8 +23,8 @@ NODE: Final = "charger_coordinator"
 STATION_SILENT_S: Final = 5.0
 """The silence (s) after which a station counts as silent. States come at 1 Hz."""
 STRIKES: Final = 2
-"""The number of failures after which a robot is not tried again. If two stations suit the robot, it has
-failed at both."""
+"""The number of failures after which a robot is not tried again. If two stations suit the robot, the
+robot has failed at both."""
 
 IDLE: Final = ChargerStateValue.CHARGER_IDLE
 ASSIGNED: Final = ChargerStateValue.CHARGER_ASSIGNED
@@ -195,21 +195,26 @@ class Nudge(msgspec.Struct, frozen=True):
 class SiteMemory(msgspec.Struct, frozen=True):
     """The memory of the site from event to event.
 
-    Publishing: `may_speak`: the coordinator may publish. `passive`: if it may not publish, the reason
-    why requesters must wait. `alone`: no other node publishes charging assignments. `assigned`: the
-    assignments published last, at `assigned_at`. `alerts`: the faults already sent as alerts. `nudges`:
-    the orders to robots to leave a pad.
+    Wishes and stations:
+    - `wishes`: in the order of service. `grants`: by station. `count`: the number of requests made.
+    - `over`: the ids of the operators' requests that ended last. Late repeats of these requests are
+      refused.
+    - `strikes`: the stations where each robot has failed. `served`: the task in which each robot was
+      charged.
+    - `rested`: the robots that the schedule does not charge again in its present time.
+    - `absent`: a robot that did not leave its place when called -> the time when it may be called
+      again.
+    - `shunned`: a station that took no request -> the time until which the station is passed over.
+    - `preferred`: the station that another node has dedicated to each robot.
+    - `nudges`: the orders to robots to leave a pad.
 
-    Wishes: `wishes`: in the order of service. `grants`: by station. `count`: the number of requests
-    made. `over`: the ids of the operators' requests that ended last. Their late repeats are refused.
-    `strikes`: the stations where each robot has failed. `served`: the task in which each robot was
-    charged. `rested`: robots that the schedule does not charge again in its present time. `absent` maps
-    a robot that did not leave its place when called to the time when it may be called again.
-    `preferred`: the station that another node has dedicated to each robot.
-
-    Readings: `robots`, `stations`: their last states. `shunned` maps a station that took no request to
-    the time until which the station is passed over. `receivers`: the error of each robot's own
+    Readings: `robots`, `stations`: their last states. `receivers`: the error of each robot's own
     receiver. `when`: the local time.
+
+    Publishing: `may_speak`: the coordinator may publish. `passive`: if the coordinator may not publish,
+    the reason why requesters must wait. `alone`: no other node publishes charging assignments.
+    `assigned`: the assignments published last, at `assigned_at`. `alerts`: the faults already sent as
+    alerts.
     """
 
     began_at: float = 0.0
@@ -275,7 +280,7 @@ class SiteMemory(msgspec.Struct, frozen=True):
     # ---- changed copies
 
     def with_grant(self, station: str, grant: Grant | None) -> "SiteMemory":
-        """Return the memory with this grant of the station; None: the station is granted to nobody."""
+        """Return the memory with this grant of the station. With None, nobody has the station."""
         rest = without(self.grants, station)
         return replace(self, grants=rest | ({} if grant is None else {station: grant}))
 

@@ -4,14 +4,14 @@ A station is free under four conditions:
 - Its last state is IDLE, and is no older than STATION_SILENT_S.
 - No robot has the station.
 - The station has not lately failed to take a request.
-- No other robot stands there.
+- No other robot stands at the station.
 
 A robot may stand on a station's pad without a request, so that the station shows an error or an
 unrequested charge. Such a robot may have that very station. A released robot that still stands at a
 station may have that station too.
 
-If a robot has failed at a station, the robot first tries every other suitable station, because a second
-station shows which side is at fault.
+If a robot has failed at a station, the robot first tries every other suitable station. A second station
+shows which side is at fault.
 
 If another node publishes a charging schedule, a robot gets the station that the schedule has dedicated
 to the robot. The reason is that RMF drives the robot to no other station. A robot without a dedicated

@@ -2,8 +2,8 @@
 obstacles to its charge, and its waiting time.
 
 The waiting time is known only if the station reports when its present charge ends. Each robot is shown
-with its probable station. Among the suitable stations this is the first to become free, without the
-stations of robots ahead in the queue.
+with its probable station. This is the suitable station that becomes free first. The probable stations
+of robots ahead in the queue do not count.
 """
 
 from collections.abc import Iterator
@@ -45,7 +45,7 @@ def reasons(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[str]:
         if first is not None and (wait_s := free_in_s(memory, first, now)) < NEVER:
             taken.add(first)
             texts.append(f"{first} is free in {_lasts(wait_s)}")
-        why = ", ".join(texts) or "the charging schedule has no station for it"
+        why = ", ".join(texts) or "the charging schedule has no station for this robot"
         why = why if memory.may_speak else memory.passive
         yield f"{wish.robot} {WHOSE[wish.by]}: {why}"
 

@@ -55,8 +55,8 @@ TITLES: Final = {
     "REQUEST_NOT_TAKEN": "A charger takes no request",
 }
 ASKS_S: Final = 5.0
-"""The delay (s) within which a robot that came to a pad unannounced normally has a wish. The fleet's
-next state brings the wish, so an earlier fault would be premature."""
+"""The delay (s) of the fault about a robot that came to a pad unannounced. Within this time the fleet's
+next state normally brings the robot's wish."""
 AGAIN_S: Final = 15.0
 ERRORS: Final = ("ROBOT_FAULTY", "STATION_OUT_OF_SERVICE")
 
@@ -158,7 +158,7 @@ def _misplaced(one: wrong_pad.OnWrongPad) -> Fault:
     if one.expected:
         text = f"{one.who} stands at {one.station}, but is expected at {one.expected}"
         return Fault("WRONG_STATION", text)
-    why = "RMF has no charging task to send it away with (finishing_request: charge gives it one)"
+    why = "RMF moves it only with a charging task (finishing_request: charge gives it one)"
     return Fault(
         "PAD_BLOCKED", f"{one.who} stands at {one.station}, and {one.waiter} waits for it: {why}"
     )
@@ -240,8 +240,8 @@ def _to_station(name: str, grant: Grant) -> tuple[AnyTopic, d.Message]:
 def _assignments(
     memory: SiteMemory, now: float, site: SiteLimits
 ) -> Iterator[d.ChargingAssignments]:
-    """Assign every robot's place, fleet by fleet, in the order of names. An order to leave a pad is the
-    other mode for TOLD_S (`wrong_pad.py`)."""
+    """Assign every robot's place, fleet by fleet, in the order of names. A robot that is ordered to
+    leave a pad gets the other mode for TOLD_S (`wrong_pad.py`)."""
     fleets: dict[str, list[d.ChargingAssignment]] = {}
     for who in sorted(site.robots):
         station, told = memory.station_of(who), wrong_pad.is_nudged(memory, who, now)

@@ -107,7 +107,7 @@ def problems(
                     there = ", ".join(sorted(known[key]))
                     yield (str(i), key, str(n)), f"no '{name}' among the {key} ({there})"
         if one.percent > most:
-            yield (str(i), "percent"), f"is above full_percent ({most:g} %): it is never reached"
+            yield (str(i), "percent"), f"is above full_percent ({most:g} %), so it is never reached"
         elif one.percent <= least:
             text = (
                 f"is not above again_percent ({least:g} %), below which robots are charged anyway"

@@ -231,7 +231,7 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
         }
 
     def rcus(self) -> dict[str, RobotName]:
-        """Map each name under which a robot's receiver publishes to that robot."""
+        """Map the name under which each robot's receiver publishes to the robot."""
         return {robot.rcu: who for who, robot in self.robots().items() if robot.rcu}
 
 
@@ -289,8 +289,8 @@ def warnings(settings: CoordinatorSettings) -> Remarks:
 
 
 def _near(settings: CoordinatorSettings) -> Remarks:
-    """Yield a warning for each two places that are too close together. A robot's position cannot tell
-    such places apart."""
+    """Yield a warning for each pair of places that are too close together. A robot's position cannot
+    tell such places apart."""
     for fleet_name, fleet in settings.fleets.items():
         names = list(fleet.waypoints)
         for i, name in enumerate(names):

@@ -1,4 +1,4 @@
-"""Robots that want to be charged. Place, battery and task decide this; the mode is only a hint.
+"""Robots that want to be charged. A robot's place, battery and task decide. Its mode is only a hint.
 
 From a robot's first charge on, RMF's fleet adapter shows the mode CHARGING in every later task too. The
 adapter never shows IDLE in a task. (See rmf_ros2 9dedd0f: TaskManager::robot_mode;
@@ -45,8 +45,7 @@ SETTLES_S: Final = 2.0
 """The time (s) for which a robot must stand still before it can have a wish. A robot that only passes
 may also show the mode CHARGING."""
 LINGERS_S: Final = 300.0
-"""The time (s) after which a robot that stays on its pad wants to be charged. No traffic jam lasts that
-long."""
+"""The time (s) on its pad after which a robot wants to be charged. No traffic jam lasts that long."""
 COMES_S: Final = 60.0
 """The time (s) within which RMF acts on a charging assignment, if it acts at all."""
 ABSENT_S: Final = 600.0

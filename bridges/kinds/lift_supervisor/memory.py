@@ -16,8 +16,7 @@ NOBODY_IS_SENT: Final = (LiftMode.MODE_FIRE, LiftMode.MODE_EMERGENCY, LiftMode.M
 
 
 class LiftSupervisorLimits(msgspec.Struct, frozen=True):
-    """The durations (s) that the site has set. `clock_synchronised`: the clocks of all machines of the
-    site agree."""
+    """The durations (s) that the site has set. `clock_synchronised`: all clocks of the site agree."""
 
     silent_after_s: float = 10.0
     orphan_after_s: float = 3.0

@@ -48,8 +48,7 @@ class LiftSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
     ] = 10.0
 
     def problems(self) -> Remarks:
-        """Yield a problem if an alarm would come after the end of its session, or if the list of lifts
-        is empty."""
+        """Yield a problem if a session would end before its alarm, or if the list of lifts is empty."""
         if self.holder_ttl_s is not None and self.holder_ttl_s <= self.holder_alarm_s:
             least = f"{self.holder_alarm_s:g} s"
             text = f"must be more than holder_alarm_s ({least}), so that the alarm comes first"

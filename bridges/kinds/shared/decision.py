@@ -1,8 +1,8 @@
 """The interface of every decision core: events in, a Decision out.
 
-A core is one pure function, `decide(memory, event, now, limits) -> Decision`. It has no I/O, no
-clock and no log. `now` is monotonic seconds. Each call derives the whole set of outputs and the
-whole report afresh, so a repeated, lost or reordered event cannot leave a relay in a wrong position.
+A core is one pure function, `decide(memory, event, now, limits) -> Decision`. The core has no I/O, no
+clock and no log. `now` is monotonic seconds. Each call derives the whole set of outputs and the whole
+report afresh. Therefore a repeated, lost or reordered event cannot leave a relay in a wrong position.
 """
 
 from typing import Generic, Literal, Protocol, TypeVar
@@ -94,8 +94,8 @@ class MemoryNotKept(msgspec.Struct, frozen=True):
 
 
 class DecidedByPerson(msgspec.Struct, frozen=True):
-    """A person has run `rmf-bridge workcell`, and decides the outcome of a request that the daemon does
-    not know.
+    """A person has decided the outcome of a request with `rmf-bridge workcell`, because the daemon does
+    not know that outcome.
 
     `request`: the request's guid; "" for every request in doubt, and for a lost memory.
     """
@@ -123,9 +123,10 @@ class Decision(msgspec.Struct, Generic[M, O, R], frozen=True):
     """The result of one scan.
 
     `outputs`: the wanted levels of all outputs. `wake_at`: the latest time of the next decision
-    (monotonic seconds; `inf` if only an event can change anything). `refused`: the reason for a
-    refusal, as `kind` or `kind: detail`; "" if the event was obeyed. `kind` is a short fixed name, by
-    which refusals are counted. `publish`: further messages beside the state, each sent once.
+    (monotonic seconds); `inf` if only an event can change anything. `refused`: the reason for a
+    refusal, as `kind` or `kind: detail`; "" if the event was obeyed. The daemon counts refusals by
+    their `kind`, which is a short fixed name. `publish`: further messages beside the state, each sent
+    once.
     """
 
     memory: M

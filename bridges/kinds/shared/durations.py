@@ -7,8 +7,8 @@ NEVER: Final = math.inf
 AGES_AGO: Final = -math.inf
 
 RIVAL_QUIET_S: Final = 5.0
-"""The silence (s) after which another node that published states is no rival any more. States come at 1
-Hz."""
+"""The silence (s) after which another node for the same device no longer counts as a rival. Nodes
+publish states at 1 Hz."""
 SILENT_S: Final = 3.0
 """The time (s) without a state after which a lift or door counts as silent. States come at 1 Hz."""
 FORGOTTEN_S: Final = 60.0
@@ -24,7 +24,7 @@ def due_at(sent_at: float, *, new: bool, again: bool) -> float:
     """Return the time of the next request. A `new` request is due GAP_S after the last request. A
     repeat (`again`) is due after REPEAT_S.
 
-    `sent_at`: the time of the last request (s; AGES_AGO: never).
+    `sent_at`: the time (s) of the last request; AGES_AGO if there was none.
     """
     if new:
         return sent_at + GAP_S

@@ -1,7 +1,8 @@
 """The names of values in rings and recordings. A recorded name never changes, even if its class moves
-or is renamed. So every version of the daemon reads the files of all earlier versions.
+or is renamed. Therefore every version of the daemon reads the files of all earlier versions.
 
-Each kind's folder has the values of that kind in `RECORDED`. All kinds share the values here.
+`RECORDED` in each kind's folder has the values of that kind. `SHARED` has the values that all kinds
+share.
 """
 
 from collections.abc import Mapping

@@ -16,8 +16,8 @@ Point = tuple[float, float]
 class Similarity(Struct, frozen=True):
     """The transform `to = turn · from + shift`.
 
-    `mse`: the mean squared error, in squared units of `to`, of the pairs from which the transform was
-    estimated.
+    `mse`: the mean squared error of the pairs from which the transform was estimated, in squared units
+    of `to`.
     """
 
     turn: complex

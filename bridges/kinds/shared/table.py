@@ -1,4 +1,4 @@
-"""A table that a person compares with a controller. `check` prints the table; the printed sheet has
+"""A table that a person compares with a controller. `check` prints the table. The printed sheet has
 boxes to tick."""
 
 from msgspec import Struct

@@ -1,4 +1,4 @@
-"""The findings of `check` about a file. `findings.py` gathers them once, and three files write them:
+"""The findings of `check` about a file. `findings.py` gathers the findings, and three files write them:
 
 text.py      for a terminal
 as_json.py   for a program

@@ -1,4 +1,4 @@
-"""The findings of `check` about one file, as tables. They become text, JSON and the commissioning
+"""The findings of `check` about one file, as tables. The tables become text, JSON and the commissioning
 sheet."""
 
 import hashlib

@@ -8,7 +8,7 @@ from bridges.system.columns import aligned, hanging
 
 
 def lines(findings: Findings, columns: int) -> list[str]:
-    """Return a valid file's findings as lines of at most `columns` characters. They show kind and
+    """Return a valid file's findings as lines of at most `columns` characters. The lines show kind and
     driver, and then the wiring or the messages."""
     driver = f", driver {findings.driver}" if findings.driver else ""
     return [

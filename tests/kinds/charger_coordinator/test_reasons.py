@@ -119,7 +119,7 @@ def test_the_remaining_time_of_a_charge_is_shown_in_seconds_or_minutes() -> None
 def test_a_robot_without_any_station_waits_for_the_schedule() -> None:
     memory = SiteMemory(may_speak=True, wishes=BUSY.wishes[:1], alone=False)
     assert list(reasons(memory, 12.0, site(2))) == [
-        "tiny/AMR01 by the robot: the charging schedule has no station for it"
+        "tiny/AMR01 by the robot: the charging schedule has no station for this robot"
     ]
 
 

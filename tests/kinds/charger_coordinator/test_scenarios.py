@@ -306,7 +306,7 @@ def test_3_a_finished_robot_is_sent_to_its_place_and_the_next_is_called(
 
 def test_3_an_alert_names_a_finished_robot_that_rmf_does_not_move_and_whom_it_blocks() -> None:
     site = three_at_two("nothing")
-    why = "RMF has no charging task to send it away with (finishing_request: charge gives it one)"
+    why = "RMF moves it only with a charging task (finishing_request: charge gives it one)"
     assert site.run(110.0) == [
         (25.5, "charger_b: RELEASED AMR03"),
         (25.5, "AMR03 -> WAIT wait_3"),

@@ -126,7 +126,7 @@ def test_every_problem_of_a_schedule_is_named_with_its_place() -> None:
     ]
     assert list(settings(schedule=schedule, full_percent=95.0).problems()) == [
         (("schedule", "1", "fleets", "1"), "no 'big' among the fleets (tiny)"),
-        (("schedule", "1", "percent"), "is above full_percent (95 %): it is never reached"),
+        (("schedule", "1", "percent"), "is above full_percent (95 %), so it is never reached"),
         (
             ("schedule", "2", "robots", "1"),
             "no 'tiny/X' among the robots (tiny/AMR01, tiny/AMR02, tiny/AMR03)",

@@ -368,7 +368,7 @@ def test_beside_a_charging_schedule_the_stations_that_it_dedicates_are_asked() -
     assert site.node.status()["passive"] is False
     assert status["assigns"] == "no: another node publishes charging_assignments"
     assert status["queue"] == (
-        "tiny/AMR02 by the schedule: the charging schedule has no station for it"
+        "tiny/AMR02 by the schedule: the charging schedule has no station for this robot"
     )
     again = dedicate(site, AMR02="charger_a")
     assert site.run(40.0) == [
