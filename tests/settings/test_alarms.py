@@ -33,7 +33,7 @@ def problems(directory: Path, text: str) -> list[str]:
         ("alarm: fire_alarm_trigger  ", "fleets: [x]\n    alarm: fire_alarm_trigger  ",
          "only emergency"),
         ("alarm: fire_alarm_trigger  ", "without_fleets: tell_all\n    alarm: fire_alarm_trigger  ",
-         "is for fleets"),
+         "has an effect only with fleets"),
         ("silent_alarm_after_s: 60", "", "needs 'silent_alarm_after_s'"),
         ("silent_alarm_after_s: 60", "silent_alarm_after_s: 3\n    limits: {stale_after_s: 5}",
          "must be at least stale_after_s (5 s)"),

@@ -151,7 +151,7 @@ def test_two_files_that_agree_are_right_and_the_transforms_error_is_reported(sit
         (
             "robot: [[7, -5], [4, -5], [7, -11], [3, -11]]",
             "robot: [[7, -5], [4, -5]]",
-            "config.yaml:10:3: 4 points and 2: they must be pairs",
+            "config.yaml:10:3: 4 points and 2 points do not make pairs",
         ),
     ],
 )

@@ -159,7 +159,7 @@ doors:
 """
     assert problems_of(file, text) == [
         "4:3: 'module' needs a connection: write tcp: {host: …} or serial: {port: …}",
-        "7:19: 'on_s' must be shorter than every_s; leave pulse out for a steady hold",
+        "7:19: 'on_s' must be shorter than every_s; delete pulse for a steady hold",
         "8:5: 'inputs' needs 'closed'; without that contact write feedback: estimated",
     ]
 

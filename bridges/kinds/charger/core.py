@@ -165,7 +165,7 @@ def _protected(memory: ChargerMemory, now: float, limits: ChargerLimits) -> Char
     if not limits.can_stop:
         return memory
     if since is not None and now - since >= limits.t.stop_timeout_s:
-        what = "station: it goes on charging though it was told to stop; cut its supply"
+        what = "station: it goes on charging after an order to stop; cut its supply"
         return replace(memory, protection=what)
     if sample.activity is Activity.ERROR and sample.side != "robot":
         return replace(memory, protection=report.error_text(sample))

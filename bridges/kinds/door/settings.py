@@ -95,7 +95,7 @@ class DoorSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
         if self.pulse and self.pulse.on_s >= self.pulse.every_s:
             yield (
                 ("pulse", "on_s"),
-                "must be shorter than every_s; leave pulse out for a steady hold",
+                "must be shorter than every_s; delete pulse for a steady hold",
             )
         delay_s = self.limits.open_delay_s
         if self.feedback == "estimated" and delay_s is None:
@@ -106,7 +106,7 @@ class DoorSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
         if self.feedback == "sensors" and delay_s is not None:
             yield (
                 ("limits", "open_delay_s"),
-                "is for feedback: estimated; otherwise contacts show when the door is open",
+                "has an effect only with feedback: estimated; otherwise contacts show an open door",
             )
         if delay_s is not None and delay_s > self.limits.travel_s:
             yield ("limits", "open_delay_s"), "must not be longer than travel_s"

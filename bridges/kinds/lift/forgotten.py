@@ -168,5 +168,5 @@ def fault(session: LiftSession, now: float) -> Fault | None:
     if session.forgotten is None or now < named_at(session):
         return None
     other = session.forgotten.by
-    does = f"asks for {other}" if other else "has ended this session"
+    does = f"asks for {other}" if other else "sends END"
     return Fault(CODE, f"lift_requests {does} while {session.id} has the lift")

@@ -134,8 +134,8 @@ class LiftSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
     ] = "auto"
     alarm_on: Annotated[
         AlarmOn,
-        tells("""the hazards that raise the alarm of `alarm`. All robots then leave the lifts and stop
-        elsewhere, until `rmf-bridge reset`."""),
+        tells("""the hazards that raise an alarm on the topic of `alarm`. All robots then leave the
+        lifts and stop elsewhere, until `rmf-bridge reset`."""),
     ] = msgspec.field(default_factory=lambda: ["fire_alarm"])
 
     def stale_after(self) -> float:

@@ -66,7 +66,10 @@ def alarm_problems(settings: AlarmingSettings) -> Remarks:
         )
         yield ("fleets",), text
     if settings.without_fleets and not settings.fleets:
-        yield ("without_fleets",), "is for fleets; all fleets are told: delete without_fleets"
+        yield (
+            ("without_fleets",),
+            "has an effect only with fleets, and all fleets are told: delete without_fleets",
+        )
 
 
 def alarm_limits(devices: Mapping[str, AlarmingSettings]) -> FleetAlarmLimits | None:

@@ -118,7 +118,9 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         tells("publish the health of the daemon and its devices each second on `/diagnostics`."),
     ] = True
     topics: Annotated[dict[Name, Name], tells("RMF's name of a topic -> the site's name.")] = {}
-    zenoh: Annotated[Zenoh | None, tells("routers, keys and certificates of `zenoh`.")] = None
+    zenoh: Annotated[
+        Zenoh | None, tells("the settings of transport `zenoh`: routers, keys, certificates.")
+    ] = None
     release: Annotated[
         Literal["auto", "jazzy", "kilted"],
         tells("""the release of RMF's messages: `jazzy` (Humble, Iron and Jazzy) or `kilted`

@@ -53,7 +53,7 @@ class Similarity(Struct, frozen=True):
 def estimate(these: Sequence[Point], those: Sequence[Point]) -> Similarity:
     """Estimate the transform from `these` to `those`, pair by pair. Raises ValueError."""
     if len(these) != len(those):
-        raise ValueError(f"{len(these)} points and {len(those)}: they must be pairs")
+        raise ValueError(f"{len(these)} points and {len(those)} points do not make pairs")
     if len(these) < 2:
         raise ValueError("two pairs at least are needed, four are better")
     p, q = [complex(*at) for at in these], [complex(*at) for at in those]

@@ -203,7 +203,7 @@ def test_a_station_that_disobeys_with_an_error_is_named_as_one_that_disobeys() -
         memory = decision.memory
     assert [fault.detail for fault in decision.report.faults] == [
         "foreign object",
-        "out of service after: station: it goes on charging though it was told to stop; cut its supply",
+        "out of service after: station: it goes on charging after an order to stop; cut its supply",
     ]
 
 

@@ -61,7 +61,7 @@ def test_the_shipped_door_is_sound() -> None:
         (
             {"pulse": {"on_s": 3.0, "every_s": 3.0}},
             "pulse.on_s",
-            "must be shorter than every_s; leave pulse out for a steady hold",
+            "must be shorter than every_s; delete pulse for a steady hold",
         ),
         (
             {"inputs": {"opened": NONE}},
@@ -71,7 +71,7 @@ def test_the_shipped_door_is_sound() -> None:
         (
             {"limits": {"open_delay_s": 3.0}},
             "limits.open_delay_s",
-            "is for feedback: estimated; otherwise contacts show when the door is open",
+            "has an effect only with feedback: estimated; otherwise contacts show an open door",
         ),
         (
             {"feedback": "estimated", "limits": {"open_delay_s": 3.0}},

@@ -135,7 +135,7 @@ def test_a_station_that_goes_on_charging_when_told_to_stop_is_out_of_service() -
         (
             35.0,
             "ERROR",
-            "out of service after: station: it goes on charging though it was told to stop; cut its"
+            "out of service after: station: it goes on charging after an order to stop; cut its"
             " supply",
         )
     ]

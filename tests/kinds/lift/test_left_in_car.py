@@ -103,7 +103,7 @@ def test_a_session_that_the_supervisor_has_ended_lasts_while_its_robot_asks_and_
     assert lift.story.state == "AGV, open at L4, fleet/a to L4"
     assert lift.story.faults == ["FORGOTTEN_BY_SUPERVISOR"]
     detail = lift.story.node.status()["faults"][0]["detail"]
-    assert detail == "lift_requests has ended this session while fleet/a has the lift"
+    assert detail == "lift_requests sends END while fleet/a has the lift"
     silent_since = lift.story.now - 1.0
     ended_at = lift.story.until(lambda: not lift.story.told[-1][1].session_id)
     assert ended_at == pytest.approx(silent_since + SILENT_S, abs=0.3)
