@@ -1,4 +1,4 @@
-"""Turns messages of fleets, stations, schedules and operators into events, and refuses invalid ones."""
+"""Turns messages of fleets, stations, schedules and operators into events. Refuses invalid messages."""
 
 import math
 from collections.abc import Mapping

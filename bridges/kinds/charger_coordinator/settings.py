@@ -184,8 +184,7 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
                     yield path, f"'{station}' is at '{place}', not in this fleet's list ({known})"
 
     def _doubles(self) -> Remarks:
-        """Yield a problem for each place or receiver of two robots, and for each place or name of two
-        stations."""
+        """Yield a problem for each place, receiver or name that two robots or two stations share."""
         taken: dict[tuple[str, str], str] = {}
         for station, places in self.places().items():
             for fleet, place in places.items():

@@ -28,7 +28,7 @@ Pulse = Annotated[float, Meta(ge=0.05, le=60, extra={"unit": "s"})]
 
 
 class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A floor whose landing has another name, or that the rear door serves."""
+    """A floor that the rear door serves, or whose landing has another name."""
 
     level: Annotated[
         Name | None, tells("the landing's name in the floor code; when absent, the floor's name.")

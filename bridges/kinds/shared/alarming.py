@@ -83,7 +83,8 @@ def alarm_limits(devices: Mapping[str, AlarmingSettings]) -> FleetAlarmLimits | 
 
 
 def disagreements(devices: Mapping[str, AlarmingSettings]) -> Iterator[tuple[str, str]]:
-    """Yield each device whose alarm differs from that of the file's first device, with a text."""
+    """Yield (device, text) for each device whose alarm differs from the alarm of the file's first
+    device."""
     alarming = [(name, one) for name, one in devices.items() if one.alarm != "none"]
     for name, one in alarming[1:]:
         first = alarming[0][1]

@@ -1,5 +1,4 @@
-"""The `recording:` section of a YAML: how much is recorded, and how much room it may take on the
-disk."""
+"""The `recording:` section of a YAML: the extent of the recording, and its space on the disk."""
 
 from typing import Annotated, Literal
 
