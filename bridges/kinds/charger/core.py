@@ -139,7 +139,7 @@ def _sampled(
 
 
 def _held(memory: ChargerMemory, holder: ChargeSession | None) -> ChargerMemory:
-    """Set the session. If it is None, remember the ended request in `over`."""
+    """Set the session. If the new session is None, remember the ended request in `over`."""
     if holder or not memory.holder:
         return replace(memory, holder=holder)
     ended = memory.holder.request.request_id

@@ -22,7 +22,7 @@ LONGEST_TIMEOUT_S = 86400.0
 
 
 def accept_request(request: ChargerRequest, settings: ChargerSettings) -> ChargeRequested:
-    """Turn a ChargerRequest into an event. Raises RequestRefused if it is malformed.
+    """Turn a ChargerRequest into an event. Raises RequestRefused if the request is malformed.
 
     A start_timeout of zero means the configured default.
     """

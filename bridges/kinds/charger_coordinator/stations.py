@@ -197,7 +197,8 @@ def in_time(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
 
 
 def not_taken_at(grant: Grant) -> float:
-    """Return the time after which a station that does not show this request is passed over."""
+    """Return the time by which a station must show this request. After that the station is passed
+    over."""
     return max(grant.made_at, grant.forgotten_at) + TAKEN_S
 
 

@@ -110,8 +110,7 @@ def fulfilled(memory: SiteMemory, who: RobotName, site: SiteLimits) -> SiteMemor
 
 
 def stays_away(memory: SiteMemory, station: str, grant: Grant, site: SiteLimits) -> bool:
-    """Return whether the robot has no task, and still stands at the place where it stood when
-    called."""
+    """Return whether the robot has no task, and has not left the place where it stood at the call."""
     standing, wish = memory.robots.get(grant.robot), memory.wish(grant.robot)
     if standing is None or wish is None or wish.by == "operator" or standing.sighting.task_id:
         return False

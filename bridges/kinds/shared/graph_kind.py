@@ -25,8 +25,8 @@ class MaySpeak(Struct, frozen=True):
     publishes.
 
     `waits`: if the core may not publish, the reason why requesters must wait. `at_once`: no other node
-    publishes. The core may then send messages that a restart must not interrupt, even during the quiet
-    start. `alone`: no other node publishes on a topic of `GraphKind.yields`.
+    publishes, so urgent messages may be sent even during the quiet start (`GraphKind.urgent`). `alone`:
+    no other node publishes on a topic of `GraphKind.yields`.
     """
 
     yes: bool
