@@ -1,7 +1,8 @@
-"""Drivers, which give a controller's signals their meaning. Each way of connecting a device has a file.
+"""Drivers translate between a controller's signals and the values that the daemon uses. Each way to
+connect a device has a file.
 
-A driver is the file `drivers/<kind>/<driver>.py`, named after `kind:` and `driver:` in the YAML. Its
-last statement defines `DRIVER` (`drivers/driver_type.py`). The rest of the code uses only this
+A driver is the file `drivers/<kind>/<driver>.py`. The YAML's `kind:` and `driver:` give this path. The
+file's last statement defines `DRIVER` (`drivers/driver_type.py`). The rest of the code uses only this
 `DRIVER`.
 """
 
@@ -13,29 +14,31 @@ Outputs = TypeVar("Outputs", contravariant=True)
 
 
 class DriverError(Exception):
-    """The error of a controller that does not answer, or answers nonsense. Its text says what to
-    check."""
+    """The error of a controller that does not answer, or whose answer makes no sense. The error's text
+    tells the reader which parts to check."""
 
 
 class Driver(Protocol[Sample, Outputs]):
     """One device on one bus. Only the thread that owns the bus calls the methods.
 
-    No call blocks longer than the bus's I/O timeout. Every method may raise DriverError and nothing
-    else. After an error the next call tries again, unless the bus's backoff still runs.
+    No call blocks longer than the bus's I/O timeout. A method may raise DriverError, and raises no
+    other error. After an error the next call tries again, except during the bus's backoff.
     """
 
     def open(self) -> None:
-        """Claim every output at its safe level. The loop calls `open` at the start and after each
-        DriverError."""
+        """Claim every output at its safe level. The loop calls `open` at the start, and again after
+        each DriverError."""
 
     def read(self) -> Sample:
-        """Read and decode every input once. Return only values of this reading. Raises DriverError."""
+        """Read and decode every input. Return only values that this call has read. Raises
+        DriverError."""
 
     def write(self, outputs: Outputs) -> None:
         """Set every output to its level in `outputs`. The call is cheap if no level has changed."""
 
     def make_safe(self) -> None:
-        """Switch every output off, even an output that is believed off. Verify each where possible."""
+        """Switch every output off, even if the driver believes that the output is off. Read each output
+        back where the hardware allows this."""
 
     def close(self) -> None:
         """Switch every output off, and release the outputs. Does not raise."""
@@ -43,16 +46,17 @@ class Driver(Protocol[Sample, Outputs]):
 
 @runtime_checkable
 class OnContacts(Protocol):
-    """A driver on contacts, whose levels a person can check with a meter."""
+    """A driver on contacts. A person can check the contacts' levels with a meter."""
 
     def contacts(self) -> Mapping[str, bool]:
-        """Return signal -> asserted, as last read or written, for each known signal."""
+        """Return for each known signal whether it is asserted. The value is from the last reading or
+        writing."""
 
 
 @runtime_checkable
 class TakesInputs(Protocol):
-    """A driver that can take inputs from other buses than its own."""
+    """A driver that can take inputs from buses other than its own bus."""
 
     def take_inputs(self, elsewhere: Callable[[], Mapping[str, bool]]) -> None:
-        """Read the inputs on other buses by `elsewhere`, which raises DriverError while they are not
-        known."""
+        """Let the driver call `elsewhere` for the inputs on other buses. `elsewhere` raises DriverError
+        while these inputs are unknown."""

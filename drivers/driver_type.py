@@ -1,4 +1,4 @@
-"""The record that describes a driver: the `DRIVER` at the end of its file.
+"""The record that describes a driver. Each driver's file ends with such a record, named `DRIVER`.
 
 The YAML's `kind:` and `driver:` name the file `drivers/<kind>/<driver>.py`, so there is no table of
 drivers to edit. Only `bridges/settings/names.py` imports a driver by its name.
@@ -22,22 +22,27 @@ Outputs = TypeVar("Outputs")
 class DriverType(msgspec.Struct, Generic[Settings, Sample, Outputs], frozen=True):
     """One driver.
 
-    `settings`: a struct that derives from the kind's (`bridges.kinds.lift.settings.LiftSettings`…)
-    and adds the wiring. `buses`: the bus types that the driver works on, as names of files in
-    `drivers/hal/`. `create(name, settings, bus)` makes the driver of one device. The driver sends
-    nothing before `open`.
+    - `settings` is a struct with the device's settings and wiring. It derives from the kind's settings,
+      such as `bridges.kinds.lift.settings.LiftSettings`.
+    - `buses` lists the bus types that the driver works on, as names of files in `drivers/hal/`.
+    - `create(name, settings, bus)` makes the driver of one device. The driver sends nothing before
+      `open`.
 
     The fields below are optional:
-    `wires(settings)`: the wiring table that an electrician checks (`drivers/hal/points.py`).
-    `debounce(settings)`: signal or group -> how long a change must last (s).
-    `describe(settings, bus's settings)`: rows (subject, meaning) for `check` if there are no wires.
-    `tables(settings)`: codes, pulses and frames for `check` (`bridges/kinds/shared/table.py`).
-    `claims(settings)`: (place, path) of each exclusive place. The wires' points are claimed anyway.
-    `warnings(settings)`: (path, text) of valid settings that may be a mistake.
-    `notes(settings)`: (path, text) of intended settings whose effects the site should know.
-    `unwired(settings)`: signals that have no wire, but that `accept_unsafe` may name.
-    `fake`: the name of the module that stands in for the hardware in `run --simulate`
-    (`hal_fakes/fake.py`). Without a name, the kind's simulated plant is at the far end of the wires.
+
+    - `wires(settings)` gives the wiring table that an electrician checks (`drivers/hal/points.py`).
+    - `debounce(settings)` gives how long (s) a change must last, for each signal or group of signals.
+    - `describe(settings, bus's settings)` gives rows (subject, meaning) for `check` if there are no
+      wires.
+    - `tables(settings)` gives tables of codes, pulses and frames for `check`
+      (`bridges/kinds/shared/table.py`).
+    - `claims(settings)` gives each place that no other device may use, with its path in the YAML. The
+      points of the wires are claimed anyway.
+    - `warnings(settings)` gives (path, text) for each valid setting that may be a mistake.
+    - `notes(settings)` gives (path, text) for each intended setting whose effects the site should know.
+    - `unwired(settings)` gives the signals without a wire that `accept_unsafe` may name.
+    - `fake` names the module that replaces the hardware in `run --simulate` (`hal_fakes/fake.py`).
+      Without a name, the wires lead to the simulated plant of the device's kind.
     """
 
     settings: type[Settings]

@@ -1,9 +1,9 @@
-"""An alarm panel on contacts or registers: each source is one point of the header, of a Modbus module,
-or of a controller's registers.
+"""An alarm panel on contacts or registers. Each source of the alarm is one point of the GPIO header, of
+a Modbus module, or of a controller's registers.
 
 A fire panel's contact is wired normally closed, so that a cut loop reads as an alarm. The daemon
-refuses a wiring whose cut reads as clear, unless `accept_unsafe` accepts the wiring. A bit of a
-register has no cable of its own, so this check leaves bits out.
+refuses a wiring whose cut loop reads as clear. The YAML's `accept_unsafe` can accept such a wiring. A
+bit of a register has no cable of its own, so this check does not apply to bits.
 """
 
 from collections.abc import Iterator, Mapping
@@ -72,7 +72,8 @@ def warnings(settings: DryContactPanelSettings) -> Remarks:
 
 
 def tables(settings: DryContactPanelSettings) -> Iterator[Table]:
-    """Yield a table of the sources' effects, of cut loops, and of a panel that falls silent."""
+    """Yield a table with the fleets that each source stops, and with the reading of each cut loop. A
+    row shows the effect of a panel that no longer answers."""
     fleets = ", ".join(settings.fleets) or "every fleet"
     reads = {None: "anything", True: "an alarm", False: "clear"}
     rows = [

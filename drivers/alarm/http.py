@@ -1,6 +1,7 @@
 """An alarm panel behind a controller that speaks HTTP and JSON. Each source is a field of one answer.
 
-A field has no cable of its own. Only the controller can notice a cut loop behind it.
+A field has no cable of its own. If the loop behind a field is cut, only the controller can notice the
+cut.
 """
 
 from collections.abc import Iterator, Mapping
@@ -77,8 +78,8 @@ class HttpPanel:
 
 
 def _flag(answer: Mapping[str, object], place: JsonFlag) -> bool:
-    """Return yes or no. Raises DriverError for null too, because an unknown source is not a clear
-    source."""
+    """Return the flag as true or false. Raises DriverError for null too, because an unknown source must
+    not count as clear."""
     if json_fields.found(answer, place.field) is None:
         raise json_fields.wrong(place.field, None, "a value")
     return json_fields.flag(answer, place)

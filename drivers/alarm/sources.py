@@ -14,8 +14,8 @@ PURPOSE: Final = (
 
 
 def drill_problems(settings: PanelSettings, sources: Collection[str], drills: bool) -> Remarks:
-    """Yield a problem for each source with a reserved name, and for a drill without a duration or a
-    contact."""
+    """Yield a problem for each source with a reserved name. Yield a problem for a drill without a
+    duration or without a contact."""
     for name in sorted({SILENT, DRILL}.intersection(sources)):
         yield ("sources", name), f"'{name}' is a word of the panel itself: take another name"
     if drills and settings.drill_s is None:

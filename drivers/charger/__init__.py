@@ -1,1 +1,1 @@
-"""Drivers for wireless chargers: a file for each protocol."""
+"""Drivers for wireless chargers. Each protocol has a file."""

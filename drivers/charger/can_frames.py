@@ -1,12 +1,12 @@
-"""A wireless charger on CAN with its maker's own frames. It broadcasts frames, and needs periodic
-frames.
+"""A wireless charger on CAN that uses its maker's own frames. The charger broadcasts frames, and must
+receive periodic frames.
 
 A map gives the frames' meanings (`can_map.py`). The charger charges only while it receives the map's
-frames at the map's periods. When these frames cease, the charger stops by itself. So a scan sends each
-frame, and no cyclic sender does: when the daemon hangs, the frames cease.
+frames at the map's periods. When these frames cease, the charger stops by itself. So the scan loop
+sends each frame itself, and the driver starts no cyclic sender. If the daemon hangs, the frames cease.
 
 While the charger's own frames are missing, the driver sends only the frames for power off and the map's
-wake frames, if the map has any.
+wake frames. A map need not have wake frames.
 """
 
 import functools
@@ -59,7 +59,8 @@ class FrameChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_un
             yield from _setpoint_problems(self)
 
     def can_stop(self) -> bool:
-        """Return True. A frame stops the charger, and the charger also stops when our frames cease."""
+        """Return True. A frame stops the charger, and the charger also stops when the driver's frames
+        cease."""
         return True
 
 
@@ -116,10 +117,10 @@ def _encoding_problems(settings: FrameChargerSettings, sent: Sent, on: bool) -> 
 
 
 def claims(settings: FrameChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of each frame that no other device may use. Yield nothing while the map has
-    problems.
+    """Yield each frame that no other device may use, with its path in the YAML. Yield nothing while the
+    map has problems.
 
-    CANopen's NMT frame is left out, because all devices share it.
+    The claims leave out CANopen's NMT frame, because all devices share this frame.
     """
     if any(PROFILE.problems(settings.profile, settings.map)):
         return
@@ -201,10 +202,11 @@ class FrameDriver:
         return sample
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Send each frame that is due, for power on or for power off. Raises DriverError.
+        """Send each frame that is due: the frames for power on or the frames for power off. Raises
+        DriverError.
 
-        While the charger's own frames are missing, send the frames for power off even if power on is
-        wanted.
+        While the charger's own frames are missing, send the frames for power off, even if `outputs`
+        wants the power on.
         """
         if outputs.power is not None:
             self._power = outputs.power
@@ -224,17 +226,17 @@ class FrameDriver:
             try:
                 self.make_safe()
             except DriverError:
-                return  # our frames cease, so the charger stops by itself
+                return  # the charger stops by itself, because the driver's frames cease
 
     def _read(self) -> Values:
-        """Return the values of fresh frames. If there are none, send each wake frame that is due.
-        Raises HalError."""
+        """Return the values of fresh frames. If no frame is fresh, send each wake frame that is due,
+        and raise HalError."""
         try:
             return self._frames.read()
         except HalError:
             for wake in self._map.wake:
                 payload = functools.partial(self._dbc.encode, wake.frame, wake.says)
-                with suppress(HalError):  # the reading's own error says more
+                with suppress(HalError):  # the error of the reading tells more than this error
                     self._frames.feed(self._dbc.id(wake.frame), wake.every_s, payload)
             raise
 
@@ -273,7 +275,7 @@ def _meant(found: FrameMap, values: Values) -> Meant:
 
 
 def _errors(found: FrameMap, values: Values, activity: Activity) -> Found:
-    """Return the errors in the received frames, in any state.
+    """Return the errors that the received frames report, whatever the state.
 
     The signal `out_of_range` counts as an error only in an error state. In other states the signal
     shows the robot's position.
@@ -284,8 +286,8 @@ def _errors(found: FrameMap, values: Values, activity: Activity) -> Found:
 
 def _measured(found: FrameMap, frames: dbc.Dbc, values: Values) -> Measured:
     def is_valid(signal: str) -> bool:
-        """Is the value within the DBC file's [min|max]? A value outside this range is not a
-        measurement."""
+        """Is the value within the signal's minimum and maximum in the DBC file? A value outside this
+        range is not a measurement."""
         low, high = frames.bounds(*signal.split("."))
         return low <= values[signal] <= high
 
@@ -306,10 +308,11 @@ def _measured(found: FrameMap, frames: dbc.Dbc, values: Values) -> Measured:
 
 
 def _sequel(found: FrameMap) -> Sequel:
-    """Return the error frames to wait for. The charger may send them after the frame of its state.
+    """Return the error frames to wait for. The charger may send an error frame after the frame of its
+    state.
 
-    Without the error frames the error has no known side. It would count as the station's error, and RMF
-    would lose the station.
+    Without the error frames, the driver cannot know whether the station or the robot has the error. The
+    error would count as the station's, and RMF would no longer use the station.
     """
     return Sequel(
         first=found.state_frames()[0],
@@ -320,8 +323,8 @@ def _sequel(found: FrameMap) -> Sequel:
 
 
 def _said(found: FrameMap, frames: dbc.Dbc) -> dict[str, Said]:
-    """Return the frames to receive. No reading is possible without the frames of the state and of the
-    pad."""
+    """Return the frames to receive. A reading fails if a frame with the state, the receiver's id,
+    `range_ok` or `at_height` is missing."""
     state = found.state_frames()
     pad = (found.receiver, found.range_ok, found.at_height)
     needed = {*state, *(signal.split(".")[0] for signal in pad if signal)}

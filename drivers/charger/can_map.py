@@ -1,5 +1,5 @@
-"""The map of a charger's CAN frames. A DBC file defines the signals, and the map gives each signal a
-purpose.
+"""The map of a charger's CAN frames. A DBC file defines the frames' signals. The map gives each signal
+a purpose.
 
 The map is under `map:` in a device YAML, or in a file of `drivers/profiles/`.
 """
@@ -32,7 +32,7 @@ Mask = Annotated[int, msgspec.Meta(ge=1, le=0x1FFF_FFFF)]
 Fresh = Annotated[float, msgspec.Meta(ge=0.05, le=60, extra={"unit": "s"})]
 WakeEvery = Annotated[float, msgspec.Meta(ge=0.2, le=60, extra={"unit": "s"})]
 NMT: Final = 0x000
-"""The id of CANopen's NMT frame, which starts nodes (CiA 301); its payload names the node."""
+"""The id of CANopen's NMT frame, which starts nodes (CiA 301). The frame's payload names the node."""
 
 
 Frames = dbc.Dbc
@@ -46,7 +46,7 @@ class State(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A frame that the driver sends periodically. Give `on`, `off` or both."""
+    """A frame that the driver sends periodically. The map gives `on`, `off` or both."""
 
     frame: Annotated[Name, tells("the frame's name in the DBC file.")]
     every_s: Annotated[Period, tells("how often the frame is sent.")]
@@ -75,8 +75,8 @@ class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
             yield (), "is never sent: give on, or off, or both"
 
     def values(self, on: bool, setpoints: Mapping[str, float]) -> dict[str, float] | None:
-        """Return signal -> value for power on (`on`) or off; None if the frame is not sent at this
-        level."""
+        """Return the value of each signal for power on (`on`) or for power off. Return None if the
+        driver does not send the frame then."""
         if not on:
             return self.off
         if self.on is None:
@@ -147,8 +147,8 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = []
 
     def problems(self) -> Remarks:
-        """Yield a problem for an unreadable DBC file, and for each frame or signal that the file
-        lacks."""
+        """Yield a problem for an unreadable DBC file. Yield a problem for each frame or signal that the
+        file lacks."""
         try:
             found = dbc.load(self.dbc)
         except ValueError as error:
@@ -170,7 +170,8 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield from self._wake_problems(found, ("wake", str(n)), wake)
 
     def _wake_problems(self, found: Frames, path: tuple[str, ...], wake: Wake) -> Remarks:
-        """Yield a problem for a wake frame that is also in `send`, or that cannot be encoded."""
+        """Yield a problem for a wake frame that is also in `send`. Yield a problem for a wake frame
+        that the DBC file cannot encode."""
         if wake.frame in (sent.frame for sent in self.send):
             yield (
                 (*path, "frame"),
@@ -187,7 +188,8 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
                 yield (*path, "says"), str(error)
 
     def signals(self) -> Iterable[tuple[tuple[str, ...], str]]:
-        """Yield (path in the map, Frame.Signal) of each signal that is read."""
+        """Yield each signal that the driver reads, written as `Frame.Signal`, with its path in the
+        map."""
         if self.state:
             yield ("state", "at"), self.state.at
         for key in ("volts", "amps", "receiver", "out_of_range", "range_ok", "at_height"):
@@ -205,14 +207,14 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return {signal.split(".")[0] for _, signal in self.errors.places()}
 
     def state_frames(self) -> list[str]:
-        """Return the frames that give the state: the frame of the state's number, and the frames in
-        rules."""
+        """Return the frames that give the state. The state's number is in a frame, and rules test
+        signals of further frames."""
         signals = [self.state.at] if self.state else []
         signals += [signal for _, signal in by_rules.places(self.rules)]
         return list(dict.fromkeys(signal.split(".")[0] for signal in signals))
 
     def frames(self) -> list[str]:
-        """Return the frames that are read."""
+        """Return the frames that the driver reads."""
         return list(dict.fromkeys(signal.split(".")[0] for _, signal in self.signals()))
 
     def wanted_setpoints(self) -> set[str]:
@@ -231,7 +233,7 @@ def _lacks(found: dbc.Dbc, path: tuple[str, ...], frame: str, signal: str = "") 
 
 
 def rows(found: FrameMap) -> Iterator[tuple[str, str]]:
-    """Yield rows (subject, meaning) for `check` about the signals that are read."""
+    """Yield rows (subject, meaning) for `check` about the signals that the driver reads."""
     frames = dbc.load(found.dbc)
     yield "frames", str(dbc.path(found.dbc))
     for path, signal in found.signals():
@@ -248,8 +250,8 @@ def rows(found: FrameMap) -> Iterator[tuple[str, str]]:
 
 
 def tables(found: FrameMap, setpoints: Mapping[str, float]) -> Iterator[Table]:
-    """Yield tables of the frames as bytes, to compare with `candump`. They show sent frames, and
-    samples of read frames."""
+    """Yield tables of the frames as bytes, for comparison with `candump`. The tables show the frames
+    that the driver sends, and samples of the frames that the driver reads."""
     frames = dbc.load(found.dbc)
     sent = [_sent(frames, sent, on, setpoints) for sent in found.send for on in (True, False)]
     woken = [_row(frames, w.frame, "charger silent", w.every_s, w.says) for w in found.wake]
@@ -281,7 +283,8 @@ def _row(
 
 
 def _samples(found: FrameMap, frames: dbc.Dbc) -> Iterator[tuple[str, ...]]:
-    """Yield sample values of each read signal, to show its scale, byte order and meaning."""
+    """Yield sample values of each signal that the driver reads. A sample shows the signal's scale, byte
+    order and meaning."""
     shown = set()
     for path, at in found.signals():
         if path[0] == "rules" and at in shown:

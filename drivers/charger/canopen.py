@@ -1,8 +1,9 @@
-"""Xnergy's receiver (`xnergy.py`) on CANopen. The driver reads and writes its objects by SDO.
+"""Xnergy's receiver (`xnergy.py`) on CANopen. The driver reads and writes the receiver's objects by
+SDO.
 
 The maker's defaults are 250 kbit/s and node id 10. The node sends a heartbeat (operational) every 100
 ms. The driver does not read a node whose heartbeat is missing. Receivers with old firmware send no
-heartbeat; for such a receiver write `heartbeat: none`.
+heartbeat. For such a receiver write `heartbeat: none`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -24,7 +25,8 @@ BeatTimeout = Annotated[float, msgspec.Meta(ge=0.15, le=10, extra={"unit": "s"})
 
 
 class Object(msgspec.Struct, frozen=True):
-    """An unsigned little-endian CANopen object, read by SDO. `octets` is its width in bytes."""
+    """An unsigned little-endian CANopen object that the driver reads by SDO. `octets` is the object's
+    width in bytes."""
 
     index: int
     subindex: int
@@ -67,7 +69,7 @@ class CanOpenChargerSettings(
 
 
 def claims(settings: CanOpenChargerSettings) -> Iterable[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of the node. No other device of the bus may use the node."""
+    """Yield the node with its path in the YAML. No other device of the bus may use the node."""
     yield f"node {settings.node}", ("node",)
 
 
@@ -98,8 +100,8 @@ def create(name: str, settings: CanOpenChargerSettings, bus: can.CanBus) -> xner
 
 
 class Objects:
-    """Access to the objects of one node (`xnergy.ReceiverAccess`). Temperatures are missing, because
-    the maker publishes no objects for them."""
+    """Access to the objects of one node (`xnergy.ReceiverAccess`). The temperatures are missing,
+    because the maker publishes no objects for temperatures."""
 
     reads = xnergy.ALWAYS
 
@@ -111,7 +113,7 @@ class Objects:
         self.now = bus.now
 
     def alive(self) -> bool:
-        """Check the heartbeat; return True if the node has restarted after the last call. Raises
+        """Check the heartbeat. Return True if the node has restarted after the last call. Raises
         HalError."""
         self._node.alive()
         before, self._starts = self._starts, self._node.starts
@@ -123,7 +125,7 @@ class Objects:
         return {name: self._node.read(o.index, o.subindex, o.octets) for name, o in objects}
 
     def write(self, name: str, value: int, safe: bool = False) -> None:
-        """Write an object by SDO. Raises HalError unless the node acknowledges it."""
+        """Write an object by SDO. Raises HalError if the node does not acknowledge the write."""
         found = OBJECTS[name]
         self._node.write(found.index, found.subindex, found.octets, value, safe=safe)
 

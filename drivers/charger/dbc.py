@@ -1,6 +1,6 @@
-"""DBC files, read by cantools. They describe a maker's frames and the signals in the frames.
+"""DBC files, which cantools reads. A DBC file describes a maker's frames and the signals in the frames.
 
-Frames and signals are named as in the file. Values are physical: they are scaled to the signal's unit.
+The code uses the file's names for frames and signals. A value is in the signal's unit, after scaling.
 The value of an enumerated signal is its number.
 """
 
@@ -46,7 +46,7 @@ class Dbc:
         return [signal.name for signal in self._messages[frame].signals]
 
     def id(self, frame: str) -> int:
-        """Return a frame's id, with EXTENDED set if it has 29 bits."""
+        """Return a frame's id. If the id has 29 bits, EXTENDED is set."""
         message = self._messages[frame]
         return int(message.frame_id) | (EXTENDED if message.is_extended_frame else 0)
 
@@ -55,14 +55,16 @@ class Dbc:
         return int(self._messages[frame].length)
 
     def decode(self, frame: str, payload: bytes) -> dict[str, float]:
-        """Return signal -> value, for each signal with a finite number. Raises DriverError."""
+        """Return the value of each signal that has a finite number. Raises DriverError."""
         from cantools.database.errors import Error
 
         try:
             found = self._messages[frame].decode(payload, decode_choices=False)
         except (Error, ValueError, KeyError) as error:
             raise DriverError(f"{frame} {payload.hex(' ')} cannot be decoded: {error}") from None
-        assert isinstance(found, dict)  # a list would mean nested frames, which DBC lacks
+        assert isinstance(
+            found, dict
+        )  # a list would mean nested frames, and DBC has no nested frames
         return {
             name: value
             for name, value in found.items()
@@ -70,7 +72,7 @@ class Dbc:
         }
 
     def encode(self, frame: str, values: Mapping[str, float]) -> bytes:
-        """Encode the payload from a value for every signal. Raises ValueError."""
+        """Encode the payload. `values` must give a value for every signal. Raises ValueError."""
         from cantools.database.errors import Error
 
         try:
@@ -102,13 +104,13 @@ class Dbc:
 
 
 def path(name: str) -> Path:
-    """Return the path of a DBC file. A `name` that is not an absolute path is a file of
+    """Return the path of a DBC file. If `name` is not an absolute path, the file is in
     drivers/profiles/."""
     return texts.FOLDER / name
 
 
 def load(name: str) -> Dbc:
-    """Load a file by its name (see `path`). Raises ValueError with the problem."""
+    """Load the DBC file that `path` finds for this name. Raises ValueError with the problem."""
     file = path(name)
     return _understood(file, texts.text(file, lambda: _read(file)))
 

@@ -1,7 +1,7 @@
 """A charging station on dry contacts. A relay enables charging, and contacts show the station's state.
 
-Relay and contacts are on the GPIO header or on a Modbus I/O module (coils and discrete inputs). The
-relay is off whenever the daemon does not run, so a charge ends with the daemon.
+The relay and the contacts are on the GPIO header or on a Modbus I/O module (coils and discrete inputs).
+The relay is off whenever the daemon does not run, so a charge ends with the daemon.
 """
 
 import itertools
@@ -33,13 +33,13 @@ CUT_MUST_READ: Final = {
     "at_height": (False, "a lowered pad reads as raised, and is energised"),
     "range_ok": (False, "a badly placed robot reads in range, and is energised"),
 }
-"""Signal -> the safe reading of a cut wire (asserted or not), and the danger of the opposite
+"""The safe reading of each signal's cut wire (True: asserted), and the danger of the opposite
 reading."""
 ENABLE: Final = "enable"
 
 
 class ChargerInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The contacts that are read."""
+    """The contacts that the driver reads."""
 
     charging: Annotated[Input, tells("current flows, also while it ramps down.")]
     ready: Annotated[
@@ -92,8 +92,8 @@ def _unsafe(settings: DryContactChargerSettings) -> Iterator[Unsafe]:
 
 
 def tables(settings: DryContactChargerSettings) -> Iterator[Table]:
-    """Yield tables of the contacts and of the relay. They show each combination, also with a wire
-    cut."""
+    """Yield tables of the contacts and of the relay. The tables show each combination, and each
+    combination with a wire cut."""
     table = {wire.signal: wire for wire in wires(settings) if wire.direction == "in"}
     rows = []
     for on in itertools.product((False, True), repeat=len(table)):
@@ -108,8 +108,8 @@ def tables(settings: DryContactChargerSettings) -> Iterator[Table]:
 
 
 def _means(shown: Mapping[str, bool]) -> str:
-    """Describe the meaning of the contacts with the relay off. Add the meaning with the relay on if it
-    differs."""
+    """Describe the meaning of the contacts with the relay off. If the relay changes the meaning, add
+    the meaning with the relay on."""
     off, on = (str(decode(shown, enabled).activity) for enabled in (False, True))
     return off if off == on else f"{off} ({on} while enabled)"
 
@@ -152,7 +152,8 @@ class DryContactCharger(OnPoints):
         return decode(self._points.read(), self._enabled)
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Set the relay; None leaves it unchanged. Contacts cannot carry a clear or a range check."""
+        """Set the relay. A `power` of None leaves the relay unchanged. Contacts cannot carry the
+        commands that clear errors or check the range."""
         if outputs.power is not None:
             self._enabled = outputs.power
         self._points.write({ENABLE: self._enabled})

@@ -1,6 +1,6 @@
 """A charging station that speaks HTTP and JSON.
 
-The defaults are the interface of the first station (a wall-mounted transmitter, TPU):
+The defaults fit the first station (a wall-mounted transmitter, TPU), which has this interface:
 
     GET  http://{api_base}/state        ->  200 {"state": 238, "error_msg": "foreign object"}
     POST http://{api_base}/clear_error  ->  2xx
@@ -8,8 +8,8 @@ The defaults are the interface of the first station (a wall-mounted transmitter,
 This interface has no start, no stop and no receiver id. So the driver can only observe the station, and
 the station itself decides which robot it charges. For other makes the YAML gives paths and fields.
 
-`codes` gives the meanings of the maker's states. An unlisted state counts as an error. A maker's state
-is never passed on as an RMF state.
+`codes` gives the meanings of the maker's states. A state that `codes` does not list counts as an error.
+The driver never passes a maker's state on as an RMF state.
 """
 
 from collections.abc import Iterator, Mapping
@@ -40,7 +40,7 @@ class HttpChargerSettings(
     ] = None
 
     def command(self, name: StationCommand) -> Call | None:
-        """Return the call for this command; None if the station has no such command."""
+        """Return the call for this command. Return None if the station has no such command."""
         if name == "clear_error":
             return Call(path=self.clear_error_path) if self.clear_error_path else None
         found: Call | None = getattr(self, name)
@@ -69,7 +69,8 @@ def create(name: str, settings: HttpChargerSettings, bus: Calls) -> JsonCharger:
 
 
 def claims(settings: HttpChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of the station's state and of its commands. No other charger may use them."""
+    """Yield the place of the station's state and of each command, with its path in the YAML. No other
+    charger may use these places."""
     yield f"{settings.fields.state} of {settings.state_path}", ("state_path",)
     for name in ("start", "stop"):
         if call := getattr(settings, name):
@@ -93,8 +94,8 @@ def describe(
 
 
 def warnings(settings: HttpChargerSettings) -> Remarks:
-    """Yield a warning (path, text) for each missing ability, and for each valid setting that may be a
-    mistake."""
+    """Yield a warning (path, text) for each missing ability. Yield a warning for each valid setting
+    that may be a mistake."""
     off_s, unseen = settings.switches_off_after_s, []
     if settings.start and off_s is not None and (text := timer_unseen(settings.start, off_s)):
         unseen = [(("start", "path"), text)]

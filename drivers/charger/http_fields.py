@@ -1,4 +1,5 @@
-"""The fields of a charging station's HTTP answer, and the values read from them."""
+"""The fields of a charging station's HTTP answer, and the values that the driver reads from the
+fields."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -21,7 +22,7 @@ WEEK_S: Final = 7 * 86400
 
 
 class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The fields of the answer to `state_path`. A field is a path of names with dots between them."""
+    """The fields of the answer to `state_path`. A field is a path of names that are joined by dots."""
 
     state: Annotated[Field, tells("the station's state; `codes` has the meanings.")] = "state"
     error_text: Annotated[
@@ -60,10 +61,10 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ] = {}
 
     def code(self, answer: Answer, words: Mapping[str, int]) -> int | str:
-        """Return the maker's number for its state. If `words` does not list the station's word, return
-        the word.
+        """Return the maker's number for the station's state. If the state is a word that `words` does
+        not list, return the word.
 
-        Raises DriverError for any other value.
+        Raises DriverError for a state that is neither a number nor a word.
         """
         code = json_fields.needed(answer, self.state)
         if words and isinstance(code, str):
@@ -76,14 +77,14 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         return code
 
     def error(self, answer: Answer) -> tuple[str, FaultSide]:
-        """Return the text of the station's error, and the side that has the error. Raises
-        DriverError."""
+        """Return the text of the station's error, and the side (station or robot) that has the error.
+        Raises DriverError."""
         said = json_fields.text(answer, self.error_text)
         means = self.error_texts.get(said)
         return ("", "") if means == "none" else (said, means or "")
 
     def measured(self, answer: Answer) -> Measured:
-        """Return the receiver's id and the measurements. A null flag counts as false. Raises
+        """Return the receiver's id and the measurements. A flag that is null counts as false. Raises
         DriverError."""
         celsius = ((name, _number(answer, at)) for name, at in self.temperatures.items())
         return Measured(
@@ -99,7 +100,7 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         )
 
     def rows(self, has_codes: bool) -> Iterator[tuple[str, str]]:
-        """Yield rows for `check`. Yield none if all fields have their defaults, which suit the first
+        """Yield rows for `check`. Yield no row if all fields have their defaults, which fit the first
         station."""
         for name in self.__struct_fields__ if self != Fields() else ():
             place = getattr(self, name)
@@ -114,8 +115,8 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 def _number(
     answer: Answer, number: JsonNumber | None, most: float = math.inf, bounds: str = ""
 ) -> float | None:
-    """Return the value in our unit. Raises DriverError for a value that is no number or out of
-    bounds."""
+    """Return the value in this code's unit. Raises DriverError for a value that is not a number, or
+    that is out of bounds."""
     value = json_fields.number(answer, number.field, number.scale) if number else None
     if number and value is not None and bounds and not 0 <= value <= most:
         raise json_fields.wrong(number.field, value, bounds)

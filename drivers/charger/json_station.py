@@ -1,7 +1,8 @@
-"""A charging station that answers with JSON over HTTP or MQTT: its fields, its rules, and its driver.
+"""A charging station that answers with JSON over HTTP or MQTT. This file has its fields, its rules and
+its driver.
 
-`codes` gives the meanings of the maker's states. An unlisted state counts as an error. A maker's state
-is never passed on as an RMF state.
+`codes` gives the meanings of the maker's states. A state that `codes` does not list counts as an error.
+The driver never passes a maker's state on as an RMF state.
 """
 
 from collections.abc import Iterator, Mapping
@@ -48,17 +49,19 @@ class JsonChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unk
     ] = None
 
     def command(self, name: StationCommand) -> Any:
-        """Return this command in the form of the bus; None if the station has no such command."""
+        """Return this command in the form of the bus. Return None if the station has no such
+        command."""
         return getattr(self, name)
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
-        """Return the time (s) after which the power goes off by itself, and its path in the YAML.
-        Return None without such a timer."""
+        """Return the time (s) after which the power goes off by itself, and the path of this time in
+        the YAML. Return None without such a timer."""
         path = ("switches_off_after_s",)
         return None if self.switches_off_after_s is None else (self.switches_off_after_s, path)
 
     def can_stop(self) -> bool:
-        """Return whether the driver can switch the power off. It can only if the YAML has `stop`."""
+        """Return whether the driver can switch the power off. The driver needs `stop` in the YAML for
+        this."""
         return self.command("stop") is not None
 
     def problems(self) -> Remarks:
@@ -119,17 +122,17 @@ def rows(settings: JsonChargerSettings) -> list[tuple[str, str]]:
 
 
 def power_off(settings: JsonChargerSettings, scan_s: float) -> Iterator[tuple[str, str]]:
-    """Yield a row about the power's timer, if the station has a timer."""
+    """Yield a row about the timer that switches the power off, if the station has such a timer."""
     if settings.switches_off_after_s:
         after = f"{settings.switches_off_after_s:g} s without a new start"
         yield "power off", f"by itself after {after}, sent every {scan_s:g} s"
 
 
 def warnings(settings: JsonChargerSettings, unseen_timer: Remarks = ()) -> Remarks:
-    """Yield a warning (path, text) for each missing ability, and for each valid setting that may be a
-    mistake.
+    """Yield a warning (path, text) for each missing ability. Yield a warning for each valid setting
+    that may be a mistake.
 
-    `unseen_timer`: the warning about a `start` command that does not contain the timer's number.
+    `unseen_timer` is the warning about a `start` command that does not contain the timer's number.
     """
     missing = [name for name in ("receiver_id", "stop") if _lacks(settings, name)]
     consequences = {
@@ -164,7 +167,7 @@ def _lacks(settings: JsonChargerSettings, what: str) -> bool:
 
 
 def how_often(settings: JsonChargerSettings) -> str:
-    """Describe when errors are cleared."""
+    """Describe the occasions on which the driver clears errors."""
     per_hour = settings.limits.clear_errors_per_h
     by_itself = f", and by itself at most {per_hour} times an hour" if per_hour else ""
     return f"when an operator resets{by_itself}"
@@ -177,14 +180,15 @@ class JsonStation(Protocol):
         """Return the station's present state."""
 
     def send(self, name: StationCommand, safe: bool = False) -> None:
-        """Send this command once, if the station has it. `safe`: the command switches the power off."""
+        """Send this command once, if the station has it. `safe` means that the command switches the
+        power off."""
 
 
 class JsonCharger:
     """`drivers.Driver` for one station.
 
-    The power is a level. The driver repeats `start` while the station stays idle, and `stop` while the
-    station still charges.
+    The driver treats the power as a level. It repeats `start` while the station stays idle, and `stop`
+    while the station still charges.
     """
 
     def __init__(self, settings: JsonChargerSettings, station: JsonStation) -> None:
@@ -200,7 +204,7 @@ class JsonCharger:
         """Do nothing, because a restart must not end a charge."""
 
     def read(self) -> ChargerSample:
-        """Read and decode the station's state. Raises DriverError for an answer without sense."""
+        """Read and decode the station's state. Raises DriverError for an answer that makes no sense."""
         answer = self._station.answer()
         fields = self._settings.fields
         has_codes = self._settings.codes is not None
@@ -219,10 +223,11 @@ class JsonCharger:
         )
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Set the power. Switching off comes first.
+        """Send the commands that the outputs need. A stop is sent first, and a start last.
 
-        A clear or a range check is sent once, even if its answer is lost. The driver counts the command
-        as done before it sends the command.
+        The driver sends the command to clear errors once for each request, even if the answer is lost.
+        The same holds for the range check. So the driver counts a command as done before it sends the
+        command.
         """
         if outputs.power is False:
             self._stop_if_needed()

@@ -39,12 +39,13 @@ class ModbusChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_u
 
 
 def points(settings: ModbusChargerSettings) -> dict[str, Point]:
-    """Return name -> its register or coil."""
+    """Return the register or coil of each name."""
     return {name: at(settings.unit, place) for name, place in PLACES.items()}
 
 
 def claims(settings: ModbusChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of the receiver's coils. No other device may use these coils."""
+    """Yield each coil of the receiver with its path in the YAML. No other device may use these
+    coils."""
     for name in (xnergy.ENABLE, xnergy.CHECK_RANGE):
         yield str(points(settings)[name]), ("unit",)
 
@@ -78,8 +79,8 @@ class Registers:
         self.now = bus.now
 
     def alive(self) -> bool:
-        """Return False, because Modbus has no heartbeat that would show a restart. Only a read shows a
-        lost unit."""
+        """Return False, because Modbus has no heartbeat that would show a restart. Only a failed read
+        shows that the unit is gone."""
         return False
 
     def read(self, names: Iterable[str]) -> dict[str, int]:
@@ -89,7 +90,8 @@ class Registers:
         return {name: image[point] for name, point in wanted.items()}
 
     def write(self, name: str, value: int, safe: bool = False) -> None:
-        """Write a register or coil, and compare the unit's echo with the request. Raises HalError."""
+        """Write a register or coil. Raises HalError, also if the unit's echo differs from the
+        request."""
         self._bus.write(self._points[name], value, safe)
 
 

@@ -1,8 +1,8 @@
 """A charging station behind an MQTT broker. Its states are JSON or plain values on topics.
 
-`topics` names each state topic. A field begins with the topic's name (`status.charger.state`). A name
-alone stands for a plain payload. The meanings of the fields are written as for a station on HTTP. A
-reading needs a live message on every topic that is not stale.
+`topics` gives each state topic a name. A field begins with this name, as in `status.charger.state`. If
+the payload is a plain value, the field is the name alone. The meanings of the fields are written as for
+a station on HTTP. For a reading, every topic needs a live message that is not stale.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -72,7 +72,7 @@ class MqttChargerSettings(
 
 
 def _fields(settings: MqttChargerSettings) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Yield (path in the YAML, name) of each field that is read."""
+    """Yield each field that the driver reads, with its path in the YAML."""
     for name in settings.fields.__struct_fields__:
         place = getattr(settings.fields, name)
         if isinstance(place, JsonFlag | JsonNumber):
@@ -88,7 +88,8 @@ def _fields(settings: MqttChargerSettings) -> Iterator[tuple[tuple[str, ...], st
 
 
 def claims(settings: MqttChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of the station's commands. No other charger may send these commands."""
+    """Yield each command of the station with its path in the YAML. No other charger may send these
+    commands."""
     for name in COMMANDS:
         if message := settings.command(name):
             yield f"the command {message.topic} {message.payload}".rstrip(), (name, "topic")
@@ -121,13 +122,13 @@ class MqttStation:
                     bus.listen(place.topic)
 
     def await_first(self) -> None:
-        """Wait until the station has had time to publish its first states. Raises HalError without a
-        broker."""
+        """Wait until the station has had time to publish its first states. Raises HalError if no broker
+        is connected."""
         topics = [state.topic for state in self._settings.topics.values()]
         self._bus.await_first(topics, self._asks)
 
     def answer(self) -> Mapping[str, object]:
-        """Return name -> the last message on the topic of this name."""
+        """Return the last message on each topic, by the topic's name."""
         self._bus.ask(self._asks)
         return {
             name: decoded(

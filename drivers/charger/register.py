@@ -1,7 +1,7 @@
-"""A charging station of any make on Modbus registers, described by a register map.
+"""A charging station of any make on Modbus registers. A register map describes the station.
 
-The power is a level. The driver writes the wanted level while the station shows a different level. At
-the daemon's start the driver writes nothing, so a restart does not end a charge.
+The driver treats the power as a level. It writes the wanted level while the station shows a different
+level. At the daemon's start the driver writes nothing, so a restart does not end a charge.
 """
 
 from collections.abc import Iterator, Mapping
@@ -37,7 +37,8 @@ class RegisterChargerSettings(
     map: Annotated[ChargerMap | None, tells("the map, written here instead of a profile.")] = None
 
     def can_stop(self) -> bool:
-        """Return whether the driver can switch the power off. It can only if the map has `power`."""
+        """Return whether the driver can switch the power off. The driver needs `power` in the map for
+        this."""
         return charger_map(self).power is not None
 
     def problems(self) -> Remarks:
@@ -60,18 +61,19 @@ def charger_map(settings: RegisterChargerSettings) -> ChargerMap:
 
 
 def cells(settings: RegisterChargerSettings) -> dict[str, list[Point]]:
-    """Return value -> the registers, coil or discrete input that hold it."""
+    """Return the registers, coil or discrete input that hold each value."""
     found: Mapping[str, RegisterNumber] = charger_map(settings).values
     return {name: [at(settings.unit, p) for p in n.places()] for name, n in found.items()}
 
 
 def orders(settings: RegisterChargerSettings) -> dict[str, Point]:
-    """Return command -> the place where the driver writes the command."""
+    """Return the place where the driver writes each command."""
     return {n: at(settings.unit, text) for n, text in charger_map(settings).orders().items()}
 
 
 def claims(settings: RegisterChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of each written place. Yield nothing while the map has problems."""
+    """Yield each place that the driver writes, with its path in the YAML. Yield nothing while the map
+    has problems."""
     if any(PROFILE.problems(settings.profile, settings.map)):
         return
     for name, text in charger_map(settings).orders().items():
@@ -125,8 +127,8 @@ def create(name: str, settings: RegisterChargerSettings, bus: ModbusBus) -> "Reg
 
 
 class RegisterCharger:
-    """`drivers.Driver` for one station. `_power` is the present level of the power, and None while
-    unknown."""
+    """`drivers.Driver` for one station. `_power` is the present level of the power, or None while the
+    level is unknown."""
 
     def __init__(self, settings: RegisterChargerSettings, bus: ModbusBus) -> None:
         self._settings = settings
@@ -158,8 +160,8 @@ class RegisterCharger:
         return decode(self._map, values)
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Set the power. Switching off comes first. A clear or a range check is written once for each
-        change of its count."""
+        """Write the commands that the outputs need. Switching off comes first. The driver writes the
+        commands to clear errors and to check the range once for each change of their counts."""
         if outputs.power is False:
             self._switch(on=False)
         if outputs.clear_errors != self._cleared:
@@ -172,8 +174,8 @@ class RegisterCharger:
             self._switch(on=True)
 
     def make_safe(self) -> None:
-        """Switch the power off, and read the command back where possible. With `on_death: keep` do
-        nothing."""
+        """Switch the power off. Read the command back if the station allows this. With `on_death: keep`
+        do nothing."""
         if self._settings.on_death == "stop":
             self._switch(on=False, anyway=True)
             command = self._map.power

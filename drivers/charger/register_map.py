@@ -1,5 +1,5 @@
-"""A charger's register map, from a YAML or a profile. The map gives places, and the meanings of
-numbers."""
+"""A charger's register map, from a YAML or a profile. The map gives the places of values and the
+meanings of numbers."""
 
 from collections.abc import Mapping
 from typing import Annotated, Final, Literal
@@ -36,8 +36,8 @@ class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ] = 1.0
 
     def problems(self) -> Remarks:
-        """Yield a problem for an invalid place, and for options that do not fit the place's table or
-        width."""
+        """Yield a problem for an invalid place. Yield a problem for options that do not fit the place's
+        table or width."""
         yield from super().problems()
         of_registers = (self.words, self.signed, self.bit) != (1, False, None)
         if of_registers and self.is_in("coil", "discrete input"):
@@ -66,7 +66,7 @@ class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         return raw if self.scale == 1.0 else round(raw * self.scale, 6)
 
     def encoded(self, value: float) -> list[int]:
-        """Encode a value as words, for a fake station."""
+        """Encode a value as words, for a simulated station."""
         raw = int(value) << self.bit if self.bit is not None else round(value / self.scale)
         raw &= (1 << BITS * self.words) - 1
         return [raw >> BITS * n & 0xFFFF for n in reversed(range(self.words))]
@@ -125,8 +125,8 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     ] = None
 
     def problems(self) -> Remarks:
-        """Yield a problem for names missing from `values`, for unused names, and for a map without a
-        state."""
+        """Yield a problem for each name that `values` lacks, for each unused name, and for a map
+        without a state."""
         yield from by_rules.problems(self.rules, self.codes is not None)
         if self.codes and "state" not in self.values:
             yield ("values",), "needs 'state', because codes is given"
@@ -145,7 +145,7 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
             yield ("range_check",), "needs the value in_range, for the check's result"
 
     def orders(self) -> Mapping[str, str]:
-        """Return command -> its place, for each command that the map gives."""
+        """Return the place of each command that the map gives."""
         names = ("power", "clear_error", "range_check")
         return {name: part.at for name in names if (part := getattr(self, name)) is not None}
 

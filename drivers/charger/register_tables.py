@@ -1,4 +1,5 @@
-"""Tabulates a station's values. For a sample of each value the table shows the registers' contents."""
+"""The table of a station's values for `check`. For a sample of each value, the table shows the contents
+of the registers."""
 
 from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
@@ -9,7 +10,8 @@ from drivers.hal.modbus.points import Point
 
 
 class ShownValue(NamedTuple):
-    """A sample with its unit. It shows the value's scale and the order of its words."""
+    """A sample of a value, with its unit. The sample shows the value's scale and the order of its
+    words."""
 
     value: float
     unit: str
@@ -24,8 +26,8 @@ SAMPLES: Final = {
 
 
 def samples(found: ChargerMap, cells: Mapping[str, list[Point]]) -> Table:
-    """Tabulate each value of the map. `cells` gives for each value its registers, coil or discrete
-    input."""
+    """Tabulate each value of the map. `cells` gives the registers, coil or discrete input of each
+    value."""
     rows = (
         (name, " and ".join(map(str, points)), _held(found.values[name], points, value), means)
         for name, points in cells.items()

@@ -1,8 +1,8 @@
-"""Rules for a charger's state, and its errors as numbers and bits, for HTTP, MQTT, Modbus and CAN.
+"""Rules that give a charger's state, and tables of its errors, for HTTP, MQTT, Modbus and CAN.
 
 A rule tests values at places. A place is a field of a JSON answer, a name in a register map's `values`,
-or a signal of a CAN frame. The driver tries the rules before `codes`. The first rule whose tests all
-hold gives the state.
+or a signal of a CAN frame. The driver tries the rules in their order, and before `codes`. A rule holds
+if all its tests hold. The first rule that holds gives the state.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -21,7 +21,7 @@ Read = Callable[[str], object]
 """A function that returns the value at a place. It raises DriverError if the place has no value."""
 Meaning = tuple[Activity, FaultSide]
 Found = list[tuple[FaultSide, str]]
-"""Errors, each with its side and its text."""
+"""A list of errors. Each error has its side (station or robot) and its text."""
 
 MEANINGS: Final[Mapping[str, Meaning]] = {
     **{str(a): (a, "") for a in Activity if a is not Activity.UNKNOWN},
@@ -32,7 +32,7 @@ UNKNOWN: Final[Meaning] = (Activity.UNKNOWN, "")
 
 
 class Test(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A test of one value. The test holds if every given condition holds."""
+    """A test of one value. The test holds if every condition in the YAML holds."""
 
     one_of: Annotated[list[Value], tells("the value is one of these.")] = []
     above: Annotated[float | None, tells("the value is greater than this.")] = None
@@ -82,7 +82,8 @@ class Rule(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """An error as one number. `check` and the status show an unlisted number as it is."""
+    """An error that the station gives as one number. `check` and the status show an unlisted number
+    without a text."""
 
     at: Annotated[Name, tells("its place.")]
     well: Annotated[tuple[int, ...], tells("the numbers that mean no error.")] = (0,)
@@ -99,7 +100,7 @@ class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             yield ("well",), f"{number} is already an error"
 
     def errors(self, value: object) -> Found:
-        """Return the error for this number. A number in `well` is no error."""
+        """Return the error for this number. A number in `well` means no error."""
         if not isinstance(value, int | float) or value in self.well:
             return [] if isinstance(value, int | float) else [("", f"error {value}")]
         sides: tuple[tuple[FaultSide, Mapping[int, str]], ...] = (
@@ -111,7 +112,8 @@ class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 
 class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Errors as bits of one number, such as a flag byte. An unlisted bit is shown by its number."""
+    """Errors that the station gives as bits of one number, such as a flag byte. `check` and the status
+    show an unlisted bit by its number."""
 
     at: Annotated[Name, tells("its place.")]
     ignore: Annotated[list[LongBit], tells("bits that mean no error.")] = []
@@ -128,7 +130,8 @@ class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
             yield ("robot", str(bit)), f"bit {bit} is already a fault of the station"
 
     def errors(self, value: object) -> Found:
-        """Return the errors of the set bits. The station's errors come first, and the robot's last."""
+        """Return the errors of the set bits. The order is the station's errors, unlisted bits, the
+        robot's errors."""
         if not isinstance(value, int | float) or value != int(value) or value < 0:
             return [("", f"error flags {value}")]
         on = [bit for bit in bits_on(int(value)) if bit not in self.ignore]
@@ -138,7 +141,8 @@ class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class StationErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Errors of the station, or of the robot at the station. They count in any state."""
+    """The values that report errors of the station, or of the robot at the station. These errors count
+    in any state."""
 
     station: Annotated[
         dict[Name, Name], tells("place -> text: a value other than 0 is this fault of the station.")
@@ -150,7 +154,8 @@ class StationErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     bits: Annotated[list[ErrorBits], tells("errors as the bits of a flag byte or word.")] = []
 
     def found(self, read: Read) -> Found:
-        """Return all present errors, the station's first. A value of None is unknown, and no error."""
+        """Return all present errors, the station's first. A value of None is unknown, and counts as no
+        error."""
         sides: tuple[tuple[FaultSide, Mapping[str, str]], ...] = (
             ("station", self.station),
             ("robot", self.robot),
@@ -165,7 +170,8 @@ class StationErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         return sorted([*flags, *numbers], key=lambda error: order.index(error[0]))
 
     def places(self) -> Iterator[tuple[tuple[str, ...], str]]:
-        """Yield (path, place) of each value that is read. The path begins below this section."""
+        """Yield the path and the place of each value that this section reads. The path begins below
+        this section of the YAML."""
         for side in ("station", "robot"):
             for at in getattr(self, side):
                 yield (side, at), at
@@ -175,7 +181,8 @@ class StationErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
 
 def places(rules: list[Rule]) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Yield (path, place) of each value that the rules test. The path begins below the rules."""
+    """Yield the path and the place of each value that the rules test. The path begins below `rules` in
+    the YAML."""
     for n, rule in enumerate(rules):
         for at in rule.when:
             yield (str(n), "when", at), at
@@ -187,10 +194,11 @@ def judge(rules: list[Rule], read: Read) -> Rule | None:
 
 
 class JudgedState(msgspec.Struct, frozen=True):
-    """The station's state after rules, codes and errors.
+    """The station's state, as rules, codes and errors give it together.
 
-    `activity` is ERROR whenever there is an error. `does` is the activity without regard to errors.
-    `side` has the error. `code` is the state's code for texts, and `text` holds the errors' texts.
+    `activity` is ERROR whenever there is an error. `does` is the activity that the station would have
+    without its errors. `side` is the side (station or robot) that has the error. `code` is the maker's
+    state for messages, and `text` holds the errors' texts.
     """
 
     activity: Activity
@@ -210,16 +218,17 @@ def judged(
 ) -> JudgedState:
     """Return the state that follows from rules, codes and errors.
 
-    `code` is the maker's state; None without codes. `told` is the side that the station's own error
-    text gives. An error that is present in `errors` makes any state an error. Raises DriverError.
+    `code` is the maker's state, or None if the station has no codes. `told` is the side that the
+    station's own error text gives. A present error of `errors` makes any state an error. Raises
+    DriverError.
     """
     meant = meaning(station.rules, station.codes, read, code)
     return with_errors(meant, station.errors.found(read), station.codes, told)
 
 
 class Meant(NamedTuple):
-    """The state that follows from rules and codes. `code` is for texts; `text` is that of the matching
-    rule."""
+    """The state that follows from rules and codes. `code` is for messages. `text` is the text of the
+    rule that holds."""
 
     activity: Activity
     side: FaultSide
@@ -258,7 +267,7 @@ class StateRules(Protocol):
 
     @property
     def rules(self) -> list[Rule]:
-        """The rules, which are tried before the codes."""
+        """The rules. The driver tries them before the codes."""
 
     @property
     def errors(self) -> StationErrors:
@@ -281,8 +290,8 @@ def rows(rules: list[Rule], errors: StationErrors) -> Iterator[tuple[str, str]]:
 
 
 def problems(rules: list[Rule], has_codes: bool) -> Remarks:
-    """Yield a problem for rules that are never reached, and for a missing state. Paths begin below the
-    station."""
+    """Yield a problem for rules that the driver never reaches, and for a missing state. Each path
+    begins below the station in the YAML."""
     if not rules and not has_codes:
         yield ("codes",), "needs codes (the meanings of the maker's state numbers), or rules"
     for n, rule in enumerate(rules[:-1]):
@@ -303,6 +312,6 @@ def said(found: Found) -> str:
 
 
 def receiver_text(number: float | None) -> str | None:
-    """Return a receiver's id as text. Return "" for 0 (no receiver), and None if the map has no such
-    value."""
+    """Return a receiver's id as text. The id 0 means no receiver and gives "". Return None if the map
+    has no receiver's id."""
     return None if number is None else str(int(number)) if number else ""

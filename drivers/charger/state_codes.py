@@ -1,6 +1,7 @@
-"""The meanings of a charger's state numbers. The YAML has a table that covers every number.
+"""The meanings of a charger's state numbers. The YAML lists the numbers of each meaning.
 
-An unlisted number counts as an error and is shown. A maker's number is never passed on as an RMF state.
+A number that the YAML does not list counts as an error, and the error's text shows the number. The
+driver never passes a maker's number on as an RMF state.
 """
 
 from collections.abc import Collection, Mapping
@@ -20,7 +21,8 @@ ROBOT_ERROR: tuple[Activity, FaultSide] = (Activity.ERROR, "robot")
 
 
 class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The meanings of the maker's state numbers. An unlisted number counts as an error and is shown."""
+    """The meanings of the maker's state numbers. A number that is not listed counts as an error, and
+    the error's text shows the number."""
 
     idle: Annotated[
         list[Code], msgspec.Meta(min_length=1), tells("nothing is on the pad: a robot may come.")
@@ -51,7 +53,8 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return listed_twice({name: getattr(self, name) for name in self.__struct_fields__})
 
     def meanings(self) -> dict[int | str, tuple[Activity, FaultSide]]:
-        """Return the maker's state -> (activity, the side of an error)."""
+        """Return the activity of each of the maker's states. For an error, add the side (station or
+        robot) that has the error."""
         made: dict[int | str, tuple[Activity, FaultSide]] = {
             code: (activity, "") for activity, codes in self.lists().items() for code in codes
         }
@@ -61,12 +64,12 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     def unnamed_side(self, code: object) -> FaultSide:
         """Return the side of a number in `error`. If only `robot_error` is given, the number is the
-        station's error; otherwise the side is "", unknown."""
+        station's error. Otherwise the side is unknown, and the function returns ""."""
         told_apart = self.robot_error and not self.station_error
         return "station" if told_apart and code in self.error else ""
 
     def lists(self) -> Mapping[Activity, list[Code]]:
-        """Return meaning -> its states, without the lists `station_error` and `robot_error`."""
+        """Return the states of each meaning, without the lists `station_error` and `robot_error`."""
         return {
             Activity.IDLE: self.idle,
             Activity.HANDSHAKE: self.handshake,
@@ -94,7 +97,7 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 def first_side(sides: Collection[FaultSide]) -> FaultSide:
-    """Return the side of an error that several sources report. The station comes before the robot; ""
-    if no source names a side."""
+    """Return the side of an error that several sources report. The station comes before the robot.
+    Return "" if no source names a side."""
     known: tuple[FaultSide, ...] = ("station", "robot")
     return next((side for side in known if side in sides), "")

@@ -1,13 +1,14 @@
-"""Xnergy's receiver (RCU): the meanings of its numbers and its commands, on any bus.
+"""Xnergy's receiver (RCU), on any bus. This file has the meanings of its numbers and its commands.
 
 `canopen.py` and `modbus.py` have the addresses of the numbers. The maker publishes no address for
 clearing an error. An error ends by itself, or when somebody cycles the receiver's power.
 
 The source is the maker's published ROS driver (`xnergy-charger-rcu`): state codes, error bits,
 addresses, scales, and the range check before a start. Nobody has tried these facts on the hardware.
-Three faults of the maker's driver are not copied. It decodes the high error word only when this word is
-zero. It never compares an SDO reply with its request. It shows an RCU that does not answer as state
-250, which the RCU itself never sends.
+This code does not copy three faults of the maker's driver:
+- The maker's driver decodes the high error word only when this word is zero.
+- The maker's driver never compares an SDO reply with its request.
+- The maker's driver shows an RCU that does not answer as state 250. The RCU itself never sends 250.
 
 Each error has a side. Errors of the transmitter (TPU, on the wall) and objects on the pad are the
 station's errors. All other errors are the robot's, because they concern its receiver or its position.
@@ -34,17 +35,18 @@ ALWAYS: Final = ("state", "error_low", "error_high", "volts", "amps", "range")
 IN_ERROR: Final = ("latched_low", "latched_high")
 TEMPERATURES: Final[Mapping[str, str]] = {"device_c": "device", "coil_c": "coil"}
 """Names of the numbers to read. Every scan reads ALWAYS. In an error state the scan also reads
-IN_ERROR, the error that the receiver latched. Every scan also reads TEMPERATURES (°C) on a bus that
-has them."""
+IN_ERROR, the error that the receiver latched. If the bus has TEMPERATURES (°C), every scan reads
+TEMPERATURES too."""
 ENABLE: Final = "enable"
 CHECK_RANGE: Final = "check_range"
-"""The values that the driver writes: ENABLE with 1 or 0, and CHECK_RANGE with 1."""
+"""The names of the numbers that the driver writes. The driver writes 1 or 0 to ENABLE, and 1 to
+CHECK_RANGE."""
 
 Words = Mapping[str, int]
 """Raw unsigned words, by their names in ALWAYS and IN_ERROR."""
 
 TICKS_PER_UNIT: Final = 128
-"""The scale of voltage and current: the receiver counts in 1/128 V and 1/128 A."""
+"""The scale of voltage and current. The receiver counts in steps of 1/128 V and 1/128 A."""
 
 IDLE: Final = 0
 CODES: Final[Mapping[int, tuple[Activity, str]]] = {
@@ -69,7 +71,8 @@ CODES: Final[Mapping[int, tuple[Activity, str]]] = {
     250: (Activity.ERROR, "not connected"),
     255: (Activity.ERROR, "debug: error"),
 }
-"""The published state codes. The function `activity` maps every other code to UNKNOWN."""
+"""The state codes that the maker has published. The function `activity` maps every other code to
+UNKNOWN."""
 
 ERROR_BITS: Final[Mapping[int, tuple[FaultSide, str]]] = {
     0x0000_0001: ("robot", "the receiver's flash memory is not set"),
@@ -91,12 +94,13 @@ ERROR_BITS: Final[Mapping[int, tuple[FaultSide, str]]] = {
 """The bits of the 32-bit error number, whose upper half is the high word."""
 
 IN_RANGE: Final = 1
-"""The range check's result for a robot in range. Other results: 0 under way, 2 out of range, 240
-failed."""
+"""The range check's result for a robot in range. The other results are 0 (the check still runs), 2 (out
+of range) and 240 (the check failed)."""
 
 
 def activity(code: int) -> Activity:
-    """Return the activity of a state code; UNKNOWN for an unpublished code."""
+    """Return the activity of a state code. Return UNKNOWN for a code that the maker has not
+    published."""
     return CODES.get(code, (Activity.UNKNOWN, ""))[0]
 
 
@@ -104,7 +108,7 @@ def sample(words: Words, settled: bool = True) -> ChargerSample:
     """Decode one reading. Never raises. `words` has at least `state`, `error_low` and `error_high`.
 
     An error bit makes any state an error. `settled` is True if the range result belongs to the last
-    range check (function `settled` below).
+    range check (see the function `settled`).
     """
     found, does = errors(error_number(words)), activity(words["state"])
     return ChargerSample(
@@ -125,7 +129,8 @@ def sample(words: Words, settled: bool = True) -> ChargerSample:
 
 
 def errors(number: int) -> list[tuple[FaultSide, str]]:
-    """Return (side, text) of each set bit. The station's errors come first, and the robot's last.
+    """Return the side and the text of each set bit. The station's errors come first, and the robot's
+    last.
 
     A bit that the maker has not published has no side.
     """
@@ -146,8 +151,8 @@ def error_number(words: Words) -> int:
 
 
 def _text(words: Words, found: list[tuple[FaultSide, str]]) -> str:
-    """Return the errors' texts. An error of another side than the first error's has its side in
-    front."""
+    """Return the errors' texts in one line. Write the side before each error whose side differs from
+    the first error's side."""
     if found:
         main = found[0][0]
         return "; ".join(
@@ -175,10 +180,11 @@ result."""
 
 
 class Written(Struct, frozen=True):
-    """The last commands written to the receiver. `enabled` is the last ENABLE, and None while unknown.
+    """The last commands that the driver wrote to the receiver. `enabled` is the last ENABLE, or None
+    while it is unknown.
 
     `range_checks` is the number of checks that were requested. `asked_at` is the time of the last check
-    (monotonic seconds). It is inf while a check waits to be sent.
+    (monotonic seconds). `asked_at` is inf while a check waits to be sent.
     """
 
     enabled: bool | None = None
@@ -187,8 +193,8 @@ class Written(Struct, frozen=True):
 
 
 class Orders(Struct, frozen=True):
-    """The commands of this scan. `enable` is None without a command; `check_range` starts a range
-    check."""
+    """The commands of this scan. `enable` is None if the scan neither starts nor stops the receiver. A
+    true `check_range` starts a range check."""
 
     enable: bool | None = None
     check_range: bool = False
@@ -202,11 +208,11 @@ def settled(written: Written, now: float) -> bool:
 def steer(
     written: Written, outputs: ChargerOutputs, code: int, now: float
 ) -> tuple[Written, Orders]:
-    """Return the new `Written`, and the commands for state `code`. The new `Written` is valid once the
-    commands are written.
+    """Return the commands for state `code`, and the new `Written`. The new `Written` becomes valid when
+    the driver has written the commands.
 
-    The receiver gets a start and a range check only in state idle, and each only once. It gets a stop
-    again while it still charges. With `power` None it gets neither start nor stop.
+    The receiver gets a start or a range check only in state idle, and each only once. It gets a stop
+    again while it still charges. If `power` is None, the receiver gets neither start nor stop.
     """
     ask = outputs.range_checks != written.range_checks
     if ask and code == IDLE:
@@ -238,14 +244,15 @@ class ReceiverAccess(Protocol):
         """The names of the numbers that every scan reads."""
 
     def alive(self) -> bool:
-        """Return True if the receiver has restarted after the last call. Raises DriverError if it is
-        gone."""
+        """Return True if the receiver has restarted after the last call. Raises DriverError if the
+        receiver does not answer."""
 
     def read(self, names: Iterable[str]) -> dict[str, int]:
         """Read the words of these names now. Raises DriverError."""
 
     def write(self, name: str, value: int, safe: bool = False) -> None:
-        """Write ENABLE or CHECK_RANGE. `safe`: the write switches the power off. Raises DriverError."""
+        """Write ENABLE or CHECK_RANGE. `safe` means that the write switches the power off. Raises
+        DriverError."""
 
     def insist(self) -> None:
         """Let the next request skip the backoff."""
@@ -295,7 +302,8 @@ class Receiver:
             self._enable(False)
 
     def close(self) -> None:
-        """Make the receiver safe if the driver ever commanded it, and it may be on. Does not raise."""
+        """Make the receiver safe if the driver ever commanded it and the receiver may be on. Does not
+        raise."""
         if self._touched and self._written.enabled is not False:
             self._wire.insist()
             try:
@@ -332,8 +340,8 @@ def _state_rows() -> Iterator[tuple[str, str]]:
 
 
 def warnings(settings: ChargerSettings, wire: str) -> Remarks:
-    """Yield a warning (path, text) for each valid setting that may be a mistake. `wire` is the cable to
-    unplug in the test."""
+    """Yield a warning (path, text) for each valid setting that may be a mistake. `wire` names the cable
+    that the test unplugs."""
     text = (
         "the maker's published numbers are not tried on hardware: watch the first charge, and pull"
     )

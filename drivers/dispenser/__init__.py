@@ -1,1 +1,1 @@
-"""Drivers of dispensers, which also serve ingestors."""
+"""Drivers for dispensers. The same drivers serve ingestors."""

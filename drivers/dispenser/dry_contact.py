@@ -1,9 +1,9 @@
-"""A dispenser or ingestor on dry contacts. A relay starts a cycle, and contacts show the cycle's
-course.
+"""A dispenser or ingestor on dry contacts. A relay starts a cycle, and contacts show whether the cycle
+runs, has ended or has failed.
 
 The contacts are on the GPIO header, or are coils, discrete inputs or bits of registers behind Modbus. A
-contact carries no number, so each request is for one item. To select among several sorts, each sort may
-have a relay of its own.
+contact carries no number, so each request is for one item. If the workcell has several sorts of items,
+each sort may have a relay that selects the sort.
 """
 
 from collections.abc import Iterator, Mapping
@@ -28,12 +28,12 @@ CUT_MUST_READ: Final = {
     "ready": (False, "a workcell that is not ready is started"),
     "fault": (True, "a fault of the workcell is not seen"),
 }
-"""Signal -> the safe reading of a cut wire (asserted or not), and the danger of the opposite
+"""The safe reading of each signal's cut wire (True: asserted), and the danger of the opposite
 reading."""
 
 
 class WorkcellInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The contacts that are read."""
+    """The contacts that the driver reads."""
 
     done: Annotated[
         Input,
@@ -50,7 +50,7 @@ class WorkcellInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unkn
 
 
 class WorkcellOutputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The relays that are driven."""
+    """The relays that the driver switches."""
 
     start: Annotated[Output, tells("starts one cycle; `pulse_s` sets how long it is on.")]
     select: Annotated[
@@ -117,7 +117,7 @@ def items_table(settings: WorkcellSettings) -> Iterator[Table]:
 
 
 def blind(settings: WorkcellSettings, *, busy: bool) -> Remarks:
-    """Yield a warning for each fact that no driver of this wiring can see."""
+    """Yield a warning for each state of the workcell that this wiring cannot show."""
     if not busy:
         text = "without busy a cycle that stops in the middle is seen after cycle_limit_s only"
         yield (), f"{text} ({settings.limits.cycle_limit_s:g} s)"
@@ -129,8 +129,8 @@ def create(name: str, settings: DryContactWorkcellSettings, bus: PointsBus) -> "
 
 
 class DryContactWorkcell(OnPoints):
-    """`drivers.Driver` for one dispenser or ingestor. `_selected`: the guid of the request whose sort
-    is selected."""
+    """`drivers.Driver` for one dispenser or ingestor. `_selected` is the guid of the request whose sort
+    the relays select."""
 
     def __init__(self, points: Points) -> None:
         super().__init__(points)
@@ -142,7 +142,7 @@ class DryContactWorkcell(OnPoints):
         return WorkcellSample(read("done"), read("busy"), read("ready"), read("fault"))
 
     def write(self, outputs: WorkcellOutputs) -> None:
-        """Set the relays. At the beginning of a cycle the relay of the sort goes on before the start
+        """Set the relays. At the beginning of a cycle, switch the relay of the sort on before the start
         relay."""
         relays = {f"select_{outputs.item.type_guid}": True} if outputs.guid else {}
         if outputs.guid != self._selected:

@@ -1,9 +1,9 @@
-"""A dispenser or ingestor behind HTTP and JSON. `start` begins a cycle, and `state_path` shows its
-course.
+"""A dispenser or ingestor behind HTTP and JSON. `start` begins a cycle. The answer to `state_path`
+shows whether the cycle runs, has ended or has failed.
 
 The body of `start` may contain the texts $guid, $type_guid, $quantity and $compartment as values. The
-driver replaces each text by the value of the request. A start is sent once for each cycle, even if its
-answer is lost, because a repeat could dispense twice.
+driver replaces each text by the value of the request. The driver sends one start for each cycle, even
+if the answer is lost. A second start could dispense twice.
 """
 
 from collections.abc import Iterator
@@ -82,7 +82,7 @@ def _unsafe(settings: HttpWorkcellSettings) -> Iterator[Unsafe]:
 
 
 def claims(settings: HttpWorkcellSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (command, path) of each command. No other device may send these commands."""
+    """Yield each command with its path in the YAML. No other device may send these commands."""
     yield claim(settings.start), ("start", "path")
     if settings.stop is not None:
         yield claim(settings.stop), (STOP, "path")
@@ -112,8 +112,8 @@ def create(name: str, settings: HttpWorkcellSettings, bus: InsistentCalls) -> "H
 
 
 class HttpWorkcell:
-    """`drivers.Driver` for one dispenser or ingestor. `_sent`: the guid of the last request whose start
-    was sent. `_on`: the cycle of this request has not ended."""
+    """`drivers.Driver` for one dispenser or ingestor. `_sent` is the guid of the last request whose
+    start the driver sent. `_on` is True until the cycle of this request has ended."""
 
     def __init__(self, settings: HttpWorkcellSettings, bus: InsistentCalls) -> None:
         self._settings = settings
@@ -158,7 +158,7 @@ class HttpWorkcell:
         try:
             self.make_safe()
         except DriverError:
-            return  # the daemon is ending
+            return  # the daemon ends, so no later call can try again
 
 
 def filled(call: Call, outputs: WorkcellOutputs) -> Call:

@@ -1,7 +1,8 @@
-"""A dispenser or ingestor behind a PLC's Modbus registers. A number shows its status, and a command
-starts a cycle.
+"""A dispenser or ingestor behind a PLC's Modbus registers. A number shows the workcell's status, and a
+command starts a cycle.
 
-The driver writes the numbers of the item before the start. An unlisted status counts as a fault.
+The driver writes the numbers of the item before the start. A status that the map does not list counts
+as a fault.
 """
 
 from collections.abc import Iterator, Mapping
@@ -28,7 +29,7 @@ Words = Annotated[list[Word], msgspec.Meta(min_length=1)]
 
 
 class WorkcellStatusWords(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The workcell's state as one number. An unlisted number counts as a fault."""
+    """The workcell's state as one number. A number that the map does not list counts as a fault."""
 
     ready: Annotated[Words, tells("numbers of a workcell at rest that may start.")]
     busy: Annotated[Words, tells("numbers of a running cycle.")]
@@ -73,7 +74,7 @@ class WorkcellMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     compartment: Annotated[ItemCode | None, tells("the number of the compartment.")] = None
 
     def places(self) -> dict[str, str]:
-        """Return part -> its place, for each part that the map gives."""
+        """Return the place of each part that the map gives."""
         parts = {name: getattr(self, name) for name in PARTS}
         return {name: part.at for name, part in parts.items() if part is not None}
 
@@ -108,12 +109,13 @@ class RegisterWorkcellSettings(
 
 
 def points(settings: RegisterWorkcellSettings) -> dict[str, Point]:
-    """Return part -> its place at this PLC, for each part of the map."""
+    """Return the place at this PLC of each part of the map."""
     return {part: at(settings.unit, text) for part, text in settings.map.places().items()}
 
 
 def claims(settings: RegisterWorkcellSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of every written place. No other device may use these places."""
+    """Yield every place that the driver writes, with its path in the YAML. No other device may use
+    these places."""
     for part, text in settings.map.places().items():
         if part != "status" and misplaced(text, WRITABLE) is None:
             yield str(at(settings.unit, text)), ("map", part, "at")
@@ -174,11 +176,11 @@ class RegisterWorkcell:
         self._lines.bring(command)
 
     def make_safe(self) -> None:
-        """Write the value at rest to every written place, and read it back."""
+        """Write the value at rest to every place that the driver writes, and read the value back."""
         self._lines.make_safe()
 
     def close(self) -> None:
-        """Write the value at rest to every written place, if the driver ever wrote any. Does not
+        """Write the value at rest to every place, if the driver ever wrote to a place. Does not
         raise."""
         self._lines.close()
 
@@ -197,8 +199,8 @@ def decode(found: WorkcellMap, word: int) -> WorkcellSample:
 
 
 def encode(found: WorkcellMap, item: Item) -> Mapping[str, int]:
-    """Return the number to write for each part of the item; 0 for a part that the request does not
-    give."""
+    """Return the number to write for each part of the item. A part that the request does not give gets
+    0."""
     words = {}
     if found.item:
         words["item"] = found.item.codes.get(item.type_guid, 0)

@@ -1,4 +1,4 @@
-"""The row about closing that `check` prints for every door driver."""
+"""The row of `check` about closing, which is the same for every door driver."""
 
 from typing import Final
 
@@ -6,4 +6,4 @@ CLOSING: Final = (
     "closing",
     "nothing is driven: a released door stays open unless its operator closes it by itself",
 )
-"""A row for `check`: (subject, meaning)."""
+"""A row for `check`, as (subject, meaning)."""

@@ -1,12 +1,12 @@
 """A door operator on dry contacts. A relay holds the door open, and limit contacts show its position.
 
 The contacts are on the GPIO header or on a Modbus I/O module (coils and discrete inputs).
-`drivers/hal/points.py` translates levels to signals, and knows the level of a cut wire. The door core
-decides.
+`drivers/hal/points.py` translates levels to signals, and knows the level of a cut wire. The driver
+makes no decision, because the door core decides.
 
 The Modbus module may time the pulses that trigger an operator (`flash`). The driver requests each pulse
-once, because a repeat would prolong the pulse. After a lost reply the driver waits until the next pulse
-is due. The module ends the pulse. If the hold ends during a pulse, the driver switches the relay off.
+once, because a repeat would prolong the pulse. The module ends the pulse. After a lost reply the driver
+waits until the next pulse is due. If the hold ends during a pulse, the driver switches the relay off.
 """
 
 from collections.abc import Iterator, Mapping
@@ -32,12 +32,12 @@ CUT_MUST_READ: Final = {
     "obstruction": (True, "somebody in the doorway is not seen"),
     "fire": (True, "a fire alarm reads clear"),
 }
-"""Signal -> the safe reading of a cut wire (asserted or not), and the danger of the opposite
+"""The safe reading of each signal's cut wire (True: asserted), and the danger of the opposite
 reading."""
 
 
 class DoorInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The contacts that are read. With `feedback: estimated` one limit contact or both may be
+    """The contacts that the driver reads. With `feedback: estimated` one or both limit contacts may be
     missing."""
 
     opened: Annotated[Input | None, tells("the door is fully open, by its limit contact.")] = None
@@ -60,7 +60,7 @@ class Hold(Output, frozen=True, forbid_unknown_fields=True):
 
 
 class DoorOutputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The commands to the operator. There is no relay to close the door."""
+    """The commands to the operator. No relay closes the door."""
 
     hold_open: Annotated[Hold, tells("holds the door open while it is on.")]
 
@@ -157,7 +157,8 @@ def create(name: str, settings: DryContactDoorSettings, bus: PointsBus) -> "DryC
 
 
 class DryContactDoor(OnPoints):
-    """`drivers.Driver` for one door. `flashes`: the module times the pulses of the hold relay."""
+    """`drivers.Driver` for one door. `flashes` means that the module times the pulses of the hold
+    relay."""
 
     def __init__(self, points: Points, flashes: bool = False) -> None:
         super().__init__(points)
@@ -170,7 +171,7 @@ class DryContactDoor(OnPoints):
         return DoorSample(read("opened"), read("closed"), read("obstruction"), read("fire"))
 
     def write(self, outputs: DoorOutputs) -> None:
-        """Set the hold relay. A pulse that the module times is requested once."""
+        """Set the hold relay. If the module times the pulses, request each pulse once."""
         asked, self._asked = self._asked, outputs.hold_open
         if not self._flashes or not (outputs.hold_open or outputs.between_pulses):
             self._points.write({"hold_open": outputs.hold_open})

@@ -1,7 +1,8 @@
-"""A door behind a controller that speaks HTTP and JSON, such as a Shelly: a relay with inputs.
+"""A door behind a controller that speaks HTTP and JSON, such as a Shelly. A Shelly is a relay with
+inputs.
 
 The answer to `state_path` holds the contacts. `hold` and `release` switch the relay. If the network
-fails, only the relay's own timer can release the door. So `hold` sets that timer
+fails, only the relay's own timer can release the door. So `hold` sets this timer
 (`switches_off_after_s`), and the driver sends `hold` in every scan while RMF holds the door.
 """
 
@@ -58,8 +59,8 @@ class HttpDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_f
     ] = None
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
-        """Return the time (s) of the relay's timer, and its path in the YAML. Return None without a
-        timer."""
+        """Return the time (s) of the relay's timer, and the path of this time in the YAML. Return None
+        without a timer."""
         path = ("switches_off_after_s",)
         return None if self.switches_off_after_s is None else (self.switches_off_after_s, path)
 
@@ -92,8 +93,8 @@ def _unsafe(settings: HttpDoorSettings) -> Iterator[Unsafe]:
 
 
 def claims(settings: HttpDoorSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (command, path) of each command. If another door used these commands, it would release this
-    door."""
+    """Yield each command with its path in the YAML. If another door sent these commands, it would
+    release this door."""
     yield claim(settings.hold), ("hold", "path")
     if settings.release != settings.hold:
         yield claim(settings.release), ("release", "path")
@@ -141,8 +142,8 @@ def create(name: str, settings: HttpDoorSettings, bus: InsistentCalls) -> "HttpD
 
 
 class HttpDoor:
-    """`drivers.Driver` for one door. `_told`: the state that the relay was last commanded to; None if
-    unknown."""
+    """`drivers.Driver` for one door. `_told` is the relay's state that the driver commanded last, or
+    None if this state is unknown."""
 
     def __init__(self, settings: HttpDoorSettings, bus: InsistentCalls) -> None:
         self._settings = settings
@@ -155,7 +156,8 @@ class HttpDoor:
     def open(self) -> None:
         """Check that the controller answers. At the first call, release the door too.
 
-        After a failure `open` only reads, because a lost answer must not release a held door.
+        After a failure `open` reads and sends no release. A lost answer must not release a door that
+        RMF holds.
         """
         held = self._held(self._bus.get_json(self._settings.state_path))
         if not self._claimed and held is not False:

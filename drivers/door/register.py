@@ -1,9 +1,9 @@
 """A door operator that the driver reads and commands through Modbus registers.
 
-The operator's status is one number. The map lists the numbers for open, closed, moving and faults. An
-unlisted number is a fault too, because the door's position is then unknown. If the map has a position
-value, this value must agree with the status. The command holds the door open or releases it; no command
-drives it shut.
+The operator's status is one number. The map lists the numbers for open, closed, moving and faults. A
+number that the map does not list is a fault too, because the door's position is then unknown. If the
+map has a position value, this value must agree with the status. The command holds the door open or
+releases the door. No command drives the door shut.
 """
 
 from collections.abc import Iterator, Mapping
@@ -69,7 +69,7 @@ def door_map(settings: RegisterDoorSettings) -> DoorMap:
 
 
 def points(settings: RegisterDoorSettings) -> dict[str, Point]:
-    """Return part -> its place at this operator, for each part of the map."""
+    """Return the place at this operator of each part of the map."""
     return {
         part: at(settings.unit, text, settings.base_address)
         for part, text in door_map(settings).places().items()
@@ -77,8 +77,8 @@ def points(settings: RegisterDoorSettings) -> dict[str, Point]:
 
 
 def claims(settings: RegisterDoorSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of the command, which no other device may use. Yield nothing for an invalid
-    map."""
+    """Yield the place of the command with its path in the YAML. No other device may use this place.
+    Yield nothing for an invalid map."""
     if any(PROFILE.problems(settings.profile, settings.map)):
         return
     place_of_command = door_map(settings).command.at
@@ -128,7 +128,7 @@ def warnings(settings: RegisterDoorSettings) -> Remarks:
 
 
 def _command_in(settings: RegisterDoorSettings) -> tuple[str, ...]:
-    """Return the path of the command in the YAML; () if the profile defines the command."""
+    """Return the path of the command in the YAML. Return () if the profile defines the command."""
     if settings.map:
         return "map", "command"
     return ("changes", "command") if settings.changes and settings.changes.command else ()
@@ -186,7 +186,7 @@ def decode(found: DoorMap, words: Mapping[str, int]) -> DoorSample:
 
 
 def _lost(found: DoorMap, words: Mapping[str, int]) -> str:
-    """Return the reason why the position is unknown; "" if the position is known."""
+    """Return the reason why the position is unknown. Return "" if the position is known."""
     value, status = words["status"], found.status
     if value in status.faults:
         return f"status {value}: {status.faults[value]}"
@@ -214,7 +214,7 @@ def _address(text: str) -> int:
     try:
         return place(text)[1]
     except ValueError:
-        return 0  # the map's own check reports an invalid place
+        return 0  # the place is invalid, which the map's own check reports
 
 
 def _meanings(status: Status) -> list[tuple[int, str]]:

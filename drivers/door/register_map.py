@@ -1,5 +1,5 @@
-"""A door operator's register map, from a YAML or a profile. It gives places, and the meanings of
-numbers."""
+"""A door operator's register map, from a YAML or a profile. The map gives the places of values and the
+meanings of numbers."""
 
 from typing import Annotated
 
@@ -15,7 +15,7 @@ Percent = Annotated[int, msgspec.Meta(ge=0, le=100)]
 
 
 class Status(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The door's state as one number. An unlisted number counts as a fault."""
+    """The door's state as one number. A number that the map does not list counts as a fault."""
 
     open: Annotated[list[Word], msgspec.Meta(min_length=1), tells("numbers of a fully open door.")]
     closed: Annotated[list[Word], msgspec.Meta(min_length=1), tells("numbers of a closed door.")]
@@ -52,7 +52,7 @@ class DoorPosition(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = 5
 
     def problems(self) -> Remarks:
-        """Yield a problem for a place that is no register, for overlapping thresholds, and for an
+        """Yield a problem for a place that is not a register, for overlapping thresholds, and for an
         `unknown` within 0 to 100."""
         yield from super().problems()
         if self.unknown is not None and self.unknown <= 100:
@@ -62,7 +62,8 @@ class DoorPosition(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class OperatorFaults(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The faults that the operator reports. The daemon shows them, and no decision depends on them."""
+    """The faults that the operator reports. The daemon shows these faults. No decision depends on these
+    faults."""
 
     bits: Annotated[
         dict[Bit, Name],
@@ -88,7 +89,8 @@ class HoldCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_field
 
 
 class Parts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Parts that replace parts of the profile's map. Each given part replaces the whole part."""
+    """Parts that replace parts of the profile's map. Each part replaces the profile's part
+    completely."""
 
     status: Annotated[Status | None, tells("the door's state as one number.")] = None
     position: Annotated[DoorPosition | None, tells("the door's position.")] = None
@@ -107,11 +109,11 @@ class DoorMap(Parts, frozen=True, kw_only=True, forbid_unknown_fields=True):
     command: Annotated[HoldCommand, tells("the command that holds the door open.")]
 
     def changed(self, parts: Parts | None) -> "DoorMap":
-        """Return this map with `parts` in place of its own."""
+        """Return this map, with `parts` in place of the map's own parts."""
         given = {name: getattr(parts, name, None) for name in Parts.__struct_fields__}
         return msgspec.structs.replace(self, **{n: p for n, p in given.items() if p is not None})
 
     def places(self) -> dict[str, str]:
-        """Return part -> its place, for each part that the map gives."""
+        """Return the place of each part that the map gives."""
         parts = {name: getattr(self, name) for name in Parts.__struct_fields__}
         return {name: part.at for name, part in parts.items() if part is not None}

@@ -1,10 +1,10 @@
-"""Buses, each in its own file or folder. Only this code imports vendor libraries, and only when a bus
-needs them.
+"""Buses, each in its own file or folder. Only these files import vendor libraries, and only when a bus
+needs such a library.
 
-The file or folder is named after the bus `type:` of the YAML and holds a `BUS`. A Bus belongs to one
-thread. Every failure is a HalError, raised within the bus's I/O timeout. After a failure the bus backs
-off for 0.5 to 30 s, and calls during the backoff fail at once. So a dead device costs the other devices
-on its bus at most one timeout per backoff.
+The file or folder is named after the bus `type:` of the YAML and defines a `BUS`. A bus belongs to one
+thread. Every failure is a HalError, raised within the bus's I/O timeout. After a failure the bus pauses
+for 0.5 to 30 s (its backoff). Calls during the backoff fail at once. So a dead device costs the other
+devices on its bus at most one timeout per backoff.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -34,9 +34,9 @@ Settings = TypeVar("Settings", bound=msgspec.Struct)
 class Where(NamedTuple):
     """The place of a bus in the building. Two files with the same `Where` use the same hardware.
 
-    `text`: the place's name for a person. `local`: the place belongs to this machine, such as a serial
-    port. `clients`: the maximum number of daemons that can use the place at once; None if the make
-    decides.
+    `text` names the place for a person. `local` is True if the place belongs to this machine, as a
+    serial port does. `clients` tells whether one or many daemons can use the place at once. `clients`
+    is None if this depends on the make.
     """
 
     text: str
@@ -47,9 +47,12 @@ class Where(NamedTuple):
 class Needs(NamedTuple):
     """The permissions that a daemon needs from systemd for a bus (`bridges/runtime/drop_in.py`).
 
-    `devices`: paths, or classes whose devices may come and go (`char-ttyUSB`), as for DeviceAllow.
-    `modules`: the kernel modules of these classes. `group`: the group with access to the devices.
-    `family`: an address family in addition to IP. `host`: the host that the bus reaches over IP.
+    - `devices` lists paths, or classes whose devices may come and go (`char-ttyUSB`), as for
+      DeviceAllow.
+    - `modules` lists the kernel modules of these classes.
+    - `group` is the group with access to the devices.
+    - `family` is an address family that the bus needs in addition to IP.
+    - `host` is the host that the bus reaches over IP.
     """
 
     devices: tuple[str, ...] = ()
@@ -67,19 +70,22 @@ class UnwatchedOutputs(NamedTuple):
 
 
 class Bus:
-    """The base of every bus. Each type adds its own methods, such as `points.PointsBus` or HTTP calls.
+    """The base of every bus. Each type adds its own methods, such as those of `points.PointsBus` or
+    HTTP calls.
 
-    `calls`: the number of ended calls, successful or not. systemd's watchdog depends on this number.
+    `calls` counts the calls that have ended, with or without success. systemd's watchdog depends on
+    this number.
     """
 
     calls = 0
 
     def on_edge(self, wake: Callable[[], None]) -> None:
-        """Call `wake`, from any thread, when an input may have changed. A polled bus never calls
-        `wake`."""
+        """Let the bus call `wake`, from any thread, when an input may have changed. A polled bus never
+        calls `wake`."""
 
     def scanned(self) -> None:
-        """Report a finished scan. If the bus has a dead-man, it drops the outputs when scans stop."""
+        """Report a finished scan. A bus with a dead-man switches its outputs off when these reports
+        cease."""
 
     def insist(self) -> None:
         """Let the next call skip the backoff, because outputs are about to go off."""
@@ -95,33 +101,41 @@ class BusSettings(
 
 
 class BusType(msgspec.Struct, Generic[Settings], frozen=True):
-    """One type of bus: the `BUS` at the end of `drivers/hal/<type>`. It needs no vendor library.
+    """One type of bus. Each file or package `drivers/hal/<type>` defines one as `BUS`, without
+    importing a vendor library.
 
-    `settings`: the struct below the bus's name in the YAML. Its `scan_s` is the period of readings (s).
-    `open_bus(settings)`: makes the bus. The bus sends nothing before its first call. Raises HalError.
-    `open_to_switch_off(settings)`: makes a bus that loads faster, for a process that only switches
-    off. It is None if there is no such bus.
-    `where(settings)`: the bus's place in the building; None if two files never share such a bus.
-    `needs(settings)`: the permissions that the bus needs in addition to IP.
-    `warnings(settings)`: (path, text) of valid settings that may be a mistake.
-    `fake`: the name of the module that simulates the far side (`hal_fakes/fake.py`). Without a name
-    there is no simulation.
-    `fake_inside`: the fake must run inside the daemon's process, as a fake of pins must.
-    `unwatched(settings, places)`: remarks on outputs at `places` that keep their value when the
-    daemon's machine or the network dies. The daemon writes all of `places`.
-    `tables(settings)`: further facts for `check`, such as the values that are written to a watchdog.
-    `paced(settings, devices, points)`: remarks on settings that are too slow for these devices and
-    for the canonical points that they use.
+    - `settings` is the struct below the bus's name in the YAML. Its `scan_s` is the period of readings
+      (s).
+    - `open_bus(settings)` makes the bus. The bus sends nothing before its first call. Raises HalError.
+    - `open_to_switch_off(settings)` makes a bus that loads faster, for a process that only switches
+      outputs off. It is None if there is no such bus.
+    - `where(settings)` gives the bus's place in the building. It gives None if two files never share
+      such a bus.
+    - `needs(settings)` gives the permissions that the bus needs in addition to IP.
+    - `warnings(settings)` gives (path, text) for each valid setting that may be a mistake.
+    - `fake` names the module that simulates the far side (`hal_fakes/fake.py`). Without a name there is
+      no simulation.
+    - `fake_inside` is True if the fake must run inside the daemon's process, as simulated pins must.
+    - `unwatched(settings, places)` gives remarks about the outputs that keep their value when the
+      daemon's machine or the network dies. `places` are all places that the daemon writes.
+    - `tables(settings)` gives further facts for `check`, such as the values that the bus writes to a
+      watchdog.
+    - `paced(settings, devices, points)` gives remarks on settings that are too slow for these devices
+      and for the canonical points that the devices use.
 
     A bus with points also has these functions:
-    `canonical(point)`: the canonical spelling of a point. Its ValueError gives the right spelling.
-    `describe(point)`: every spelling of the point, for the electrician's table.
-    `wire_problems(wire)`: the errors of this wire on this bus.
-    `wire_warnings(wire)`: valid properties of the wire that may be a mistake.
-    `unreachable(settings, point)`: why a bus with these settings cannot reach this canonical point.
-    `unfit(settings, point, direction)`: why the point cannot be an input, or an output.
-    `place(settings, point)`: the hardware at this canonical point that no other file may use. It is
-    None if every file may use the point.
+
+    - `canonical(point)` gives the canonical spelling of a point. Its ValueError gives the right
+      spelling.
+    - `describe(point)` gives every spelling of the point, for the electrician's table.
+    - `wire_problems(wire)` gives the errors of this wire on this bus.
+    - `wire_warnings(wire)` gives valid properties of the wire that may be a mistake.
+    - `unreachable(settings, point)` gives the reason why a bus with these settings cannot reach this
+      canonical point.
+    - `unfit(settings, point, direction)` gives the reason why the point cannot be an input (`in`) or an
+      output (`out`).
+    - `place(settings, point)` gives the hardware at this canonical point that no other file may use. It
+      gives None if every file may use the point.
     """
 
     settings: type[Settings]

@@ -9,12 +9,12 @@ from drivers.hal.points import HalError
 BACKOFF_FIRST_S: Final = 0.5
 BACKOFF_MAX_S: Final = 30.0
 JITTER: Final = 0.2
-"""The maximum random cut of a pause, as a fraction. The cut keeps many daemons from calling at the same
-moment."""
+"""The longest random cut of a pause, as a fraction of the pause. The cut keeps many daemons from
+calling at the same moment."""
 
 
 class Backoff:
-    """Pauses after failures. `jitter()` returns a number between 0 and 1."""
+    """The pauses after failures. `jitter()` returns a random number between 0 and 1."""
 
     def __init__(self, clock: Callable[[], float], jitter: Callable[[], float]) -> None:
         self._clock = clock
@@ -42,20 +42,21 @@ class Backoff:
         return self.failing and not self._insisted
 
     def check(self, not_yet: bool = False) -> None:
-        """Raise HalError with the last failure's text if the pause still runs, or if `not_yet`."""
+        """Raise HalError with the last failure's text while the pause runs. `not_yet` raises HalError
+        even without a pause."""
         if self._clock() < self._retry_at or not_yet:
             raise HalError(self._failure)
 
     def failed(self, text: str) -> HalError:
-        """Begin a pause that is twice as long as the last. Return the HalError that the caller
-        raises."""
+        """Begin a pause that is twice as long as the last pause. Return the HalError for the caller to
+        raise."""
         self._failure = text
         self._pause_s = min(max(2 * self._pause_s, BACKOFF_FIRST_S), BACKOFF_MAX_S)
         self._retry_at = self._clock() + self._pause_s * (1 - JITTER * self._jitter())
         return HalError(text)
 
     def mended(self) -> None:
-        """Record a success. It ends the pause, and makes the next pause the shortest."""
+        """Record a success. The success ends the pause, and makes the next pause the shortest."""
         self._pause_s, self._retry_at, self._insisted = 0.0, -math.inf, False
         self.proven = True
 

@@ -1,10 +1,10 @@
-"""CAN: one bus, on an interface of the kernel (SocketCAN) or an slcan adapter, through python-can.
+"""CAN through python-can: one bus, on an interface of the kernel (SocketCAN) or on an slcan adapter.
 
     settings.py    the settings in a YAML
     frames.py      frames, their ids and their names
     bus.py         receives and distributes frames, pauses, and tracks the bus's troubles
     link.py        opens, reads and sends through python-can
-    broadcasts.py  one device that broadcasts its frames and needs periodic frames from us
+    broadcasts.py  one device that broadcasts its frames and needs periodic frames from the driver
     canopen.py     one CANopen node
     sdo.py         the SDO client of the canopen library
 
