@@ -1,8 +1,8 @@
 """TCP connections with one deadline for a whole call, even if the far side misbehaves.
 
-A timeout of requests or of a socket covers only a single wait. A server that sends one byte now and
-then would keep the caller waiting for ever. Here every wait of a call (the name lookup, the connection,
-each send and each receive) gets only the call's remaining time.
+A timeout of requests or of a socket covers only a single wait. A server that sends a byte from time to
+time would keep the caller waiting for ever. In this file every wait of a call gets only the call's
+remaining time. The waits are the name lookup, the connection, each send and each receive.
 """
 
 import ipaddress
@@ -25,7 +25,7 @@ Address = tuple[socket.AddressFamily, socket.SocketKind, int, str, SocketAddress
 
 
 class Resolve(Protocol):
-    """The name lookup: socket.getaddrinfo, or a test's replacement."""
+    """The name lookup. Tests replace `socket.getaddrinfo`."""
 
     def __call__(self, host: str, port: int, *, type: int) -> Sequence[Address]:
         """Return the addresses of this name. Raises OSError."""
@@ -49,7 +49,7 @@ class Deadline:
         return left_s
 
     def passed(self) -> bool:
-        """Is the time up?"""
+        """Has the deadline passed?"""
         return time.monotonic() >= self.at
 
 
@@ -64,7 +64,8 @@ class DeadlineSocket(socket.socket):
         return super().recv_into(buffer, nbytes, flags)
 
     def sendall(self, data: "ReadableBuffer", flags: int = 0) -> None:
-        """Send within the deadline. The timeout of socket.sendall already covers the whole send."""
+        """Send within the deadline. One timeout suffices, because the timeout of socket.sendall covers
+        the whole send."""
         self.settimeout(self.deadline.left())
         super().sendall(data, flags)
 
@@ -72,7 +73,7 @@ class DeadlineSocket(socket.socket):
 def tls_socket(deadline: Deadline) -> "type[ssl.SSLSocket]":
     """Make a class of TLS sockets whose waits all end by the deadline.
 
-    A TLS socket takes only the timeout from the plain socket inside. So the TLS socket checks the
+    A TLS socket takes only the timeout from the plain socket inside it. So this class checks the
     deadline itself.
     """
     import ssl
@@ -92,10 +93,10 @@ def tls_socket(deadline: Deadline) -> "type[ssl.SSLSocket]":
 
 
 class Dialler:
-    """The maker of all connections to one host. `dialled`: the number of connections so far. `failure`:
+    """The maker of all connections to one host. `dialled` counts the connections so far. `failure` is
     the last error.
 
-    `resolve`: socket.getaddrinfo, or a test's replacement.
+    Tests replace `resolve`, which is socket.getaddrinfo.
     """
 
     def __init__(self, host: str, port: int, resolve: Resolve = socket.getaddrinfo) -> None:
@@ -119,7 +120,7 @@ class Dialler:
             raise
 
     def hang_up(self) -> None:
-        """End the last connection, even if a file object of the connection is still open."""
+        """Close the last connection, even if a file object of the connection is still open."""
         last, self._last = self._last, None
         descriptor = -1 if last is None else last.detach()
         if descriptor != -1:
@@ -149,7 +150,8 @@ class Dialler:
         return sock
 
     def _addresses(self) -> Sequence[Address]:
-        """Look up the host's addresses, in a thread, because getaddrinfo has no timeout."""
+        """Look up the host's addresses. The lookup runs in a thread, because getaddrinfo has no
+        timeout."""
         if _is_numeric(self._host):
             return socket.getaddrinfo(self._host, self._port, type=socket.SOCK_STREAM)
         if self._lookup is not None and self._lookup.is_alive():

@@ -1,4 +1,4 @@
-"""Tries several steps. If a step fails, the next steps are tried all the same."""
+"""Runs several steps. If a step fails, the later steps still run."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,15 +7,15 @@ from drivers.hal.points import HalError
 
 
 class Every:
-    """Steps that are all tried. Put `with every.one():` around each step, then call `check`. `failure`:
-    the first HalError."""
+    """Steps that all run, even after a failure. Put `with every.one():` around each step, then call
+    `check`. `failure` is the first HalError."""
 
     def __init__(self) -> None:
         self.failure: HalError | None = None
 
     @contextmanager
     def one(self) -> Iterator[None]:
-        """Run one step. Keep its HalError for `check`."""
+        """Run one step. If the step raises a HalError, keep the error for `check`."""
         try:
             yield
         except HalError as error:

@@ -1,12 +1,12 @@
-"""Checks the text of a host's name or address, for Modbus TCP, HTTP and MQTT."""
+"""Checks of a host's name or address, for Modbus TCP, HTTP and MQTT."""
 
 import ipaddress
 import re
 
 
 def misspelt_address(host: str) -> str:
-    """Return the error of a text of dotted numbers that is no IPv4 address. Return "" for an address or
-    a name."""
+    """Return an error for dotted numbers that are not an IPv4 address. Return "" for an address or a
+    name."""
     if not re.fullmatch(r"[0-9]+(\.[0-9]+)+", host):
         return ""
     try:
@@ -25,7 +25,7 @@ def is_loopback(host: str) -> bool:
 
 
 def misspelt_host(host: str) -> str:
-    """Return the error of a text that is neither an address nor a host's name. Return "" for a valid
+    """Return an error for a text that is neither an address nor a host's name. Return "" for a valid
     text."""
     if re.fullmatch(r"[^:]*:[0-9]+", host):
         name, _, port = host.partition(":")

@@ -1,11 +1,11 @@
-"""HTTP: one controller that answers requests, through the library requests. An https address uses TLS.
+"""One controller that answers HTTP requests, through the library requests. An https address uses TLS.
 
 Every call has one deadline from the lookup of the name to the last byte of the body
 (`drivers/hal/deadline.py`). The body has a maximum size. Proxies, redirects and compression are off.
 
-Each call has a connection of its own, because replies in HTTP/1.1 have no numbers. On a kept
-connection, a late or second reply would pass for the reply to the next request. A call is sent only
-once.
+Each call has a connection of its own, because replies in HTTP/1.1 have no numbers. If a connection
+served several calls, a late or second reply could pass for the reply to the next request. A call is
+sent only once.
 """
 
 import os
@@ -49,7 +49,8 @@ _HINTS = {
 
 
 class HttpBus(Bus):
-    """Calls to one controller. Every failure is a HalError that says what to check.
+    """Calls to one controller. Every failure is a HalError, whose text tells the reader which parts to
+    check.
 
     Tests replace `clock` and `resolve`.
     """
@@ -69,8 +70,7 @@ class HttpBus(Bus):
         self._pushes: Pushes | None = None
 
     def on_edge(self, wake: Callable[[], None]) -> None:
-        """Call `wake` at each message of the controller's WebSocket, if the controller has a
-        WebSocket."""
+        """If the controller has a WebSocket, call `wake` at each of its messages."""
         if self._settings.push_path and self._pushes is None:
             from drivers.hal.http_push import Pushes
 
@@ -87,7 +87,7 @@ class HttpBus(Bus):
         """Read `api_base` + `path`, and return the JSON object of the answer. The answer must have
         status 200.
 
-        `method`, `body`: for a controller whose readings are other requests than GET.
+        `method` and `body` are for a controller that is not read by GET.
         """
         url = self._base.url(path)
         with self._attempt(self._backoff):
@@ -98,15 +98,16 @@ class HttpBus(Bus):
     ) -> None:
         """Send a command, with a JSON `body` if given. Any status 2xx is success.
 
-        The command is sent at most once, even when the answer is lost. `safe`: the command switches an
-        output off, so it does not wait for the backoff of a failed reading.
+        The command is sent at most once, even when the answer is lost. `safe` means that the command
+        switches an output off. So the command does not wait for the backoff of a failed reading.
         """
         url = self._base.url(path)
         with self._attempt(self._safe_backoff if safe else self._backoff):
             self._call(method, url, body)
 
     def ask(self, path: str, method: Method = "POST", body: str | None = None) -> dict[str, object]:
-        """Send a command as `send` does; return the JSON object of its answer, of status 200."""
+        """Send a command as `send` does. Return the JSON object of its answer, which must have status
+        200."""
         url = self._base.url(path)
         with self._attempt(self._backoff):
             return json_object(url, *self._call(method, url, body, reads=True))
@@ -123,8 +124,8 @@ class HttpBus(Bus):
 
     @contextmanager
     def _attempt(self, backoff: Backoff) -> Iterator[None]:
-        """Guard one attempt. During the backoff after a failure, fail at once with the failure's
-        text."""
+        """Run one attempt. During the backoff after a failure, raise the failure's text again
+        instead."""
         backoff.check()
         self._dialler.deadline.start(self._settings.timeout_s)
         try:
@@ -141,7 +142,8 @@ class HttpBus(Bus):
     def _call(
         self, method: str, url: str, sent: str | None = None, reads: bool = False
     ) -> tuple[str, bytes]:
-        """Return (content type, body) of a good answer. The body of a command's answer is not read."""
+        """Return (content type, body) of a good answer. For a command, do not read the answer's
+        body."""
         import requests
 
         self._dialler.failure = None
@@ -162,7 +164,7 @@ class HttpBus(Bus):
                 body = _capped(answer.raw)
         except HalError:
             raise
-        except Exception as error:  # a server's bytes can make the libraries raise anything
+        except Exception as error:  # a server's bytes can make the libraries raise any exception
             raise self._explained(url, error) from error
         if len(body) > BODY_MAX:
             raise HalError(
@@ -211,8 +213,9 @@ class HttpBus(Bus):
 def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":
     """Make requests' HTTP adapter, on the dialler's connections.
 
-    There is no Session, for three reasons. A Session reads the whole body of a redirect that it must
-    not follow. It keeps cookies. It takes proxies and passwords from the environment.
+    This file uses no Session, for three reasons. A Session reads the whole body of a redirect, even
+    when it must not follow the redirect. A Session keeps cookies. A Session takes proxies and passwords
+    from the environment.
     """
     from requests.adapters import HTTPAdapter
     from urllib3 import HTTPConnectionPool, HTTPSConnectionPool
@@ -240,14 +243,14 @@ def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":
     if scheme == "https":
         context = (
             create_urllib3_context()
-        )  # this context trusts no authority; each call's `verify` adds some
+        )  # this context trusts no authority yet; each call's `verify` adds authorities
         context.sslsocket_class = tls_socket(dialler.deadline)
         adapter.poolmanager.connection_pool_kw["ssl_context"] = context
     return adapter
 
 
 def _tls_failure(error: BaseException | None, ca_file: str | None) -> str:
-    """Return the cause of a TLS failure; "" if TLS did not fail."""
+    """Return the cause of a TLS failure. Return "" if TLS did not fail."""
     import ssl
 
     if ca_file and not os.path.isfile(ca_file):
@@ -265,7 +268,8 @@ def _check_status(url: str, reads: bool, status: int) -> None:
 
 
 def _capped(raw: "BaseHTTPResponse") -> bytes:
-    """Read the whole body, or one byte beyond the limit. A body that was cut shows only at its end."""
+    """Read the whole body, up to one byte beyond the limit. Only the end of a body shows that the body
+    was cut."""
     body = b""
     while len(body) <= BODY_MAX and (
         more := raw.read(BODY_MAX + 1 - len(body), decode_content=False)

@@ -28,7 +28,8 @@ _BASE: Final = re.compile(
 
 
 class Base(NamedTuple):
-    """An `api_base` in parts. A `path` that is not "" begins with a slash and does not end with one."""
+    """An `api_base`, split into its parts. `path` is "", or begins with a slash and does not end with a
+    slash."""
 
     host: str
     port: int

@@ -1,8 +1,8 @@
 """A user and password for HTTP: basic (RFC 7617) or digest (RFC 7616), through the library requests.
 
 A digest login takes two requests. The controller refuses the first request with a challenge, and does
-nothing. Later requests carry the challenge's nonce from the start, until the controller refuses the
-nonce.
+nothing else. The later requests contain the challenge's nonce from the start, until the controller
+refuses this nonce.
 """
 
 import base64
@@ -50,7 +50,7 @@ class Signer:
         self._digest = HTTPDigestAuth(login.user, "")
 
     def sign(self, request: "PreparedRequest") -> None:
-        """Sign the request. A digest needs a challenge first, so before the first challenge it stays
+        """Sign the request. A digest needs a challenge, so a request before the first challenge stays
         unsigned. Raises HalError."""
         if self._login.method == "basic":
             request.headers.update(self.basic())
@@ -70,8 +70,8 @@ class Signer:
         return digest and answer.status_code == 401
 
     def answered(self, answer: "Response", verify: bool | str) -> "Response":
-        """Sign the challenged request, send it again, and return its answer. If this answer is a second
-        challenge, it counts as a refusal. The body of the challenge is not read."""
+        """Sign the challenged request, send it again, and return its answer. A second challenge counts
+        as a refusal. Do not read the body of the challenge."""
         answer.raw.close()
         signed: Response = self._digest.handle_401(  # type: ignore[no-untyped-call]
             answer, stream=True, verify=verify

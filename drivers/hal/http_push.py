@@ -1,9 +1,9 @@
-"""A controller's WebSocket, through the library websockets. At each message the controller is read at
-once.
+"""A controller's WebSocket, through the library websockets. Each message causes a reading of the
+controller at once.
 
 The content of a message is not used. A message has no age, and many makes push only the part that has
-changed. So a WebSocket that is silent, late, garbled or gone makes no reading wrong. In this case the
-controller is read only every `scan_s`, and once more after each new connection.
+changed. So a WebSocket that is silent, late, garbled or gone makes no reading wrong. Without messages
+the daemon reads the controller every `scan_s`, and once after each new connection.
 """
 
 import logging
@@ -17,7 +17,7 @@ from drivers.hal.backoff import BACKOFF_FIRST_S, BACKOFF_MAX_S
 from drivers.hal.http_json import excerpt
 
 AT_MOST_EVERY_S: Final = 0.1
-"""The least time (s) between two readings that messages cause."""
+"""The shortest time (s) between two readings that messages cause."""
 MESSAGE_MAX: Final = 64 * 1024
 OPEN_S: Final = 3.0
 CLOSE_S: Final = 0.2
@@ -29,11 +29,11 @@ log = logging.getLogger(__name__)
 
 
 class Pushes:
-    """Listens to a WebSocket in a thread of its own, until `close`.
+    """A thread that listens to a WebSocket until `close`.
 
-    `headers` returns the headers of the handshake, anew for each connection. The thread calls `wake`
-    after each connection and for messages. A connection without a message counts as failed, because a
-    server may accept each connection and close it at once.
+    The thread calls `headers` for each connection, to get the headers of the handshake. The thread
+    calls `wake` after each connection and for messages. A connection without a message counts as
+    failed, because a server may accept each connection and close it at once.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""The section of an `http` bus in a YAML: the controller's address, its secrets, its pace."""
+"""The section of an `http` bus in a YAML: the controller's address, the secrets, and the times."""
 
 from typing import Annotated, Literal
 
@@ -88,8 +88,8 @@ class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 def _readable_secret(settings: HttpSettings) -> Literal["login", "token_file", ""]:
-    """Return the setting whose secret leaves this machine unencrypted; "" if every secret is encrypted
-    or there is none."""
+    """Return the setting whose secret would leave this machine unencrypted. Return "" if every secret
+    is encrypted or the settings have no secret."""
     basic = settings.login is not None and settings.login.method == "basic"
     if not basic and not settings.token_file:
         return ""
@@ -114,10 +114,10 @@ def warnings(settings: HttpSettings) -> Remarks:
 
 
 def needs(settings: HttpSettings) -> Needs:
-    """Return the controller's address."""
+    """Return the controller's address as the need."""
     return Needs(host=base(settings.api_base).host)
 
 
 def where(settings: HttpSettings) -> Where:
-    """Return the controller's address."""
+    """Return the controller's address as the place."""
     return Where(base(settings.api_base).url(""), local=False)

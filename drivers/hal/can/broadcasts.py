@@ -1,7 +1,7 @@
 """A device that broadcasts its frames, and works only while it receives periodic frames.
 
-A broadcast is valid while it is fresh. A scan sends the periodic frames, and no cyclic sender does. So
-the frames cease when the daemon hangs.
+A received frame is valid only for a certain time. The scan loop itself sends the periodic frames. There
+is no cyclic sender beside the loop. So the frames cease when the daemon hangs.
 """
 
 from collections.abc import Callable, Collection, Mapping
@@ -15,9 +15,11 @@ NEVER = float("-inf")
 
 
 class Said(NamedTuple):
-    """A frame that the device sends. `mask`: the bits of its id that are compared. `length`: its bytes.
+    """A frame that the device sends. `mask` selects the bits of the id to compare. `length` is the
+    payload's length in bytes.
 
-    `fresh_s`: how long the frame is valid (s). `needed`: a reading fails without this frame.
+    `fresh_s` is the time (s) for which a received frame is valid. If `needed` is true, a reading fails
+    without this frame.
     """
 
     id: int
@@ -28,15 +30,16 @@ class Said(NamedTuple):
 
 
 Values = Mapping[str, float]
-"""Frame.Signal -> the signal's value."""
+"""The value of each signal. A key is the frame's name and the signal's name, as in `Frame.Signal`."""
 
 
 class Sequel(NamedTuple):
-    """Frames that explain another frame, such as an error, and may come after the explained frame.
+    """A frame that needs an explanation, such as a frame with an error state, and the frames that
+    explain it.
 
-    `first`: the name of the explained frame. `others`: the names of the explaining frames.
-    `begins(values)` returns whether `first` needs an explanation. `is_told(values)` returns whether the
-    explanation has come.
+    `first` is the name of the frame that needs the explanation. `others` are the names of the
+    explaining frames, which may come later. `begins(values)` returns whether `first` needs an
+    explanation now. `is_told(values)` returns whether the explanation has come.
     """
 
     first: str
@@ -46,7 +49,8 @@ class Sequel(NamedTuple):
 
 
 class Broadcasts:
-    """The frames of one device by their names. `decode(frame, payload)` returns signal -> value."""
+    """The frames of one device, by their names. `decode(frame, payload)` returns the value of each
+    signal."""
 
     def __init__(
         self,
@@ -70,11 +74,11 @@ class Broadcasts:
             )
 
     def read(self) -> dict[str, float]:
-        """Return Frame.Signal -> value, from all fresh frames. Raises HalError, and the errors of
+        """Return the value of each signal in all fresh frames. Raises HalError, and the errors of
         `decode`.
 
-        The call waits for a needed frame that is missing. When the sequel's first frame begins to need
-        an explanation, the call waits once for the explaining frames.
+        If a needed frame is missing, the call waits for this frame. When the sequel's first frame
+        begins to need an explanation, the call waits once for the explaining frames.
         """
         self._bus.take()
         if self._missing():
@@ -108,7 +112,7 @@ class Broadcasts:
             )
 
     def feed(self, frame_id: int, every_s: float, payload: Callable[[], bytes]) -> bool:
-        """Send a frame if the frame is due in this scan; return whether it was sent. Raises
+        """Send a frame if the frame is due in this scan. Return whether the frame was sent. Raises
         HalError."""
         now, slack_s = self._bus.now(), self._bus.settings.scan_s / 2
         if now < self._sent_at.get(frame_id, NEVER) + every_s - slack_s:
@@ -146,7 +150,7 @@ class Broadcasts:
         }
 
     def _missing(self) -> str:
-        """Return the first needed frame that is not fresh; "" if there is none."""
+        """Return the first needed frame that is not fresh. Return "" if all needed frames are fresh."""
         needed = (name for name, said in self._frames.items() if said.needed)
         return next((name for name in needed if not self._is_fresh(name)), "")
 

@@ -1,9 +1,10 @@
-"""CAN: one bus, on an interface of the kernel (SocketCAN) or an slcan adapter, through python-can.
+"""One CAN bus through python-can. The bus is on an interface of the kernel (SocketCAN) or on an slcan
+adapter.
 
 Everything runs in the loop's thread. A reading takes all frames that came after the last reading. It
-gives each frame to the devices that want the frame. The bus remembers ids that no device wants for a
-while, because errors about missing frames name these ids. Only a scan sends frames; no cyclic sender of
-the kernel or the library does. So a daemon that hangs falls silent.
+gives each frame to the devices that want the frame. The bus remembers for some seconds the ids that no
+device wants, because errors about missing frames name these ids. Only a scan sends frames. No cyclic
+sender of the kernel or of the library sends frames. So a daemon that hangs falls silent.
 
 If the interface is down, gone or bus-off, the bus closes it and opens it again after a backoff of 0.5
 to 30 s. Calls during the backoff fail at once. A bus-off ends with the next frame, or when the
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 FRAMES_AT_ONCE: Final = 20_000
 """The maximum number of frames in a reading. A bus at 1 Mbit/s has about 8,000 frames a second."""
 HANG_S: Final = 1.0
-"""The delay (s) of a reading that shows that the daemon has hung."""
+"""The delay (s) between readings that proves that the daemon has hung. The period of scans is added."""
 ROUTES_MAX: Final = 4096
 RECENT_S: Final = 5.0
 OTHERS_MAX: Final = 64
@@ -59,7 +60,8 @@ class CanBus(Bus):
         self._deaf = False
 
     def backoff(self) -> Backoff:
-        """Return a new backoff for one device. `insist` ends the pauses of this backoff too."""
+        """Return a new backoff for one device. A call of `insist` also ends the pauses of this
+        backoff."""
         made = Backoff(self.now, self._jitter)
         self._backoffs.append(made)
         return made
@@ -84,8 +86,8 @@ class CanBus(Bus):
             self._deaf, self._taken_at = False, self.now()
 
     def wait(self, heard: Callable[[], bool], within_s: float) -> bool:
-        """Take frames until `heard()` is true, or for `within_s` seconds. Return whether it became
-        true. Raises HalError."""
+        """Take frames until `heard()` is true, or for at most `within_s` seconds. Return whether
+        `heard()` became true. Raises HalError."""
         deadline = self.now() + within_s
         while not heard():
             left_s = deadline - self.now()
@@ -99,7 +101,7 @@ class CanBus(Bus):
         return True
 
     def send(self, frame: Frame) -> None:
-        """Send a frame. Raises HalError; after an error the frame may have been sent or not."""
+        """Send a frame. Raises HalError. After an error nobody knows whether the frame was sent."""
         self._open()
         try:
             self._link.send(frame)
@@ -107,8 +109,8 @@ class CanBus(Bus):
             raise self._failed(str(error)) from error
 
     def silence(self) -> str:
-        """Describe a likely cause of a device's silence: trouble on the bus, or other ids than
-        expected."""
+        """Describe a likely cause of a device's silence, such as trouble on the bus, or ids that no
+        device wants."""
         if self._trouble.text and (
             self._trouble.bus_off or self.now() - self._trouble_at < RECENT_S
         ):
@@ -120,7 +122,7 @@ class CanBus(Bus):
         return f"the bus works, and other ids are heard: {shown}{' …' if others[OTHERS_SHOWN:] else ''}"
 
     def others(self) -> list[int]:
-        """Return the ids heard in the last RECENT_S seconds that no device wants."""
+        """Return the ids that no device wants and that were heard in the last RECENT_S seconds."""
         now = self.now()
         return sorted(found for found, at in self._others.items() if now - at < RECENT_S)
 
@@ -141,7 +143,7 @@ class CanBus(Bus):
             raise self._failed(str(error)) from error
 
     def _step(self, wait_s: float) -> bool:
-        """Take one frame. Return False when no frame came."""
+        """Take one frame or trouble. Return False if nothing came."""
         self._open()
         try:
             found = self._link.receive(wait_s)
@@ -174,7 +176,7 @@ class CanBus(Bus):
         return made
 
     def _note(self, trouble: Trouble) -> None:
-        """Record the controller's report that a trouble began or ended."""
+        """Record the controller's report that a trouble of the bus has begun or ended."""
         self._trouble, self._trouble_at = trouble, self.now()
         if trouble.bus_off:
             raise self._failed(

@@ -1,4 +1,5 @@
-"""One CANopen node: its heartbeat, and its objects by SDO (CiA 301), through the `canopen` library.
+"""One CANopen node, through the `canopen` library (CiA 301). The node has a heartbeat, and objects that
+are read and written by SDO.
 
 The library encodes and decodes. This file sends, waits and backs off, in the loop's thread. The library
 alone would accept any frame with the reply's id, even a late reply. This file has stricter rules:
@@ -36,13 +37,13 @@ OPERATIONAL: Final = 5
 
 
 class Aborted(HalError):
-    """The error of a transfer that the node refused. The node is present, but the transfer is wrong."""
+    """The error of a transfer that the node refused. The node is present, but refuses this transfer."""
 
 
 class CanOpenNode:
     """One node of a bus. `heartbeat_timeout_s` is None for a node without a heartbeat.
 
-    `starts`: the number of restarts that the node has reported.
+    `starts` is the number of restarts that the node has reported.
     """
 
     def __init__(self, bus: CanBus, node: int, heartbeat_timeout_s: float | None) -> None:
@@ -66,7 +67,7 @@ class CanOpenNode:
         bus.listen([FrameFilter(SDO_FROM_NODE + node)], self._hear_reply)
 
     def alive(self) -> None:
-        """Take new frames. Raises HalError if the heartbeat is missing, or the node is not
+        """Take new frames. Raises HalError if the heartbeat is missing, or if the node is not
         operational."""
         self._bus.take()
         if self._beat_limit_s is None:
@@ -97,9 +98,11 @@ class CanOpenNode:
     def write(
         self, index: int, subindex: int, octets: int, number: int, safe: bool = False
     ) -> None:
-        """Set an unsigned number. Raises HalError; after an error the number may be set or not.
+        """Set an unsigned number. Raises HalError. After an error nobody knows whether the number is
+        set.
 
-        `safe`: the write switches power off, so it ignores the backoff of failed readings.
+        `safe` means that the write switches power off. So the write ignores the backoff of failed
+        readings.
         """
         what = f"write 0x{index:04X}:{subindex:02X}"
         payload = number.to_bytes(octets, "little")
@@ -124,7 +127,7 @@ class CanOpenNode:
 
     def exchange(self, request: bytes) -> bytes:
         """Send eight bytes. Return the reply about the same object. Raises TimeoutError or HalError."""
-        self._bus.take()  # this drops a late reply to the last request
+        self._bus.take()  # drops a late reply to the last request
         self._answer, self._stray, self._asked = None, "", request[1:4]
         try:
             self.post(request)

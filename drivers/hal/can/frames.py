@@ -4,18 +4,18 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 EXTENDED: Final = 1 << 31
-"""The mark of an id of 29 bits. It keeps 0x123 and an extended 0x123 apart."""
+"""The mark of an id of 29 bits. The mark distinguishes an extended 0x123 from a standard 0x123."""
 
 
 class Frame(NamedTuple):
-    """One data frame. `id` has EXTENDED set if it has 29 bits."""
+    """One data frame. If the `id` has 29 bits, EXTENDED is set."""
 
     id: int
     payload: bytes
 
 
 class Trouble(NamedTuple):
-    """A trouble of the bus itself, reported by an error frame. `text` is "" when the trouble has
+    """A trouble of the bus itself, which an error frame reports. `text` is "" when the trouble has
     ended."""
 
     text: str
@@ -23,7 +23,8 @@ class Trouble(NamedTuple):
 
 
 class LinkDown(Exception):
-    """The error of an interface that cannot be used now. Its text says what to check."""
+    """The error of an interface that cannot be used now. The error's text tells the reader which parts
+    to check."""
 
 
 class FrameFilter(NamedTuple):

@@ -1,15 +1,16 @@
-"""One CAN bus through python-can: an interface of the kernel (SocketCAN), or an slcan adapter.
+"""One CAN bus through python-can. The bus is on an interface of the kernel (SocketCAN), or on an slcan
+adapter.
 
-python-can opens, reads and sends. This file adds what python-can lacks:
+python-can opens, reads and sends. This file corrects the following behaviour of python-can:
 
-- python-can's `recv` waits by the wall clock. If the clock is set back by an hour, `recv` waits an hour
-  longer on a silent bus. So this file waits, and `recv` only reads received data.
-- An slcan adapter may return no frame although more data follows: the adapter may have sent an
-  acknowledgement. So this file reads on.
+- python-can's `recv` waits by the wall clock. If somebody sets the clock back by an hour, `recv` waits
+  an hour longer on a silent bus. So this file waits, and `recv` only reads received data.
+- python-can may return no frame although an slcan adapter has sent more data. This happens when the
+  adapter sends an acknowledgement first. So this file reads on.
 - Bytes that are not slcan break python-can's parser permanently. So this file opens the adapter again.
-- python-can's slcan write waits for the adapter without limit. Here the write has `timeout_s`.
-- An interface that is down or gone raises many types of exceptions. Here each exception becomes a
-  LinkDown, whose text has a remedy.
+- python-can's slcan write waits for the adapter without limit. In this file the write has `timeout_s`.
+- An interface that is down or gone raises many types of exceptions. This file turns each exception into
+  a LinkDown, whose text has a remedy.
 - SocketCAN reports the bus's own troubles as error frames (linux/can/error.h). This file decodes them.
 """
 
@@ -30,12 +31,13 @@ from can.interfaces.slcan import slcanBus
 from drivers.hal.can.frames import EXTENDED, Frame, LinkDown, Trouble
 from drivers.hal.can.settings import Slcan
 
-logging.getLogger("can").setLevel(logging.CRITICAL)  # our texts report the same failures
+logging.getLogger("can").setLevel(logging.CRITICAL)  # this file's errors report the same failures
 
 FAILURES: Final = (can.CanError, serial.SerialException, OSError, ValueError, IndexError)
 """The errors of python-can and its libraries. python-can's parser raises ValueError and IndexError."""
 IN_ONE_GO: Final = 4096
-"""The maximum number of lines that one call reads from an adapter without finding a frame."""
+"""The maximum number of lines that one call reads from an adapter before it gives up finding a
+frame."""
 
 BUS_OFF: Final = 0x40
 RESTARTED: Final = 0x100
@@ -56,7 +58,7 @@ Vendor = Callable[[], BusABC]
 
 
 def socketcan(interface: str) -> BusABC:
-    """Open an interface of the kernel. `ip link` has set its bitrate."""
+    """Open an interface of the kernel. The bitrate is that of `ip link`."""
     from can.interfaces.socketcan import SocketcanBus
 
     return SocketcanBus(channel=interface)
@@ -74,7 +76,7 @@ def slcan(settings: Slcan) -> BusABC:
 
 
 class SlcanAdapter(slcanBus):
-    """python-can's adapter, with two changes: the port is exclusive, and writes have a time limit."""
+    """python-can's adapter with two changes. The port is exclusive, and writes have a time limit."""
 
     def _write(self, string: str) -> None:
         with error_check("Could not write to serial device"):
@@ -88,7 +90,7 @@ class SlcanAdapter(slcanBus):
 
 
 class Link:
-    """One bus, which is opened again when needed. `where` is its name in errors."""
+    """One bus. The link opens the bus again when needed. `where` is the bus's name in errors."""
 
     def __init__(self, vendor: Vendor, where: str, timeout_s: float) -> None:
         self._vendor = vendor
@@ -138,7 +140,7 @@ class Link:
             raise LinkDown(self._explained(error)) from error
 
     def close(self) -> None:
-        """Close the interface, in any state. The caller may call `close` twice."""
+        """Close the interface, whatever its state. The caller may call `close` twice."""
         bus, self._bus = self._bus, None
         if bus is None:
             return
@@ -171,8 +173,8 @@ _HINTS: Final = {
 
 
 def _selecting(bus: BusABC) -> Callable[[float], bool] | None:
-    """Return a function that waits for input. Return None for a bus inside this process, which has no
-    file."""
+    """Return a function that waits for input. Return None for a bus inside this process, because such a
+    bus has no file to wait for."""
     try:
         descriptor = bus.fileno()
     except NotImplementedError:
@@ -181,7 +183,7 @@ def _selecting(bus: BusABC) -> Callable[[float], bool] | None:
 
 
 def _meaning(message: Message) -> Frame | Trouble | None:
-    """Convert a data frame, or a trouble that the controller reports. Return None for remote and FD
+    """Return the data frame, or the trouble that the controller reports. Return None for remote and FD
     frames."""
     if message.is_error_frame:
         found = message.arbitration_id

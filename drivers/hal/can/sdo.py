@@ -1,5 +1,5 @@
-"""The canopen library's SDO client, which sends through `canopen.py`. The first node imports this
-file."""
+"""The canopen library's SDO client, which sends through `canopen.py`. Python imports this file when the
+first node is made."""
 
 import logging
 import struct
@@ -15,8 +15,8 @@ logging.getLogger("canopen").setLevel(logging.CRITICAL)  # our HalErrors report 
 
 
 class Client(SdoClient):
-    """SDO client. `exchange` sends eight bytes and returns the reply's eight. `post` sends without a
-    reply.
+    """An SDO client. `exchange` sends eight bytes and returns the eight bytes of the reply. `post`
+    sends eight bytes that have no reply.
 
     Raises ABORTED if the node refuses, and FAILURES for an invalid reply.
     """

@@ -1,4 +1,4 @@
-"""`type: can` of a device YAML: the bus and its times."""
+"""The settings of a CAN bus in a device YAML (`type: can`)."""
 
 from typing import Annotated, Final
 
@@ -85,20 +85,20 @@ def warnings(settings: CanSettings) -> Remarks:
 
 
 def where(settings: CanSettings) -> Where:
-    """Return the place of the bus. Programs can share a kernel's interface, but not an adapter's
-    port."""
+    """Return the place of the bus. Several programs can use a kernel's interface, but only one can use
+    an adapter's port."""
     if settings.slcan:
         return Where(settings.slcan.port, local=True, clients="one")
     return Where(str(settings.socketcan), local=True)
 
 
 def needs(settings: CanSettings) -> Needs:
-    """Return the needs: CAN sockets for an interface, or the port of an adapter."""
+    """Return the needed permissions. An interface needs CAN sockets. An adapter needs its port."""
     return serial_port.needs(settings.slcan.port) if settings.slcan else Needs(family="AF_CAN")
 
 
 def describe(settings: CanSettings) -> str:
-    """Describe the bus's place, for `check`."""
+    """Describe for `check` where the bus is."""
     if settings.slcan:
         return f"{settings.slcan.port}, {settings.slcan.bitrate // 1000} kbit/s"
     return f"{settings.socketcan}, at the bitrate that `ip link` gave it"

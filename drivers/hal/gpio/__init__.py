@@ -1,14 +1,15 @@
 """GPIO: the pins of a Raspberry Pi's 40-pin header, through gpiozero on lgpio.
 
-Outputs are claimed at their safe level in one call, and released at that level
-(`drivers/hal/gpio/pins.py`). Inputs are sampled: an edge only calls `wake`, because lgpio loses edges.
+One call claims an output and sets its safe level. An output is released at its safe level
+(`drivers/hal/gpio/pins.py`). Every scan reads the inputs' levels. An edge only calls `wake`, because
+lgpio loses edges.
 
     header.py     the spelling of pins
     bus.py        claims, samples, drives and releases pins
     pins.py       gpiozero's pins on lgpio; imported when the header is opened
     bare.py       the same claims without gpiozero, to switch off from a new process
     chip.py       finds the chip, and the holder of a line
-    dead_man.py   drops the outputs when scans stop
+    dead_man.py   switches the outputs to their safe level when scans stop
 """
 
 import time
@@ -55,13 +56,13 @@ class GpioSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 def where(settings: GpioSettings) -> Where:
-    """Return the header, or another chip."""
+    """Return the place of the pins: the header, or another chip."""
     return Where("the header" if settings.chip is None else f"gpiochip{settings.chip}", local=True)
 
 
 def needs(settings: GpioSettings) -> Needs:
-    """Return the need for the chip in the settings. Without one, return every chip, because the bus
-    opens each chip to read its label."""
+    """Return the chip in the settings as the need. Without a chip in the settings, return every chip,
+    because the bus opens each chip to read its label."""
     chip = "char-gpiochip" if settings.chip is None else f"/dev/gpiochip{settings.chip}"
     return Needs((chip,), group="gpio")
 
@@ -71,9 +72,9 @@ def open_bus(
     factory: Factory | None = None,
     clock: Callable[[], float] = time.monotonic,
 ) -> "GpioBus":
-    """Open the header's pins. Raises HalError; its text says what to check.
+    """Open the header's pins. Raises HalError, whose text tells the reader which parts to check.
 
-    `factory`: a gpiozero pin factory whose pins claim lines as those of `pins.py` do.
+    `factory` is a gpiozero pin factory whose pins claim lines in the same way as `pins.py`.
     """
     if factory is None:
         with _with_lgpio():
@@ -99,7 +100,7 @@ def _with_lgpio() -> Iterator[None]:
             f"GPIO needs lgpio ({error}): apt install python3-lgpio, or in the"
             " clone .venv/bin/pip install '.[gpio]'; or run with --simulate"
         ) from error
-    except OSError as error:  # lgpio makes a FIFO in the working directory when it is imported
+    except OSError as error:  # lgpio's import makes a FIFO in the working directory
         raise HalError(f"lgpio cannot write in the working directory: {error}") from error
 
 

@@ -1,6 +1,8 @@
-"""Pins on lgpio alone. A new process switches off sooner if it need not load gpiozero.
+"""Pins on lgpio, without gpiozero. A new process switches outputs off sooner if it does not load
+gpiozero.
 
-The calls that claim, write and release outputs are the same as in `pins.py`. There are no edges.
+The calls that claim, write and release outputs are the same as in `pins.py`. These pins report no
+edges.
 """
 
 from collections.abc import Callable
@@ -32,7 +34,8 @@ class BarePin:
         lgpio.gpio_write(self._handle, self._line, int(level))
 
     def output_with_state(self, state: bool) -> None:
-        """Claim the line as an output at this level. This is its safe level, which `close` restores."""
+        """Claim the line as an output at this level. This level is the line's safe level, which `close`
+        restores."""
         self._claim(lgpio.gpio_claim_output, int(state))
         self._safe = int(state)
 

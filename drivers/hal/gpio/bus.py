@@ -23,7 +23,7 @@ DROPPED = (
 
 
 class Pin(Protocol):
-    """A gpiozero pin that claims lines as those of `pins.py` do."""
+    """A gpiozero pin that claims lines in the same way as the pins of `pins.py`."""
 
     state: int
     edges: str
@@ -74,12 +74,12 @@ class GpioBus(Bus):
         clearing: Mapping[str, Clearing] = MappingProxyType({}),
     ) -> "GpioLines":
         """Return the lines of these points: canonical inputs with their pull, and outputs with their
-        safe level. The last two parameters matter only for modules, not for pins."""
+        safe level. The last two parameters concern only Modbus modules."""
         self._devices.append(GpioLines(self, dict(inputs), dict(outputs)))
         return self._devices[-1]
 
     def on_edge(self, wake: Callable[[], None]) -> None:
-        """Call `wake` from gpiozero's thread when an input may have changed. It must not raise."""
+        """Let gpiozero's thread call `wake` when an input may have changed. `wake` must not raise."""
         self._wake = wake
 
     def edge(self, ticks: object, state: object) -> None:
@@ -121,8 +121,8 @@ class GpioLines:
         self._dropped = False
 
     def claim(self) -> None:
-        """Claim the outputs at their safe level, each in one call, then the inputs. After a failure,
-        release all of them."""
+        """Claim each output at its safe level with one call, then claim the inputs. After a failure,
+        release all lines."""
         self._release()
         self._dropped = False
         try:
@@ -142,7 +142,7 @@ class GpioLines:
         return self._levels(self._pulls)
 
     def write(self, levels: Mapping[str, bool]) -> None:
-        """Drive these outputs. Try every output that goes off, even after a failure. Raises
+        """Drive these outputs. If an output fails, still try every output that goes off. Raises
         HalError."""
         every = Every()
         for point, level in levels.items():
@@ -157,8 +157,8 @@ class GpioLines:
             self._check()
 
     def drop(self) -> None:
-        """Hold every output at its safe level until the next claim. Any thread may call this. Does not
-        raise."""
+        """Hold every output at its safe level until the next claim. Any thread may call `drop`. Does
+        not raise."""
         self._dropped = True
         for point, level in self._safe.items():
             if point in self._claimed:
@@ -194,7 +194,7 @@ class GpioLines:
         return self._claimed[point]
 
     def _pin(self, point: str) -> Pin:
-        """Reserve a pin before its use. gpiozero refuses a pin that another device holds."""
+        """Reserve a pin, and return it. gpiozero refuses a pin that another device holds."""
         self._bus.factory.reserve_pins(self, point)
         self._claimed[point] = self._bus.factory.pin(point)
         return self._claimed[point]
@@ -206,8 +206,8 @@ class GpioLines:
         pin.when_changed = self._bus.edge
 
     def _conflicts_with(self, other: object) -> bool:
-        """Return whether `other` is a different device. gpiozero asks this about the present holder of
-        a pin."""
+        """Return whether `other` is a different device. gpiozero calls this with the device that holds
+        a wanted pin."""
         return other is not self
 
     def _release(self) -> None:
@@ -225,7 +225,7 @@ class GpioLines:
 
 
 def _failures() -> tuple[type[Exception], ...]:
-    """Return the error types of gpiozero and lgpio, without libraries that are not loaded."""
+    """Return the error types of gpiozero and lgpio. Leave out a library that is not loaded."""
     gpiozero, lgpio = sys.modules.get("gpiozero"), sys.modules.get("lgpio")
     vendors = ((gpiozero, "GPIOZeroError"), (lgpio, "error"))
     return (OSError, *(getattr(vendor, name) for vendor, name in vendors if vendor))

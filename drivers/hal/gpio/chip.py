@@ -1,7 +1,8 @@
-"""The header's chip and the claims of its lines, through lgpio alone. Import this only where lgpio is
-installed.
+"""The header's chip and the claims of its lines, through lgpio alone. Import this file only where lgpio
+is installed.
 
-lgpio creates a FIFO in the working directory during import, so import this in the runtime directory.
+The import of lgpio creates a FIFO in the working directory. So import this file in the runtime
+directory.
 """
 
 import os
@@ -19,7 +20,7 @@ DEV = Path("/dev")
 
 
 def open_chip(chip: int | None, dev: Path = DEV) -> tuple[int, int]:
-    """Open this chip; without a number, find the header's chip by its label. Return (handle, number).
+    """Open this chip. Without a number, find the header's chip by its label. Return (handle, number).
     Raises HalError."""
     if chip is not None:
         return _open(chip, dev), chip
@@ -40,7 +41,8 @@ def open_chip(chip: int | None, dev: Path = DEV) -> tuple[int, int]:
 def claim(
     call: Callable[[int, int, int], object], handle: int, chip: int, line: int, value: int
 ) -> None:
-    """Claim a line with this lgpio function. Raises HalError with the name of the line's holder."""
+    """Claim a line with `call`, which is a function of lgpio. Raises HalError with the name of the
+    line's holder."""
     try:
         call(handle, line, value)
     except lgpio.error as error:
@@ -48,8 +50,8 @@ def claim(
 
 
 def _holder(handle: int, chip: int, line: int) -> str:
-    """Name the line's holder: the processes that have the chip open. If none is seen, give the kernel's
-    label."""
+    """Name the holder of the line by the processes that have the chip open. If no process can be seen,
+    return the kernel's label."""
     *_, label = lgpio.gpio_get_line_info(handle, line)
     if not label:
         return ""

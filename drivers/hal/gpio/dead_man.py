@@ -1,7 +1,8 @@
-"""The dead-man beside a loop. When the loop's scans stop, the outputs drop and stay dropped.
+"""A dead-man that watches a loop. When the loop's scans stop, the dead-man switches the outputs to
+their safe level. The outputs stay there.
 
-The dead-man writes outputs from another thread, so it is only for GPIO. (No thread can interrupt a
-Modbus client; Modbus modules have their own watchdog.) A thread that keeps Python's global lock stops
+The dead-man writes outputs from another thread, so it is only for GPIO. No thread can interrupt a
+Modbus client, so Modbus modules have their own watchdog. A thread that keeps Python's global lock stops
 the dead-man too. In this case systemd's watchdog acts.
 """
 
@@ -13,7 +14,7 @@ AFTER_S = 2.0
 
 
 class GpioDeadMan:
-    """A thread that calls `drop` once when nobody has called `fed` for AFTER_S seconds."""
+    """A thread that calls `drop` once when `fed` has not been called for AFTER_S seconds."""
 
     def __init__(
         self, drop: Callable[[], None], clock: Callable[[], float] = time.monotonic
@@ -32,7 +33,8 @@ class GpioDeadMan:
             self._thread.start()
 
     def check(self) -> bool:
-        """Drop the outputs if the last scan is too old. Return True if they were dropped."""
+        """Drop the outputs if the last scan is too old. Return whether this call dropped the
+        outputs."""
         overdue = self._fed_at is not None and self._clock() - self._fed_at > AFTER_S
         if overdue:
             self._fed_at = None

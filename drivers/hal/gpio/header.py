@@ -1,7 +1,7 @@
 """The 40-pin header: the spelling of its pins, and checks of the wires on the pins.
 
-A point is written as `BCM17` or `J8:11`. A bare number is refused, because mixing up position and BCM
-number is the most common wiring mistake.
+A point is written as `BCM17` or `J8:11`. A bare number is refused, because people often mistake the
+position of a pin for its BCM number.
 """
 
 import re
@@ -9,12 +9,37 @@ from collections.abc import Iterable
 
 from drivers.hal.points import Wire
 
-# The 40-pin header, the same on every Raspberry Pi since the B+ (2014): position -> BCM number.
-# fmt: off
+# Position -> BCM number, for the 40-pin header. The header is the same on every Raspberry Pi since the
+# B+ (2014). fmt: off
 J8 = {
-    3: 2, 5: 3, 7: 4, 8: 14, 10: 15, 11: 17, 12: 18, 13: 27, 15: 22, 16: 23, 18: 24, 19: 10,
-    21: 9, 22: 25, 23: 11, 24: 8, 26: 7, 27: 0, 28: 1, 29: 5, 31: 6, 32: 12, 33: 13, 35: 19,
-    36: 16, 37: 26, 38: 20, 40: 21,
+    3: 2,
+    5: 3,
+    7: 4,
+    8: 14,
+    10: 15,
+    11: 17,
+    12: 18,
+    13: 27,
+    15: 22,
+    16: 23,
+    18: 24,
+    19: 10,
+    21: 9,
+    22: 25,
+    23: 11,
+    24: 8,
+    26: 7,
+    27: 0,
+    28: 1,
+    29: 5,
+    31: 6,
+    32: 12,
+    33: 13,
+    35: 19,
+    36: 16,
+    37: 26,
+    38: 20,
+    40: 21,
 }
 # fmt: on
 POSITION = {bcm: position for position, bcm in J8.items()}
@@ -65,11 +90,11 @@ def describe(point: str) -> str:
 
 
 def boot_level(point: str) -> bool:
-    """Return the level of a pin from power-on until the daemon claims it. A resistor pulls the pin
-    there.
+    """Return the level of a pin from power-on until the daemon claims the pin. A resistor sets this
+    level.
 
-    The level is up for BCM0-8, and down for BCM9-27 (BCM2835 ARM Peripherals, table 6-31, and its
-    successors).
+    The resistor pulls BCM0 to BCM8 up, and BCM9 to BCM27 down (BCM2835 ARM Peripherals, table 6-31, and
+    its successors).
     """
     return int(canonical(point)[3:]) <= 8
 

@@ -1,5 +1,5 @@
-"""Finds the processes that have a GPIO chip open. About the holder of a line the kernel tells only a
-label ('lg')."""
+"""Finds the processes that have a GPIO chip open. The kernel itself tells only a label ('lg') of a
+line's holder."""
 
 import os
 from collections.abc import Iterator
@@ -7,8 +7,8 @@ from pathlib import Path
 
 
 def holders(chip: Path, proc: Path = Path("/proc")) -> list[str]:
-    """Return the other processes that have this device open. Processes that this user may not see are
-    missing.
+    """Return the other processes that have this device open. The list lacks the processes that this
+    user may not see.
 
     A service appears by its systemd unit. Any other process appears by its id and command.
     """

@@ -1,7 +1,8 @@
-"""gpiozero's pins on lgpio, with outputs that never glitch. Import this only where lgpio is installed.
+"""gpiozero's pins on lgpio, with outputs that never glitch. Import this file only where lgpio is
+installed.
 
-The stock `LGPIOPin` claims an output first as an input, then as an output at low, and writes its level
-last. So an active-low relay clicks at each start. On close the stock pin claims a floating input.
+gpiozero's own `LGPIOPin` claims an output in three steps: as an input, as an output at low, and at last
+at its level. So an active-low relay clicks at each start. On close `LGPIOPin` claims a floating input.
 
 The pins of this file claim a line once, at its safe level. They keep this level after close, because
 the kernel of Raspberry Pi OS keeps the level of a line that no process holds.
@@ -17,8 +18,8 @@ from gpiozero.pins.local import LocalPiFactory, LocalPiPin
 
 from drivers.hal.gpio.chip import DEV, PULLS, claim, open_chip
 
-# Any board with the 40-pin header. gpiozero needs a board for the names of pins. It would read the
-# board from /proc/cpuinfo, but our hardened systemd unit hides that file.
+# The revision of any board with the 40-pin header. gpiozero needs a board for the names of pins. It
+# would read the board from /proc/cpuinfo, but the daemon's hardened systemd unit hides that file.
 REVISION = 0xA02082
 
 
@@ -35,7 +36,8 @@ class HeldPin(LGPIOPin):  # type: ignore[misc]
         self._safe: int | None = None
 
     def output_with_state(self, state: bool) -> None:
-        """Claim the line as an output at this level. This is its safe level, which `close` restores."""
+        """Claim the line as an output at this level. This level is the line's safe level, which `close`
+        restores."""
         self._claim(lgpio.gpio_claim_output, int(state))
         self._safe = int(state)
 
@@ -66,7 +68,8 @@ class HeldPin(LGPIOPin):  # type: ignore[misc]
 
 
 class HeldFactory(LGPIOFactory):  # type: ignore[misc]
-    """The pins of an open chip. gpiozero's own constructor would choose the chip by the board."""
+    """The pins of an open chip. This constructor takes the chip, because gpiozero's own constructor
+    would choose a chip by the board."""
 
     def __init__(self, handle: int, chip: int) -> None:
         LocalPiFactory.__init__(self)
@@ -79,5 +82,6 @@ class HeldFactory(LGPIOFactory):  # type: ignore[misc]
 
 
 def open_factory(chip: int | None, dev: Path = DEV) -> HeldFactory:
-    """Open the header's chip by this number; without a number, by its label. Raises HalError."""
+    """Open the header's chip by this number. Without a number, find the chip by its label. Raises
+    HalError."""
     return HeldFactory(*open_chip(chip, dev))

@@ -7,8 +7,8 @@
     registers.py      the spelling of places in a register map
     bus.py            the units of one connection or line, with retries and pauses
     lines.py          one device's coils and registers: claim, read, write, read back, release;
-                      a second master on one output is a fault, and makes no relay chatter
-    clearing.py       calls that the controller takes and clears by itself
+                      reports a second master on an output as a fault, without chattering relays
+    clearing.py       commands that a controller takes and clears by itself, such as lift calls
     dead_man.py       arms and refreshes the modules' watchdogs
     wire.py           a request and its answer
     tcp.py, rtu.py    carry requests and answers

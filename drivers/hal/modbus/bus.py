@@ -2,8 +2,8 @@
 
 - One try of a request has `timeout_s`, from the name lookup to the last byte of the reply. After a
   failure there are up to `retries` more tries. Reads and writes may be repeated. A pulse is not
-  repeated, because a repeat would prolong it. `tcp.py` (by a new connection) and `rtu.py` (by silence)
-  keep a late reply or half a frame from passing for the reply to another request.
+  repeated, because a repeat would prolong it. A late reply or half a frame must not pass for the reply
+  to another request. For this, `tcp.py` opens a new connection, and `rtu.py` waits for silence.
 - If the connection or port cannot be opened, the whole bus backs off for 0.5 to 30 s. If a unit fails,
   only this unit backs off. During a backoff calls fail at once with the same text.
 - After a backoff each request gets only one try, until the unit answers again. A unit that has never
@@ -46,16 +46,16 @@ from drivers.hal.modbus.wire import (
 from drivers.hal.points import Clearing, Pull
 
 TURN_S: Final = 0.05
-"""The pause (s) after a failed try before another failed unit is tried. The pause is longer than the
+"""The pause (s) between a failed try and a try of another failed unit. The pause is longer than the
 rest of a scan, and shorter than the period of scans."""
 
 
 class ModbusBus(Bus):
     """One TCP connection or serial line, and its units. It is also a `drivers.hal.points.PointsBus`.
 
-    Tests replace `clock` and `jitter`; `now` is the clock. `scan_s` is the period of readings (s).
-    `refused` holds the ranges that a unit refused because it lacks an address between used points. No
-    further reading asks for these ranges.
+    Tests replace `clock` and `jitter`. `now` is the clock. `scan_s` is the period of readings (s).
+    `refused` holds ranges of addresses that a unit refused, because the unit lacks an address between
+    the used points. No further reading asks for such a range.
     """
 
     canonical = staticmethod(canonical)
@@ -84,8 +84,8 @@ class ModbusBus(Bus):
         unread: Collection[str] = (),
         clearing: Mapping[str, Clearing] = MappingProxyType({}),
     ) -> ModbusLines:
-        """Return the lines of these points: canonical inputs, and coils with their safe level (True is
-        1)."""
+        """Return the lines of these points: canonical inputs, and coils with their safe level (True
+        means 1)."""
         read, driven = ({n: parse(n) for n in names} for names in (inputs, outputs))
         return ModbusLines(self, read, driven, dict(outputs), unread, clearing)
 
@@ -100,7 +100,8 @@ class ModbusBus(Bus):
         return Image(self, points).read()
 
     def write(self, point: Point, value: int, safe: bool = False) -> None:
-        """Set this coil (0 or 1) or register. Raises HalError; after an error its value is unknown."""
+        """Set this coil (0 or 1) or register. Raises HalError. After an error nobody knows its
+        value."""
         coil = point.table == "coil"
         sent = (COIL_ON if value else 0) if coil else value
         what = f"write {'coil' if coil else 'register'} {point.address}"
@@ -114,14 +115,14 @@ class ModbusBus(Bus):
         value is the time in tenths of a second. The reply is an echo. Source: the maker's manual,
         protocol V2: `01 05 02 00 00 07 8D B0` switches relay 0 of unit 1 on for 0.7 s.
 
-        The request is sent once, because a repeat would restart the time. Raises HalError; after an
-        error there may be a pulse.
+        The request is sent once, because a repeat would restart the time. Raises HalError. After an
+        error nobody knows whether the module gives the pulse.
         """
         question = UnitRequest(place.unit, WRITES["coil"], place.address, round(on_s * 10))
         self._ask(f"flash at coil {place.address:#x}", question, once=True)
 
     def guard(self, units: Iterable[int]) -> DeviceWatchdogs:
-        """Return the watchdogs of the modules at these units, for a device with outputs there."""
+        """Return the watchdogs of the modules at these units. The caller's device has outputs there."""
         return self._watchdogs.guard(units)
 
     def scanned(self) -> None:
@@ -140,7 +141,7 @@ class ModbusBus(Bus):
     def _ask(
         self, what: str, question: UnitRequest, safe: bool = False, once: bool = False
     ) -> UnitReply:
-        """Return the unit's valid answer. `once`: send the request only once. Raises HalError."""
+        """Return the unit's valid answer. With `once` send the request only once. Raises HalError."""
         unit = question.unit
         backoff = self._units.setdefault((unit, safe), self._backoff())
         self._link.check()
@@ -162,8 +163,8 @@ class ModbusBus(Bus):
         return answer
 
     def _tried(self, question: UnitRequest, tries: int) -> tuple[UnitReply | None, str]:
-        """Return (answer, ""), or (None, the reason why there is none). Raises HalError without a
-        connection."""
+        """Return the answer and "". If no answer comes, return None and the reason. Raises HalError
+        without a connection."""
         reason = ""
         for _ in range(tries):
             try:
@@ -191,7 +192,7 @@ class ModbusBus(Bus):
 
 
 def _way(settings: ModbusSettings) -> tuple[UnitWire, str]:
-    """Return the wire to the units, and its name for texts. Only this function imports the
+    """Return the wire to the units, and its name for messages. Only this function imports the
     libraries."""
     if settings.serial:
         from drivers.hal.modbus.rtu import SerialLine
@@ -199,6 +200,6 @@ def _way(settings: ModbusSettings) -> tuple[UnitWire, str]:
         return SerialLine(settings.serial, settings.timeout_s), settings.serial.port
     from drivers.hal.modbus.tcp import Connection
 
-    assert settings.tcp  # `problems` refuses other settings
+    assert settings.tcp  # `problems` refuses settings with neither tcp nor serial
     host, port = settings.tcp.host, settings.tcp.port
     return Connection(host, port, settings.timeout_s), f"{host}:{port}"

@@ -1,12 +1,12 @@
-"""Calls that a controller takes and then clears by itself. Soon after the write their places read "no
-call".
+"""Calls (such as a lift's calls) that a controller takes from a place and then clears. Soon after the
+write the place reads "no call".
 
-Only places of calls are judged here. A place counts as clearing itself if it loses the value of each
-written call within a scan. Another master that writes "no call" as quickly would look the same, so the
-warning names both causes.
+This file judges only the places of calls. A place counts as clearing itself if each written call is
+lost within a scan. Another master that writes "no call" as quickly would look the same, so the warning
+names both causes.
 
-Every other contradiction counts as another master's write (`Rivals` in `lines.py`). Such are a call
-that is lost later, another call than the written one, and any other command.
+Every other contradiction counts as another master's write (`Rivals` in `lines.py`). A contradiction is,
+for example, a call that is lost later, a call that the daemon did not write, or any other command.
 """
 
 import logging
@@ -19,8 +19,8 @@ from drivers.hal.points import Clearing
 log = logging.getLogger(__name__)
 
 TWICE: Final = 2
-"""The number of calls in a row that must be lost within a scan before the place counts as clearing
-itself. The first lost call is written again, because the module may have restarted."""
+"""The number of successive calls that must be lost within a scan before the place counts as clearing
+itself. The driver writes the first lost call again, because the module may have restarted."""
 
 
 class ClearedCalls:
@@ -50,13 +50,13 @@ class ClearedCalls:
         self._gone.discard(name)
 
     def may_read(self, name: str, written: int, found: int) -> bool:
-        """Return whether this reading is the written value, or the written value without its call."""
+        """Return whether `found` is the written value, or the written value without its call."""
         cleared = name not in self._stayed and found == self._without_call(name, written)
         return found == written or cleared
 
     def keeps(self, name: str, written: int, found: int) -> bool:
-        """Judge a reading for which `may_read` is true. Return False if the call must be written
-        again."""
+        """Return False if the written call must be written again. `may_read` must be true for this
+        reading."""
         habits = self._clearing.get(name)
         if habits is None or habits.pulse or self._without_call(name, written) == written:
             return True
@@ -71,7 +71,7 @@ class ClearedCalls:
         return self._in_a_row[name] >= TWICE
 
     def tell(self, name: str, place: str) -> None:
-        """Log a warning that this place clears itself, once for each place."""
+        """If this place clears itself, log a warning, once for each place."""
         if self._in_a_row.get(name, 0) >= TWICE and name not in self._told:
             self._told.add(name)
             text = (

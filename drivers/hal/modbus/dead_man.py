@@ -1,11 +1,11 @@
-"""Arms and refreshes the modules' own watchdogs. Their settings are in `watchdog.py`.
+"""Arms and refreshes the watchdogs inside Modbus modules. Their settings are in `watchdog.py`.
 
-- The first output is driven only after its watchdog is armed. A watchdog counts as armed only when read
-  back.
-- Only a finished scan refreshes a watchdog, so the module drops its outputs when the daemon hangs. One
-  round of the loop must be shorter than the module's time, even with failing units.
-- After a trip (read back, or reported by exception 4) every output is unknown. The watchdog is armed
-  again. Each device on the unit fails one reading, and its outputs are written anew.
+- An output is driven only after its module's watchdog is armed. A watchdog counts as armed only after
+  the daemon has read this back.
+- Only a finished scan refreshes a watchdog. So the module switches its outputs off when the daemon
+  hangs. One round of the loop must be shorter than the module's time, even with failing units.
+- A trip is read back, or exception 4 reports it. After a trip the state of every output is unknown. The
+  watchdog is armed again. Each device on the unit fails one reading, and writes its outputs anew.
 
 After the daemon's end the watchdog stays armed. The outputs are off already, and stay off.
 """
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from drivers.hal.modbus.bus import ModbusBus
 
 DEVICE_FAILURE: Final = 4
-"""The exception code with which a module refuses outputs after its watchdog tripped."""
+"""The exception code with which a module refuses outputs after its watchdog has tripped."""
 
 
 class UnitWatchdog:
@@ -62,7 +62,7 @@ class UnitWatchdog:
             self.tripped()
 
     def tripped(self) -> None:
-        """Record a trip. Afterwards the outputs are unknown."""
+        """Record a trip. After a trip nobody knows the state of the outputs."""
         if self.armed:
             self.armed = False
             self.trips += 1
@@ -91,8 +91,8 @@ class DeviceWatchdogs:
         self._seen = {watchdog: watchdog.trips for watchdog in watchdogs}
 
     def check(self) -> None:
-        """Arm all watchdogs. Raises HalError. After each trip it raises once more, because outputs went
-        off."""
+        """Arm all watchdogs. Raises HalError. After each trip `check` raises once more, because outputs
+        went off."""
         trips = [watchdog for watchdog, seen in self._seen.items() if watchdog.trips != seen]
         for watchdog in self._seen:
             watchdog.arm()
@@ -105,7 +105,7 @@ class DeviceWatchdogs:
 
 
 class Watchdogs:
-    """The watchdogs of one bus, by unit. There are none if the YAML has no watchdog."""
+    """The watchdogs of one bus, by unit. If the YAML has no watchdog, this is empty."""
 
     def __init__(
         self, bus: "ModbusBus", settings: Watchdog | None, clock: Callable[[], float]
@@ -117,7 +117,7 @@ class Watchdogs:
             self._units = {unit: UnitWatchdog(bus, unit, habits) for unit in settings.units}
 
     def guard(self, units: Iterable[int]) -> DeviceWatchdogs:
-        """Return the watchdogs of these units, for a device with outputs there."""
+        """Return the watchdogs of these units. The caller's device has outputs there."""
         return DeviceWatchdogs(
             self._units[unit] for unit in sorted(set(units)) if unit in self._units
         )

@@ -2,10 +2,10 @@
 
 pymodbus's decoders accept wrong replies, so this file has stricter decoders.
 
-pymodbus's client is not used, for four reasons. Its timeout starts again at each byte and follows the
-wall clock. Its name lookup has no limit. It repeats requests on a connection that may still hold late
-replies. It accepts a reply to another function. pymodbus's server costs 15 MB of memory and is never
-imported.
+This code does not use pymodbus's client, for four reasons. The client's timeout starts again at each
+byte and follows the wall clock. Its name lookup has no limit. It repeats requests on a connection that
+may still hold late replies. It accepts a reply to another function. Nothing imports pymodbus's server,
+because it costs 15 MB of memory.
 """
 
 import logging
@@ -33,7 +33,9 @@ from pymodbus.pdu.register_message import (
 
 from drivers.hal.modbus.wire import BadReply, UnitReply, UnitRequest
 
-logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # our HalErrors report them
+logging.getLogger("pymodbus.logging").setLevel(
+    logging.CRITICAL
+)  # HalErrors report the same failures
 
 FAILURES: Final = (ModbusException, struct.error, IndexError, ValueError)
 """The errors that pymodbus raises for bytes that are not a reply."""
@@ -118,16 +120,18 @@ RTU: Final = FramerRTU(DECODER)
 
 
 def tcp_request(question: UnitRequest, number: int) -> bytes:
-    """Return the request's frame on TCP. `number` is the transaction number, which is not 0. Raises
-    BadReply."""
+    """Return the request's frame on TCP. `number` is the transaction number, which must not be 0.
+    Raises BadReply."""
     return TCP.buildFrame(_request(question, number))
 
 
 def tcp_answer(question: UnitRequest, number: int, heard: bytes) -> tuple[int, UnitReply | None]:
-    """Return (number of used bytes, answer). The answer is None until it is complete. Raises BadReply.
+    """Return the number of used bytes, and the answer. The answer is None until it is complete. Raises
+    BadReply.
 
     Replies to other requests and replies of other units are dropped. pymodbus alone would accept a
-    reply with number 0 for any request. It would also accept any unit's reply to a request to unit 0.
+    reply with number 0 for any request. pymodbus would also accept any unit's reply to a request to
+    unit 0.
     """
     used = 0
     while True:
@@ -152,9 +156,9 @@ def rtu_answer(question: UnitRequest, frame: bytes) -> UnitReply:
 
 
 def rtu_size(heard: bytes) -> int:
-    """Return the size of the reply at the beginning of `heard`; 0 if there are too few bytes. Raises
-    BadReply."""
-    if len(heard) < 5:  # an exception is the shortest reply
+    """Return the size of the reply at the beginning of `heard`. Return 0 if there are too few bytes.
+    Raises BadReply."""
+    if len(heard) < 5:  # the shortest reply is an exception, with five bytes
         return 0
     try:
         sort = DECODER.lookupPduClass(heard)

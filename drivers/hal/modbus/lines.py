@@ -1,10 +1,10 @@
-"""One device's coils and registers. For each driver, claim, read, write, read-back and close are the
-same.
+"""One device's coils and registers. Every driver claims, reads, writes, reads back and closes its lines
+through this file.
 
-An output is read before its first write, read back after each write, and compared in each reading. The
-comparison reveals a module that restarted with its outputs off, a tripped watchdog, and another master
-(`Rivals`). Every output that goes to its safe value is written, even if another output, an input or the
-unit's watchdog fails.
+The driver reads an output before its first write, and reads it back after each write. Each later
+reading compares the output with the written value. The comparison reveals a module that restarted with
+its outputs off, a tripped watchdog, and another master (`Rivals`). Every output that goes to its safe
+value is written, even if another output, an input or the unit's watchdog fails.
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -45,8 +45,8 @@ class Image:
         return image
 
     def _part(self, part: Range, asked: list[Range], safe: bool) -> dict[Point, int]:
-        """Make one request. If the module lacks an address between used points, later requests skip
-        that gap."""
+        """Make one request. If the module lacks an address between used points, later requests leave
+        that address out."""
         parts = pieces(part, self._points)
         if len(parts) == 1 or not self._units.refused.within(part):
             try:
@@ -64,9 +64,9 @@ class Image:
 class ModbusLines:
     """One device's inputs and outputs by name (`drivers.hal.points.Lines`).
 
-    `safe`: each output's safe value. `unread`: outputs that cannot be read back. Every scan writes
-    these outputs, because the controller may have restarted. `clearing`: outputs that the controller
-    may clear.
+    `safe` gives each output's safe value. `unread` are the outputs that cannot be read back. Every scan
+    writes these outputs, because the controller may have restarted. `clearing` are the outputs that the
+    controller may clear.
     """
 
     def __init__(
@@ -94,11 +94,10 @@ class ModbusLines:
         self._guard = units.guard(point.unit for point in outputs.values())
 
     def claim(self) -> None:
-        """Read each output, and bring it to its safe value. Only the first claim does so.
+        """Read each output. In the first claim, also bring each output to its safe value.
 
         If the outputs cannot be read, read the inputs instead, to check that the unit answers. A claim
-        after a failure only reads. It leaves the outputs unchanged, because a lost reply must not
-        release a held door.
+        after a failure leaves the outputs unchanged, because a lost reply must not release a held door.
         """
         self._set.clear()
         every = Every()
@@ -114,8 +113,8 @@ class ModbusLines:
         self._claimed = True
 
     def read(self) -> dict[str, int]:
-        """Read every input, and each output whose lost call must be written again. Raises HalError.
-        Also raises if an output contradicts its written value.
+        """Read every input, and each output whose lost call must be written again. Raises HalError,
+        also if an output contradicts its written value.
 
         After a failure the outputs count as unknown.
         """
@@ -128,7 +127,7 @@ class ModbusLines:
         return {**lost, **{name: p.of(image[p.cell]) for name, p in self._inputs.items()}}
 
     def bring(self, values: Mapping[str, int]) -> None:
-        """Set these outputs. Skip an output that is known to have its value already. Raises HalError.
+        """Set these outputs. Skip an output that certainly has its value already. Raises HalError.
 
         Also raises while another master writes one of the device's outputs.
         """
@@ -137,8 +136,8 @@ class ModbusLines:
         self._rivals.check(map(str, self._outputs.values()))
 
     def write(self, values: Mapping[str, int]) -> None:
-        """Set these outputs, and read them back. Raises HalError; after an error their values are
-        unknown."""
+        """Set these outputs, and read them back. Raises HalError. After an error nobody knows the
+        outputs' values."""
         every = Every()
         self._write(values, every)
         every.check()
@@ -156,22 +155,23 @@ class ModbusLines:
         return {n: image[p] for n, p in self._outputs.items() if n not in self._unread} or None
 
     def make_safe(self) -> None:
-        """Set every output to its safe value, even an output that is believed safe. Raises HalError."""
+        """Set every output to its safe value, even if the output should have this value already. Raises
+        HalError."""
         self.write(self._safe)
 
     def close(self) -> None:
-        """If any output was ever written, try once to make every output safe. Does not raise."""
+        """If this device ever wrote an output, try once to make every output safe. Does not raise."""
         if not self._touched:
             return
         self._units.insist()
-        unheard = Every()  # failures are dropped, because the daemon is ending
+        unheard = Every()  # keeps failures that nobody reads, because the daemon is ending
         for name, point in self._outputs.items():
             with unheard.one():
                 self._units.write(point, self._safe[name], safe=True)
 
     def _write(self, values: Mapping[str, int], every: Every) -> None:
-        """Write the outputs that go off first, then read back each output. After a failure switch
-        nothing on."""
+        """Write first the outputs that go to their safe value. After a failure write no other outputs.
+        Then read each written output back."""
         self._touched = self._touched or bool(values)
         safe = {name for name, value in values.items() if value == self._safe[name]}
         written: dict[str, int] = {}
@@ -209,7 +209,7 @@ class ModbusLines:
         return value if name in self._unread else image.get(self._outputs[name], value)
 
     def _lost(self, known: Mapping[str, int], image: Mapping[Point, int]) -> dict[str, int]:
-        """Return name -> reading of the outputs that have lost their call. These calls must be written
+        """Return the reading of each output that has lost its call. The driver must write these calls
         again."""
         lost: dict[str, int] = {}
         for name, value in known.items():

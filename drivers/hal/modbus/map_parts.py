@@ -1,4 +1,4 @@
-"""The parts of a register map in a YAML or a profile: a place, a bit, a command.
+"""The parts of a register map in a YAML or a profile, such as a place, a bit or a command.
 
 The register maps of lifts, doors, chargers and module watchdogs consist of these parts.
 """
@@ -38,7 +38,7 @@ class Placed(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class InRegister(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A part that is read from a register."""
+    """A part that the driver reads from a register."""
 
     TABLES: ClassVar[Collection[str]] = REGISTERS
 
@@ -46,7 +46,7 @@ class InRegister(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class WrittenPlace(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A part that is written."""
+    """A part that the driver writes."""
 
     TABLES: ClassVar[Collection[str]] = WRITABLE
 
@@ -64,7 +64,8 @@ class RegisterBit(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 
 class WrittenLevels(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A command with an on value and an off value. `ON` and `OFF` are the names of their two keys."""
+    """A command with an on value and an off value. `ON` and `OFF` are the names of the two keys in the
+    map."""
 
     ON: ClassVar[str]
     OFF: ClassVar[str]

@@ -1,11 +1,11 @@
 """The spelling of a point of a Modbus module in a YAML: unit, table and address.
 
-A contact is a discrete input, a coil, or one bit of a register. A relay is a coil. Addresses are those
-on the wire, which begin at 0.
+A contact is a discrete input, a coil, or one bit of a register. A relay is a coil. Addresses begin at
+0, as in the frames on the wire.
 
 Manuals often print the numbers of the data model. These numbers begin at 1, and their first digit is
-the table: coil 0 is 00001, discrete input 0 is 10001, input register 0 is 30001, holding register 0 is
-40001. Such a number is refused, and the error suggests the probable address.
+the table. For example, coil 0 is 00001, discrete input 0 is 10001, input register 0 is 30001, and
+holding register 0 is 40001. Such a number is refused, and the error suggests the probable address.
 """
 
 import re
@@ -18,7 +18,7 @@ from drivers.hal.points import Wire
 from drivers.numbers import BITS
 
 Table = Literal["coil", "discrete input", "holding register", "input register"]
-"""The four tables of a unit. For places without a unit, and whole registers, see `registers.py`."""
+"""The four tables of a unit. `registers.py` has places without a unit."""
 
 GAP_MAX: Final[dict[Table, int]] = {
     "coil": 8,
@@ -26,8 +26,9 @@ GAP_MAX: Final[dict[Table, int]] = {
     "holding register": 0,
     "input register": 0,
 }
-"""The widest gap between two points of one read request. Registers are never read across a gap, because
-a controller may lack the addresses in the gap, or take their reading for an acknowledgement."""
+"""The widest gap between two points of one read request, for each table. A request never reads
+registers that nobody uses. A controller may lack such registers, or take their reading for an
+acknowledgement."""
 COUNT_MAX: Final[dict[Table, int]] = {
     "coil": 2000,
     "discrete input": 2000,
@@ -60,7 +61,7 @@ _HOW: Final = (
 class Point(Struct, frozen=True, order=True):
     """One coil, discrete input or register of one unit, or one bit of a register.
 
-    `str` gives its canonical spelling.
+    `str` gives the point's canonical spelling.
     """
 
     unit: int
@@ -76,11 +77,11 @@ class Point(Struct, frozen=True, order=True):
 
     @property
     def cell(self) -> "Point":
-        """Return the point to read. For one bit of a register, the point is the whole register."""
+        """Return the point to read. For one bit of a register, this is the whole register."""
         return self if self.bit is None else Point(self.unit, self.table, self.address)
 
     def of(self, value: int) -> int:
-        """Return the point's value, taken from the value of its cell."""
+        """Return the point's value. `value` is the value of the point's cell."""
         return value if self.bit is None else value >> self.bit & 1
 
 
@@ -152,7 +153,8 @@ def wire_problems(wire: Wire) -> Iterable[str]:
 
 
 def wire_warnings(wire: Wire) -> Iterable[str]:
-    """Yield a warning for a relay whose release nobody can verify. A call needs no such proof."""
+    """Yield a warning for a relay if nobody can verify that the relay went off. A call needs no such
+    proof."""
     if wire.direction == "out" and not (wire.read_back or wire.clearing):
         yield "the coil is not read back: switching it off is not verified"
 
@@ -168,8 +170,8 @@ def _flash_problems(wire: Wire, output: Point) -> Iterable[str]:
 
 
 def ranges(points: Iterable[Point], gap: int | None = None) -> list[Range]:
-    """Return as few read requests as possible for all these points. They also read gaps of up to `gap`
-    addresses.
+    """Return as few read requests as possible for all these points. A request also reads gaps of up to
+    `gap` addresses between the points.
 
     Without `gap`, the widest gap is the table's GAP_MAX.
     """
@@ -184,7 +186,7 @@ def ranges(points: Iterable[Point], gap: int | None = None) -> list[Range]:
 
 
 def pieces(whole: Range, points: Iterable[Point]) -> Sequence[Range]:
-    """Return the parts of a range that contain these points and nothing between them."""
+    """Return the parts of a range that contain these points and no other address."""
     return ranges(set(points).intersection(whole.points()), gap=0)
 
 
@@ -226,7 +228,7 @@ def _table(text: str, words: str) -> Table:
 
 
 def _bit(text: str, table: Table, bit: str | None) -> int | None:
-    """Return the bit of a register; None for a coil or discrete input."""
+    """Return the bit of a register. Return None for a coil or discrete input."""
     if table in ("coil", "discrete input"):
         if bit is not None:
             raise ValueError(f"{text!r}: a {table} is one bit already: leave 'bit {bit}' out")

@@ -1,8 +1,8 @@
 """The spelling of a place in register maps and profiles: `holding register 4`, `coil 0`.
 
-A place has no unit, because one map serves several units. Addresses are those on the wire, from 0. The
-numbers of the data model begin at 1: 40001 is holding register 0, and 30001 is input register 0. Such a
-number is refused, and the error names the right address.
+A place has no unit, because one map serves several units. Addresses begin at 0, as in the frames on the
+wire. The numbers of the data model begin at 1. For example, 40001 is holding register 0, and 30001 is
+input register 0. Such a number is refused, and the error names the right address.
 """
 
 import re
@@ -24,7 +24,7 @@ Place = Annotated[
         extra={"number": "table and address; addresses begin at 0 (input register 1)"},
     ),
 ]
-"""`holding register 4`, `input register 0x10`, `coil 0` or `discrete input 2`."""
+"""A place, such as `holding register 4`, `input register 0x10`, `coil 0` or `discrete input 2`."""
 
 TABLES: Final[dict[str, Table]] = {
     "coil": "coil",
@@ -49,7 +49,7 @@ def place(text: str, tables: Collection[str] = tuple(TABLES)) -> tuple[Table, in
 
 
 def misplaced(text: str, tables: Collection[str]) -> str | None:
-    """Return the error in a place as a text for a struct's `problems`. Return None for a valid
+    """Return the error of a misspelt place, for a struct's `problems`. Return None for a valid
     place."""
     try:
         place(text, tables)

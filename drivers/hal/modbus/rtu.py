@@ -7,7 +7,7 @@ RTU has no transaction number, so a late reply looks like the reply to the prese
 rules:
 
 - A request is sent only after 3.5 characters of silence. Earlier bytes are dropped.
-- Frames of other units are dropped, and the wait goes on. Bytes that are no frame may be the wanted
+- Frames of other units are dropped, and the wait goes on. Bytes that are not a frame may be the wanted
   reply in collision with a late reply. After such bytes the try ends when the line is silent.
 - A unit that misses its timeout may answer late, until LATE x `timeout_s` after its request. Until then
   the unit gets only repeats of the same request, within the same call. The first reply counts, because
@@ -43,11 +43,11 @@ FRAME_MAX: Final = 256
 
 
 class Noise(BadReply):
-    """The error of bytes that are not a frame. The reply may come later."""
+    """The error of bytes that are not a frame. The wanted reply may still come."""
 
 
 class SerialLine:
-    """One serial port, opened exclusively. It is opened again when needed."""
+    """One serial port, opened exclusively. The line opens the port again when needed."""
 
     def __init__(self, settings: Serial, timeout_s: float) -> None:
         self._settings = settings
@@ -60,7 +60,7 @@ class SerialLine:
         self._stray = b""
 
     def owes(self, unit: int) -> bool:
-        """May this unit still reply to an older request? If so, a new request should wait."""
+        """May this unit still reply to an older request? In this case a new request should wait."""
         return time.monotonic() < self._late.get(unit, 0.0)
 
     def begin(self, unit: int) -> None:
@@ -110,7 +110,7 @@ class SerialLine:
         port, self._port = self._port, None
         if port is not None:
             with suppress(OSError, termios.error):
-                port.reset_output_buffer()  # bytes that a dead line has not taken would delay closing
+                port.reset_output_buffer()  # unsent bytes on a dead line would delay closing
             with suppress(OSError, termios.error):
                 port.close()
 
@@ -159,7 +159,7 @@ class SerialLine:
         return received
 
     def _without_echo(self, request: bytes) -> bytes:
-        """Return the bytes after the echo of our own request."""
+        """Return the bytes after the echo of the sent request."""
         heard = b""
         while len(heard) < len(request) and request.startswith(heard):
             heard += self._heard(self._timeout_s)
@@ -223,8 +223,8 @@ class SerialLine:
 
 
 def _answers(request: bytes, function: bytes) -> bool:
-    """Return whether a reply to this request may have this function. Return True until the function has
-    come."""
+    """Return whether a reply to this request may have this function. If the function has not come yet,
+    return True."""
     return not function or function[0] & 0x7F == request[1]
 
 
@@ -240,6 +240,7 @@ def _start(heard: bytes) -> str:
 
 
 def _why(error: Exception) -> str:
-    """Return the cause's own text. pyserial wraps texts, and termios.error is not an OSError."""
+    """Return the text of the cause itself. pyserial wraps this text, and termios.error is not an
+    OSError."""
     text = getattr(error, "strerror", None) or (error.args[-1] if error.args else error)
     return str(text)

@@ -1,4 +1,4 @@
-"""`type: modbus` of a device YAML: where the units are, and the times."""
+"""The settings of a Modbus bus in a device YAML (`type: modbus`): the units' address and the times."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -54,7 +54,7 @@ class ModbusSettings(
                 )
 
     def watched(self) -> Sequence[int]:
-        """Return the units whose own watchdog drops their outputs."""
+        """Return the units whose own watchdog switches their outputs off."""
         return self.module_watchdog.units if self.module_watchdog else ()
 
 
@@ -67,8 +67,8 @@ def warnings(settings: ModbusSettings) -> Remarks:
 
 
 def unwatched(settings: ModbusSettings, places: Iterable[str]) -> UnwatchedOutputs:
-    """Report the written units without a watchdog. Only this daemon switches the outputs of these units
-    off."""
+    """Report the units that the daemon writes and that have no watchdog. Only this daemon switches the
+    outputs of these units off."""
     written = {int(place.split()[1]) for place in places}
     bare = sorted(written.difference(settings.watched(), settings.without_watchdog))
     warned = [((), _bare(bare))] if bare else []
@@ -85,8 +85,8 @@ def unwatched(settings: ModbusSettings, places: Iterable[str]) -> UnwatchedOutpu
 def paced(
     settings: ModbusSettings, devices: Sequence[DeviceSettings], points: Iterable[str]
 ) -> Remarks:
-    """Yield a warning if one silent unit makes the other units' readings stale. Yield one if a serial
-    line is too slow for its `scan_s`."""
+    """Yield a warning if one silent unit makes the other units' readings stale. Yield a warning if a
+    serial line is too slow for its `scan_s`."""
     units = {int(point.split()[1]) for point in points}
     units |= {device.unit for device in devices if hasattr(device, "unit")}
     stale_s = min((s for d in devices if (s := d.stale_after()) is not None), default=math.inf)
@@ -104,7 +104,7 @@ def paced(
 
 
 def tables(settings: ModbusSettings) -> Iterable[Table]:
-    """Yield a table of the writes and readings of the modules' watchdogs."""
+    """Yield a table of the registers that the bus writes and reads for the modules' watchdogs."""
     if settings.module_watchdog:
         units = ", ".join(map(str, settings.module_watchdog.units))
         yield Table(
@@ -125,8 +125,8 @@ def _bare(units: Sequence[int]) -> str:
 
 
 def unreachable(settings: ModbusSettings, point: str) -> str | None:
-    """Return an error for a unit outside 1 to 247 on a serial line (Modbus over Serial Line 2.2), or
-    None."""
+    """Return an error for a unit outside 1 to 247 on a serial line (Modbus over Serial Line 2.2).
+    Return None for any other unit."""
     unit = int(point.split()[1])
     if settings.serial is None or 1 <= unit <= 247:
         return None
@@ -135,8 +135,8 @@ def unreachable(settings: ModbusSettings, point: str) -> str | None:
 
 
 def where(settings: ModbusSettings) -> Where:
-    """Return the address of the gateway or module, or the port of the line. Only one daemon can open
-    the port."""
+    """Return the address of the gateway or module, or the port of the line. Only one daemon can open a
+    port."""
     if settings.serial:
         return Where(settings.serial.port, local=True, clients="one")
     assert settings.tcp  # otherwise `problems` has reported the missing address

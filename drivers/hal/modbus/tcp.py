@@ -14,7 +14,7 @@ number their replies."""
 
 
 class Connection:
-    """The connection to one host, opened again when needed. Tests replace `resolve` (DNS)."""
+    """The connection to one host. It opens again when needed. Tests replace `resolve` (DNS)."""
 
     def __init__(
         self, host: str, port: int, timeout_s: float, resolve: Resolve = socket.getaddrinfo
@@ -23,7 +23,7 @@ class Connection:
         self._where = f"{host}:{port}"
         self._dialler = Dialler(host, port, resolve)
         self._socket: socket.socket | None = None
-        self._number = 0  # goes on in the next connection, so no late reply matches
+        self._number = 0  # also counts on in the next connection, so no late reply matches
 
     def owes(self, unit: int) -> bool:
         """Return False. Replies have numbers, so a late reply cannot pass for a new reply."""
@@ -42,7 +42,8 @@ class Connection:
                 raise Unreachable(self._unreachable(error)) from error
 
     def ask(self, question: UnitRequest) -> UnitReply:
-        """Send this request, and return its answer. Without an answer, close and raise NoReply."""
+        """Send this request, and return its answer. If no answer comes, close the connection and raise
+        NoReply."""
         try:
             return self._answer(question)
         except (OSError, BadReply) as error:

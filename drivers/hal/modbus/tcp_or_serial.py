@@ -1,4 +1,4 @@
-"""The two connections of Modbus units: a TCP address, or a serial line."""
+"""The two ways to reach Modbus units: a TCP address, or a serial line."""
 
 import re
 from typing import Annotated, Final, Literal
@@ -63,13 +63,14 @@ class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     @property
     def least_s(self) -> float:
-        """Return the time (s) of the shortest reading, which has a request of 8 characters and a reply
-        of 6."""
+        """Return the time (s) of the shortest reading. Its request has 8 characters, and its reply has
+        6."""
         return 14 * self.character_s + 2 * self.gap_s
 
     @property
     def gap_s(self) -> float:
-        """Return the silence between two frames (s). It is 3.5 characters, or 1.75 ms above 19200 baud.
+        """Return the silence between two frames (s). The silence is 3.5 characters, or 1.75 ms above
+        19200 baud.
 
         Source: Modbus over Serial Line V1.02, 2.5.1.1.
         """

@@ -1,6 +1,6 @@
-"""`module_watchdog:` of a Modbus bus: the module's own watchdog for its outputs.
+"""The watchdog that a Modbus module has for its own outputs (`module_watchdog:` in the YAML).
 
-Without timely writes the module drops its outputs by itself. Each make has its own registers for
+Without timely writes the module switches its outputs off by itself. Each make has its own registers for
 arming, refreshing and checking the watchdog. So these registers are in the YAML or a profile.
 `dead_man.py` uses them.
 """
@@ -24,7 +24,7 @@ class RegisterWrite(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fiel
 
 
 class Refresh(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The write that keeps the watchdog from tripping."""
+    """The periodic write that keeps the watchdog from tripping."""
 
     values: Annotated[
         list[Word],
@@ -36,13 +36,13 @@ class Refresh(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class Shows(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A place, and the values that match there."""
+    """A place that is read, and the values that count as a match."""
 
     values: Annotated[list[Word], msgspec.Meta(min_length=1), tells("the readings that match.")]
 
 
 class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The use of one make's watchdog: its writes, readings and times."""
+    """The registers and times of one make's watchdog."""
 
     time_s: Annotated[Period, tells("the time that `arm` gives the module.")]
     arm: Annotated[
@@ -79,8 +79,8 @@ class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = None
 
     def problems(self) -> Remarks:
-        """Yield a problem for a missing or double choice of profile and habits, and for a profile with
-        problems."""
+        """Yield a problem if the YAML gives neither profile nor habits, or gives both. Yield the
+        problems of the profile."""
         if len(set(self.units)) < len(self.units):
             yield ("units",), "a unit is listed twice"
         yield from PROFILE.problems(self.profile, self.habits)
@@ -90,7 +90,7 @@ class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return PROFILE.chosen(self.profile, self.habits)
 
     def rows(self) -> Iterator[tuple[str, str, str]]:
-        """Yield (when, place, value) of each write, and of each reading that is compared."""
+        """Yield (when, place, value) for each write, and for each reading that the daemon compares."""
         chosen = self.chosen()
         for write in chosen.arm:
             yield f"starts the watchdog, for {chosen.time_s:g} s", write.at, str(write.value)

@@ -1,6 +1,7 @@
-"""A request to a Modbus unit and its answer. `tcp.py` and `rtu.py` carry both.
+"""A request to a Modbus unit, and its answer. `tcp.py` and `rtu.py` carry requests and answers.
 
-Only functions 1 to 6 are used: they read the four tables, and write one coil or one register.
+The daemon uses only functions 1 to 6. These functions read the four tables, and write one coil or one
+register.
 """
 
 from typing import Final, NamedTuple, Protocol
@@ -48,19 +49,20 @@ class UnitRequest(Struct, frozen=True):
 
 
 class UnitReply(NamedTuple):
-    """A unit's reply. It has bits or registers as numbers, or the code of an exception, which may be
-    0."""
+    """A unit's reply. The reply has either bits or registers as numbers, or the code of an exception.
+    The code may be 0."""
 
     values: tuple[int, ...] = ()
     exception: int | None = None
 
 
 class Unreachable(Exception):
-    """The error of a missing connection. Its text gives the cause."""
+    """The error of a connection that cannot be made. The error's text gives the cause."""
 
 
 class NoReply(Exception):
-    """The error of a request without a reply in time. Its text describes anything else that came."""
+    """The error of a request that gets no reply in time. The error's text describes any other bytes
+    that came."""
 
 
 class BadReply(Exception):
@@ -76,13 +78,13 @@ class UnitException(HalError):
 
 
 class UnitWire(Protocol):
-    """The connection or line to some units, opened again when needed."""
+    """The connection or line to some units. It opens again when needed."""
 
     def owes(self, unit: int) -> bool:
-        """May this unit still reply to an older request? If so, a new request should wait."""
+        """May this unit still reply to an older request? In this case a new request should wait."""
 
     def begin(self, unit: int) -> None:
-        """Before a new request, wait until no late reply can pass for the new reply."""
+        """Wait until no late reply can pass for the reply to a new request."""
 
     def connect(self) -> None:
         """Connect if necessary, and start the time limit of one try. Raises Unreachable."""

@@ -4,7 +4,7 @@
     points.py    one contact or relay in the YAML
     topics.py    topics and messages in the YAML
     makes.py     the topics of well-known makes, for `profile`
-    bus.py       the broker, which a driver uses: listening, publishing, ages, backoff
+    bus.py       one broker for the drivers: listening, publishing, ages, backoff
     lines.py     one device's contacts and relays: claim, read, write, read back, renew, release
     link.py      one connection through paho-mqtt
 
