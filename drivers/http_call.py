@@ -1,4 +1,4 @@
-"""Commands over HTTP: their settings in the YAML, and their use by drivers."""
+"""Commands over HTTP. This file has their settings in the YAML, and the functions that send them."""
 
 import re
 from typing import Annotated, Protocol
@@ -37,7 +37,8 @@ class Calls(Protocol):
     def send(
         self, path: str, method: http.Method = "POST", body: str | None = None, safe: bool = False
     ) -> None:
-        """Send one request once. `safe`: the request switches an output off. Raises HalError."""
+        """Send one request once. `safe` means that the request switches an output off. Raises
+        HalError."""
 
 
 class InsistentCalls(Calls, Protocol):
@@ -55,13 +56,14 @@ def send(bus: Calls, call: Call | None, safe: bool = False) -> None:
 
 
 def claim(call: Call) -> str:
-    """Return the command as a claim. A claim forbids the command to all other devices of this bus."""
+    """Return the text that claims this command for one device. No other device of this bus may claim
+    the same text."""
     return f"{call.method} {call.path}{f' {call.body}' if call.body else ''}"
 
 
 def timer_unseen(call: Call, off_s: float) -> str:
-    """Describe a command in which the timer's number (s or ms) cannot be found; "" if the number is
-    there."""
+    """Describe a command that does not contain the timer's time (in s or ms). Return "" if the command
+    contains this time."""
     written = f"{call.path} {call.body or ''}".strip()
     numbers = re.findall(r"[0-9]+(?:\.[0-9]+)?", written)
     if {off_s, 1000 * off_s}.intersection(map(float, numbers)):

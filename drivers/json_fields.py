@@ -1,8 +1,8 @@
-"""Reads typed values from one JSON object. Names with dots between them address a field
+"""Reads typed values from one JSON object. The path of a field is its names with dots between them
 (`pad.receiver.id`).
 
-Each function returns a value of the type that its caller wants. For any other JSON it raises a
-DriverError that names the field.
+Each function returns a value of the type that its caller wants. For any other JSON the function raises
+a DriverError that names the field.
 """
 
 import math
@@ -54,7 +54,7 @@ class JsonNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 
 
 def flag(answer: Mapping[str, object], place: JsonFlag) -> bool:
-    """Return yes or no; null means no. Raises DriverError for an absent field or a wrong type."""
+    """Return yes or no. Null means no. Raises DriverError for an absent field or a wrong type."""
     value = needed(answer, place.field)
     if value is None:
         return False
@@ -66,27 +66,28 @@ def flag(answer: Mapping[str, object], place: JsonFlag) -> bool:
 
 
 def flag_if(answer: Mapping[str, object], place: JsonFlag | None) -> bool | None:
-    """Return the flag as `flag` does; None without a place. Raises DriverError."""
+    """Return the flag as `flag` does. Return None without a place. Raises DriverError."""
     return None if place is None else flag(answer, place)
 
 
 def certain(answer: Mapping[str, object], place: JsonFlag | None) -> bool:
-    """Return the flag of a danger; False without a place. Raises DriverError as `flag` does. Raises it
-    for null too, because null says nothing about the danger."""
+    """Return a flag that reports a danger. Return False without a place. Raises DriverError as `flag`
+    does, and for null too, because null says nothing about the danger."""
     if place and needed(answer, place.field) is None:
         raise wrong(place.field, None, "yes or no")
     return place is not None and flag(answer, place)
 
 
 def place_text(place: JsonFlag | JsonNumber) -> str:
-    """Describe the place for `check`. Give its field, and the values that mean yes, or the scale."""
+    """Describe the place for `check`. A flag's description has the field and the values that mean yes.
+    A number's description has the field and the scale."""
     if isinstance(place, JsonNumber):
         return place.field if place.scale == 1.0 else f"{place.field} x {place.scale:g}"
     return f"{place.field} is {', '.join(map(value_text, place.when)) or 'true'}"
 
 
 def value_text(value: Value) -> str:
-    """Return a value as JSON writes it, but a text without its quotes."""
+    """Return a value as JSON writes it. A text has no quotes."""
     return clean(str(value).lower() if isinstance(value, bool) else str(value), 40)
 
 
@@ -105,7 +106,7 @@ def is_field(text: str) -> bool:
 
 
 def found(answer: object, field: str) -> object:
-    """Return the field's value, or ABSENT."""
+    """Return the field's value. Return ABSENT if the answer has no such field."""
     for part in field.split("."):
         if isinstance(answer, dict):
             answer = answer.get(part, ABSENT)
@@ -127,7 +128,7 @@ def needed(answer: Mapping[str, object], field: str) -> object:
 
 
 def text(answer: Mapping[str, object], field: str) -> str:
-    """Return a text, made printable and put on one line; "" if absent or null."""
+    """Return a text, made printable and put on one line. Return "" if the field is absent or null."""
     value = found(answer, field)
     if value is ABSENT or value is None:
         return ""
@@ -137,7 +138,8 @@ def text(answer: Mapping[str, object], field: str) -> str:
 
 
 def number(answer: Mapping[str, object], field: str, scale: float) -> float | None:
-    """Return a number times `scale`; None if absent or null. Raises DriverError for other values."""
+    """Return a number times `scale`. Return None if the field is absent or null. Raises DriverError for
+    any other value."""
     value = found(answer, field)
     if value is ABSENT or value is None:
         return None
@@ -153,7 +155,8 @@ def number(answer: Mapping[str, object], field: str, scale: float) -> float | No
 
 
 def name(answer: Mapping[str, object], field: str) -> str:
-    """Return an id as text; "" for null. Raises DriverError if the field is absent or not an id."""
+    """Return an id as text. Return "" for null. Raises DriverError if the field is absent or not an
+    id."""
     value = needed(answer, field)
     if value is None:
         return ""

@@ -10,7 +10,7 @@ from bridges.kinds.shared.remarks import Remarks
 BITS: Final = 16
 """The number of bits in a register."""
 Bit = Annotated[int, msgspec.Meta(ge=0, le=BITS - 1)]
-"""A bit of a register; 0 is the least significant."""
+"""A bit of a register. Bit 0 is the least significant."""
 LongBit = Annotated[int, msgspec.Meta(ge=0, le=2 * BITS - 1)]
 """A bit of a number of up to 32 bits."""
 
@@ -21,8 +21,8 @@ def bits_on(number: int) -> list[int]:
 
 
 def listed_twice(lists: Mapping[str, Collection[int]]) -> Remarks:
-    """Yield a problem for each number that is listed twice, in one list or in two. `lists` is YAML key
-    -> numbers."""
+    """Yield a problem for each number that is listed twice, in one list or in two. `lists` gives the
+    numbers of each key of the YAML."""
     first: dict[int, str] = {}
     for key, numbers in lists.items():
         for i, number in enumerate(numbers):

@@ -12,11 +12,11 @@ class OnPoints:
         self._points = points
 
     def take_inputs(self, elsewhere: Readings) -> None:
-        """Read the contacts on other buses by `elsewhere`."""
+        """Let the driver call `elsewhere` for the contacts on other buses."""
         self._points.take_inputs(elsewhere)
 
     def open(self) -> None:
-        """Claim every relay and every contact. All relays are off afterwards."""
+        """Claim every relay and every contact. The claim leaves all relays off."""
         self._points.open()
 
     def contacts(self) -> Mapping[str, bool]:
@@ -24,7 +24,7 @@ class OnPoints:
         return self._points.last_known()
 
     def make_safe(self) -> None:
-        """Switch every relay off, and verify each where possible."""
+        """Switch every relay off. Read each relay back where the hardware allows this."""
         self._points.make_safe()
 
     def close(self) -> None:

@@ -1,11 +1,12 @@
-"""Finds how a code on several lines reads when one wire is broken, for checks and their tables."""
+"""Finds the readings of a code on several lines when one wire is broken. The checks and their tables
+use these readings."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
 from drivers.hal.points import Wire
 
 Lines = Mapping[str, bool]
-"""Signal -> asserted, for each line of a code."""
+"""For each line of a code, whether its signal is asserted."""
 
 
 def lines_on(shown: Lines) -> str:
@@ -14,8 +15,8 @@ def lines_on(shown: Lines) -> str:
 
 
 def breaks(shown: Lines, wires: Mapping[str, Wire]) -> Iterator[tuple[str, str, dict[str, bool]]]:
-    """Yield (signal, `cut` or `shorted`, lines) for each line that may break. The lines are the code's
-    reading.
+    """Yield (signal, `cut` or `shorted`, lines) for each line that may break. `lines` is the reading of
+    the whole code.
 
     The reading of a cut line depends on its wiring (`Wire.broken_reads`). A shorted line, or a line
     with a stuck contact, reads the opposite. A cut line that floats (`pull: none`) may read either way.
@@ -26,12 +27,13 @@ def breaks(shown: Lines, wires: Mapping[str, Wire]) -> Iterator[tuple[str, str, 
 
 
 def one_cut(shown: Lines, wires: Mapping[str, Wire]) -> Iterator[tuple[str, dict[str, bool]]]:
-    """Yield (signal, changed reading) of each wire whose cut changes the reading."""
+    """Yield each wire whose cut changes the reading, with the changed reading."""
     return ((signal, then) for signal, how, then in breaks(shown, wires) if how == "cut")
 
 
 def told_of_cuts(readings: Sequence[tuple[str, str]]) -> str:
-    """Join pairs (signal, its reading when cut) to one text: `L1: floor_bit1; a fault: floor_bit0`."""
+    """Join pairs (signal, reading with this signal cut) to one text: `L1: floor_bit1; a fault:
+    floor_bit0`."""
     by_reading: dict[str, list[str]] = {}
     for signal, reading in readings:
         by_reading.setdefault(reading, []).append(signal)

@@ -1,8 +1,8 @@
-"""Wiring that works but is unsafe, such as a cut wire that reads as safe, or a relay that energises at
-boot.
+"""Finds wiring that works but is unsafe. Examples are a cut wire that reads as safe, and a relay that
+energises at boot.
 
-The daemon refuses to start with an unsafe choice, unless `accept_unsafe: {signal: reason}` accepts the
-choice.
+The daemon refuses to start with an unsafe choice. `accept_unsafe: {signal: reason}` in the YAML accepts
+the choice.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -20,7 +20,7 @@ Unsafe = tuple[str, tuple[str, ...], str]
 
 
 def cut_must_read(wire: Wire, asserted: bool, meaning: str) -> Iterator[Unsafe]:
-    """Yield the wire unless it reads as `asserted` when cut. `meaning` describes the danger of the
+    """Yield the wire if it does not read as `asserted` when cut. `meaning` describes the danger of the
     false reading."""
     reads = wire.broken_reads()
     if reads is None:
@@ -30,7 +30,7 @@ def cut_must_read(wire: Wire, asserted: bool, meaning: str) -> Iterator[Unsafe]:
 
 
 def energised_at_boot(wires: Iterable[Wire]) -> Iterator[Unsafe]:
-    """Yield each output whose relay is energised from power-on until the daemon's claim."""
+    """Yield each output whose relay is energised from power-on until the daemon claims it."""
     for wire in wires:
         if wire.direction == "in":
             continue
@@ -50,7 +50,7 @@ def energised_at_boot(wires: Iterable[Wire]) -> Iterator[Unsafe]:
 
 def unsafe_wires(wires: list[Wire], must_read: Mapping[str, tuple[bool, str]]) -> Iterator[Unsafe]:
     """Yield each wire whose cut reads as safe, and each output that is energised at boot. `must_read`
-    gives for a signal the `asserted` and `meaning` of `cut_must_read`."""
+    gives `asserted` and `meaning` of `cut_must_read` for each signal."""
     for wire in wires:
         if wire.signal in must_read:
             yield from cut_must_read(wire, *must_read[wire.signal])
@@ -66,14 +66,14 @@ def slow_alarms(wires: Iterable[Wire]) -> Remarks:
 
 
 def needlessly_accepted(found: Iterable[Unsafe], accepted: Mapping[str, str]) -> Remarks:
-    """Yield a problem (path, text) for each safe signal that `accept_unsafe` names."""
+    """Yield a problem (path, text) for each signal that `accept_unsafe` names although it is safe."""
     for signal in accepted.keys() - {signal for signal, _, _ in found}:
         yield ("accept_unsafe", signal), f"nothing is unsafe about {signal}: delete this entry"
 
 
 def unaccepted(found: Iterable[Unsafe], accepted: Mapping[str, str]) -> Remarks:
-    """Yield a problem for each unsafe choice that `accept_unsafe` does not name. Its text has two
-    remedies."""
+    """Yield a problem for each unsafe choice that `accept_unsafe` does not name. The problem's text has
+    two remedies."""
     for signal, path, text in found:
         if signal not in accepted:
             yield path, f"unsafe: {text}; or accept_unsafe: {{{signal}: <why it is safe here>}}"

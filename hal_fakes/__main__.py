@@ -1,4 +1,4 @@
-"""`python -m hal_fakes FILE BUS --socket PATH`: serve the far side of one bus in a separate process.
+"""Serves the far side of one bus in a separate process: `python -m hal_fakes FILE BUS --socket PATH`.
 
 This is for buses whose fake is `Outside` (`hal_fakes/fake.py`). When the far side is ready, the process
 prints the replacements for the bus's settings as one line of JSON.
@@ -29,7 +29,7 @@ from hal_fakes.realtime import RealTime
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Serve until standard input ends."""
-    atexit.register(gc.freeze)  # as in bridges/cli.py
+    atexit.register(gc.freeze)  # saves CPU time at exit, as in bridges/cli.py
     parser = argparse.ArgumentParser(prog="python -m hal_fakes")
     parser.add_argument("file", type=Path)
     parser.add_argument("bus")

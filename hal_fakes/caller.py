@@ -12,12 +12,13 @@ PATIENCE_S: Final = 120.0
 
 
 class SimulationRefused(Exception):
-    """The error of an order that the simulation refuses. Its text is the simulation's answer."""
+    """The error of an order that the simulation refuses. The error's text is the simulation's
+    answer."""
 
 
 class Caller:
-    """A connection. Raises OSError if nobody listens, or if no answer comes within `patience_s` (None:
-    wait for ever)."""
+    """A connection. Raises OSError if nobody listens, or if no answer comes within `patience_s`. If
+    `patience_s` is None, the connection waits for ever."""
 
     def __init__(self, path: Path, patience_s: float | None = PATIENCE_S) -> None:
         self._end = socket.socket(socket.AF_UNIX)
@@ -41,17 +42,17 @@ class Caller:
         return self.hear()
 
     def order(self, line: str) -> None:
-        """Send an order. Raises SimulationRefused unless the plant obeys."""
+        """Send an order. Raises SimulationRefused if the plant does not obey."""
         answer = self.say(line)
         if answer != "ok":
             raise SimulationRefused(f"{line}: {answer or 'no answer'}")
 
     def hear(self) -> str:
-        """Return the next line. Return "" when the simulation has hung up."""
+        """Return the next line. Return "" after the simulation has closed the connection."""
         return self._lines.readline().rstrip("\n")
 
     def edges(self) -> Iterator[Edge]:
-        """Yield every edge until the simulation hangs up. Send `follow` first."""
+        """Yield every edge until the simulation closes the connection. Send `follow` first."""
         while line := self.hear():
             yield Edge(**json.loads(line))
 
@@ -60,6 +61,6 @@ class Caller:
         return next(e.at for e in self.edges() if (e.signal, e.value) == (signal, value))
 
     def close(self) -> None:
-        """Hang up. The caller may call `close` twice."""
+        """Close the connection. The caller may call `close` twice."""
         self._lines.close()
         self._end.close()

@@ -18,14 +18,14 @@ from drivers import DriverError
 Active = Literal["high", "low"]
 Pull = Literal["up", "down", "none"]
 Point = Annotated[str, msgspec.Meta(extra={"check": "point"})]
-"""A contact's address. The bus's `canonical` checks it while the YAML is read."""
+"""A contact's address. The bus's `canonical` checks the address while the YAML is read."""
 OtherBus = Annotated[str, msgspec.Meta(extra={"check": "other bus"})]
-"""The name of a bus that is not the device's. `bridges/settings/wiring.py` checks the name."""
+"""The name of a bus other than the device's own bus. `bridges/settings/wiring.py` checks the name."""
 DebounceSeconds = Annotated[float, msgspec.Meta(ge=0, le=10, extra={"unit": "s"})]
 
 
 class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One contact that is read."""
+    """One contact that the driver reads."""
 
     point: Annotated[
         Point, tells("the address: `BCM4` or `J8:7` on GPIO, `unit 1 discrete input 0` on Modbus.")
@@ -45,14 +45,14 @@ class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ] = None
 
     def wire(self, signal: str, path: tuple[str, ...], debounce_s: float | None) -> "Wire":
-        """Return the input's row of the wiring table; `debounce_s` is the default."""
+        """Return the input's row of the wiring table. `debounce_s` is the default of the debounce."""
         own_s = debounce_s if self.debounce_s is None else self.debounce_s
         bus = self.bus or ""
         return Wire(signal, "in", self.point, self.active, self.pull, own_s, path, bus=bus)
 
 
 class Output(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One relay or line that is driven. Its safe level always means "not asserted"."""
+    """One relay or line that the driver drives. The safe level always means "not asserted"."""
 
     refused: ClassVar[Mapping[str, str]] = {
         "bus": "an output is always on the device's own bus: wire the relay there, and delete 'bus'"
@@ -89,23 +89,23 @@ class Output(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def input_wires(inputs: msgspec.Struct, debounce_s: float | None = None) -> list["Wire"]:
-    """Return a row for each Input of a YAML's `inputs`. `debounce_s` is the default."""
+    """Return a row for each Input of a YAML's `inputs`. `debounce_s` is the default of the debounce."""
     fields = ((signal, getattr(inputs, signal)) for signal in inputs.__struct_fields__)
     return [line.wire(s, ("inputs", s), debounce_s) for s, line in fields if line is not None]
 
 
 class Flash(msgspec.Struct, frozen=True):
-    """A pulse that the module times. It has the point of the request, and the duration (s)."""
+    """A pulse that the module times. `Flash` has the point for the request, and the duration (s)."""
 
     point: str
     on_s: float
 
 
 class Clearing(msgspec.Struct, frozen=True):
-    """The habit of a controller that takes commands and clears them by itself. `bits`: the bits of a
-    place that hold the command.
+    """The behaviour of a controller that takes commands from a place and clears them by itself. `bits`
+    are the bits of the place that hold the command.
 
-    `pulse`: the command is a pulse. If the controller ends the pulse early, nobody needs a warning.
+    If `pulse` is true, the command is a pulse. The controller may end a pulse early without a warning.
     """
 
     bits: int = 1
@@ -126,12 +126,12 @@ class Wire(msgspec.Struct, frozen=True):
     flash: Flash | None = None
     read_back: bool = True
     clearing: Clearing | None = None
-    """An output that the controller may clear by itself."""
+    """The behaviour of a controller that clears this output by itself, or None."""
     bus: str = ""
     """The bus of an input that is not on the device's own bus."""
 
     def level(self, asserted: bool) -> bool:
-        """Return the electrical level (True is high) that means asserted, or not asserted."""
+        """Return the electrical level (True is high) for an asserted or a not asserted signal."""
         return asserted == (self.active == "high")
 
     def asserted(self, level: int) -> bool:
@@ -142,7 +142,8 @@ class Wire(msgspec.Struct, frozen=True):
         """Return the reading of a cut wire: True for asserted, False for not asserted, None if the wire
         floats.
 
-        A GPIO input goes to the level of its pull. An open contact at a Modbus module reads 0.
+        A cut wire at a GPIO input takes the level of the input's pull. At a Modbus module an open
+        contact reads 0.
         """
         if self.direction == "out":
             return False
@@ -153,24 +154,24 @@ class Wire(msgspec.Struct, frozen=True):
 
 def is_number(wires: Iterable[Wire]) -> bool:
     """Return whether these lines are bits of registers. Such bits form a number inside a controller,
-    and have no cable that could be cut."""
+    and have no cable that somebody could cut."""
     return all(re.search(r"\bbit\b", wire.point, re.IGNORECASE) for wire in wires)
 
 
 class Lines(Protocol):
-    """The raw levels of one device's points on one bus. 1 and True are high."""
+    """The raw levels of one device's points on one bus. The values 1 and True mean high."""
 
     def claim(self) -> None:
-        """Claim every output at its safe level in one step, and every input. Raises HalError."""
+        """Claim every input, and claim every output at its safe level in one step. Raises HalError."""
 
     def read(self) -> Mapping[str, int]:
-        """Read the level of every input now. Return canonical point -> level. Raises HalError.
+        """Read the level of every input now. Return the level of each canonical point. Raises HalError.
 
-        An output in the result has lost its level, and must be written again.
+        If the result contains an output, this output has lost its level, and must be written again.
         """
 
     def write(self, levels: Mapping[str, bool]) -> None:
-        """Drive these outputs. Raises HalError; after an error their levels are unknown.
+        """Drive these outputs. Raises HalError. After an error nobody knows their levels.
 
         The call tries every output that goes to its safe level, even after another output has failed.
         """
@@ -190,7 +191,7 @@ class FlashLines(Protocol):
     def flash(self, point: str, flash: Flash) -> None:
         """Request once that the module switches this output on, and off again by itself.
 
-        Raises HalError; after an error the output may be on.
+        Raises HalError. After an error the output may be on.
         """
 
 
@@ -217,16 +218,18 @@ class PointsBus(Protocol):
     ) -> Lines:
         """Return the lines of one device: canonical inputs, and outputs with their safe levels.
 
-        `unread`: outputs that are never read back. `clearing`: outputs that the controller may clear.
+        `unread` are the outputs that are never read back. `clearing` are the outputs that the
+        controller may clear.
         """
 
 
 class HalError(DriverError):
-    """The error of a bus: no such chip, connection refused, timeout, exception reply, bad frame."""
+    """The error of a bus, such as a missing chip, a refused connection, a timeout or a bad frame."""
 
 
 Readings = Callable[[], Mapping[str, bool]]
-"""Returns signal -> asserted for inputs on other buses. Raises DriverError if one is not known now."""
+"""A function that returns for each input on another bus whether the input is asserted. The function
+raises DriverError while one of these inputs is unknown."""
 
 
 def _not_read() -> Mapping[str, bool]:
@@ -236,7 +239,8 @@ def _not_read() -> Mapping[str, bool]:
 class Points:
     """The signals of one device, as asserted or not.
 
-    The outputs are on `bus`, the device's own. `take_inputs` says how inputs on other buses are read.
+    The outputs are on `bus`, the device's own bus. `take_inputs` sets the function that reads the
+    inputs on other buses.
     """
 
     def __init__(self, wires: Sequence[Wire], bus: PointsBus) -> None:
@@ -254,7 +258,7 @@ class Points:
         self._written: dict[str, bool] | None = None
 
     def take_inputs(self, elsewhere: Readings) -> None:
-        """Read the inputs on other buses by `elsewhere` from now on."""
+        """Call `elsewhere` for the inputs on other buses from now on."""
         self._elsewhere = elsewhere
 
     def open(self) -> None:
@@ -263,10 +267,10 @@ class Points:
         self._lines.claim()
 
     def read(self) -> dict[str, bool]:
-        """Read signal -> asserted for each input. After a failure of the device's own bus the outputs
-        are written again.
+        """Return for each input whether it is asserted. After a failure of the device's own bus, the
+        next `write` writes all outputs again.
 
-        Raises DriverError also while the inputs of another bus are not known.
+        Raises DriverError also while the inputs of another bus are unknown.
         """
         written, self._written = self._written, None
         levels = self._lines.read()
@@ -277,8 +281,8 @@ class Points:
         return self._read
 
     def last_known(self) -> dict[str, bool]:
-        """Return each input's last reading, and each output's last written value if this value is
-        known."""
+        """Return each input's last reading, and each output's last written value. Leave out an output
+        whose value is unknown."""
         return {**self._read, **(self._written or {})}
 
     def write(self, asserted: Mapping[str, bool]) -> None:
@@ -305,17 +309,18 @@ class Points:
     def flash(self, signal: str) -> None:
         """Let the module time a pulse of this output. From now on the output's level is unknown.
 
-        Raises HalError; after an error there may be a pulse, and a second request would prolong it.
+        Raises HalError. After an error the module may give the pulse. A second request would prolong
+        the pulse.
         """
         wire, point = self._out[signal]
-        assert wire.flash  # the caller only passes outputs with `flash`
+        assert wire.flash  # callers pass only outputs with `flash`
         assert isinstance(self._lines, FlashLines)  # `wire_problems` refuses `flash` on other buses
         self._written = None
         self._lines.flash(point, wire.flash)
 
     def make_safe(self) -> None:
-        """Switch every output off, even an output that is believed off. Read the outputs back where
-        possible."""
+        """Switch every output off, even if the output should be off already. Read the outputs back
+        where the hardware allows this."""
         self._written = None
         self.write({})
         levels = self._lines.outputs()

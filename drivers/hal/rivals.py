@@ -1,4 +1,5 @@
-"""Finds outputs that another master writes too, so that no relay is switched to and fro for ever."""
+"""Finds outputs that another master writes too. Without this, the two masters would switch a relay to
+and fro for ever."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -7,8 +8,8 @@ from typing import Final
 from drivers.hal.points import HalError
 
 AGAIN_S: Final = 5.0
-"""The time (s) after a pause in which a contradiction counts as a repetition. A later one counts as the
-first."""
+"""The time (s) after a pause in which a contradiction counts as a repetition. A contradiction after
+this time counts as the first."""
 FIRST_S: Final = 1.0
 LONGEST_S: Final = 30.0
 """The longest pause (s) before the next write to an output that another master writes too. FIRST_S is
@@ -19,11 +20,12 @@ class Rivals:
     """The outputs, by name, that another master seems to write too. Such an output contradicts its
     written value repeatedly.
 
-    After the first contradiction the output is written again at once, because the module may have
-    restarted. With another master, repeated writes would switch the relay to and fro for ever. So after
-    the second contradiction the output is left alone for 1 s. Each further pause is twice as long, up
-    to 30 s. During a pause every write of the device fails with an error that names the fault. Only
-    safe values are still written, at once and every time.
+    After the first contradiction the daemon writes the output again at once, because the module may
+    have restarted. If there is another master, repeated writes would switch the relay to and fro for
+    ever. So after the second contradiction the daemon does not write the output for 1 s. Each further
+    pause is twice as long, up to 30 s. During a pause every write of the device fails with an error
+    that names the fault. Only safe values are an exception: the daemon writes them at once and every
+    time.
     """
 
     def __init__(self, now: Callable[[], float]) -> None:
@@ -39,7 +41,8 @@ class Rivals:
         self._pause_s[name] = min(max(FIRST_S, 2 * before_s), LONGEST_S) if again else 0.0
 
     def check(self, names: Iterable[str]) -> None:
-        """Raise HalError for the first of these outputs whose pause still runs."""
+        """Raise HalError if the pause of one of these outputs runs. The error is for the first such
+        output."""
         for name in names:
             if self._now() - self._at.get(name, -math.inf) < self._pause_s.get(name, 0.0):
                 raise HalError(

@@ -8,12 +8,12 @@ from drivers.hal import Needs
 USB: Final = ("ttyUSB", "ttyACM")
 BOARD: Final = ("ttyAMA", "ttyS")
 MODULES: Final = {"ttyUSB": "usbserial", "ttyACM": "cdc_acm"}
-"""Class of a USB adapter's device -> its kernel module. The module may load after the daemon's start,
-and then adds the class."""
+"""The kernel module for each class of USB adapters. The module may load after the daemon's start, and
+adds the class at that moment."""
 
 
 def needs(port: str) -> Needs:
-    """Return the daemon's needs for the serial port at this path."""
+    """Return the permissions that the daemon needs for the serial port at this path."""
     classes = _classes(PurePath(port))
     modules = tuple(MODULES[name] for name in classes if name in MODULES)
     return Needs(tuple(f"char-{name}" for name in classes), modules, "dialout")

@@ -1,4 +1,5 @@
-"""Stamps of messages whose protocol wants the time of day. No duration is taken from them."""
+"""Timestamps for messages whose protocol wants the time of day. No code calculates a duration from
+these timestamps."""
 
 import time
 

@@ -1,1 +1,1 @@
-"""Drivers of ingestors, which are those of dispensers."""
+"""Drivers of ingestors. They are the drivers of dispensers."""

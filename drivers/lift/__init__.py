@@ -1,1 +1,1 @@
-"""Drivers for lifts: one file for each way of connecting a lift."""
+"""Drivers for lifts. Each way to connect a lift has a file."""

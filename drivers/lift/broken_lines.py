@@ -1,7 +1,8 @@
-"""Finds misreadings of a lift's codes when one of the code's lines is cut or shorted.
+"""Finds misreadings of a lift's codes. A misreading happens when one of the code's lines is cut or
+shorted.
 
-A misread service or motion code is unsafe if it shows a safer state than the lift's real state. A
-misread floor code gives a warning if it shows another floor.
+The misreading of a service or motion code is unsafe if the read state is safer than the lift's real
+state. The misreading of a floor code gives a warning if another floor is read.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,13 +15,14 @@ from drivers.tables import Lines, breaks
 from drivers.unsafe import Unsafe
 
 SERVES = {"agv_mode": 0, "normal": 1, "overload": 1}
-"""State -> how far the state restricts robots. Every unlisted state takes the lift away from RMF."""
+"""A rank for each state that serves robots. A higher rank restricts robots more. Every state that is
+not listed takes the lift away from RMF."""
 TAKEN_AWAY = 2
 
 
 class Misread(NamedTuple):
-    """One misreading. With `line` broken (`how` is cut or shorted), the code for `shown` reads as
-    `reads`."""
+    """One misreading. While `line` is broken (`how` is cut or shorted), the lift shows the state
+    `shown`, and the daemon reads the state `reads`."""
 
     line: str
     how: str
@@ -33,8 +35,8 @@ def misread(
     read: Callable[[Lines], str | None],
     table: Mapping[str, Wire],
 ) -> Iterator[Misread]:
-    """Yield each misreading that one broken line causes. `shown` is meaning -> its codes; `read`
-    decodes lines."""
+    """Yield each misreading that one broken line causes. `shown` gives the codes of each meaning.
+    `read` returns the meaning of lines."""
     for meaning, numbers in shown.items():
         for lines in numbers:
             for line, how, then in breaks(lines, table):
@@ -58,8 +60,8 @@ def unsafe_codes(wiring: LiftWiring, table: Mapping[str, Wire]) -> Iterator[Unsa
 
 
 def floor_warnings(code: FloorCode, table: Mapping[str, Wire]) -> str:
-    """Describe the floors that read as another floor when one line is broken. Return "" if there are
-    none."""
+    """Describe the floors that read as another floor when one line is broken. Return "" if no floor
+    does."""
     shown: dict[str, list[Lines]] = {}
     for _, level, lines in code.shows():
         if level is not None:
@@ -76,14 +78,14 @@ def sentence(found: Iterator[Misread]) -> str:
 
 
 def _danger(state: str) -> int:
-    """Rank a state by how far it restricts robots. A greater rank is stricter, and a moving car is
-    strictest."""
+    """Return a rank for a state. A higher rank restricts robots more. The rank of a moving car is the
+    highest."""
     return 0 if state == "stopped" else SERVES.get(state, TAKEN_AWAY)
 
 
 def _shown(name: str, code: ServiceCode | MotionCode) -> dict[str, list[Lines]]:
-    """Return state -> its codes as lines. Codes of a fault are missing, because the controller never
-    shows them."""
+    """Return the codes of each state, as lines. Leave out the codes of a fault, because the controller
+    never shows them."""
     shown: dict[str, list[Lines]] = {}
     for number, state in code.codes.items():
         if state != "fault":

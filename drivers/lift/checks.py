@@ -27,8 +27,8 @@ ALARMED = (Hazard.FIRE, Hazard.CODE_BLUE, Hazard.EARTHQUAKE, Hazard.EMERGENCY)
 
 
 def problems(wiring: LiftWiring) -> Remarks:
-    """Yield the problems that keep the daemon from starting. Unsafe choices that nobody has accepted
-    are among them."""
+    """Yield the problems that keep the daemon from starting. An unsafe choice that nobody has accepted
+    is such a problem."""
     yield from floors(wiring)
     yield from alarm(wiring)
     yield from _floor_code(wiring.floor_code, wiring.levels())
@@ -71,9 +71,9 @@ def missing(
 ) -> Remarks:
     """Yield a warning for each optional signal that is absent.
 
-    `told`: the lift reports AGV mode. `asks`: an output requests AGV mode. `fire`: the lift reports a
-    fire. `holds`: an output holds the door open. `path`: the section of the YAML where the signal would
-    be.
+    `told` means that the lift reports AGV mode. `asks` means that an output requests AGV mode. `fire`
+    means that the lift reports a fire. `holds` means that an output holds the door open. `path` is the
+    section of the YAML where the signal would be.
     """
     by_call = settings.agv_mode == "by_call"
     if not told:
@@ -124,8 +124,8 @@ def unseen(settings: LiftSettings, sees: Sees) -> Remarks:
 
 
 def by_call(settings: LiftSettings, told: bool, asks: bool, request: tuple[str, ...]) -> Remarks:
-    """Yield problems with `by_call`. The lift must report AGV mode, and no output may request AGV mode.
-    `request` is the path of such an output."""
+    """Yield problems with `by_call`. The lift must report AGV mode (`told`), and no output may request
+    AGV mode (`asks`). `request` is the path of such an output in the YAML."""
     if settings.agv_mode == "by_call" and not told:
         text = "by_call needs an agv_mode input: nothing else shows that the lift accepted a call"
         yield ("agv_mode",), text
@@ -134,8 +134,8 @@ def by_call(settings: LiftSettings, told: bool, asks: bool, request: tuple[str, 
 
 
 def unsafe(wiring: LiftWiring) -> Iterator[Unsafe]:
-    """Yield the wiring that `accept_unsafe` must name, because a cut wire or a power-on could cause
-    harm."""
+    """Yield the wiring that `accept_unsafe` must name. With such wiring a cut wire or a power-on could
+    cause harm."""
     table = {w.signal: w for w in wires(wiring)}
     yield from _cut(table, Hazard.FIRE, True, "a fire alarm reads clear")
     yield from _cut(table, "agv_mode", False, "AGV mode reads on")
@@ -156,8 +156,8 @@ def _cut(table: Mapping[str, Wire], signal: str, asserted: bool, meaning: str) -
 
 
 def floors(wiring: LiftSettings) -> Remarks:
-    """Yield problems: no floors at all, a floor that is named twice, or one door of a landing that is
-    named twice."""
+    """Yield a problem if there are no floors. Yield a problem for a floor that is named twice, and for
+    a landing that names one door twice."""
     stops = wiring.stops()
     if not stops:
         yield ("floors",), "no floors: list this lift's floors by their names on RMF's map"
@@ -189,8 +189,8 @@ def counts_down(settings: LiftSettings, codes: Mapping[int, str], path: tuple[st
 def named(
     what: str, section: tuple[str, ...], given: Collection[str], levels: Collection[str]
 ) -> Remarks:
-    """Yield a problem for each landing that `given` lacks or has in addition. `what` names an entry of
-    `given`."""
+    """Yield a problem for each landing that `given` lacks, and for each name in `given` that is not a
+    landing. `what` names an entry of `given`."""
     for level in given:
         if level not in levels:
             yield section, f"{level!r} is not a landing of this lift, which has {', '.join(levels)}"
@@ -330,8 +330,8 @@ def _in_register(code: FloorCode, table: Mapping[str, Wire]) -> bool:
 
 
 def _dead_code(code: FloorCode, table: Mapping[str, Wire]) -> Iterator[Unsafe]:
-    """Yield the code if it reads as a floor when all lines are cut at once, with the cable or the
-    supply."""
+    """Yield the code if it reads as a floor when all its lines are cut at once. A cut cable or a lost
+    supply cuts all lines."""
     if _in_register(code, table):
         return
     lines = [signal for signal, _, _ in code.inputs()]

@@ -1,5 +1,5 @@
-"""Converts numbers on several lines. The code is binary, Gray or BCD, and the least significant line
-comes first."""
+"""Converts between numbers and the lines that show them. The code is binary, Gray or BCD, and the least
+significant line comes first."""
 
 from collections.abc import Mapping, Sequence
 from typing import Literal
@@ -8,7 +8,7 @@ Encoding = Literal["binary", "gray", "bcd"]
 
 
 def decode(encoding: Encoding, lines: Sequence[bool]) -> int | None:
-    """Return the number on these lines; None for a BCD digit above 9."""
+    """Return the number on these lines. Return None for a BCD digit above 9."""
     number = sum(on << place for place, on in enumerate(lines))
     if encoding == "gray":
         return _from_gray(number)
@@ -16,7 +16,7 @@ def decode(encoding: Encoding, lines: Sequence[bool]) -> int | None:
 
 
 def encode(encoding: Encoding, number: int, width: int) -> tuple[bool, ...]:
-    """Return the lines for a number. Raises ValueError if the number needs more lines than `width`."""
+    """Return the lines for a number. Raises ValueError if `width` lines are too few for the number."""
     pattern = number
     if encoding == "gray":
         pattern = number ^ (number >> 1)
@@ -28,12 +28,13 @@ def encode(encoding: Encoding, number: int, width: int) -> tuple[bool, ...]:
 
 
 def shown_number(prefix: str, shown: Mapping[str, bool], width: int) -> int:
-    """Return the number on the binary lines `<prefix>_bit0`…"""
+    """Return the number on the binary lines `<prefix>_bit0`, `<prefix>_bit1`…"""
     return sum(shown[f"{prefix}_bit{i}"] << i for i in range(width))
 
 
 def lines(prefix: str, number: int, width: int) -> dict[str, bool]:
-    """Return signal -> asserted, for a number on the binary lines `<prefix>_bit0`…"""
+    """Return for each of the binary lines `<prefix>_bit0`, `<prefix>_bit1`… whether the number asserts
+    the line."""
     return {f"{prefix}_bit{i}": bool(number >> i & 1) for i in range(width)}
 
 

@@ -1,4 +1,5 @@
-"""A lift on dry contacts. By the YAML, each signal has a line, or several lines form a number.
+"""A lift on dry contacts. The YAML gives a line to each signal, or gives several lines that form a
+number.
 
 The lines are GPIO pins, or coils and discrete inputs of a Modbus I/O module.
 """
@@ -23,7 +24,7 @@ DOOR = {
     (False, False): DoorReading.BETWEEN,
     (True, True): DoorReading.BOTH,
 }
-"""(opened, closed) contacts -> the reading of the door."""
+"""The reading of the door for each pair of contacts (opened, closed)."""
 
 UP_DOWN = {
     (True, False): Motion.UP,
@@ -73,7 +74,7 @@ class DryContactLift(OnPoints):
 
 
 def encode(settings: DryContactLiftSettings, outputs: LiftOutputs) -> dict[str, bool]:
-    """Return signal -> asserted for all signals. `Points` leaves out signals without a wire."""
+    """Return for each signal whether it is asserted. `Points` leaves out signals without a wire."""
     calls = {f"call_{level}": level == outputs.call for level in settings.calls}
     if settings.call_code:
         calls = settings.call_code.lines(outputs.call)
@@ -88,7 +89,8 @@ def encode(settings: DryContactLiftSettings, outputs: LiftOutputs) -> dict[str, 
 def decode(
     settings: DryContactLiftSettings, shown: Mapping[str, bool], conditional: frozenset[str]
 ) -> LiftSample:
-    """Decode the lines (signal -> asserted). The groups in `conditional` count only in AGV mode."""
+    """Decode the lines. `shown` tells for each signal whether it is asserted. The groups in
+    `conditional` count only in AGV mode."""
     inputs = settings.inputs
     service = _service(inputs, shown)
     agv = _agv(inputs, shown, service)

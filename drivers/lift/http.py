@@ -1,8 +1,9 @@
 """A lift behind a gateway that speaks HTTP and JSON, such as RMF's lift template or a maker's gateway.
 
-If the network fails, only the gateway's own timers can end AGV mode and release the door. So `ask` of a
-held command starts the command's timer (`switches_off_after_s`). The driver sends `ask` in every scan
-while the command is on. A call is one request, just as a person presses a button once.
+If the network fails, only the gateway's own timers can end AGV mode and release the door. So the
+request `ask` of a held command starts the command's timer (`switches_off_after_s`). The driver sends
+`ask` in every scan while the command is on. A call of the car is one request, as when a person presses
+a button once.
 """
 
 from collections.abc import Iterator, Mapping
@@ -39,7 +40,8 @@ class HttpLiftSettings(LiftSettings, frozen=True, kw_only=True, forbid_unknown_f
     ] = None
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
-        """Return the shortest timer (s), and its path in the YAML. Return None if there is no timer."""
+        """Return the time (s) of the shortest timer, and its path in the YAML. Return None if there is
+        no timer."""
         if any(PROFILE.problems(self.profile, self.api)):
             return None
         timers = (
@@ -79,7 +81,7 @@ def api_of(settings: HttpLiftSettings) -> LiftApi:
 
 
 def _path(settings: HttpLiftSettings, *below: str) -> tuple[str, ...]:
-    """Return the YAML path of a part of the API. If a profile has the API, return the path of
+    """Return the path in the YAML of a part of the API. If a profile gives the API, return the path of
     `profile`."""
     return ("api", *below) if settings.api else ("profile",)
 
@@ -115,8 +117,8 @@ def _unsafe(settings: HttpLiftSettings) -> Iterator[Unsafe]:
 
 
 def claims(settings: HttpLiftSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (command, path) of each command. If another device used the command, it would disturb this
-    lift."""
+    """Yield each command with its path in the YAML. If another device sent the command, it would
+    disturb this lift."""
     if any(PROFILE.problems(settings.profile, settings.api)):
         return
     seen: set[str] = set()
@@ -168,7 +170,8 @@ def notes(settings: HttpLiftSettings) -> Remarks:
 
 
 def debounce(settings: HttpLiftSettings) -> Mapping[str, float]:
-    """Return debounce times (s), as for contacts, because a gateway may show a half-changed state."""
+    """Return the debounce times (s). They are those of contacts, because a gateway may show a
+    half-changed state."""
     return {**DEBOUNCE_S, **dict.fromkeys(Hazard, HAZARD_DEBOUNCE_S)}
 
 
@@ -224,9 +227,9 @@ def create(name: str, settings: HttpLiftSettings, bus: GatewayCalls) -> "HttpLif
 class HttpLift:
     """`drivers.Driver[LiftSample, LiftOutputs]` for one lift.
 
-    `_told`: the state that each held command was last commanded to; commands in doubt are missing.
-    `_called`: the landing of the last call that was not withdrawn. `_sure`: the gateway has answered
-    this call.
+    `_told` holds the state that the driver last commanded for each held command. A command whose state
+    is in doubt is missing. `_called` is the landing of the last call that was not withdrawn. `_sure` is
+    True if the gateway has answered this call.
     """
 
     def __init__(self, settings: HttpLiftSettings, bus: GatewayCalls) -> None:
@@ -262,8 +265,8 @@ class HttpLift:
         return sample
 
     def write(self, outputs: LiftOutputs) -> None:
-        """Set every command to this level. Commands that go off come first. Renew the commands that
-        have a timer."""
+        """Set every command to its level in `outputs`. Commands that go off come first. Renew the
+        commands that have a timer."""
         wanted = {name: _wants(outputs, name) for name in self._held}
         idle = [name for name in wanted if not wanted[name] and self._told.get(name) is not False]
         for name in sorted(idle, key=lambda name: name == self._failed):
@@ -296,15 +299,15 @@ class HttpLift:
             return  # the daemon ends, and the gateway's timers end the commands
 
     def _answer(self) -> Mapping[str, object]:
-        """Return the state: the whole answer, or part -> answer if the state has several parts."""
+        """Return the state. If the state has several parts, the result has the answer for each part."""
         if self._api.state_path:
             return self._bus.get_json(self._api.state_path)
         parts = self._api.state_parts.items()
         return {name: self._bus.get_json(c.path, c.method, c.body) for name, c in parts}
 
     def _off(self, names: list[Held]) -> None:
-        """Withdraw the call, and switch these commands off. Each is tried, even if another has
-        failed."""
+        """Withdraw the call, and switch these commands off. Try each command, even if another command
+        has failed."""
         failed: DriverError | None = None
         for step in (self._withdraw, *(lambda n=n: self._switch(n, on=False) for n in names)):
             try:

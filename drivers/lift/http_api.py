@@ -1,7 +1,8 @@
 """The HTTP API of a lift's gateway: the requests for the lift's state, and the commands.
 
-`profile: NAME` takes such an API from drivers/profiles/. In a body, "{lift_id}" with its quotes stands
-for the device's `lift_id`. "{level}" stands for the value of the called landing.
+`profile: NAME` takes such an API from drivers/profiles/. In a body, the text "{lift_id}", with its
+quotes, stands for the device's `lift_id`. The text "{level}" stands for the value of the called
+landing.
 """
 
 import json
@@ -29,11 +30,11 @@ Part = Annotated[
 ]
 Held = Literal["agv_mode_request", "door_open", "rear_door_open"]
 HELD: Final[tuple[Held, ...]] = ("agv_mode_request", "door_open", "rear_door_open")
-"""The commands that are held, in the order in which they are switched on."""
+"""The commands that the driver holds on. The driver switches them on in this order."""
 
 
 class HeldCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A command that is switched on and off."""
+    """A command that the driver switches on and off."""
 
     ask: Annotated[Call, tells("asks for it.")]
     release: Annotated[
@@ -84,7 +85,7 @@ class LiftCommands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     ] = None
 
     def held(self) -> dict[Held, HeldCommand]:
-        """Return signal -> command, for each held command that the YAML gives."""
+        """Return each held command that the YAML gives, by its signal."""
         given = {name: getattr(self, name) for name in HELD}
         return {name: command for name, command in given.items() if command is not None}
 
@@ -96,7 +97,7 @@ class LiftCommands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
         return _filled(self.call, LEVEL, value)
 
     def requests(self) -> Iterator[tuple[tuple[str, ...], Call]]:
-        """Yield (path, request) of each request. The path begins below this section."""
+        """Yield each request with its path. The path begins below this section of the YAML."""
         for name, command in self.held().items():
             yield (name, "ask"), command.ask
             if command.release:
@@ -106,7 +107,7 @@ class LiftCommands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
     def problems(self) -> Remarks:
         """Yield a problem for two ways of calling, for a call without a landing, and for a request that
-        is used twice."""
+        occurs twice."""
         if self.call and self.calls:
             yield ("calls",), "calls and call are two ways of calling: delete one of the two"
         if self.call and LEVEL not in (self.call.body or ""):
@@ -135,7 +136,8 @@ class LiftApi(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     commands: Annotated[LiftCommands, tells("the commands to the gateway.")]
 
     def requests(self) -> dict[tuple[str, ...], Call]:
-        """Return path -> request, except a GET of `state_path`. The path begins below this section."""
+        """Return each request by its path. Leave out a GET of `state_path`. The path begins below this
+        section of the YAML."""
         parts = {("state_parts", name): call for name, call in self.state_parts.items()}
         return parts | {("commands", *path): call for path, call in self.commands.requests()}
 
@@ -178,7 +180,7 @@ def _filled(call: Call, mark: str, value: Value) -> Call:
 
 
 def numbers(values: Mapping[str, Value]) -> dict[int, str]:
-    """Return number -> landing, for each landing whose value is a whole number."""
+    """Return the landing for each number. Leave out a landing whose value is not a whole number."""
     return {
         value: level
         for level, value in values.items()

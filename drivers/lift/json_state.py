@@ -1,7 +1,7 @@
 """A lift's state in a JSON answer. Floor, doors, motion, service state and hazards each have a field.
 
-An unlisted value is a fault. It never means a floor, an open door or a standing car. A field that is
-null is unknown. With a null hazard the whole reading fails.
+A value that the YAML does not list is a fault. Such a value never means a floor, an open door or a
+standing car. A field that is null is unknown. If a hazard is null, the whole reading fails.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -49,12 +49,13 @@ class JsonFloor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class ListedStates(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A field whose values stand for states. Each further key is a state with a list of its values."""
+    """A field whose values stand for states. Each key except the field's own keys is a state, with a
+    list of its values."""
 
     field: Annotated[Field, tells("the field that holds it.")]
 
     def states(self) -> dict[str, list[Value]]:
-        """Return state -> its values, for each state that has a value."""
+        """Return the values of each state that has a value."""
         given = {name: getattr(self, name) for name in self.__struct_fields__ if name != "field"}
         return {name: values for name, values in given.items() if values}
 
@@ -68,7 +69,7 @@ class ListedStates(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
 
 class JsonDoor(ListedStates, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The field of a door. An unlisted value is a fault."""
+    """The field of a door. A value that is not listed is a fault."""
 
     open: Annotated[Values, tells("the values for a fully open door.")]
     closed: Annotated[Values, tells("the values for a closed door.")]
@@ -76,7 +77,7 @@ class JsonDoor(ListedStates, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class JsonMotion(ListedStates, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The field of the car's motion. An unlisted value is a fault."""
+    """The field of the car's motion. A value that is not listed is a fault."""
 
     stopped: Annotated[Values, tells("the values for a standing car.")]
     up: Annotated[list[Value], tells("the values for a car that goes up.")] = []
@@ -91,7 +92,7 @@ class JsonMotion(ListedStates, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class JsonService(ListedStates, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The field of the lift's service state. An unlisted value means that the lift is out of
+    """The field of the lift's service state. A value that is not listed means that the lift is out of
     service."""
 
     normal: Annotated[Values, tells("the values for a lift that serves people.")]
@@ -141,7 +142,7 @@ class JsonLiftState(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     overload: Annotated[JsonFlag | None, tells("the car is too heavy; delays the ride.")] = None
 
     def places(self) -> dict[str, str]:
-        """Return part -> its field, for each part that the YAML gives."""
+        """Return the field of each part that the YAML gives."""
         parts = {name: getattr(self, name) for name in self.__struct_fields__}
         return {name: part.field for name, part in parts.items() if part is not None}
 
@@ -152,7 +153,7 @@ class JsonLiftState(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         return in_service or getattr(self, state) is not None
 
     def problems(self) -> Remarks:
-        """Yield a problem for AGV mode that has two fields."""
+        """Yield a problem if two fields show AGV mode."""
         if self.agv_mode and self.service and self.service.agv_mode:
             yield ("agv_mode",), "service shows agv_mode too: delete one of the two"
 
@@ -170,8 +171,8 @@ def _doubles(given: Iterable[tuple[tuple[str, str], Value, str]]) -> Remarks:
 def decode(
     place: JsonLiftState, answer: Answer, levels: Sequence[str], stale_s: float
 ) -> LiftSample:
-    """Decode the answer of a lift with these landings. Raises a DriverError that names the field. Also
-    raises if the gateway's reading is older than `stale_s`."""
+    """Decode the answer of a lift with these landings. Raises a DriverError that names the field.
+    Raises DriverError too if the gateway's reading is older than `stale_s`."""
     _current(place, answer, stale_s)
     level, code_fault = _floor(place.floor, answer, levels)
     service = _service(place, answer)
@@ -211,7 +212,8 @@ def _value(answer: Answer, field: str) -> Value | None:
 
 
 def _state(place: ListedStates, answer: Answer) -> str | None:
-    """Return the state for this field's value. Return None for null and for an unlisted value."""
+    """Return the state for this field's value. Return None for null and for a value that is not
+    listed."""
     value = _value(answer, place.field)
     return next((state for state, given in place.states().items() if _is_one(value, given)), None)
 

@@ -1,7 +1,8 @@
 """A lift behind the Modbus registers of a gateway.
 
-Floor, door, motion and service state are numbers. Hazards are bits. Commands are registers or coils. An
-unlisted number is a fault. It never means a floor, an open door or a standing car.
+Floor, door, motion and service state are numbers. Hazards are bits. Commands are registers or coils. A
+number that the map does not list is a fault. Such a number never means a floor, an open door or a
+standing car.
 """
 
 from collections.abc import Iterator, Mapping, Set
@@ -93,7 +94,7 @@ def _rear_door(settings: RegisterLiftSettings) -> Remarks:
 
 
 def warnings(settings: RegisterLiftSettings) -> Remarks:
-    """Yield valid settings that deserve a second look: (path below the device, text)."""
+    """Yield a warning (path below the device, text) for each valid setting that may be a mistake."""
     found, commands = settings.map, settings.map.commands
     fire, told = found.shows(Hazard.FIRE), found.shows("agv_mode")
     asks, holds = bool(commands.agv_mode_request), bool(commands.door_open)
@@ -122,12 +123,14 @@ def notes(settings: RegisterLiftSettings) -> Remarks:
 
 
 def debounce(settings: RegisterLiftSettings) -> Mapping[str, float]:
-    """Return debounce times (s), as for contacts, because a gateway may show a half-changed number."""
+    """Return the debounce times (s). They are those of contacts, because a gateway may show a
+    half-changed number."""
     return {**DEBOUNCE_S, **dict.fromkeys(Hazard, HAZARD_DEBOUNCE_S)}
 
 
 def claims(settings: RegisterLiftSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield (place, path) of each command. No other device may write to these places."""
+    """Yield the place of each command with its path in the YAML. No other device may write to these
+    places."""
     seen: set[str] = set()
     for path, place, _ in settings.map.commands.places():
         if place not in seen and misplaced(apart(place)[1], WRITABLE) is None:
@@ -178,7 +181,8 @@ def _unlisted(part: Number) -> str:
 
 
 def _outputs(settings: RegisterLiftSettings) -> Table:
-    """Tabulate each command alone. (Commands that share a register are written as one value.)"""
+    """Tabulate each command as if no other command were on. If commands share a register, the driver
+    writes them as one value."""
     commands, off = settings.map.commands, settings.map.commands.words((), None)
     levels = settings.levels()
     rows = []
@@ -231,11 +235,11 @@ class RegisterLift:
         return decode(self._map, self._lines.read())
 
     def write(self, outputs: LiftOutputs) -> None:
-        """Set every command to this level. Commands that go off come first."""
+        """Set every command to its level in `outputs`. Commands that go off come first."""
         self._lines.bring(encode(self._map, outputs))
 
     def make_safe(self) -> None:
-        """Switch every command off, and read it back where possible."""
+        """Switch every command off. Read the commands back where the gateway allows this."""
         self._lines.make_safe()
 
     def close(self) -> None:
@@ -244,7 +248,7 @@ class RegisterLift:
 
 
 def encode(found: LiftMap, outputs: LiftOutputs) -> dict[str, int]:
-    """Return place -> value. If commands share a register, their values are combined with OR."""
+    """Return the value of each place. If commands share a register, combine their values with OR."""
     asserted = {"agv_mode_request"} if outputs.agv_request else set()
     if outputs.hold_door:
         asserted.add(HOLD[outputs.hold_door])

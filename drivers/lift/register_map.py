@@ -1,4 +1,5 @@
-"""The register map of a lift's gateway in the YAML. It gives places, and the meanings of numbers."""
+"""The register map of a lift's gateway in the YAML. The map gives the places of values and the meanings
+of numbers."""
 
 import functools
 import operator
@@ -44,7 +45,7 @@ class LiftCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_field
 
 
 class CallCommand(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The command for calls, which are numbers in one register."""
+    """The command that calls the car. The register's number tells the landing."""
 
     TABLES = ("holding register",)
 
@@ -55,8 +56,8 @@ class CallCommand(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields
     unit: Annotated[Unit | None, UNIT] = None
 
     def problems(self) -> Remarks:
-        """Yield a problem for a place that cannot be written, and for a landing with the number of "no
-        call"."""
+        """Yield a problem for a place that cannot be written. Yield a problem for a landing whose
+        number means "no call"."""
         yield from super().problems()
         if self.none in self.codes:
             yield ("codes", str(self.none)), f"{self.none} is the number for no call (none)"
@@ -85,8 +86,8 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = True
 
     def singles(self) -> Iterator[tuple[str, tuple[str, ...], LiftCommand]]:
-        """Yield (signal, path, command) of each command except `call`. The path begins below this
-        section."""
+        """Yield (signal, path, command) for each command except `call`. The path begins below this
+        section of the YAML."""
         for name in ("agv_mode_request", "door_open", "rear_door_open"):
             command: LiftCommand | None = getattr(self, name)
             if command:
@@ -95,7 +96,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield f"call_{level}", ("calls", level), command
 
     def places(self) -> Iterator[tuple[tuple[str, ...], str, int]]:
-        """Yield (path, place, bits) of each command. `bits`: the bits of the place that the command
+        """Yield (path, place, bits) for each command. `bits` are the bits of the place that the command
         uses."""
         for _, path, command in self.singles():
             yield path, place_of(command), command.ask | command.release
@@ -104,7 +105,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield ("call",), place_of(self.call), bits
 
     def calling(self) -> dict[str, int]:
-        """Return place -> the bits that calls use there."""
+        """Return for each place the bits that calls use."""
         found: dict[str, int] = {}
         for path, place, bits in self.places():
             if path[0] in ("calls", "call"):
@@ -112,12 +113,12 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return found
 
     def unread(self) -> set[str]:
-        """Return the places that are never read back."""
+        """Return the places that the driver never reads back."""
         return {place for place, read_back in self._read_back().items() if False in read_back}
 
     def _read_back(self) -> dict[str, dict[bool, tuple[str, ...]]]:
-        """Return place -> `read_back` -> the path of the last command at this place with this
-        `read_back`."""
+        """Return for each place the values of `read_back` that its commands give. Each value has the
+        path of the last command that gives it."""
         found: dict[str, dict[bool, tuple[str, ...]]] = {}
         every: list[tuple[tuple[str, ...], LiftCommand | CallCommand]] = [
             (path, command) for _, path, command in self.singles()
@@ -130,8 +131,8 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return found
 
     def words(self, asserted: Collection[str], call: str | None) -> dict[str, int]:
-        """Return place -> value, for these asserted signals and a call to this landing (None: no
-        call)."""
+        """Return the value of each place, for these asserted signals and a call to this landing. A call
+        of None means no call."""
         found: dict[str, int] = {}
         for signal, _, command in self.singles():
             at = place_of(command)
@@ -143,8 +144,8 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return found
 
     def problems(self) -> Remarks:
-        """Yield a problem if both `calls` and `call` are given, and if commands use the same bit of a
-        register."""
+        """Yield a problem if the YAML gives both `calls` and `call`. Yield a problem if commands use
+        the same bit of a register."""
         if self.calls and self.call:
             yield ("calls",), "calls and call are two ways of calling: delete one of the two"
         for at, told in self._read_back().items():
@@ -172,8 +173,8 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The gateway's register map. Addresses begin at 0.
 
-    Each door is either a number or the flags of contacts, and so is the motion. Give the motion in one
-    way: `motion`, `moving`, `stopped`, or `up` with `down`.
+    A door is either a number or the flags of contacts. The motion is a number or flags too. Give the
+    motion in one of these ways: `motion`, `moving`, `stopped`, or `up` together with `down`.
     """
 
     floor: Annotated[FloorField, tells("the car's position.")]
@@ -240,13 +241,13 @@ class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
             yield (ways[1],), f"{' and '.join(ways)} are several ways of motion: keep one"
 
     def parts(self) -> dict[str, Number | LiftFlag]:
-        """Return name -> part, for each part that is read."""
+        """Return each part that the driver reads, by its name."""
         read = [name for name in self.__struct_fields__ if name != "commands"]
         found = {name: getattr(self, name) for name in read}
         return {name: part for name, part in found.items() if part is not None}
 
     def flag(self, name: str) -> LiftFlag | None:
-        """Return the flag of this name; None if the map does not give it."""
+        """Return the flag of this name. Return None if the map does not give it."""
         part = getattr(self, name, None)
         return part if isinstance(part, LiftFlag) else None
 

@@ -19,7 +19,8 @@ UNIT: Final = tells("the unit with this place, if it is another than the device'
 
 
 class AtUnit(Protocol):
-    """A field of the map that may name its own Modbus unit. Without a name the device's unit counts."""
+    """A field of the map that may name its own Modbus unit. Without such a unit, the field is at the
+    device's unit."""
 
     @property
     def at(self) -> str:
@@ -27,11 +28,12 @@ class AtUnit(Protocol):
 
     @property
     def unit(self) -> int | None:
-        """Return the part's unit; None for the device's unit."""
+        """Return the part's own unit. Return None if the part is at the device's unit."""
 
 
 def place_of(part: AtUnit) -> str:
-    """Return a part's place, with the part's unit if it has its own: `coil 0`, `unit 2 coil 0`."""
+    """Return a part's place, such as `coil 0`. If the part has its own unit, return for example `unit 2
+    coil 0`."""
     return part.at if part.unit is None else f"unit {part.unit} {part.at}"
 
 
@@ -42,8 +44,8 @@ def point_at(unit: int, where: str) -> Point:
 
 
 def apart(where: str) -> tuple[int | None, str]:
-    """Split a place that `place_of` has written into (its own unit, the place there). The place may be
-    invalid."""
+    """Split a place that `place_of` has written into the part's own unit and the place at this unit.
+    The place may be invalid."""
     if not where.startswith("unit "):
         return None, where
     _, own, place = where.split(" ", 2)
@@ -75,7 +77,7 @@ class NumberField(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=T
 
     def fits(self, numbers: Collection[int], key: str) -> Remarks:
         """Yield a problem for an invalid place, for a bit that is listed twice, and for numbers that do
-        not fit. `key` is the key of the numbers."""
+        not fit. `key` is the key of the numbers in the YAML."""
         yield from InRegister.problems(self)
         if len(set(self.bits)) < len(self.bits):
             yield ("bits",), "a bit is listed twice"
@@ -154,7 +156,7 @@ Number: TypeAlias = FloorField | DoorField | MotionField | ServiceField
 
 
 class LiftFlag(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A flag: one bit."""
+    """A flag, which is one bit."""
 
     bit: Annotated[Bit | None, tells("the bit's number; 0 is the least significant.")] = None
     active: Annotated[Literal["high", "low"], tells("the asserted level; `high` is 1.")]
@@ -164,11 +166,12 @@ class LiftFlag(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
     unit: Annotated[Unit | None, UNIT] = None
 
     def asserted(self, word: int) -> bool:
-        """Return whether the flag is asserted at this value of its register or bit."""
+        """Return whether this value of the flag's register or bit means that the flag is asserted."""
         return bool(word >> (self.bit or 0) & 1) == (self.active == "high")
 
     def word(self, asserted: bool) -> int:
-        """Return the value of the flag's register or bit for an asserted or clear flag."""
+        """Return the value of the flag's register or bit for an asserted flag or a flag that is not
+        asserted."""
         return (asserted == (self.active == "high")) << (self.bit or 0)
 
     def problems(self) -> Remarks:

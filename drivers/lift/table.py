@@ -7,10 +7,11 @@ from drivers.hal.points import Clearing, Output, Wire
 from drivers.lift.wiring import LiftInput, LiftWiring
 
 DEBOUNCE_S = {"floor": 0.08, "door": 0.1, "rear_door": 0.1, "motion": 0.05, "agv_mode": 0.05}
-"""Each group's default debounce (s). HAZARD_DEBOUNCE_S is the default for hazards and service codes.
+"""The default debounce (s) of each group. HAZARD_DEBOUNCE_S is the default for hazards and service
+codes.
 
-A door that reads open for 50 ms while the car passes a floor is a glitch. Without a motion line,
-nothing but the debounce filters this glitch out.
+A door that reads open for 50 ms while the car passes a floor is a glitch. If there is no motion line,
+only the debounce filters this glitch out.
 """
 
 HAZARD_DEBOUNCE_S = 0.05
@@ -20,7 +21,7 @@ Row = tuple[str, tuple[str, ...], LiftInput]
 
 
 def input_rows(wiring: LiftWiring) -> Iterator[Row]:
-    """Yield (signal, path, line) of each input line. The path begins below the device."""
+    """Yield (signal, path, line) for each input line. The path begins below the device."""
     for name in wiring.inputs.__struct_fields__:
         found = getattr(wiring.inputs, name)
         if isinstance(found, LiftInput):
@@ -33,7 +34,7 @@ def input_rows(wiring: LiftWiring) -> Iterator[Row]:
 
 
 def output_rows(wiring: LiftWiring) -> Iterator[tuple[str, tuple[str, ...], Output]]:
-    """Yield (signal, path, line) of each output line. The path begins below the device."""
+    """Yield (signal, path, line) for each output line. The path begins below the device."""
     for name in wiring.outputs.__struct_fields__:
         output = getattr(wiring.outputs, name)
         if output is not None:
@@ -45,7 +46,7 @@ def output_rows(wiring: LiftWiring) -> Iterator[tuple[str, tuple[str, ...], Outp
 
 
 def wires(wiring: LiftWiring) -> list[Wire]:
-    """Return the wiring table with default debounces filled in. Inputs come first."""
+    """Return the wiring table, with the default debounces. Inputs come first."""
     return [
         *(line.wire(s, path, _debounce_s(s, line)) for s, path, line in input_rows(wiring)),
         *(line.wire(s, path, clearing=_call(wiring, s)) for s, path, line in output_rows(wiring)),
@@ -53,14 +54,15 @@ def wires(wiring: LiftWiring) -> list[Wire]:
 
 
 def _call(wiring: LiftWiring, signal: str) -> Clearing | None:
-    """Return how a controller may clear this line. Return None for a line that is no call."""
+    """Return the way in which a controller may clear this line. Return None for a line that is not a
+    call."""
     pulse = wiring.limits.call_pulse_s is not None
     return Clearing(pulse=pulse) if signal.startswith("call_") else None
 
 
 def group(signal: str) -> str:
-    """Return a signal's group: `floor`, `door`, `rear_door`, `motion` or `service`; otherwise the
-    signal itself."""
+    """Return a signal's group: `floor`, `door`, `rear_door`, `motion` or `service`. A signal outside
+    these groups is its own group."""
     for name in ("floor", "door", "rear_door", "motion", "service"):
         if signal == name or signal.startswith(f"{name}_"):
             return name
@@ -68,7 +70,7 @@ def group(signal: str) -> str:
 
 
 def debounce(wiring: LiftWiring) -> dict[str, float]:
-    """Return group -> debounce (s). A group's debounce is the longest of its lines.
+    """Return the debounce (s) of each group. A group's debounce is the longest of its lines.
 
     A state of the service code has the debounce of the code's lines.
     """

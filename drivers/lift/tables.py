@@ -1,4 +1,5 @@
-"""Tabulates a lift's codes and outputs. Each number has its lines, and its readings with a cut line."""
+"""Tabulates a lift's codes and outputs. A row shows a number, its lines, and the readings with one line
+cut."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -17,7 +18,8 @@ BETWEEN = "between floors"
 
 
 def tables(wiring: LiftWiring) -> Iterator[Table]:
-    """Yield tables of the floors (lowest first), of the other codes, and of each output's drive."""
+    """Yield tables of the floors (lowest first), of the other codes, and of how long each output is
+    on."""
     table = {wire.signal: wire for wire in wires(wiring)}
     yield floors(wiring)
     yield _floor_code(wiring, table)
@@ -28,7 +30,7 @@ def tables(wiring: LiftWiring) -> Iterator[Table]:
 
 
 def floors(wiring: LiftSettings) -> Table:
-    """Tabulate RMF's floors with the lowest first, to reveal a list in the wrong order."""
+    """Tabulate RMF's floors with the lowest first. The table reveals a list in the wrong order."""
     stops = list(wiring.stops().items())
     rows = [
         (_place(i, len(stops)), name, stop.level, "rear door" if stop.side is Side.REAR else "door")
@@ -55,7 +57,7 @@ def _floor_code(wiring: LiftWiring, table: Mapping[str, Wire]) -> Table:
 
 
 def _height(level: str | None, levels: Sequence[str]) -> int:
-    """Return a sort key that puts "between floors" first, then the landings from the lowest to the
+    """Return a sort key. The key puts "between floors" first, then the landings from the lowest to the
     highest."""
     return -1 if level is None else levels.index(level)
 
@@ -97,7 +99,7 @@ _DRIVEN = {
 
 
 def how_long(settings: LiftSettings, output: str) -> str:
-    """Describe how long an output is driven. An output that is missing in `_DRIVEN` is a call."""
+    """Describe how long an output is on. An output that `_DRIVEN` does not list is a call."""
     limits = settings.limits
     if output in _DRIVEN:
         return _DRIVEN[output].format(grace_s=limits.release_grace_s)

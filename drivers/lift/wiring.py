@@ -1,4 +1,4 @@
-"""A lift's wiring in the YAML. Every signal is configured, because sites differ in every signal."""
+"""A lift's wiring in the YAML. The YAML gives every signal, because sites differ in every signal."""
 
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
@@ -28,7 +28,7 @@ class LiftInput(Input, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class DoorInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The only contact of a door."""
+    """The contact of a door that has only one contact."""
 
     proves: Annotated[
         Literal["open", "closed"],
@@ -37,7 +37,7 @@ class DoorInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class ParityInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A parity line. It reveals that a line of the code is broken."""
+    """A parity line. It reveals a broken line of the code."""
 
     total: Annotated[
         Literal["even", "odd"], tells("the number of asserted lines, including the parity line.")
@@ -45,7 +45,7 @@ class ParityInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class MotionCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Motion as a number on several lines."""
+    """The car's motion as a number on several lines."""
 
     bits: Annotated[list[LiftInput], tells("least significant first.")]
     codes: Annotated[
@@ -88,7 +88,7 @@ class LiftInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
     """The lines from the lift.
 
     A hazard takes the lift away from RMF at once. A door has one contact or two. Give the motion in one
-    way: `moving`, `stopped`, `up` with `down`, or a code.
+    of these ways: `moving`, `stopped`, `up` together with `down`, or a code.
     """
 
     fire_alarm: Annotated[
@@ -157,7 +157,7 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     ] = msgspec.field(default_factory=lambda: [0])
 
     def inputs(self) -> Iterator[tuple[str, tuple[str, ...], LiftInput]]:
-        """Yield (signal, path, line) of each line. The path begins below this section."""
+        """Yield (signal, path, line) for each line. The path begins below this section of the YAML."""
         for i, bit in enumerate(self.bits):
             yield f"floor_bit{i}", ("bits", str(i)), bit
         for level, line in self.lines.items():
@@ -166,8 +166,8 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
             yield "floor_parity", ("parity",), self.parity
 
     def read(self, shown: Mapping[str, bool]) -> tuple[str | None, str]:
-        """Return (landing, fault). The landing is None between floors; the fault of the code is "" if
-        there is none."""
+        """Return the landing and the code's fault. The landing is None between floors. The fault is ""
+        for a valid code."""
         if self.encoding == "one_hot":
             on = [level for level in self.lines if shown[f"floor_{level}"]]
             if len(on) > 1:
@@ -184,15 +184,15 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         return None, "" if number in self.between_floors else f"code {number} is not a floor's"
 
     def show(self, level: str | None) -> dict[str, bool]:
-        """Return signal -> asserted at a landing (None: between floors). Raises ValueError if the
-        landing has no code."""
+        """Return for each signal whether it is asserted at this landing. A `level` of None means
+        between floors. Raises ValueError if the landing has no code."""
         for _, shown_level, shown in self.shows():
             if shown_level == level:
                 return shown
         raise ValueError(f"no code for {level or 'between floors'}")
 
     def shows(self) -> Iterator[tuple[int | None, str | None, dict[str, bool]]]:
-        """Yield (number, landing, lines) of each code that the controller shows. The landing is None
+        """Yield (number, landing, lines) for each code that the controller shows. The landing is None
         between floors.
 
         With `one_hot` the number is None. Raises ValueError for a number that does not fit on the
@@ -216,13 +216,14 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class CallCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Calls as a binary number on several lines; 0 means no call."""
+    """Calls as a binary number on several lines. The number 0 means no call."""
 
     bits: Annotated[list[Output], tells("least significant first.")]
     codes: Annotated[dict[Number, Name], tells("number -> landing.")]
 
     def lines(self, level: str | None) -> dict[str, bool]:
-        """Return signal -> asserted for a call to this landing (None: no call)."""
+        """Return for each signal whether a call to this landing asserts it. A `level` of None means no
+        call."""
         number = next((n for n, name in self.codes.items() if name == level), 0)
         return codes.lines("call", number, len(self.bits))
 

@@ -1,9 +1,10 @@
-"""Profiles: a make's register or frame map as drivers/profiles/NAME.yaml, for `profile: NAME`.
+"""Profiles are files for `profile: NAME`. The file drivers/profiles/NAME.yaml has a make's register map
+or frame map.
 
     for: door_register       the driver that reads the profile
     hardware: untried        `tried` on the hardware, `untried`, or `none`: an example of no make
     source: "..."            where the numbers come from
-    map: {...}               the content, under the key for it in a device YAML
+    map: {...}               the content, under the key that a device YAML uses for it
 
 A profile is parsed like a device YAML, so each problem has its file, line and column. Only code that
 uses a profile imports the parser, because `outputs-off` must work without a parser.
@@ -27,8 +28,8 @@ Content = TypeVar("Content", bound=msgspec.Struct, covariant=True)
 
 
 class Profile(Generic[Content]):
-    """One type of profile. `reader` is its `for:`, `key` the key of its content, and `content` its
-    struct."""
+    """One type of profile. `reader` is the profile's `for:`. `key` is the key of the profile's content,
+    and `content` is the content's struct."""
 
     def __init__(self, reader: str, key: str, content: type[Content]) -> None:
         self.reader = reader
@@ -53,7 +54,7 @@ class Profile(Generic[Content]):
         return inline or self.load(name or "")
 
     def problems(self, name: str | None, inline: object) -> Remarks:
-        """Yield problems of `profile:`, and of the key that may replace the profile (`map`)."""
+        """Yield problems of `profile:`, and of the key (such as `map`) that may replace the profile."""
         if name is None and inline is None:
             text = f"needs '{self.key}', or a profile: {either(self.names())}"
             yield ("profile",), text
@@ -69,8 +70,8 @@ class Profile(Generic[Content]):
                     yield ("profile",), f"the profile is not right: {problem}"
 
     def warnings(self, name: str | None, advice: str) -> Remarks:
-        """Yield a warning for a make's profile that nobody has tried on hardware. `advice` is the test
-        to do."""
+        """Yield a warning for a make's profile that nobody has tried on hardware. `advice` tells the
+        reader which test to do."""
         if name and self._read(FOLDER / f"{name}.yaml")["hardware"] == "untried":
             text = f"nobody has tried the profile {name} on hardware: {advice}"
             yield ("profile",), text

@@ -1,10 +1,11 @@
-"""Stores the texts of profiles and DBC files that this process has read or received.
+"""Stores the texts of profiles and DBC files that this process has read, or that another process gave
+it.
 
 A daemon records these texts together with its claims. `outputs-off` may run much later, even after an
 upgrade that changed the files. With the recorded texts, `outputs-off` reads the same maps as the
 daemon.
 
-A file of drivers/profiles/ is stored under its name, and any other file under its path.
+A file of drivers/profiles/ is stored under its name. Any other file is stored under its path.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,14 +17,14 @@ _texts: dict[str, bytes] = {}
 
 
 def text(file: Path, read: Callable[[], bytes]) -> bytes:
-    """Return a file's stored text. If there is none, call `read` and store the result."""
+    """Return a file's stored text. If no text is stored, call `read` and store the result."""
     if _name(file) not in _texts:
         _texts[_name(file)] = read()
     return _texts[_name(file)]
 
 
 def known(file: Path) -> bytes | None:
-    """Return a file's stored text; None if there is none."""
+    """Return a file's stored text. Return None if no text is stored."""
     return _texts.get(_name(file))
 
 
@@ -33,12 +34,12 @@ def known_in(folder: Path) -> list[Path]:
 
 
 def all_known() -> dict[str, bytes]:
-    """Return name -> text of every stored file."""
+    """Return the text of every stored file, by its name or path."""
     return dict(_texts)
 
 
 def give(texts: Mapping[str, bytes]) -> None:
-    """Replace the stored texts by these texts. They are not read from disk again."""
+    """Replace all stored texts by `texts`. Later calls of `text` do not read these files from disk."""
     _texts.clear()
     _texts.update(texts)
 

@@ -1,8 +1,8 @@
-"""The far side of a `can` bus across processes: controllers behind an slcan adapter on a
+"""The far side of a `can` bus, in a separate process. Controllers are behind an slcan adapter on a
 pseudo-terminal.
 
-`side.py` lists the failures of the bus, `canopen_rcu.py` those of a CANopen receiver, and
-`frame_charger.py` those of a charger with its own frames.
+`side.py` lists the failures of the bus. `canopen_rcu.py` lists the failures of a CANopen receiver, and
+`frame_charger.py` those of a charger with its maker's own frames.
 """
 
 from collections.abc import Sequence

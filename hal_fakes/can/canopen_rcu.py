@@ -70,13 +70,13 @@ class CanOpenRcu:
         send(frame(0x700 + self._id, beat))
 
     def reply(self, can_id: int, answer: bytes) -> None:
-        """Send the library's answer. An ordered failure spoils the answer first."""
+        """Send the library's answer. If the plant has an ordered failure, spoil the answer first."""
         mode = self.plant.failures.get("node")
         if mode == "garbage":
             answer = answer[:5]
         elif mode == "wrong":
             answer = answer[:3] + bytes((answer[3] ^ 0x40,)) + answer[4:]
-        assert self._send  # an answer always comes after a request, which sets this
+        assert self._send  # a request has set this, because an answer comes only after a request
         self._send(frame(can_id, answer), late=mode == "slow")
 
     def _reading(self) -> Reading:

@@ -240,5 +240,5 @@ def _hal_errors(point: str) -> Iterator[None]:
 
 
 def _hal_error(point: str, error: Exception) -> HalError:
-    text = getattr(error, "value", error)  # printed directly, lgpio's errors have quotes
+    text = getattr(error, "value", error)  # an lgpio error as text has quotes
     return HalError(f"{describe(point)}: {text}")

@@ -1,6 +1,7 @@
-"""The broker as a bus: messages that devices have published, and messages to the devices.
+"""The broker as a bus. It has the messages that devices have published, and sends messages to the
+devices.
 
-A driver of its own (one that is not on contacts) uses these calls:
+A driver whose signals are not contacts uses these calls:
 
     bus.listen(topic)                  in the constructor, for each topic that the driver reads
     bus.fresh(topic, stale_after_s)    in `read`: the last message, or a HalError if it is no fact
@@ -8,14 +9,16 @@ A driver of its own (one that is not on contacts) uses these calls:
     bus.publish(topic, payload)        in `write`; with `safe=True` for a message that switches off
     bus.up()                           in `open`: a HalError if there is no broker
 
+A message is a fact only if it came live in this connection, and is not older than the device's own
+period.
+
 No reading waits. The connection has a thread of its own, which receives the messages. A changed payload
 wakes the bus's thread for a scan. With `listen(topic, take)` the connection's thread calls `take` for
 each message. This is for a driver that must not miss a message.
 
-- A retained message reports an earlier state of unknown age. A message is a fact only if it came live
-  in this connection, and is not older than the device's own period.
+- A retained message is no fact, because it reports an earlier state of unknown age.
 - All devices of the bus share one connection. If the connection fails, every device fails, and the bus
-  backs off for 0.5 to 30 s. A silent device costs the other devices nothing, because nobody waits for
+  backs off for 0.5 to 30 s. A silent device costs the other devices nothing, because no call waits for
   it.
 - Every connection starts with a clean session and without earlier messages. The bus may have missed the
   decisive message while the broker was away.
@@ -46,13 +49,14 @@ if TYPE_CHECKING:
 EXPIRES_S: Final = 2
 """The time (s) after which the broker drops an "on" that it could not deliver."""
 KEPT_MAX: Final = 4 * 1024 * 1024
-"""The maximum length (bytes) of all kept payloads together. Beyond this length no payload is kept."""
+"""The maximum length (bytes) of all kept payloads together. When this length is reached, the bus keeps
+no further payload."""
 
 
 class Heard(msgspec.Struct, frozen=True):
-    """The last message of a topic. `at` is in monotonic seconds, and None for a retained message.
+    """The last message of a topic. `at` is in monotonic seconds. For a retained message `at` is None.
 
-    `length` is the payload's length in bytes. A payload that is too long is not kept, only its length.
+    `length` is the payload's length in bytes. If a payload is too long, the bus keeps only its length.
     """
 
     payload: bytes
@@ -70,7 +74,7 @@ def open_bus(settings: MqttSettings) -> "MqttBus":
 
 
 class MqttBus(Bus):
-    """One broker. It is also a `drivers.hal.points.PointsBus`. `now` is its clock, which tests
+    """One broker. It is also a `drivers.hal.points.PointsBus`. `now` is the bus's clock, which tests
     replace."""
 
     def __init__(
@@ -101,8 +105,8 @@ class MqttBus(Bus):
         unread: Collection[str] = (),
         clearing: Mapping[str, Clearing] = MappingProxyType({}),
     ) -> MqttLines:
-        """Return the lines of these points, and listen to their topics. The last two parameters matter
-        only for modules."""
+        """Return the lines of these points, and listen to their topics. The last two parameters concern
+        only Modbus modules."""
         found = {name: self.points[name] for name in (*inputs, *outputs)}
         for point in found.values():
             for place in (point, point.availability):
@@ -113,7 +117,7 @@ class MqttBus(Bus):
     def listen(self, topic: str, take: Callable[[Heard], None] | None = None) -> None:
         """Subscribe to this topic, now and in each later connection.
 
-        Another thread calls `take` for each message; `take` must be quick and must not raise. Raises
+        Another thread calls `take` for each message. `take` must be quick and must not raise. Raises
         HalError if the bus would have too many topics.
         """
         if len(self._takers) >= TOPICS_MAX and topic not in self._takers:
@@ -123,9 +127,9 @@ class MqttBus(Bus):
             self._link.subscribe([topic])
 
     def up(self, safe: bool = False) -> "Link":
-        """Return the connection, and make one if there is none. Raises HalError, at once during a
-        backoff. `safe`: the caller switches off, so the call does not wait for the backoff of a
-        failed reading."""
+        """Return the connection, and make one if there is none. Raises HalError. During a backoff,
+        raises it at once. `safe` means that the caller switches off. Such a call does not wait for
+        the backoff of a failed reading."""
         if self._link is not None and self._link.up:
             return self._link
         backoff = self._safe_backoff if safe else self._backoff
@@ -141,7 +145,7 @@ class MqttBus(Bus):
         return link
 
     def heard(self, topic: str) -> Heard | None:
-        """Return the topic's last message in this connection; None without a message. Raises
+        """Return the topic's last message in this connection. Return None without a message. Raises
         HalError."""
         if reason := self.up().refused.get(topic):
             raise HalError(f"the broker does not let us read {topic}: {reason}")
@@ -166,10 +170,10 @@ class MqttBus(Bus):
         return found
 
     def believed(self, topic: str, stale_after_s: float, notices: Availability | None) -> Heard:
-        """Return the topic's last message if the message is a fact and the device has not gone offline
-        later.
+        """Return the topic's last message if the message is a fact. Otherwise raise HalError.
 
-        Otherwise raise HalError. A retained notice of availability proves nothing.
+        If the device has gone offline after the message, raise HalError too. A retained notice of
+        availability does not count.
         """
         found = self.fresh(topic, stale_after_s)
         if notices is None or (notice := self.heard(notices.topic)) is None or notice.at is None:
@@ -189,8 +193,9 @@ class MqttBus(Bus):
     ) -> None:
         """Send a message that is not retained. With `qos` 1, wait for the broker's confirmation.
 
-        `safe`: the message switches off. It does not wait for a backoff, and never expires. Every
-        message is sent once. Raises HalError; after an error the device may have received the message.
+        `safe` means that the message switches off. Such a message does not wait for a backoff, and
+        never expires. Every message is sent once. Raises HalError. After an error nobody knows whether
+        the device has received the message.
         """
         data = payload.encode() if isinstance(payload, str) else payload
         link = self.up(safe)
@@ -200,7 +205,8 @@ class MqttBus(Bus):
             self.calls += 1
 
     def ask(self, asks: Iterable[Ask]) -> None:
-        """Send these messages. Each is sent at most once in half a scan, even if many points need it.
+        """Send these messages. Send each message at most once in half a scan, even if many points need
+        it.
 
         The broker must confirm each message within `timeout_s`, otherwise the connection ends. A broker
         that was frozen would deliver old states as if they were live. Raises HalError.
@@ -212,7 +218,8 @@ class MqttBus(Bus):
                 self.publish(one.topic, one.payload)
 
     def await_first(self, topics: Iterable[str], asks: Iterable[Ask]) -> None:
-        """Give the devices `timeout_s` to publish these topics for the first time. Raises HalError."""
+        """Wait at most `timeout_s` until the devices have published on each of these topics. Raises
+        HalError."""
 
         def all_live() -> bool:
             found = [self._heard.get(topic) for topic in topics]
@@ -222,8 +229,8 @@ class MqttBus(Bus):
         self.wait(all_live, self.settings.timeout_s)
 
     def wait(self, done: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until `done()` is true, for at most `timeout_s`. Each message causes a new call. Return
-        whether the wait succeeded.
+        """Wait until `done()` is true, for at most `timeout_s`. Call `done` again after each message.
+        Return whether `done()` became true.
 
         Raises HalError without a connection.
         """
@@ -240,7 +247,8 @@ class MqttBus(Bus):
     def survey(self, listen_s: float) -> tuple[Mapping[str, str], bool]:
         """Listen to every topic of the broker on a second connection, for people who look for devices.
 
-        Return (topic -> `live` or `retained`, whether all topics had room). Raises HalError.
+        Return `live` or `retained` for each topic, and whether there was room for all topics. Raises
+        HalError.
         """
         from drivers.hal.mqtt.link import Link
 
@@ -263,8 +271,8 @@ class MqttBus(Bus):
         return found, len(found) < TOPICS_MAX
 
     def on_edge(self, wake: Callable[[], None]) -> None:
-        """Call `wake` when a topic's payload changes, and when the connection ends. The connection's
-        thread makes the call."""
+        """Let the connection's thread call `wake` when a topic's payload changes, and when the
+        connection ends."""
         self._wake = wake
 
     def insist(self) -> None:

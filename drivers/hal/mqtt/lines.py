@@ -1,7 +1,7 @@
 """One device's contacts and relays behind a broker (`drivers.hal.points.Lines`).
 
 The claim switches every relay off. A relay's state must follow each command within `answers_within_s`.
-A later contradiction means one of three things: the device has restarted, its timer has run out, or
+A later contradiction has one of three causes. The device has restarted, its timer has run out, or
 somebody else switches the relay too (`Rivals`). Every relay that goes off gets its message, even if
 another relay fails.
 """
@@ -41,11 +41,11 @@ class MqttLines:
         self._rivals = Rivals(bus.now)
 
     def claim(self) -> None:
-        """Switch every relay off, and give the device time to publish its first states. Only the first
-        claim does so.
+        """Check each state. In the first claim, also switch every relay off, and give the device time
+        to publish its first states.
 
-        Raises HalError for a state that is no fact. A claim after a failure only reads, because a lost
-        confirmation must not release a held door.
+        Raises HalError for a state that is not live and recent. A claim after a failure only reads,
+        because a lost confirmation must not release a held door.
         """
         points = (*self._inputs.values(), *self._outputs.values())
         if not self._claimed:
@@ -67,8 +67,8 @@ class MqttLines:
         return found
 
     def write(self, levels: Mapping[str, bool]) -> None:
-        """Switch these relays, off before on. Raises HalError; the states of these relays are then
-        unknown."""
+        """Switch these relays. Switch off before on. Raises HalError. After an error nobody knows the
+        states of these relays."""
         self._touched = self._touched or bool(levels)
         every = Every()
         for name in sorted(levels, key=lambda name: levels[name]):
@@ -78,7 +78,7 @@ class MqttLines:
             with every.one():
                 if levels[name]:
                     self._rivals.check([name])
-                self._since[name] = self._bus.now()  # an answer may come before the confirmation
+                self._since[name] = self._bus.now()  # before sending: answers are fast
                 self._send(name, levels[name])
                 self._set[name] = levels[name]
         every.check()
@@ -105,11 +105,11 @@ class MqttLines:
         return {name: bool(self._said(name)) for name in readable}
 
     def close(self) -> None:
-        """If any relay was ever switched, try once to switch every relay off. Does not raise."""
+        """If this device ever switched a relay, try once to switch every relay off. Does not raise."""
         if not self._touched:
             return
         self._bus.insist()
-        unheard = Every()  # failures are dropped, because the daemon is ending
+        unheard = Every()  # keeps failures that nobody reads, because the daemon is ending
         for name in self._outputs:
             with unheard.one():
                 self._send(name, False)
@@ -121,14 +121,14 @@ class MqttLines:
         self._bus.publish(command.topic, payload, command.qos, safe=not on)
 
     def _state(self, point: MqttPoint) -> bool:
-        """Return the state. Raises HalError if the state is no fact."""
+        """Return the state. Raises HalError if the state is not live and recent."""
         assert point.topic
         assert point.stale_after_s
         found = self._bus.believed(point.topic, point.stale_after_s, point.availability)
         return point.asserted(found.payload)
 
     def _verify(self, name: str, level: bool) -> None:
-        """Raise HalError if this relay's state contradicts `level` although it has had time to
+        """Raise HalError if this relay's state contradicts `level`, although the relay has had time to
         follow."""
         point = self._outputs[name]
         if point.topic is None:
@@ -153,7 +153,8 @@ class MqttLines:
         )
 
     def _said(self, name: str) -> bool | None:
-        """Return the relay's state if it came after the relay's last command; otherwise None."""
+        """Return the relay's state if this state came after the relay's last command. Otherwise return
+        None."""
         point = self._outputs[name]
         assert point.topic
         found = self._bus.heard(point.topic)

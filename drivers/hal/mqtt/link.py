@@ -1,13 +1,13 @@
 """One connection to a broker, through paho, from the lookup of the name to the end. An ended connection
 is never used again.
 
-Each connection has a client of its own and a clean session, so nothing of an earlier connection is sent
-again. paho would repeat unconfirmed messages after a reconnect, and an "on" of a minute ago must not be
-repeated. A thread serves the connection, and ends with the connection.
+Each connection has a client of its own and a clean session, so it sends nothing of an earlier
+connection. paho would repeat unconfirmed messages after a reconnect. But nobody may repeat an "on" of a
+minute ago. A thread serves the connection, and ends with the connection.
 
-The protocol allows packets of 256 MB. With MQTT 5 we tell the broker our limit (Maximum Packet Size,
-section 3.1.2.11.4), and the broker holds longer packets back. MQTT 3.1.1 has no such limit. With this
-version a longer packet ends the connection before its payload is read.
+The protocol allows packets of 256 MB. With MQTT 5 the link tells the broker its limit (Maximum Packet
+Size, section 3.1.2.11.4), and the broker holds longer packets back. MQTT 3.1.1 has no such limit. With
+this version the link reads no payload of a longer packet, and ends the connection.
 """
 
 import os
@@ -37,22 +37,23 @@ NOBODY: Final = 0x10
 """The code "no matching subscribers" (MQTT 5.0, 3.4.2.1). No device has received the message."""
 TAKEN: Final = ""
 ACKS_MAX: Final = 256
-"""The maximum number of confirmations that are remembered."""
+"""The maximum number of confirmations that the link remembers."""
 LOOK_S: Final = 1.0
 GARBLED: Final = (ValueError, IndexError, KeyError, TypeError, struct.error, MQTTException)
-"""The errors that paho raises for bytes that are no MQTT."""
+"""The errors that paho raises for bytes that are not MQTT."""
 
 Taken = Callable[[str, bytes, bool], None]
-"""A function that takes topic, payload, and whether the message is retained. The connection's thread
-calls it."""
+"""A function that takes a message: its topic, its payload, and whether the message is retained. The
+connection's thread calls the function."""
 
 
 class Link(threading.Thread):
-    """A connection. `up`: it is connected and has subscribed to the topics. `failure`: why it has
-    ended.
+    """A connection. `up` is True while the link is connected and has subscribed to its topics.
+    `failure` is the reason for the connection's end.
 
-    `refused`: topic -> the broker's reason for refusing our subscription. When one of these changes,
-    the thread notifies `changed`. When the connection ends, the thread calls `on_end`.
+    `refused` holds the broker's reason for each topic whose subscription the broker refused. When one
+    of these attributes changes, the thread notifies `changed`. When the connection ends, the thread
+    calls `on_end`.
     """
 
     def __init__(self, settings: MqttSettings, topics: Iterable[str], take: Taken) -> None:
@@ -169,7 +170,7 @@ class Link(threading.Thread):
         self._rise()
 
     def _on_message(self, client: object, _: object, message: paho.MQTTMessage) -> None:
-        if not self._closing:  # messages after the end of a connection may be old
+        if not self._closing:  # after the end of a connection its messages may be old
             self._take(message.topic, bytes(message.payload), message.retain)
 
     def _on_publish(self, _c: Any, _u: Any, mid: int, reason: ReasonCode, _p: Any) -> None:
@@ -207,7 +208,7 @@ class Link(threading.Thread):
         self._client.disconnect()
         self._client.loop_write()
         if (sock := self._client.socket()) is not None:
-            sock.close()  # a broker that does not read leaves DISCONNECT unsent, so close anyway
+            sock.close()  # a broker that does not read blocks DISCONNECT, so close the socket anyway
         self.on_end()
 
     def _explained(self, error: OSError) -> str:
@@ -227,8 +228,8 @@ class Link(threading.Thread):
 class BoundedClient(paho.Client):
     """A client that ends the connection before it reads a packet beyond PACKET_MAX.
 
-    `cut`: the reason, if the client ended the connection so. paho reads the rest of a packet with one
-    call of `_sock_recv`.
+    If this happens, `cut` is the reason. The limit works because paho reads the rest of a packet with
+    one call of `_sock_recv`.
     """
 
     cut = ""
@@ -252,7 +253,7 @@ def _connect_options(v5: bool) -> dict[str, Any]:
 
 
 def _password(file: str | None) -> str | None:
-    """Read the password, anew for each connection, because somebody may have renewed it. Raises
+    """Read the password. Each connection reads it again, because somebody may have renewed it. Raises
     HalError."""
     if file is None:
         return None
@@ -263,7 +264,7 @@ def _password(file: str | None) -> str | None:
 
 
 def _tls(settings: BrokerTls) -> ssl.SSLContext:
-    """Read the certificates, anew for each connection. Raises HalError."""
+    """Read the certificates. Each connection reads them again. Raises HalError."""
     for file in (settings.ca_file, settings.certificate_file, settings.key_file):
         if file and not os.access(file, os.R_OK):
             raise HalError(f"tls: {file} cannot be read")

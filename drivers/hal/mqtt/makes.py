@@ -1,7 +1,7 @@
 """Relays and inputs of well-known makes on MQTT: their topics, payloads and fields.
 
 Each function takes the device's name on MQTT, one part of the device, and the time of the relay's timer
-in seconds (None without a timer). It returns the keys of a point (`points.py`).
+in seconds (None without a timer). Each function returns the keys of a point (`points.py`).
 """
 
 import json
@@ -14,10 +14,11 @@ Keys = Mapping[str, Any]
 
 
 def shelly(device: str, part: str, off_s: float | None) -> Keys:
-    """Return `switch:0` or `input:0` of a Shelly of generation 2 or later; `device`: its topic prefix.
+    """Return the keys for `switch:0` or `input:0` of a Shelly of generation 2 or later. `device` is the
+    Shelly's topic prefix.
 
     The web page of the Shelly must have both "Enable MQTT Control" and "Generic status update over
-    MQTT" on. A switch is set by RPC, because `toggle_after` is a parameter of `Switch.Set`.
+    MQTT" on. The commands to a switch use RPC, because `toggle_after` is a parameter of `Switch.Set`.
     Sources: shelly-api-docs.shelly.cloud, gen2, ComponentsAndServices: Mqtt (`<prefix>/status/…`,
     `<prefix>/command` with `status_update`, `<prefix>/online`), Switch (`output`, `Switch.Set`) and
     Input (`state`).
@@ -39,13 +40,13 @@ def shelly(device: str, part: str, off_s: float | None) -> Keys:
 
 
 def tasmota(device: str, part: str, off_s: float | None) -> Keys:
-    """Return `POWER1` or `Switch1` of a device with Tasmota; `device`: its topic.
+    """Return the keys for `POWER1` or `Switch1` of a device with Tasmota. `device` is its topic.
 
-    A timer is the device's own setting `PulseTime`, which each `POWER1 ON` starts again: set
-    `PulseTime1` to the seconds plus 100, from 12 s on. A switch needs a `SwitchMode` of 1 or 2. Tasmota
-    answers every command without a payload with the present value. A device with a single relay
-    answers on `POWER`: then write `POWER`. Sources: tasmota.github.io/docs: Commands (Power, PulseTime,
-    Status 10), MQTT (topics cmnd, stat and tele, LWT) and Buttons-and-Switches.
+    A timer is the device's own setting `PulseTime`, which each `POWER1 ON` starts again. For times from
+    12 s on, set `PulseTime1` to the seconds plus 100. A switch needs a `SwitchMode` of 1 or 2. Tasmota
+    answers every command without a payload with the present value. A device with a single relay answers
+    on `POWER`. For such a device write `POWER`. Sources: tasmota.github.io/docs: Commands (Power,
+    PulseTime, Status 10), MQTT (topics cmnd, stat and tele, LWT) and Buttons-and-Switches.
     """
     sort, _ = _matched(part, r"(POWER|Switch)([0-9]{0,2})", "POWER1 or Switch1")
     away = {"topic": f"tele/{device}/LWT", "offline": ["Offline"]}
@@ -63,11 +64,12 @@ def tasmota(device: str, part: str, off_s: float | None) -> Keys:
 
 
 def zigbee2mqtt(device: str, part: str, off_s: float | None) -> Keys:
-    """Return a property such as `state` (a relay) or `contact`; `device`: its friendly name.
+    """Return the keys for a property such as `state` (a relay) or `contact`. `device` is the device's
+    friendly name.
 
     `contact` is true while the contact is closed. The relay's firmware must support `on_time`. A
-    battery sensor sleeps and does not answer `get`, so its properties are never asked for. The
-    availability topic is published only if Zigbee2MQTT has `availability` enabled. Sources:
+    battery sensor sleeps and does not answer `get`, so the bus never asks for a sensor's properties.
+    The availability topic is published only if Zigbee2MQTT has `availability` enabled. Sources:
     www.zigbee2mqtt.io/guide/usage/mqtt_topics_and_messages.html, and "On with timed off" on the pages
     of switches below www.zigbee2mqtt.io/devices.
     """

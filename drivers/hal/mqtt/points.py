@@ -1,5 +1,5 @@
-"""One point of the YAML's `points`. It is a state that a device publishes, or a relay that a device
-switches."""
+"""One point of the YAML's `points`. A point is a state that a device publishes, or a relay that a
+device switches."""
 
 from typing import Annotated
 
@@ -15,7 +15,7 @@ from drivers.hal.points import HalError
 from drivers.json_fields import Field, Value
 
 WHOLE = "payload"
-"""The name, in messages, of a payload that is read without `field`."""
+"""The name that messages use for a whole payload, which is read without `field`."""
 
 
 class MqttPoint(
@@ -69,8 +69,8 @@ class MqttPoint(
     ] = None
 
     def whole(self) -> "MqttPoint":
-        """Return the point with its profile's keys. Keys written in the YAML come first. Raises
-        ValueError."""
+        """Return the point, with the keys of its profile added. A key in the YAML replaces the
+        profile's key. Raises ValueError."""
         if self.profile is None:
             return self
         keys = MAKES[self.profile](self.device or "", self.part or "", self.switches_off_after_s)
@@ -125,7 +125,7 @@ class MqttPoint(
 
 
 def decoded(payload: bytes) -> object:
-    """Decode JSON; return any other payload as its text."""
+    """Decode JSON. Return any other payload as text."""
     text = payload.decode(errors="replace")
     try:
         return strict_json(text)

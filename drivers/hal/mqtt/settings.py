@@ -1,4 +1,5 @@
-"""`type: mqtt` of a device YAML: the broker, its secrets, and the points behind it."""
+"""The settings of an MQTT bus in a device YAML (`type: mqtt`): the broker, its secrets, and its
+points."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Literal
@@ -84,7 +85,7 @@ class MqttSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
     ] = msgspec.field(default_factory=dict)
 
     def wholes(self) -> Mapping[str, MqttPoint]:
-        """Return the points, completed from their profiles. Points that have problems are missing."""
+        """Return the points, completed from their profiles. Leave out points that have problems."""
         valid = {name: point for name, point in self.points.items() if not any(point.problems())}
         return {name: point.whole() for name, point in valid.items()}
 
@@ -118,8 +119,8 @@ class MqttSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 def _used_twice(points: Mapping[str, MqttPoint]) -> Remarks:
-    """Yield a problem for a state or command that two points use, and for a command topic that is also
-    a state topic."""
+    """Yield a problem for a state or command that two points use. Yield a problem for a command topic
+    that is also a state topic."""
     states = {point.topic: name for name, point in points.items() if point.topic}
     first: dict[object, str] = {}
     for name, point in points.items():
@@ -182,18 +183,19 @@ def warnings(settings: MqttSettings) -> Remarks:
 
 
 def needs(settings: MqttSettings) -> Needs:
-    """Return the broker's address."""
+    """Return the broker's address as the need."""
     return Needs(host=settings.host)
 
 
 def where(settings: MqttSettings) -> Where:
-    """Return the broker's address."""
+    """Return the broker's address as the place."""
     host, port = settings.address()
     return Where(f"{host}:{port}", local=False)
 
 
 def unfit(settings: MqttSettings, point: str, direction: Literal["in", "out"]) -> str | None:
-    """Return the reason why this point cannot be an input, or an output. Return None if it can."""
+    """Return the reason why this point cannot be an input, or cannot be an output. Return None if it
+    can."""
     if point not in settings.points:
         return unknown("point", point, settings.points)
     whole = settings.wholes().get(point)
@@ -207,8 +209,8 @@ def unfit(settings: MqttSettings, point: str, direction: Literal["in", "out"]) -
 
 
 def place(settings: MqttSettings, point: str) -> str | None:
-    """Return the command, which no other file may send. Return None for a state, which every file may
-    read."""
+    """Return the command of a relay, because no other file may send it. Return None for a state,
+    because every file may read it."""
     command = settings.wholes()[point].command
     return f"the command {command.topic} {command.payload_on}" if command else None
 

@@ -20,13 +20,14 @@ Topic = Annotated[
         extra={"pattern": "one whole topic, without the wildcards # and + (door-1/status/input:0)"},
     ),
 ]
-"""The name of one topic. A wildcard would let an unknown device speak for a known device."""
+"""The name of one topic. Wildcards are refused, because an unknown device could then speak for a known
+device."""
 Payload = Annotated[str, msgspec.Meta(max_length=1024)]
 Age = Annotated[float, msgspec.Meta(ge=0.1, le=86400, extra={"unit": "s"})]
 Answer = Annotated[float, msgspec.Meta(ge=0.1, le=60, extra={"unit": "s"})]
 Qos = Literal[0, 1]
-"""At most once (0), or at least once (1). "Exactly once" (2) would add nothing, because a level is sent
-again anyway."""
+"""The delivery: at most once (0), or at least once (1). "Exactly once" (2) would add nothing, because
+the driver sends a level again anyway."""
 
 
 class Ask(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -37,11 +38,11 @@ class Ask(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
 
 class Availability(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A device's notice that it has lost its connection. It is the device's last will, or a gateway's
-    judgement.
+    """A notice that a device has lost its connection. The notice is the device's last will, or a
+    gateway's judgement.
 
-    The notice is only a hint. A broker publishes a last will after one and a half keepalive periods of
-    silence.
+    The notice is only a hint. A broker publishes a last will only after one and a half keepalive
+    periods of silence.
     """
 
     topic: Annotated[Topic, tells("where the notice is published.")]
