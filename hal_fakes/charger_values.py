@@ -1,7 +1,7 @@
-"""Chooses values for a charger's fields. The driver's rules and errors must read the wanted activity
-from them.
+"""Chooses values for a charger's fields. From these values the driver's rules and errors must read the
+wanted activity.
 
-It tries values until the driver's own rules give that activity.
+This file tries values until the driver's own rules give that activity.
 """
 
 import itertools
@@ -27,7 +27,7 @@ NEAREST: Final = {
     Activity.STOPPING: Activity.CHARGING,
     Activity.RELEASED: Activity.IDLE,
 }
-"""Activity -> the nearest activity, which is shown if the activity has no code or rule."""
+"""The activity to show in place of each activity, if the latter has no code or rule."""
 
 
 def values(
@@ -38,7 +38,7 @@ def values(
 ) -> dict[str, Value] | None:
     """Return the value of each field. `natural` gives the fields' usual values, which are tried first.
 
-    Return None if no rule fits. If no rule shows an error, the first error field shows it.
+    Return None if no rule fits. If no rule shows an error, the first error field shows the error.
     """
     shown: dict[str, Value] = {at: 0 for _, at in errors.places()}
     shown |= {n.at: n.well[0] for n in errors.codes}
@@ -57,8 +57,8 @@ def values(
 
 
 def _shows_error(errors: StationErrors, shown: dict[str, Value], robot: bool) -> bool:
-    """Show an error of this side. If this side has no error field, show an error of the other side.
-    Return whether an error is shown."""
+    """Show an error of the robot, or of the station. If this side has no error field, show an error of
+    the other side. Return whether an error is shown."""
     sides = ("robot", "station") if robot else ("station", "robot")
     for side in sides:
         for number in errors.codes:

@@ -1,9 +1,10 @@
 """The control socket to the plants of a running simulation.
 
-AF_UNIX, lines of text, words with spaces in quotes. Each line is answered `ok` or `error TEXT`:
+The socket is AF_UNIX and carries lines of text. Words with spaces are in quotes. The answer to each
+line is `ok` or `error TEXT`:
 
-- `follow`: from now on every edge is sent as a line of JSON,
-  `{"at": s monotonic, "device": …, "what": "relay"|"sensor", "signal": …, "value": …}`
+- `follow`: from now on every edge is sent as a line of JSON, `{"at": s monotonic, "device": …, "what":
+  "relay"|"sensor", "signal": …, "value": …}`
 - `fail DEVICE PART MODE`: a wire or part fails (`off`, `stuck`, `slow`, `garbage`, `wrong`), or works
   again (`ok`)
 - `press DEVICE SIGNAL on|off`: a person or the building acts
@@ -31,7 +32,7 @@ log = logging.getLogger(__name__)
 
 
 class Control:
-    """The server. One thread accepts callers, and each caller has a thread that reads the caller's
+    """The server. One thread accepts callers. Each caller has a thread that reads this caller's
     orders."""
 
     def __init__(self, path: Path, plants: Mapping[str, Plant]) -> None:
@@ -41,7 +42,7 @@ class Control:
         self._callers: dict[socket.socket, threading.Thread] = {}
         self._lock = (
             threading.Lock()
-        )  # guards followers and callers; no thread holds this lock in a call of a plant
+        )  # guards followers and callers; no thread holds this lock while it calls a plant
         self._listener = _listen(path)
         for plant in plants.values():
             plant.on_edge = self._tell
@@ -49,7 +50,8 @@ class Control:
         self._thread.start()
 
     def close(self) -> None:
-        """Stop listening, hang up, and remove the socket. The caller may call `close` twice."""
+        """Stop listening, close the connections, and remove the socket. The caller may call `close`
+        twice."""
         for plant in self._plants.values():
             plant.on_edge = None
         _hang_up(self._listener)

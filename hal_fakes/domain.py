@@ -16,8 +16,7 @@ CLAIM: Final = "\0rmf-bridges-test-domain-{}"
 
 
 def free_domain() -> int:
-    """Return a domain without participants on this machine. The domain is claimed until this process
-    ends.
+    """Return a domain without participants on this machine, and claim it until this process ends.
 
     Raises OSError if no domain is free.
     """
@@ -28,7 +27,7 @@ def free_domain() -> int:
 
 @contextmanager
 def domain_for_a_while() -> Iterator[int]:
-    """Yield a free domain. The domain is claimed until the end of the block."""
+    """Yield a free domain, and claim it until the end of the block."""
     domain, claim = _claimed()
     with claim:
         yield domain
@@ -38,8 +37,9 @@ def _claimed() -> tuple[int, socket.socket]:
     """Return a free domain and a socket. The domain is claimed until the socket is closed.
 
     Raises OSError if no domain is free. The ports of domain d begin at 7400 + 250 d. The first port is
-    for multicast discovery. Participant i has the unicast ports 10 + 2 i and 11 + 2 i above the first
-    (DDSI-RTPS 2.5, 9.6.2.3). The first participant may have left when others remain.
+    for multicast discovery. Participant i has two unicast ports, 10 + 2 i and 11 + 2 i above the first
+    port (DDSI-RTPS 2.5, 9.6.2.3). The check covers the ports of many participants, because the first
+    may have left while others remain.
     """
     for domain in random.sample(DOMAINS, len(DOMAINS)):
         base = 7400 + 250 * domain

@@ -1,7 +1,7 @@
-"""Finds fakes by name. `DRIVER` and `BUS` each name a module whose `FAKE` stands in for the hardware.
+"""Finds fakes by name. `DRIVER` and `BUS` each name a module whose `FAKE` replaces the hardware.
 
-Only this file imports fakes by name. A driver without a fake gets its kind's plant,
-`hal_fakes/plants/<kind>.py`, at the far end of its wires.
+Only this file imports fakes by name. If a driver has no fake, the wires of its device lead to the
+kind's plant, `hal_fakes/plants/<kind>.py`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -24,11 +24,12 @@ Station = TypeVar("Station")
 class Fake(Generic[Settings]):
     """A fake controller of one sort.
 
-    - `plant(name, settings, wires)` makes its physics. `wires` is the driver's wiring table.
-    - `station(plant, settings)` makes the controller for the bus's fake, with this plant behind the
+    - `plant(name, settings, wires)` makes the physics of the device. `wires` is the driver's wiring
+      table.
+    - `station(plant, settings)` makes the controller for the bus's fake. The plant is behind the
       controller. Without `station`, a `PlantWiring` wires the plant's contacts to the bus.
-    - `sited(config, name)` makes a plant that needs more of the file than the device's settings. If
-      given, it replaces `plant`.
+    - `sited(config, name)` makes a plant that needs more of the YAML than the device's settings. If
+      given, `sited` replaces `plant`.
     """
 
     plant: Callable[[str, Settings, Sequence[Wire]], Plant]
@@ -39,8 +40,8 @@ class Fake(Generic[Settings]):
 class Server(Protocol):
     """A running far side.
 
-    `replace`: the replacements for the bus's settings, such as
-    `{"tcp": {"host": "127.0.0.1", "port": 41234}}`.
+    `replace` holds the replacements for the bus's settings, such as `{"tcp": {"host": "127.0.0.1",
+    "port": 41234}}`.
     """
 
     replace: dict[str, object]
@@ -51,12 +52,12 @@ class Server(Protocol):
 
 @dataclass(frozen=True)
 class Outside(Generic[Settings, Station]):
-    """The far side of a bus in a process of its own.
+    """The far side of a bus, in a process of its own.
 
     - `serve(settings, stations)` starts a real server on 127.0.0.1, or on a line of its own, and
       returns at once. The server may call the plants from any thread, and never advances the plants'
       time.
-    - `parts`: the parts of the far side that can fail for each plant on the bus.
+    - `parts` are the parts of the far side that can fail, for each plant on the bus.
     """
 
     serve: Callable[[Settings, Sequence[Station]], Server]
@@ -65,7 +66,7 @@ class Outside(Generic[Settings, Station]):
 
 @dataclass(frozen=True)
 class Inside(Generic[Settings, Station]):
-    """The far side of a bus that cannot leave the daemon's process.
+    """The far side of a bus that must be in the daemon's process.
 
     `open_bus(settings, stations, world)` makes the real bus with these stations on it.
     """
@@ -93,7 +94,8 @@ def _plant(config: Config, name: str) -> Plant:
 
 
 def stations_on(config: Config, bus: str, plants: Mapping[str, Plant]) -> list[Any]:
-    """Return this bus's stations: the devices on it, and contacts of devices on other buses."""
+    """Return this bus's stations. They are the devices on the bus, and contacts of devices on other
+    buses."""
     return [_station(config, bus, name, plants[name]) for name in config.devices_at(bus)]
 
 

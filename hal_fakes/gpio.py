@@ -1,9 +1,9 @@
 """The far side of the GPIO header: gpiozero's mock pins, wired to plants.
 
-The daemon's own code and gpiozero run as on hardware; only the pins are ours. They claim an output at
-its safe level in one call, as `drivers/hal/gpio/pins.py` does on hardware. (gpiozero's stock MockPin
-records a glitch at this point.) The pins refuse the same uses as hardware: a pin claimed twice, another
-pull on a pin with a fixed resistor, driving an input, a pull on an output.
+The daemon's own code and gpiozero run as on hardware. Only the pins are simulated. They claim an output
+at its safe level in one call, as `drivers/hal/gpio/pins.py` does on hardware. gpiozero's own MockPin
+would record a glitch at this point. The simulated pins refuse the same uses as hardware: a second claim
+of a pin, another pull on a pin with a fixed resistor, driving an input, a pull on an output.
 """
 
 import time
@@ -39,7 +39,7 @@ class WiredPin(MockPin):  # type: ignore[misc]
         self.factory.driven(self.point, self._state)
 
     def input_with_pull(self, pull: str) -> None:
-        """Claim the pin as an input. It has the wire's level from the first read on."""
+        """Claim the pin as an input. The first reading already has the wire's level."""
         if self._safe is not None:
             raise PinInvalidFunction(f"{self.point} is an output")
         super().input_with_pull(pull)
@@ -47,7 +47,7 @@ class WiredPin(MockPin):  # type: ignore[misc]
         self.clear_states()
 
     def close(self) -> None:
-        """Set an output to its safe level, which the kernel keeps. Then release the pin."""
+        """Set an output to its safe level, then release the pin. The kernel would keep this level."""
         if self._safe is not None:
             self._change_state(self._safe)
         self._safe = None
@@ -55,7 +55,8 @@ class WiredPin(MockPin):  # type: ignore[misc]
         self._function = "input"
 
     def follow_wire(self, level: bool) -> None:
-        """Take the wire's level. Report an edge to the pin's watcher."""
+        """Set the pin to the wire's level. If the level changes, report an edge to the pin's
+        watcher."""
         if self._function == "input":
             (self.drive_high if level else self.drive_low)()
 
@@ -69,8 +70,8 @@ class WiredPin(MockPin):  # type: ignore[misc]
 class WiredFactory(MockFactory):  # type: ignore[misc]
     """The header with its wiring.
 
-    `clock` gives the time (s) of the daemon's outputs. `lock` is held when pins take their wires'
-    levels, so that an older level never overtakes a newer one.
+    `clock` gives the time (s) of the daemon's outputs. A thread holds `lock` while it sets pins to
+    their wires' levels. So an older level never replaces a newer level.
     """
 
     def __init__(
@@ -91,7 +92,8 @@ class WiredFactory(MockFactory):  # type: ignore[misc]
                 wiring.drive(point, level, self.clock())
 
     def show(self, now: float, only: WiredPin | None = None) -> None:
-        """Set every claimed input (or only this input) to the level of its wire at `now` (s)."""
+        """Set every claimed input to the level of its wire at `now` (s). With `only`, set only this
+        input."""
         pins = [only] if only else list(self.pins.values())
         claimed = {pin.point: pin for pin in pins}
         with self._lock:

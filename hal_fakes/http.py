@@ -1,7 +1,7 @@
 """The far side of an `http` bus: a real HTTP server on 127.0.0.1 in front of stations.
 
-Each sort of station has a file that makes its answers (`hal_fakes/http_charger.py`). The wire fails by
-part and mode (`hal_fakes.plants.plant.FAILURE_MODES`):
+Each sort of station has a file that makes its answers, such as `hal_fakes/http_charger.py`. The wire
+has parts that fail in several modes (`hal_fakes.plants.plant.FAILURE_MODES`):
 
 |         | off              | stuck           | slow               | garbage        | wrong         |
 | server  | hangs up at once | the last answer | answers too late   | an HTML page   | state as text |
@@ -41,15 +41,17 @@ def serve(
 
 
 Asked = tuple[str, str, str]
-"""A request: its method, its path below `api_base`, and its body. The body is "" if there is none."""
+"""A request: its method, its path below `api_base`, and its body. A request without a body has ""."""
 ANY_BODY: Final = "*"
-"""A mark in a command's request. It means that the body differs from call to call."""
+"""A mark in place of the body in a command's request. The mark means that the body differs from call to
+call."""
 
 
 class HttpStation(Protocol):
     """A controller with a plant behind it.
 
-    `reads`: the requests for its state. `commands`: request -> (signal, asserted or not).
+    `reads` are the requests for the controller's state. `commands` gives for each request its signal,
+    and whether the request asserts the signal.
     """
 
     plant: Plant
@@ -63,24 +65,24 @@ class HttpStation(Protocol):
         """Obey a command for this signal."""
 
     def tick(self) -> None:
-        """Let timers run out. The server calls this often."""
+        """Switch off every output whose timer has run out. The server calls `tick` often."""
 
 
 @runtime_checkable
 class FreeStation(Protocol):
-    """A station whose paths and bodies hold values of a command."""
+    """A station whose requests have values of a command in their paths and bodies."""
 
     plant: Plant
 
     def reply(self, method: str, path: str, body: bytes, all_stations: Any) -> bytes | None:
-        """Answer a call; None if the call is not for this station."""
+        """Answer a call. Return None if the call is not for this station."""
 
 
 class HttpServer:
     """A running server. `replace` holds the replacements for the bus's settings.
 
-    `path`: the API's path. `timeout_s`: the client's deadline (s), which slow failures overrun.
-    `push_path`: the WebSocket below `path`, if the controller has a WebSocket.
+    `path` is the API's path. `timeout_s` is the client's deadline (s), and slow failures take longer.
+    `push_path` is the WebSocket's path below `path`, if the controller has a WebSocket.
     """
 
     def __init__(
@@ -130,7 +132,7 @@ class _Listener(ThreadingHTTPServer):
         super().__init__(("127.0.0.1", 0), _Call)
 
     def service_actions(self) -> None:
-        """Let timers run out. The server calls this between requests."""
+        """Call `tick` of each station. The server calls this between requests."""
         for station in self.stations:
             station.tick()
 
@@ -141,7 +143,7 @@ class _Listener(ThreadingHTTPServer):
         return caller, address
 
     def shutdown_request(self, request: socket.socket | tuple[bytes, socket.socket]) -> None:
-        assert isinstance(request, socket.socket)  # a request by datagram would be a pair
+        assert isinstance(request, socket.socket)  # only a datagram server would get a pair
         with self._lock:
             self._callers.discard(request)
         super().shutdown_request(request)
@@ -157,8 +159,8 @@ class _Listener(ThreadingHTTPServer):
     def handle_error(
         self, request: socket.socket | tuple[bytes, socket.socket], client_address: object
     ) -> None:
-        """Ignore the error of a caller that has hung up. Raise any other error, because it is a defect
-        of this file."""
+        """Ignore the error of a caller that has closed the connection. Raise any other error, because
+        it is a defect of this file."""
         if not isinstance(sys.exception(), ConnectionError):
             super().handle_error(request, client_address)
 
@@ -193,7 +195,8 @@ class _Call(BaseHTTPRequestHandler):
     do_POST = do_PUT = do_GET
 
     def _free(self, sent: bytes) -> None:
-        """Let the station answer that the call is for. One station's failures are those of all."""
+        """Pass the call to the station that the call is for. A failure of one station is a failure of
+        all."""
         path, failures = self.path.removeprefix(self.server.api), dict[str, FailureMode]()
         for station in self.server.free:
             failures |= station.plant.failures
@@ -264,7 +267,7 @@ class _Call(BaseHTTPRequestHandler):
         """Write the part of an answer that the failure lets through. Return True if the connection must
         be closed.
 
-        Head and body go out in one write. With two writes each answer would take 40 ms (delayed ACK).
+        Write head and body at once. With two writes each answer would take 40 ms (delayed ACK).
         """
         whole = head + body
         if failures.get("server") == "off":
@@ -287,7 +290,7 @@ class _Call(BaseHTTPRequestHandler):
             self.wfile.write(rest[n : n + 1])
 
     def _wait(self, seconds: float) -> None:
-        """Wait this long (s). Raise ConnectionError if the caller hangs up or the server closes
+        """Wait this long (s). Raise ConnectionError if the caller or the server closes the connection
         first."""
         end = time.monotonic() + seconds
         while (left_s := end - time.monotonic()) > 0:

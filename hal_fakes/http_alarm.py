@@ -22,7 +22,7 @@ PARTS: Final = ("server", "headers", "body")
 
 
 def fields(settings: HttpPanelSettings) -> dict[str, JsonFlag]:
-    """Return source -> its field, with the drill among the sources."""
+    """Return the field of each source. The drill is among the sources."""
     drill = {DRILL: settings.drill} if settings.drill else {}
     return {**settings.sources, **drill}
 
@@ -44,7 +44,7 @@ class FakeHttpPanel:
         """Do nothing, because the controller has no timer."""
 
     def answer(self, asked: Asked) -> bytes:
-        """Return the present answer to `GET state_path`. If that failure is ordered, return a wrong
+        """Return the present answer to `GET state_path`. In the failure mode `wrong`, return a wrong
         answer."""
         self.plant.advance(time.monotonic())
         server, body = self.plant.failures.get("server"), self.plant.failures.get("body")

@@ -36,7 +36,7 @@ def build(
 
 
 class FakeJsonCharger:
-    """A station that answers with JSON. Its one plant is shown in the maker's fields, numbers and
+    """A station that answers with JSON. It shows its one plant in the maker's fields, numbers and
     words."""
 
     def __init__(self, plant: Plant, settings: JsonChargerSettings) -> None:
@@ -73,7 +73,8 @@ class FakeJsonCharger:
         return self.body(self.reading())
 
     def body(self, reading: Reading) -> bytes:
-        """Return the answer for this reading. If that failure is ordered, return a wrong answer."""
+        """Return the answer for this reading. In a failure mode of the server or the body, return the
+        answer of this mode."""
         server, body = reading.failures.get("server"), reading.failures.get("body")
         if server == "stuck" and self._last is not None:
             return self._last
@@ -111,7 +112,7 @@ class FakeJsonCharger:
         return answer
 
     def _by_rules(self, reading: Reading, answer: dict[str, object]) -> dict[str, Value]:
-        """Return field -> value, for the fields that rules and errors read."""
+        """Return the value of each field that rules and errors read."""
         said = self._settings
         wanted = ROBOT_ERROR if reading.robots else (reading.activity, "")
         shown = {at: found(answer, at) for _, at in places(said.rules)}

@@ -21,8 +21,8 @@ PARTS: Final = ("server", "headers", "body")
 
 
 def contacts(settings: HttpDoorSettings) -> list[Wire]:
-    """Return the controller's own contacts and relay. The plant needs them, because they can fail as
-    our wires can."""
+    """Return the controller's own contacts and relay. The plant needs them, because they can fail in
+    the same way as the daemon's wires."""
     fields = settings.inputs.__struct_fields__
     inputs = [Wire(s, "in", s, "high") for s in fields if getattr(settings.inputs, s)]
     return [*inputs, Wire(HOLD, "out", HOLD, "high")]
@@ -56,7 +56,7 @@ class FakeHttpDoor:
             self.obey(HOLD, False)
 
     def answer(self, asked: Asked) -> bytes:
-        """Return the present answer to `GET state_path`. If that failure is ordered, return a wrong
+        """Return the present answer to `GET state_path`. In the failure mode `wrong`, return a wrong
         answer."""
         self.tick()
         self.plant.advance(time.monotonic())

@@ -1,4 +1,5 @@
-"""A lift's gateway on HTTP. Its API's fields show the plant's contacts, and its commands act as relays.
+"""A lift's gateway on HTTP. The fields of its API show the plant's contacts. Its commands act as
+relays.
 
 A held command ends by itself when its timer is not renewed. A call without `cancel` is a short press of
 a button. `hal_fakes/http.py` describes the failures of server, headers and body.
@@ -27,13 +28,14 @@ from hal_fakes.plants.plant import Plant
 PARTS: Final = ("server", "headers", "body")
 PRESS_S: Final = 0.2
 NONSENSE: Final = "?"
-"""The value for a door that is open and closed at once. It also stands for every unlisted state."""
+"""The value for a door that is open and closed at once. It also stands for every state that the YAML
+does not list."""
 NEVER: Final = float("inf")
 
 
 def contacts(settings: HttpLiftSettings) -> DryContactLiftSettings:
-    """Return the wiring of the contacts of the lift behind the gateway. These contacts can be cut as
-    our wires can."""
+    """Return the wiring of the contacts of the lift behind the gateway. These contacts can be cut in
+    the same way as the daemon's wires."""
     api, numbers = api_of(settings), count()
     state, levels = api.state, settings.levels()
 
@@ -100,7 +102,7 @@ class FakeHttpLift:
             self._drive(signal, False, NEVER)
 
     def answer(self, asked: Asked) -> bytes:
-        """Return the present answer to this request. If that failure is ordered, return a wrong
+        """Return the present answer to this request. In the failure mode `wrong`, return a wrong
         answer."""
         self.tick()
         self.plant.advance(time.monotonic())
@@ -171,7 +173,8 @@ class FakeHttpLift:
 
 
 def _value(place: ListedStates, *states: str) -> Value:
-    """Return the first value of the first of these states that the API has."""
+    """Return the API's value for the first of these states that has a value. If the state has several
+    values, return the first."""
     listed = place.states()
     return next((listed[state][0] for state in states if state in listed), NONSENSE)
 

@@ -1,4 +1,4 @@
-"""The counterpart of `drivers/json_fields.py`. It writes an answer in which the driver finds its
+"""The counterpart of `drivers/json_fields.py`. This file writes an answer in which the driver finds its
 fields."""
 
 from drivers.http_call import Call
@@ -6,7 +6,7 @@ from drivers.json_fields import JsonFlag, Value, same
 
 
 def asked(call: Call) -> tuple[str, str, str]:
-    """Return the request by which the command reaches its controller."""
+    """Return the request that carries the command to its controller."""
     return call.method, call.path, call.body or ""
 
 

@@ -1,5 +1,5 @@
-"""A real broker on 127.0.0.1. It is mosquitto, in a process that can be killed, frozen and
-restarted."""
+"""A real broker on 127.0.0.1. The broker is mosquitto, in a process that tests can kill, freeze and
+restart."""
 
 import shutil
 import signal
@@ -22,7 +22,8 @@ ENDS_WITH_US: Final = ("setpriv", "--pdeathsig", "KILL")
 class Mosquitto:
     """A broker at `port`. `lines` are further lines of its configuration, such as those for TLS.
 
-    `replace`: replacements for a bus's settings, to reach this broker by its default `lines`.
+    `replace` holds the replacements for a bus's settings. With them a bus reaches the broker without
+    user and without TLS, as the default `lines` allow.
     """
 
     def __init__(self, lines: Sequence[str] = ("allow_anonymous true",)) -> None:
@@ -51,7 +52,7 @@ class Mosquitto:
         self.start()
 
     def start(self) -> None:
-        """Start the broker without any memory, and wait until it listens. Raises HalError."""
+        """Start the broker without earlier messages, and wait until it listens. Raises HalError."""
         self._process = subprocess.Popen(
             self._command,
             stdin=subprocess.DEVNULL,
@@ -72,12 +73,12 @@ class Mosquitto:
             process.wait()
 
     def freeze(self) -> None:
-        """Freeze the broker, so that it does nothing. Every connection stays open."""
+        """Freeze the broker. It stops working, but every connection stays open."""
         if self._process is not None:
             self._process.send_signal(signal.SIGSTOP)
 
     def thaw(self) -> None:
-        """Let a frozen broker go on."""
+        """Let a frozen broker work again."""
         if self._process is not None:
             self._process.send_signal(signal.SIGCONT)
 

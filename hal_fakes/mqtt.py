@@ -1,8 +1,8 @@
 """The far side of an `mqtt` bus: a real broker on 127.0.0.1, and the devices that publish there.
 
-The devices are one real MQTT client. They publish a changed state at once, answer `ask`, and publish
-states that are not asked for three times in `stale_after_s`. A relay with a timer switches itself off.
-On command (`fail DEVICE unit|server MODE`) one device, or the broker, is
+One real MQTT client plays all devices. The devices publish a changed state at once, and answer `ask`.
+They publish states without `ask` three times in `stale_after_s`. A relay with a timer switches itself
+off. The order `fail DEVICE unit|server MODE` lets one device (`unit`) or the broker (`server`) fail:
 
 |        | off    | stuck           | slow           | garbage         | wrong          |
 | unit   | silent | says the same   | obeys too late | publishes noise | publishes `?`  |
@@ -40,8 +40,8 @@ NEVER: Final = float("inf")
 class MqttStation(Protocol):
     """A device with a plant behind it.
 
-    `asks`: topic -> the message that makes the device publish. `commands`: (topic, message) -> (signal,
-    asserted or not).
+    `asks` gives for each topic the message that makes the device publish. `commands` gives for each
+    topic and message the signal, and whether the message asserts the signal.
     """
 
     plant: Plant
@@ -56,10 +56,10 @@ class MqttStation(Protocol):
         nothing changed."""
 
     def tick(self) -> None:
-        """Let timers run out. The site calls this often."""
+        """Switch off every relay whose timer has run out. The site calls `tick` often."""
 
     def states(self) -> dict[str, bytes]:
-        """Return topic -> payload, for each state."""
+        """Return the payload of each state, by its topic."""
 
 
 def serve(
@@ -73,7 +73,8 @@ def serve(
 
 
 class MqttDevice:
-    """One device's points as a station. It has contacts, and relays that publish their states."""
+    """One device's points as a station. The station has contacts, and relays that publish their
+    states."""
 
     def __init__(self, wiring: PlantWiring, points: Mapping[str, MqttPoint]) -> None:
         self.plant = wiring.plant
@@ -109,7 +110,7 @@ class MqttDevice:
                 self.obey(name, False)
 
     def states(self) -> dict[str, bytes]:
-        """Return topic -> payload, for each state."""
+        """Return the payload of each state, by its topic."""
         levels = {**self._wiring.levels(time.monotonic()), **self._on}
         groups: dict[tuple[str, str], list[tuple[MqttPoint, bool]]] = {}
         for name, point in self._points.items():
@@ -285,7 +286,7 @@ class MqttSite:
 
     @contextlib.contextmanager
     def _wrong(self) -> Iterator[None]:
-        """Restart the broker with nothing but retained states. The devices stay away."""
+        """Restart the broker with only the retained states. The devices stay away."""
         self._detach()
         self._broker.kill()
         self._broker.start()
@@ -309,7 +310,7 @@ def _value(group: Sequence[tuple[MqttPoint, bool]]) -> object:
 
 
 def plain(value: object) -> bytes:
-    """Encode a payload. A text stays as it is; any other value becomes JSON."""
+    """Encode a payload. A text stays as it is. Any other value becomes JSON."""
     return value.encode() if isinstance(value, str) else json.dumps(value).encode()
 
 

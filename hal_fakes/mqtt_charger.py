@@ -16,7 +16,7 @@ EFFECTS: dict[StationCommand, tuple[str, bool]] = {
     "range_check": ("range_check", True),
     "clear_error": ("clear_error", True),
 }
-"""Command -> (signal of the plant, asserted or not)."""
+"""The plant's signal for each command, and whether the command asserts the signal."""
 
 
 class FakeMqttCharger(FakeJsonCharger):
@@ -38,7 +38,7 @@ class FakeMqttCharger(FakeJsonCharger):
         return None
 
     def states(self) -> dict[str, bytes]:
-        """Return topic -> payload of each state."""
+        """Return the payload of each state, by its topic."""
         said = json.loads(self.body(self.reading()))
         if self.plant.failures.get("unit") == "wrong":
             said = {name: ["?"] for name in self._topics}

@@ -1,4 +1,4 @@
-"""Plants in real time. One lock guards them, and one thread runs each event when it is due.
+"""Runs plants in real time. One lock guards the plants. One thread runs each event when it is due.
 
 The thread sleeps until the next event of any plant, so an idle simulation costs nothing.
 """
@@ -11,10 +11,10 @@ from hal_fakes.plants.plant import Edge, FailureMode, Plant
 
 
 class RealTime:
-    """A running world. `plants` are views of the plants that any thread may call.
+    """A running world. Any thread may call its `plants`.
 
-    `on_step` callbacks run after each step, and hold the lock. GPIO pins take their levels in such a
-    callback.
+    The world calls each callback of `on_step` after each step, with the lock held. In such a callback,
+    GPIO pins take their levels.
     """
 
     def __init__(self, plants: Mapping[str, Plant]) -> None:
@@ -30,19 +30,19 @@ class RealTime:
         self._thread.start()
 
     def stir(self) -> None:
-        """Compute the next event again, because a plant was driven."""
+        """Compute the time of the next event again, because somebody drove a plant."""
         with self.lock:
             self._stirred = True
             self._due.notify()
 
     def show(self) -> None:
-        """Show moved contacts at once, in the caller's thread. Wake our thread if necessary."""
+        """Show moved contacts at once, in the caller's thread. Wake the world's thread if necessary."""
         with self.lock:
             if self._step() < self._next_at:
                 self.stir()
 
     def close(self) -> None:
-        """Stop time. The caller may call `close` twice."""
+        """Stop the plants' time. The caller may call `close` twice."""
         with self.lock:
             self._closed = True
             self._due.notify()
@@ -70,7 +70,8 @@ def _timeout(next_at: float) -> float | None:
 
 
 class _Serialised:
-    """One plant behind the world's lock. Driving the plant also stirs the world."""
+    """One plant that any thread may call, because each call holds the world's lock. After a drive the
+    world computes its next event again."""
 
     def __init__(self, plant: Plant, world: RealTime) -> None:
         self.name = plant.name

@@ -1,8 +1,9 @@
 """The hardware of `rmf-bridge run FILE --simulate`. Each device has a plant behind its bus.
 
-If possible, a far side is a child process on 127.0.0.1 (`hal_fakes/__main__.py`), and the real bus is
-pointed there. GPIO pins cannot leave a process, so their fake lives in the daemon's. If a device has
-inputs on another bus, its plant stands behind both: then all far sides live in the daemon's process.
+If possible, a far side is a child process on 127.0.0.1 (`hal_fakes/__main__.py`), and the real bus
+connects to this process. GPIO pins cannot leave a process, so their fake is in the daemon's process. If
+a device has inputs on another bus, its plant is behind both buses. In this case all far sides are in
+the daemon's process.
 
 Each bus has a control socket in the runtime directory. The socket is `plant.sock`, or
 `plant-<bus>.sock` if the file has several buses.
@@ -31,7 +32,7 @@ READY_S = 15.0
 STAND_IN = "STAND-IN: rmf_adapter is not installed: no RMF directs these robots, and they patrol"
 PATIENCE_S = 1.5
 """The least time (s) for which a simulated bus waits for an answer. The far side shares this machine,
-which may be busy. The time is no longer, because a call may take only half of the shortest
+which may be busy. A longer time is not possible, because a call may take only half of the shortest
 WatchdogSec (bridges/runtime/drop_in.py)."""
 
 
@@ -39,14 +40,14 @@ class Simulation:
     """The far sides of a file's buses. Far sides in separate processes start at the same time as the
     daemon.
 
-    Make a Simulation before the daemon changes its directory, because the file's relative paths must be
-    valid.
+    Make a Simulation before the daemon changes its directory. Otherwise the file's relative paths would
+    be wrong.
     """
 
     def __init__(
         self, config: Config, runtime_dir: Path, *, log_format: LogFormat | None = None
     ) -> None:
-        """Start the far sides. `log_format` is the format in which a child logs presses; None means no
+        """Start the far sides. `log_format` is the format in which a child logs presses. None means no
         log."""
         self._log = ["--log-format", log_format] if log_format else []
         self._config = config

@@ -1,4 +1,4 @@
-"""The wire of the demos and the tests. It is `dds` if available, otherwise `zenoh`."""
+"""The wire of the demos and the tests. The wire is `dds` if available, otherwise `zenoh`."""
 
 import os
 from typing import Literal
@@ -11,8 +11,8 @@ Wire = Literal["dds", "zenoh"]
 
 
 def wire() -> Wire:
-    """Return the wire in the environment variable TRANSPORT; without one, a wire that runs on this
-    machine."""
+    """Return the wire in the environment variable TRANSPORT. If it is not set, return a wire that runs
+    on this machine."""
     named = os.environ.get("TRANSPORT") or runs_here()
     if named not in ("dds", "zenoh"):
         raise TransportError(f"TRANSPORT is {named!r}: dds or zenoh")
@@ -20,8 +20,8 @@ def wire() -> Wire:
 
 
 def runs_here() -> Wire:
-    """Return dds if cyclonedds can be imported, otherwise zenoh. `auto` does the same on a machine
-    without ROS."""
+    """Return `dds` if cyclonedds can be imported, otherwise `zenoh`. The setting `auto` does the same
+    on a machine without ROS."""
     return "zenoh" if missing_of_dds() else "dds"
 
 

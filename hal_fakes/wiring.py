@@ -12,7 +12,7 @@ from hal_fakes.plants.plant import Plant
 class PlantWiring:
     """The wires between one plant and one bus. `canonical` returns the bus's spelling of a point.
 
-    `clears_s`: the time (s) after which a module clears the coil of a call that its controller has
+    `clears_s` is the time (s) after which a module clears the coil of a call that its controller has
     taken. None means never.
     """
 
@@ -31,7 +31,8 @@ class PlantWiring:
         self.flashes = {canonical(w.flash.point): canonical(w.point) for w in wires if w.flash}
 
     def levels(self, now: float) -> dict[str, bool]:
-        """Return canonical point -> level (True is high) for every input, at `now` (monotonic s)."""
+        """Return the level (True is high) of every input at `now` (monotonic s), by its canonical
+        point."""
         self.plant.advance(now)
         return {p: w.level(self.plant.sense(w.signal)) for p, w in self.inputs.items()}
 

@@ -1,13 +1,13 @@
-"""A charger with its maker's own CAN frames: a plant behind the driver's map.
+"""A charger with its maker's own CAN frames. A plant stands behind the driver's map.
 
 The charger charges while every frame of its map comes on time with the values of `on`. It stops when a
-frame has the values of `off`, or is missing for three periods. A busy machine delays this station as
-well as the daemon. So a long gap between two looks of the station counts as one short gap. If the map
-has wake frames, the charger sleeps until a wake frame comes, and sleeps again after it was off.
+frame has the values of `off`, or is missing for three periods. A busy machine delays this fake as well
+as the daemon. So a long gap between two checks of the frames counts as one short gap. If the map has
+wake frames, the charger sleeps until a wake frame comes, and sleeps again after it was off.
 
-The part `node` can fail in addition to the parts of plant and bus. `off` is silent. `stuck` repeats its
-last status. `slow` sends a status every two seconds. `garbage` sends frames of six bytes. `wrong` sends
-an unlisted state.
+The part `node` can fail in addition to the parts of plant and bus. In the mode `off` it is silent.
+`stuck` repeats the last status. `slow` sends a status every two seconds. `garbage` sends frames of six
+bytes. `wrong` sends a state that the map does not list.
 """
 
 import time
@@ -40,7 +40,7 @@ FLAGS: Final = {
     "too_far": "BadCoilPosition",
     "too_near": "BadCoilPosition",
 }
-"""The plant's faults -> their error signals. The maker publishes no signal for foreign objects."""
+"""The error signal for each fault of the plant. The maker publishes no signal for foreign objects."""
 ROBOTS_FAULTS: Final = frozenset(FLAGS) - {"transmitter_fault", "foreign_object"}
 
 
@@ -64,7 +64,7 @@ class FrameCharger:
         self._status: list[can.Message] = []
 
     def hear(self, message: can.Message, now: float, send: Send) -> None:
-        """Take a frame that keeps the charge going or ends the charge."""
+        """Take a frame that lets the charge go on, or that ends the charge."""
         self._look(now)
         extended = dbc.EXTENDED if message.is_extended_id else 0
         heard = message.arbitration_id | extended
@@ -98,7 +98,7 @@ class FrameCharger:
             send(_short(message) if mode == "garbage" else message)
 
     def _look(self, now: float) -> None:
-        """Add up the time during which this station has watched the bus."""
+        """Add up the time during which this fake has watched the bus."""
         self._watched_s += min(now - self._looked_at, STATUS_S)
         self._looked_at = now
 
@@ -160,8 +160,8 @@ class FrameCharger:
     def _by_rules(
         self, reading: Reading, natural: Mapping[str, float], wrong: bool
     ) -> dict[str, float]:
-        """Return values for the signals of rules, error numbers and error bits. Error flags are left
-        out."""
+        """Return values for the signals of rules, error numbers and error bits. Leave out the error
+        flags."""
         known = self._map
         flags = (*known.errors.station, *known.errors.robot)
         numbers = StationErrors(codes=known.errors.codes, bits=known.errors.bits)
@@ -173,8 +173,8 @@ class FrameCharger:
         return {at: float(value) for at, value in (found or {}).items() if at not in flags}
 
     def _code(self, state: State, reading: Reading) -> int:
-        """Return the first code of the plant's activity. If the map has none, return that of the
-        nearest activity."""
+        """Return the first code of the plant's activity. If the map has no such code, return the first
+        code of the nearest activity."""
         lists = state.codes.lists()
         codes = lists[reading.activity] or lists[NEAREST.get(reading.activity, Activity.ERROR)]
         return codes[0]

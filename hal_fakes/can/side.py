@@ -1,13 +1,13 @@
 """The far side of a CAN bus: a medium with stations, in a thread of their own.
 
-The medium is python-can's `virtual` bus within one process, or an slcan adapter on a pseudo-terminal
-across processes (`hal_fakes/can/slcan_port.py`). The part `bus` of any plant on the medium fails as
-buses do:
+Within one process the medium is python-can's `virtual` bus. Across processes the medium is an slcan
+adapter on a pseudo-terminal (`hal_fakes/can/slcan_port.py`). Each plant on the medium has a part `bus`,
+which fails in the ways of a bus:
 
 - `off`: the adapter is unplugged; a virtual bus is silent
 - `stuck`: nothing passes in either direction
 - `slow`: every frame from the far side comes too late
-- `garbage`: noise, which is bytes that are no slcan, or frames with random ids and content
+- `garbage`: noise comes: an adapter sends bytes that are not slcan, a virtual bus sends random frames
 - `wrong`: the controller reports bus-off; an adapter cannot report, so it passes only foreign frames
 """
 
@@ -42,13 +42,13 @@ class Medium(Protocol):
     replace: dict[str, object]
 
     def receive(self, wait_s: float) -> can.Message | None:
-        """Return the daemon's next frame; None if no frame comes within `wait_s`."""
+        """Return the daemon's next frame. Return None if no frame comes within `wait_s`."""
 
     def send(self, message: can.Message) -> None:
         """Send a frame to the daemon. The frame is lost if no program has the bus open."""
 
     def fail(self, mode: FailureMode | None) -> None:
-        """Fail in this way from now on; None ends the failure. The far side calls this often."""
+        """Fail in this way from now on. None ends the failure. The far side calls `fail` often."""
 
     def close(self) -> None:
         """End the medium. The caller may call `close` twice."""
@@ -76,7 +76,7 @@ class CanStation(Protocol):
 class VirtualBus:
     """python-can's `virtual` bus. Both sides open the bus under the name `channel`.
 
-    `interface`: another interface of python-can, such as `socketcan` with the channel vcan0.
+    `interface` may name another interface of python-can, such as `socketcan` with the channel vcan0.
     """
 
     def __init__(self, channel: str, interface: str = "virtual") -> None:
@@ -124,7 +124,7 @@ def any_frame(noise: random.Random) -> can.Message:
 class CanFarSide:
     """A running far side. `replace` holds the replacements for the bus's settings.
 
-    `slow_s`: the delay (s) of a frame that is sent late, or on a slow bus.
+    `slow_s` is the delay (s) of a late frame, and of every frame on a slow bus.
     """
 
     def __init__(self, medium: Medium, stations: Sequence[CanStation], slow_s: float) -> None:

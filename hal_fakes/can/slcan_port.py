@@ -1,5 +1,5 @@
-"""An slcan adapter behind a pseudo-terminal (LAWICEL). It carries frames as lines of text to another
-process.
+"""An slcan adapter (LAWICEL) behind a pseudo-terminal. The adapter carries frames as lines of text to
+another process.
 
     t123 2 0102 CR     frame 0x123 with two bytes; T and eight digits for an id of 29 bits
     Sn CR, O CR, C CR  bitrate, open, close
@@ -42,7 +42,7 @@ class SlcanPort:
         self._open = False
 
     def receive(self, wait_s: float) -> can.Message | None:
-        """Return the daemon's next frame. Obey commands that come before the frame."""
+        """Return the daemon's next frame. Obey the commands that come before this frame."""
         while b"\r" not in self._heard:
             wire = self.adapter.wire
             readable = select.select([wire] if wire is not None else [], [], [], wait_s)[0]
@@ -61,8 +61,8 @@ class SlcanPort:
             self._write(encoded(message))
 
     def fail(self, mode: FailureMode | None) -> None:
-        """Fail in this way: `off` unplugs the adapter, `garbage` sends noise, `wrong` passes only other
-        stations' frames."""
+        """Fail in this way. `off` unplugs the adapter, `garbage` sends noise, and `wrong` passes only
+        other stations' frames."""
         if (mode == "off") != (self.adapter.wire is None):
             self._heard, self._open = b"", False
             (self.adapter.pull if mode == "off" else self.adapter.plug)()

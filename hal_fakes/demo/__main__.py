@@ -1,5 +1,8 @@
-"""`python -m hal_fakes.demo [ride|charging|page]`: the exit code is 0 after a correct day, 1 with the
-reason after an error, and 130 after Ctrl-C. The demo never leaves a process running."""
+"""Runs a demo: `python -m hal_fakes.demo [ride|charging|page]`.
+
+The exit code is 0 after a correct day. After an error the exit code is 1, and the demo prints the
+reason. After Ctrl-C the exit code is 130. The demo never leaves a process running.
+"""
 
 import argparse
 import sys

@@ -1,7 +1,8 @@
-"""`make demo-page`: two lifts, two doors, two chargers, five robots that ride endlessly, and the page.
+"""`make demo-page`: a page that shows two lifts, two doors, two chargers, and five robots that ride
+endlessly.
 
-The daemons and the page are processes of their own. This process plays the fleet adapters, lets a part
-fail every minute, and ends with Ctrl-C.
+The daemons and the page are processes of their own. This process plays the fleet adapters. It lets a
+part fail every minute, and ends with Ctrl-C.
 """
 
 import secrets
@@ -36,17 +37,19 @@ FAULTS: Final = (
     (PAD_A, "fail", "server", "off", "ok"),
     (LIFT2, "fail", "unit", "off", "ok"),
 )
-"""The faults in their order: device, order, part or signal, mode, and the mode that ends the fault."""
+"""The faults in their order. Each has a device, an order, a part or signal, a mode, and the mode that
+ends the fault."""
 FAULT_EVERY_S, FAULT_LASTS_S = 60.0, 15.0
 DRIVES_S: Final = 3.0
 CHARGES_S: Final = 20.0
 
 Step = Phase | float | Callable[[], bool]
-"""A phase of RMF's task, seconds to wait, or a condition to await."""
+"""One step of a robot. It is a phase of RMF's task, a number of seconds to wait, or a condition to
+await."""
 
 
 class Rider:
-    """One robot on its errands."""
+    """One robot that repeats its steps."""
 
     def __init__(self, world: World, robot: RobotContext, errands: Iterator[Step]) -> None:
         self.robot = robot
@@ -76,8 +79,8 @@ class Rider:
 def errands(
     robot: RobotContext, lift: str, door: str, floors: tuple[str, str], levels: dict[str, str]
 ) -> Iterator[Step]:
-    """Yield the robot's steps endlessly: through a door, up or down in a lift, a rest. `levels` is
-    robot -> level."""
+    """Yield the robot's steps endlessly: through a door, up or down in a lift, a rest. `levels` holds
+    each robot's level."""
     there = cycle((floors, floors[::-1]))
     for start, goal in there:
         yield DoorOpen(door)
@@ -95,7 +98,7 @@ def errands(
 
 
 def charges(world: World, robot: str, charger: str) -> Iterator[Step]:
-    """Yield the robot's steps endlessly: onto the pad, some charging, off the pad."""
+    """Yield the robot's steps endlessly: onto the pad, a charge for some time, off the pad."""
     numbers = count(1)
     request_at = [0.0]
 
@@ -189,7 +192,7 @@ def _fleet(riders: list[Rider], levels: Mapping[str, str], now: float) -> d.Flee
 
 
 def dawns(world: World) -> bool:
-    """Is every daemon up, and has it published a state from its sensors?"""
+    """Is every daemon up, and has every daemon published a state from its sensors?"""
     devices = (LIFT1, LIFT2, WARD, SIDE, PAD_A, PAD_E)
     return all(world.journal.latest(device) is not None for device in devices)
 

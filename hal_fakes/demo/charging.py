@@ -1,4 +1,4 @@
-"""`make demo-charging`: the numbered scenarios of shared chargers, and the verdict on each.
+"""`make demo-charging`: the numbered scenarios of shared chargers, and the verdict on each scenario.
 
 Two chargers on HTTP and the coordinator are processes of their own. This process plays two fleets of
 two brands, an operator and a technician. The scenarios are:
@@ -10,8 +10,8 @@ two brands, an operator and a technician. The scenarios are:
 - (5a) chargers overheat;
 - (5b) a robot cannot be charged.
 
-A line that begins with `so:` is an awaited fact. If the fact does not come, the demo ends with exit
-code 1.
+A line that begins with `so:` is a fact that the demo awaits. If the fact does not come, the demo ends
+with exit code 1.
 """
 
 from collections.abc import Iterable
@@ -202,10 +202,10 @@ def _robot_faulty(world: World, fleets: DemoFleets) -> None:
     _free(world)
 
 
-# --- the verdict: pure -------------------------------------------------------------------------
+# --- the verdict, from the journal alone ---------------------------------------------------------
 
 CHARGED: Final = {A: [ONE, TWO, ONE, ONE, ONE, ONE], B: [PORTER, TWO, ONE]}
-"""The only charges that are allowed. Each charger has its robots in their order."""
+"""The only charges that are allowed. Each charger has its robots in the order of their charges."""
 
 
 def problems(journal: Journal) -> list[str]:
@@ -223,7 +223,8 @@ def _charged(states: list[d.ChargerState]) -> Iterable[str]:
 
 
 def _shared(states: list[d.ChargerState]) -> Iterable[str]:
-    """Yield an error for each robot that is on two chargers at once, by the chargers' states."""
+    """Yield an error for each robot that is on two chargers at once, according to the chargers'
+    states."""
     latest: dict[str, d.ChargerState] = {}
     for state in states:
         latest[state.charger_name] = state

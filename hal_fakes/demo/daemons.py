@@ -1,5 +1,5 @@
-"""The demo's daemons. They are real processes, and the control sockets lead to the plants behind
-them."""
+"""The demo's daemons, as real processes. Their control sockets lead to the plants behind the
+daemons."""
 
 import os
 import signal
@@ -23,13 +23,14 @@ TAIL = 15
 
 
 class DemoFailed(Exception):
-    """The error of a demo that failed. Its text names the missing event."""
+    """The error of a demo that failed. The error's text names the missing event."""
 
 
 class Program:
     """One `rmf-bridge …` in a session of its own.
 
-    So Ctrl-C in the terminal reaches only the demo. The demo stops every program in order.
+    The session keeps Ctrl-C in the terminal from the program. So Ctrl-C reaches only the demo, and the
+    demo stops every program in order.
     """
 
     def __init__(self, name: str, log: Path, words: Iterable[str], domain_id: int) -> None:
@@ -71,8 +72,8 @@ class Program:
         self._process.wait()
 
     def _exited(self) -> bool:
-        """Has the program exited? It is not reaped, so its pid and session id stay reserved until
-        `end`."""
+        """Has the program exited? Its exit status is not collected, so its pid and session id stay
+        reserved until `end`."""
         if self._process.returncode is not None:
             return True
         look = os.WEXITED | os.WNOHANG | os.WNOWAIT
@@ -88,7 +89,7 @@ class DaemonProcess(Program):
         super().__init__(file.stem, directory / f"{file.stem}.log", words, domain_id)
 
     def follow(self, tell: Callable[[Edge], None]) -> None:
-        """Call `tell` for every edge of the daemon's plants from now on. A thread makes the calls."""
+        """From now on call `tell` for every edge of the daemon's plants. A thread makes the calls."""
         caller = self._caller()
         caller.order("follow")
         threading.Thread(target=_read, args=(caller, tell), daemon=True).start()
@@ -131,7 +132,7 @@ class PageProcess(Program):
         super().__init__("page", directory / "page.log", words, domain_id)
 
     def address(self) -> str:
-        """Return the page's address after the page has logged it."""
+        """Wait until the page has logged its address, and return the address."""
         deadline = time.monotonic() + CONNECT_WITHIN_S
         while not (said := [line for line in self.tail().splitlines() if "http://" in line]):
             self.check()
@@ -142,7 +143,8 @@ class PageProcess(Program):
 
 
 def _page_port() -> str:
-    """Return PAGE_PORT if it is set, otherwise 8080. If 8080 is taken, return 0 (any free port)."""
+    """Return PAGE_PORT if it is set, otherwise 8080. If 8080 is in use, return 0, which means any free
+    port."""
     if given := os.environ.get("PAGE_PORT"):
         return given
     try:
@@ -159,7 +161,7 @@ def _read(caller: Caller, tell: Callable[[Edge], None]) -> None:
 
 
 def stop_all(daemons: Iterable[Program], within_s: float = STOP_WITHIN_S) -> None:
-    """End every daemon. A daemon that still runs after `within_s` seconds is killed."""
+    """End every daemon. Kill a daemon that still runs after `within_s` seconds."""
     daemons = list(daemons)
     for daemon in daemons:
         daemon.ask_to_stop()

@@ -1,6 +1,7 @@
 """Runs a demo: starts the daemons, plays the day, gives the verdict, and leaves no process running.
 
-The exit code is 0 after a correct day, 1 with the reason after an error, and 130 after Ctrl-C.
+The exit code is 0 after a correct day. After an error the exit code is 1, and the demo prints the
+reason. After Ctrl-C the exit code is 130.
 """
 
 import shutil
@@ -39,16 +40,16 @@ class Interrupted(Exception):
 class Demo:
     """One demo.
 
-    - `files`: device -> its daemon's YAML.
-    - `dawn`: the state of everything in the morning, in words. `dawns` checks this state.
-    - `live`: the day itself. It raises DemoFailed when an awaited event is late.
-    - `problems`: the errors of the day, from the journal alone.
-    - `right`: a sentence that sums up a correct day.
-    - `outcomes`: the results of the parts of the day, if the summary lists them.
-    - `page_password`: if given, the page is served too, and the user `demo` may log in with this
-      password.
-    - `publishes`: the topics that RMF's side publishes. The supervisors' topics are left out if real
-      supervisors run.
+    - `files` holds each daemon's YAML, by the device's name.
+    - `dawn` describes in words the state of everything in the morning. `dawns` checks this state.
+    - `live` plays the day itself. It raises DemoFailed when an awaited event is late.
+    - `problems` returns the errors of the day, from the journal alone.
+    - `right` is a sentence that sums up a correct day.
+    - `outcomes` returns the results of the parts of the day, if the summary lists them.
+    - `page_password` is the password of the page's user `demo`. Without a password the demo serves no
+      page.
+    - `publishes` are the topics that RMF's side publishes. If real supervisors run, their topics are
+      left out.
     """
 
     files: dict[str, Path]
@@ -65,7 +66,7 @@ class Demo:
 class DemoRun:
     """One run of a demo. `failures` are set before the day begins.
 
-    `patience`: a factor on every step's time limit.
+    `patience` is a factor on the time limit of every step.
     """
 
     def __init__(self, demo: Demo, failures: Sequence[Failure] = (), patience: float = 1.0) -> None:
@@ -135,7 +136,7 @@ class DemoRun:
 
     @contextmanager
     def _up(self, directory: Path) -> Iterator[Transport]:
-        """Start every daemon on a private domain and on loopback. Yield RMF's side on the same
+        """Start every daemon on a ROS domain of its own and on loopback. Yield RMF's side of the same
         graph."""
         domain = free_domain()
         count = len(self.demo.files)
@@ -157,8 +158,8 @@ class DemoRun:
             transport.close()
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
-        """Record the signal, and do nothing else. The present step is completed first, so no process is
-        left behind."""
+        """Record the signal, and do nothing else. The present step ends first, so no process is left
+        behind."""
         self._interrupted = True
 
     def _check(self) -> None:

@@ -12,8 +12,8 @@ from hal_fakes.plants.plant import Edge
 
 What = Literal["robot", "request", "relay", "sensor", "state", "place", "alert", "demo"]
 SETTLES_S = 0.15
-"""The time (s) for which a line waits for sorting. Events arrive on several ways, and each source
-stamps its own events."""
+"""The time (s) for which a line waits, so that the journal can sort the lines. Events arrive in several
+ways, and each source stamps its own events."""
 COLOURS = {
     "request": 36,
     "relay": 33,
@@ -36,7 +36,7 @@ class JournalLine:
 
     def render(self, began_at: float, *, colour: bool, columns: int = 0) -> str:
         """Return a line such as `   1.234 s  state    Lift1       car at L1, door open, mode AGV`.
-        `columns` is the terminal's width; 0 allows a line of any length."""
+        `columns` is the terminal's width. The width 0 allows a line of any length."""
         start = f"{self.at - began_at:8.3f} s  "
         body = f"{self.what:<7}  {self.device:<10}  {self.text}"
         if columns:
@@ -46,7 +46,7 @@ class JournalLine:
 
 
 class Journal:
-    """All events. Repeats are kept and counted, but are not printed."""
+    """All events. The journal counts an event that repeats the last, but does not print it."""
 
     def __init__(
         self,
@@ -88,7 +88,7 @@ class Journal:
         self._add(JournalLine(at, what, device, text))
 
     def forget(self) -> None:
-        """Drop all events except each device's latest. An endless demo needs this."""
+        """Drop all events except each device's latest state. An endless demo needs this."""
         latest = {words.device(state): state for state in self.states}
         self.states[:] = latest.values()
         self.edges.clear()
@@ -103,7 +103,7 @@ class Journal:
             self._write(shown + "\n")
 
     def begin_day(self) -> None:
-        """Start the counts. Drop all states except each device's last."""
+        """Start the counts at 0. Drop all states except each device's last."""
         self.states = [*{words.device(state): state for state in self.states}.values()]
         self.edges, self.requests = [], []
 
@@ -112,7 +112,7 @@ class Journal:
         return next((s for s in reversed(self.states) if words.device(s) == device), None)
 
     def relays_on(self) -> list[str]:
-        """Return `Lift1 door_open` for each energised relay."""
+        """Return a text such as `Lift1 door_open` for each energised relay."""
         last = {(e.device, e.signal): e.value for e in self.edges if e.what == "relay"}
         return [f"{device} {signal}" for (device, signal), value in last.items() if value]
 
@@ -124,7 +124,7 @@ class Journal:
         return counts
 
     def _once(self, line: JournalLine) -> None:
-        """Add a line, unless the line equals the device's last line of this sort."""
+        """Add a line if it differs from the device's last line of this sort."""
         key = (line.what, line.device)
         if self._told.get(key) != line.text:
             self._told[key] = line.text

@@ -25,7 +25,7 @@ CHARGE_S: Final = 3.0
 
 
 def dawns(world: World) -> bool:
-    """Is every daemon up and listening, and has it published its sensors' state?"""
+    """Is every daemon up and listening, and has every daemon published its sensors' state?"""
     lift = world.journal.latest(LIFT)
     return (
         world.listened_to(topics.LIFT_REQUESTS, topics.DOOR_REQUESTS, topics.CHARGER_REQUESTS)
@@ -107,7 +107,7 @@ def _at_rest(world: World) -> bool:
     return world.door_is(DOOR, d.DoorModeValue.MODE_CLOSED) and not world.journal.relays_on()
 
 
-# --- the verdict: pure -------------------------------------------------------------------------
+# --- the verdict, from the journal alone ---------------------------------------------------------
 
 RELAYS = {
     DOOR: [("hold_open", True), ("hold_open", False)],
@@ -122,7 +122,7 @@ RELAYS = {
         ("agv_mode_request", False),
     ],
 }
-"""Device -> the relay edges that the day must have, and no others."""
+"""The relay edges that each device must have on this day. Other edges are errors."""
 CHARGING = ["IDLE", "ASSIGNED", "CHARGING", "RELEASED", "IDLE"]
 
 
@@ -181,7 +181,7 @@ def _charger(journal: Journal) -> Iterable[str]:
 
 
 def _in_order(values: Iterable[str]) -> list[str]:
-    """Return the items in their order, each only once."""
+    """Return the items in their order, without repetitions."""
     return [value for value, _ in groupby(values)]
 
 

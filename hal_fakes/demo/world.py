@@ -1,7 +1,7 @@
-"""RMF's side of a demo on a real graph: supervisors, fleet adapters, robots, and the messages heard.
+"""RMF's side of a demo on a real graph: supervisors, fleet adapters, robots, and the received messages.
 
-Requests go the whole way through RMF. A fleet adapter publishes on the adapter topics. The supervisor
-hears these messages on the wire, and publishes on the daemon's topic.
+Requests take the same way as in RMF. A fleet adapter publishes on the adapter topics. The supervisor
+receives these messages from the wire, and publishes on the daemon's topic.
 """
 
 import time
@@ -43,10 +43,10 @@ LOOK_EVERY_S: Final = 0.05
 
 
 class World:
-    """One inbox for messages and edges. The day waits in `until`, and RMF works during the wait.
+    """One inbox for messages and edges. The day waits in `until`, and RMF's side works during the wait.
 
-    `places`: robot -> its assigned place to charge or wait. `alerts`: texts for a person. `page`: the
-    line with the page's address, if there is a page.
+    `places` holds the assigned place of each robot, where the robot charges or waits. `alerts` are
+    texts for a person. `page` is the line with the page's address, if there is a page.
     """
 
     def __init__(
@@ -59,9 +59,9 @@ class World:
         *,
         publishes: Iterable[AnyTopic] = PUBLISHED,
     ) -> None:
-        """Join the graph. `check` is called all the time, and raises when the demo must end. `patience`
-        is a factor on the time limits of `until`. `publishes` are the topics published from here. A
-        supervisor waits if it hears another publisher on its topics."""
+        """Join the graph. `until` calls `check` all the time, and `check` raises when the demo must
+        end. `patience` is a factor on the time limits of `until`. `publishes` are the topics that
+        this side publishes. A supervisor waits if it hears another publisher on its topics."""
         self.daemons = daemons
         self.journal = journal
         self.places: dict[str, str] = {}
@@ -77,11 +77,11 @@ class World:
         }
         self._heard: set[str] = set()
         self._hear(*STATES, topics.CHARGING_ASSIGNMENTS, topics.ALERT)
-        for topic in TO_DAEMONS:  # our own messages are recorded when we send them
+        for topic in TO_DAEMONS:  # messages of this side are recorded when they are sent
             transport.subscribe(topic, self._to_inbox(topic), others_only=True)
 
     def edge(self, edge: Edge) -> None:
-        """Record a plant's edge. Any thread may call this."""
+        """Record a plant's edge. Any thread may call `edge`."""
         self._inbox.put(lambda: self.journal.edge(edge))
 
     def join(self, *parties: Party) -> None:
@@ -96,16 +96,17 @@ class World:
         return time.time()
 
     def listened_to(self, *to: AnyTopic) -> bool:
-        """Has a daemon matched each of these request topics?"""
+        """Does a daemon listen to each of these request topics?"""
         return all(self._publishers[topic.name].matched() for topic in to)
 
     def door_is(self, door: str, mode: d.DoorModeValue) -> bool:
-        """Has the door's last state this mode?"""
+        """Does the door's last state have this mode?"""
         latest = self.journal.latest(door)
         return isinstance(latest, d.DoorState) and latest.current_mode.value == mode
 
     def charger_is(self, charger: str, state: str, robot: str = "", error: str = "") -> bool:
-        """Has the charger's last state this state and robot, and this text in its error message?"""
+        """Does the charger's last state have this state and robot, and this text in its error
+        message?"""
         latest = self.journal.latest(charger)
         return (
             isinstance(latest, d.ChargerState)
@@ -142,7 +143,7 @@ class World:
 
     @contextmanager
     def leg(self, name: str, text: str = "") -> Iterator[None]:
-        """Time a part of the day. If there is a text, announce the part with it."""
+        """Time a part of the day. If `text` is given, announce the part with this text."""
         began_at = time.monotonic()
         if text:
             self.note(f"-- {name}: {text}")
@@ -155,7 +156,7 @@ class World:
     def until(
         self, ready: Callable[[], bool], within_s: float, what: str, repeat: Said | None = None
     ) -> None:
-        """Run until `ready()`. `repeat`: messages to publish now and then every second.
+        """Run until `ready()`. Publish the messages of `repeat` now, and then every second.
 
         Raises DemoFailed with the text `what` after `within_s` times the patience.
         """
@@ -171,7 +172,7 @@ class World:
             self._turn(LOOK_EVERY_S)
 
     def shows(self, what: str, ready: Callable[[], bool], within_s: float = 10.0) -> None:
-        """Wait for this fact, and print the fact. Raises DemoFailed after the time limit."""
+        """Wait until `ready()`, and print `what`. Raises DemoFailed after the time limit."""
         self.until(ready, within_s, what)
         self.note(f"   so: {what}")
 

@@ -4,12 +4,12 @@ A bus on a serial line has a far side of its own, `hal_fakes/modbus/rtu.py`.
 
 Each device's points are bits of its units, with the plant behind them. As at a gateway, an unknown
 address gets exception 2, and an unknown unit gets exception 11. The order `fail DEVICE unit|server
-MODE` lets one unit, or the server with all units, fail:
+MODE` lets one unit fail, or the server with all units:
 
 - `off`: the unit is silent; the server refuses and drops connections
 - `stuck`: the unit's inputs stay unchanged; the server takes requests and never answers
 - `slow`: the reply comes after the client has stopped waiting
-- `garbage`: the reply is bytes that are no Modbus, or half a reply
+- `garbage`: the reply is bytes that are not Modbus, or half a reply
 - `wrong`: the unit answers exception 4; the server answers for another transaction, or as another unit
 """
 
@@ -33,7 +33,7 @@ from hal_fakes.modbus.units import FakeUnits, FarSide
 
 _aiohttp = sys.modules.get("aiohttp")
 sys.modules["aiohttp"] = None  # type: ignore[assignment]  # as if it were not installed
-try:  # otherwise pymodbus imports aiohttp, which takes half of a start's time
+try:  # without this, pymodbus imports aiohttp, which takes half of a start's time
     from pymodbus.server import ModbusTcpServer
 finally:
     del sys.modules["aiohttp"]
@@ -42,7 +42,7 @@ finally:
 
 TRANSACTION: Final = 0
 UNIT: Final = 6
-"""The positions (bytes) of transaction number and unit in a reply on TCP."""
+"""The positions (bytes) of the transaction number and of the unit in a reply on TCP."""
 LOOK_S: Final = 0.02
 """The maximum delay (s) with which the server obeys `off`."""
 READY_S: Final = 10.0
@@ -58,14 +58,14 @@ def serve(settings: ModbusSettings, stations: Sequence[FarSide]) -> "ModbusServe
     return ModbusServer(devices, slow_s=1.5 * settings.timeout_s)
 
 
-logging.getLogger("pymodbus").setLevel(logging.WARNING)  # a daemon's log may be in this process
+logging.getLogger("pymodbus").setLevel(logging.WARNING)  # a daemon may log from this process too
 
 
 class ModbusServer:
     """A running server, whose asyncio loop has a thread of its own.
 
-    `replace`: the replacements for the bus's settings. `devices`: the units; another server may serve
-    the same units.
+    `replace` holds the replacements for the bus's settings. `devices` are the units. Another server may
+    serve the same units.
     """
 
     def __init__(self, devices: Iterable[FarSide] | FakeUnits, slow_s: float) -> None:
@@ -73,7 +73,7 @@ class ModbusServer:
         self._noise = random.Random("modbus")
         self._kinds = itertools.cycle((0, 1))
         self._port = 0
-        self._server: Any = None  # pymodbus's sockets and our context have no types
+        self._server: Any = None  # pymodbus's sockets and the server's context have no types
         self._closed = False
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="modbus", daemon=True)
@@ -140,7 +140,7 @@ class ModbusServer:
 
 
 def _placeholder() -> SimDevice:
-    """Make the registers that pymodbus demands. They are unused, because the plants have the real
+    """Make the registers that pymodbus demands. Nobody uses them, because the plants have the real
     registers."""
     return SimDevice(0, simdata=SimData(0, datatype=DataType.REGISTERS))
 

@@ -2,7 +2,7 @@
 
 Its holding registers are 0x1000 time (x 100 ms), 0x1003 trigger, 0x1006 state (0 stopped, 1 running, 2
 tripped), and 0x1007 restart. A trigger counts if its value differs from the last trigger's value. The
-first trigger starts the watchdog. When the watchdog trips, the module's coils go off. After a trip
+first trigger starts the watchdog. When the watchdog trips, the module's coils go off. After a trip,
 writes to coils get exception 4 until the watchdog is restarted.
 """
 
@@ -31,7 +31,7 @@ class ModuleWatchdog:
 
     @property
     def tripped(self) -> bool:
-        """Are the outputs off, and are writes to them refused?"""
+        """Are the outputs off, and are writes to the outputs refused?"""
         return self._registers[STATE] == TRIPPED
 
     def get(self, point: Point, now: float) -> int:
@@ -52,7 +52,7 @@ class ModuleWatchdog:
         return True
 
     def expire(self) -> None:
-        """Make the watchdog trip when it is looked at next."""
+        """Make the watchdog trip at the next call of `trips`."""
         self._due_at = 0.0
 
     def trips(self, now: float) -> bool:

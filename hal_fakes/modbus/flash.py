@@ -14,7 +14,8 @@ COIL_VALUES: Final = (0xFF00, 0)
 
 
 class TimedCoilRequest(WriteSingleCoilRequest):
-    """Function 5 with the value that was sent. A value other than on or off makes `FakeUnits` flash."""
+    """Function 5 that keeps the sent value. A value other than on or off makes `FakeUnits` give a
+    pulse."""
 
     def decode(self, data: bytes) -> None:
         """Decode the request, and keep its value."""
@@ -22,7 +23,7 @@ class TimedCoilRequest(WriteSingleCoilRequest):
         self.registers = [int.from_bytes(data[2:4], "big")]
 
     async def datastore_update(self, context: ModbusServerContext, device_id: int) -> ModbusPDU:
-        """Write the coil. The reply to a flash is its echo."""
+        """Write the coil. The reply to a pulse's request repeats the request."""
         if self.registers[0] in COIL_VALUES:
             return await super().datastore_update(context, device_id)
         assert isinstance(context, FakeUnits)
@@ -38,7 +39,7 @@ class TimedCoilRequest(WriteSingleCoilRequest):
 
 
 class FlashEcho(WriteSingleCoilRequest):
-    """The reply to a flash."""
+    """The reply to the request for a pulse."""
 
     def encode(self) -> bytes:
         """Return the request's own bytes."""

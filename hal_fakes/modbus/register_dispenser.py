@@ -13,15 +13,15 @@ NONSENSE = 65535
 
 
 def contacts(settings: RegisterWorkcellSettings) -> list[Wire]:
-    """Return the PLC's own contacts and relay. The plant needs them, because they can fail as our wires
-    can."""
+    """Return the PLC's own contacts and relay. The plant needs them, because they can fail in the same
+    way as the daemon's wires."""
     at = points(settings)
     inputs = [Wire(s, "in", str(at["status"]), "high") for s in ("done", "busy", "ready", "fault")]
     return [*inputs, Wire("start", "out", str(at["command"]), "high")]
 
 
 class FakeRegisterWorkcell:
-    """The cells of one PLC, at `unit`. `points` are all cells, with `outputs` among them."""
+    """The cells of one PLC, at `unit`. `points` are all cells, including `outputs`."""
 
     def __init__(self, plant: Plant, settings: RegisterWorkcellSettings) -> None:
         self.plant = plant

@@ -17,8 +17,8 @@ NONSENSE = 65535
 
 
 def contacts(settings: RegisterDoorSettings) -> list[Wire]:
-    """Return the operator's own contacts and relay. The plant needs them, because they can fail as our
-    wires can."""
+    """Return the operator's own contacts and relay. The plant needs them, because they can fail in the
+    same way as the daemon's wires."""
     at = points(settings)
     signals = {"opened": "status", "closed": "status", "obstruction": "obstruction"}
     inputs = [Wire(s, "in", str(at[part]), "high") for s, part in signals.items() if part in at]
@@ -26,7 +26,7 @@ def contacts(settings: RegisterDoorSettings) -> list[Wire]:
 
 
 class FakeRegisterDoor:
-    """The cells of one operator, at `unit`. `points` are all cells, with `outputs` among them."""
+    """The cells of one operator, at `unit`. `points` are all cells, including `outputs`."""
 
     def __init__(self, plant: Plant, settings: RegisterDoorSettings) -> None:
         self.plant = plant

@@ -1,8 +1,8 @@
 """A lift's gateway. The numbers of its register map show the plant's contacts, and its commands act as
 relays.
 
-Behind the gateway is a lift on contacts: one contact for each floor, two for a door, one for each
-hazard. These contacts can be cut, as our wires can.
+Behind the gateway is a lift on contacts. It has one contact for each floor, two for a door, and one for
+each hazard. These contacts can be cut in the same way as the daemon's wires.
 """
 
 import math
@@ -73,10 +73,10 @@ def contacts(settings: RegisterLiftSettings) -> dry_contact.DryContactLiftSettin
 
 
 class FakeRegisterLift:
-    """The cells of one gateway, at `unit`. `points` are all cells, with `outputs` among them.
+    """The cells of one gateway, at `unit`. `points` are all cells, including `outputs`.
 
-    `clears_s`: the time (s) after which the gateway clears the place of a call that it has taken. None
-    means never.
+    `clears_s` is the time (s) after which the gateway clears the place of a call that it has taken.
+    None means never.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class FakeRegisterLift:
     def get(self, point: Point, now: float) -> int:
         """Return this point's value at `now` (monotonic s)."""
         self.plant.advance(now)
-        if now >= self._clear_at.get(point, math.inf):  # the lift keeps the call until our release
+        if now >= self._clear_at.get(point, math.inf):  # the lift keeps the call until its release
             bits = self._calling[point]
             self._written[point] = self._written[point] & ~bits | self._none[point] & bits
         value = self._written.get(point, 0)

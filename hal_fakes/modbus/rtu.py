@@ -59,7 +59,7 @@ class SerialAdapter:
         return self._ends[0] if self._ends else None
 
     def plug(self) -> None:
-        """Plug the adapter in. It appears under the same path, as another device."""
+        """Plug the adapter in. It gets the same path, but is another device."""
         self._ends = pty.openpty()
         tty.setraw(self._ends[1])
         os.set_blocking(self._ends[0], False)
@@ -76,7 +76,7 @@ class SerialAdapter:
 class RtuLine:
     """A running line with a thread of its own. `replace` holds the replacements for the bus's settings.
 
-    `slow_s`: a slow reply's delay (s). `requests`: every frame that the line has received.
+    `slow_s` is the delay (s) of a slow reply. `requests` holds every frame that the line has received.
     """
 
     def __init__(
@@ -138,7 +138,7 @@ class RtuLine:
             (self.adapter.pull if pulled else self.adapter.plug)()
 
     def _listen(self) -> None:
-        """Read until something is due. Each character takes its time on the wire."""
+        """Read until an event is due. Each character takes its time on the wire."""
         wire = self.adapter.wire
         readable = select.select([wire] if wire is not None else [], [], [], self._idle_s())[0]
         sent = b""
@@ -172,8 +172,8 @@ class RtuLine:
     # ---- the units: frames and their meaning
 
     def _hear(self, frame: bytes) -> None:
-        """Handle a complete request. If there is a reply, it begins now, or later if the unit is
-        slow."""
+        """Handle a complete request. If the request has a reply, the reply begins now. If the unit is
+        slow, the reply begins later."""
         self.requests.append(frame)
         unit = frame[0]
         modes = {self.units.failure("server"), self.units.failure("unit", unit)} - {None}
@@ -186,7 +186,7 @@ class RtuLine:
         self._put(reply, heard_at + (self._slow_s if "slow" in modes else 0.0))
 
     def _reply(self, frame: bytes) -> bytes:
-        """Return the unit's reply. Return b"" for a broken frame, which has no reply."""
+        """Return the unit's reply. Return b"" for a broken frame, because it gets no reply."""
         crc = int.from_bytes(frame[-2:], "big")
         if len(frame) < 4 or not FramerRTU.check_CRC(frame[:-2], crc):
             return b""
@@ -202,8 +202,7 @@ class RtuLine:
         return self._framer.buildFrame(response)
 
     def _spoiled(self, mode: FailureMode | None, reply: bytes) -> bytes:
-        """Spoil the reply as this failure mode does. Each mode has several ways, which are used in
-        turn."""
+        """Spoil the reply as this failure mode does. A mode with several ways uses them in turn."""
         if mode == "garbage":
             broken = bytes((reply[-1] ^ 0x55,))
             return reply[:-1] + broken if next(self._kinds) % 2 else reply[: len(reply) // 2]

@@ -21,8 +21,8 @@ Part = Literal["unit", "server"]
 
 
 class UnitCells(Protocol):
-    """Registers and bits of one unit, with a plant behind them. `outputs` are the cells that can be
-    written."""
+    """Registers and bits of one unit, with a plant behind them. `outputs` are the cells that the daemon
+    can write."""
 
     unit: int
     points: frozenset[Point]
@@ -40,7 +40,7 @@ class UnitCells(Protocol):
 
 
 FarSide: TypeAlias = PlantWiring | UnitCells
-"""The types of things that a unit may contain."""
+"""A part of a unit: a plant's wires, or cells."""
 
 TABLES: Final[dict[int, Table]] = {
     1: "coil",
@@ -52,11 +52,11 @@ TABLES: Final[dict[int, Table]] = {
     15: "coil",
     16: "holding register",
 }
-"""Number of a function -> the table that it reads or writes."""
+"""The table that each function number reads or writes."""
 
 
 class FakeUnits:
-    """All units, as pymodbus's server reads and writes them. `slow_s` is a slow reply's delay (s).
+    """All units, as pymodbus's server reads and writes them. `slow_s` is the delay (s) of a slow reply.
 
     Coils keep the written value. Inputs show the plants' contacts.
     """
@@ -106,7 +106,7 @@ class FakeUnits:
             self._set(coil, False)
         for coil in [coil for coil, at in self._clear_at.items() if at <= now]:
             del self._clear_at[coil]
-            self._coils[coil] = False  # the controller still keeps the call
+            self._coils[coil] = False  # only the coil ends; the lift's controller keeps the call
         for dead_man in self._dead_men:
             if dead_man.trips(now):
                 for point, (wiring, name) in self._at.items():
@@ -114,7 +114,7 @@ class FakeUnits:
                         wiring.drive(name, False, now)
 
     def failure(self, part: Part, unit: int | None = None) -> FailureMode | None:
-        """Return the failure of the server, or of this unit. Return None if it works."""
+        """Return the failure of the server, or of this unit. Return None if the part works."""
         modes = (plant.failures.get(part) for plant in self._plants.get(unit, ()))
         return next((mode for mode in modes if mode is not None), None)
 

@@ -1,8 +1,8 @@
-"""An alarm panel. Its contacts change only when people or the building press them; nothing moves.
+"""An alarm panel. Its contacts change only when a person or the building presses them.
 
-To press: each source (`fire_panel on`), and `drill`. A loop that is cut (`fail fire_panel off`), that
-jams (`stuck`) or chatters (`garbage`) fails as every wire does (`contact.py`). At a Modbus module
-`unit` and `server` can fail too. With `off` the panel goes silent.
+The signals to press are each source (`fire_panel on`) and `drill`. A contact's loop can fail as every
+wire can (`contact.py`): cut (`fail fire_panel off`), jammed (`stuck`) or chattering (`garbage`). At a
+Modbus module `unit` and `server` can fail too. With `off` the panel goes silent.
 """
 
 from collections.abc import Iterable
@@ -21,7 +21,7 @@ class PanelPlant(WiredPlant):
         super().__init__(name, wired, parts, [wire.signal for wire in wired])
 
     def contact(self, signal: str) -> bool:
-        """Is this contact really asserted?"""
+        """Is this contact asserted, before any failure of its wire?"""
         return self.pressed[signal]
 
     def run(self) -> None:

@@ -53,8 +53,8 @@ RANGE_CHECK_S: Final = 0.3
 EMPTY_V, FULL_V, CURRENT_A = 24.0, 29.2, 30.0
 HOT_C, COOLED_C, UNCOOLED_C = 97.0, 60.0, 140.0
 FIRST, STRANGER = "4711", "815"
-"""The ids of two receivers: that of a `robot`, if the YAML lists no receivers, and that of a
-`stranger`."""
+"""The ids of two receivers. FIRST is the id of a `robot` if the YAML lists no receivers. STRANGER is
+the id of a `stranger`."""
 
 PARTS: Final = ("pad", "receiver", "fan", "battery", "thermometer")
 CAUSES: Final = ("foreign_object", "over_temperature", "transmitter_fault")
@@ -77,16 +77,16 @@ RANGES: Final = {"in": True, "out": False, "failed": False}
 class Reading:
     """The controller's knowledge at one instant.
 
-    - `progress`: the activity's progress, 0 to 1.
-    - `faults`: keys of TEXTS.
-    - `here`: is a robot on the pad?
-    - `receiver`: the id of its receiver, or "".
-    - `couples`: could current flow now?
-    - `range_result`: the result of the last range check: `none`, `ongoing`, `in`, `out` or `failed`.
-    - `in_range`: is that result `in`? A station without range checks uses `couples` instead.
-    - `range_ok`: is the robot well placed?
-    - `battery`: 0 to 1.
-    - `time_to_full_s`: the time (s) until the battery is full, if current flows.
+    - `progress` is the activity's progress, 0 to 1.
+    - `faults` are keys of TEXTS.
+    - `here` is True while a robot is on the pad.
+    - `receiver` is the id of the robot's receiver, or "".
+    - `couples` is True if current could flow now.
+    - `range_result` is the result of the last range check: `none`, `ongoing`, `in`, `out` or `failed`.
+    - `in_range` is True if the result is `in`. For a station without range checks it equals `couples`.
+    - `range_ok` is True if the robot is well placed.
+    - `battery` is the charge of the battery, 0 to 1.
+    - `time_to_full_s` is the time (s) until the battery is full, if current flows.
     """
 
     activity: Activity
@@ -118,7 +118,7 @@ class Reading:
 
     @property
     def number(self) -> float:
-        """Return the receiver's number; 0 for a receiver without a number."""
+        """Return the receiver's number. Return 0 for a receiver without a number."""
         return float(self.receiver) if self.receiver.isdecimal() else 0.0
 
 
@@ -126,13 +126,14 @@ class ChargerPlant(WiredPlant):
     """One charger. `battery` is the charge of the robot on the pad, 0 to 1. It is meaningless without a
     robot.
 
-    - `receivers`: id -> robot.
-    - `commanded`: the station charges only while `power` is on.
-    - `asked`: only a range check shows whether a robot is in range.
-    - `cleared`: an error stays until it is cleared.
-    - `pace`: how many times faster than a real charger handshake, movement and stopping are.
-    - `wires`: the station's contacts, if there are any.
-    - `links`: the parts of the wire that can fail.
+    - `receivers` gives the robot of each receiver's id.
+    - `commanded` means that the station charges only while `power` is on.
+    - `asked` means that only a range check shows whether a robot is in range.
+    - `cleared` means that an error stays until a command clears it.
+    - `pace` is a factor: how many times faster than a real charger the handshake, movements and
+      stopping are.
+    - `wires` are the station's contacts, if it has any.
+    - `links` are the parts of the wire that can fail.
     """
 
     def __init__(
@@ -192,7 +193,7 @@ class ChargerPlant(WiredPlant):
         )
 
     def contact(self, signal: str) -> bool:
-        """Is this contact really asserted?"""
+        """Is this contact asserted, before any failure of its wire?"""
         return {
             "charging": self.activity in CURRENT_FLOWS,
             "fault": self.activity is Activity.ERROR,
@@ -242,7 +243,8 @@ class ChargerPlant(WiredPlant):
             self.battery = self.battery if self._here else 0.0
 
     def run(self) -> None:
-        """End the activities that are due. Begin the activities that pad, heat and causes demand."""
+        """End the activities that are due. Begin the activities that follow from the pad, the heat and
+        the causes of errors."""
         if self.pad.follow(self.now, bool(self._here), self.failures.get("pad"), self.pace):
             self.note("sensor", "gap_mm", self.pad.gap_mm())
         if self.now >= self._range_until:
@@ -281,7 +283,7 @@ class ChargerPlant(WiredPlant):
         return [*found, *({"thermometer"} & self.failures.keys())]
 
     def _forgets(self) -> bool:
-        """Does an error without a cause end by itself?"""
+        """Does an error end by itself when its cause is gone?"""
         left = self.faults <= ROBOTS_FAULTS and not self._here
         return left or not (self._cleared or (self._commanded and self.power))
 
@@ -304,8 +306,8 @@ class ChargerPlant(WiredPlant):
             self.note("sensor", "state", str(activity))
 
     def _stop(self) -> None:
-        """End a handshake, or ramp the current down if possible, because the robot or the power is
-        gone."""
+        """End a handshake. If current flows and the robot is there, ramp the current down. The reason
+        is that the robot or the power is gone."""
         if self.activity is Activity.HANDSHAKE:
             self._enter(Activity.IDLE)
         elif not self._here:
@@ -351,7 +353,7 @@ class ChargerPlant(WiredPlant):
         return HOT_C if self.pressed["over_temperature"] else self._coil.celsius(self.now)
 
     def _fills(self) -> float:
-        """Return the share of the battery that fills in a second."""
+        """Return the share of the battery that a second of charging fills."""
         mode = self.failures.get("battery")
         slowness = SLOWNESS if mode == "slow" else 1.0
         return 0.0 if mode in ("stuck", "off", "garbage") else 1.0 / FILL_S / slowness

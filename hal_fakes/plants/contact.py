@@ -2,12 +2,12 @@
 
 Every bus has the same five failures, so a test scenario on GPIO also works on Modbus:
 
-- `off`: cut. An input falls to its pull (it reads 0 at a module, and floats without a pull);
-  the relay behind a cut output never energises.
-- `stuck`: holds its last value (a welded relay, a jammed contact).
-- `slow`: everything arrives SLOW_S late.
-- `garbage`: random, a new value every GARBAGE_S at the most, the same values in each run.
-- `wrong`: inverted (normally open taken for normally closed).
+- `off`: the wire is cut. An input falls to its pull (it reads 0 at a module, and floats without a
+  pull). The relay behind a cut output never energises.
+- `stuck`: the wire holds its last value, as with a welded relay or a jammed contact.
+- `slow`: every change arrives SLOW_S late.
+- `garbage`: the value is random, and changes at most every GARBAGE_S. Each run has the same values.
+- `wrong`: the value is inverted, as when somebody takes normally open for normally closed.
 """
 
 import random
@@ -23,8 +23,8 @@ GARBAGE_S = 0.1
 class Contact:
     """One wire. `feed` takes the true value at one end, and `shows` is the value seen at the other end.
 
-    For an input the plant feeds and the bus sees. For an output we feed and the relay sees. Values are
-    asserted or not; they are never levels.
+    For an input the plant feeds the wire, and the bus sees the value. For an output the daemon feeds
+    the wire, and the relay sees the value. Values mean asserted or not. They are never levels.
     """
 
     def __init__(self, wire: Wire, seed: str) -> None:
@@ -37,7 +37,7 @@ class Contact:
         self._noise_at = 0.0
 
     def feed(self, asserted: bool, now: float) -> None:
-        """Take the near end's value at `now` (s)."""
+        """Take the true value at `now` (s)."""
         if asserted != self._fed and self.mode == "slow":
             self._late.append((now + SLOW_S, asserted))
         self._fed = asserted
@@ -51,7 +51,8 @@ class Contact:
         self._settle(now)
 
     def next_at(self) -> float:
-        """Return the next time (s) at which `shows` may change by itself; inf on a sound wire."""
+        """Return the next time (s) at which `shows` may change by itself. Return inf for a sound
+        wire."""
         if self._late:
             return self._late[0][0]
         return self._noise_at if self._noisy() else float("inf")

@@ -7,7 +7,8 @@ conveyor stops when the start goes off. The edge `moved` counts the items that r
 To press:
 
 - `hatch`: somebody has the hatch open. The workcell is not ready, and a running cycle stands still.
-- `restart`: the PLC restarts. It forgets its cycle, and takes a start that is on for a new start.
+- `restart`: the PLC restarts and forgets its cycle. If the start is on, the PLC takes it for a new
+  start.
 - `fault`: the PLC reports a fault.
 
 The part `conveyor` can fail. `off` and `stuck` jam in the middle, `slow` takes five times as long,
@@ -39,8 +40,8 @@ def build(
 
 
 class WorkcellPlant(WiredPlant):
-    """One workcell. `moved` is the number of items that left. `steady`: the start must stay on during
-    the cycle."""
+    """One workcell. `moved` is the number of items that left. `steady` means that the start must stay
+    on during the cycle."""
 
     def __init__(
         self, name: str, wires: Iterable[Wire], *, steady: bool, parts: Iterable[str] = ()
@@ -57,7 +58,7 @@ class WorkcellPlant(WiredPlant):
         self._fault = False
 
     def contact(self, signal: str) -> bool:
-        """Is this contact really asserted?"""
+        """Is this contact asserted, before any failure of its wire?"""
         up = self.now >= self._boots_at and not self.pressed["restart"]
         done = self._on_since_done() or self.now < self._done_until
         return up and {
@@ -81,7 +82,7 @@ class WorkcellPlant(WiredPlant):
             self._busy = False
 
     def act(self, signal: str, asserted: bool) -> None:
-        """Restart the PLC when its button is released; end a fault when the conveyor is mended."""
+        """Restart the PLC at each change of its button `restart`."""
         if signal == "restart":
             self._busy, self._fault, self._done_until = False, False, -NEVER
             self._boots_at = self.now + BOOT_S
@@ -120,7 +121,7 @@ class WorkcellPlant(WiredPlant):
 
     def event_at(self) -> float:
         """Return the time of the next event: half of the way, the end of the way, the end of `done`, or
-        a boot."""
+        the end of a restart."""
         found = [at for at in (self._done_until, self._boots_at) if at > self.now]
         if speed := self._speed():
             half = self._left_s - CYCLE_S / 2

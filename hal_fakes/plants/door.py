@@ -1,8 +1,8 @@
-"""A pedestrian door with an operator. It opens while held or pushed, and closes by itself.
+"""A pedestrian door with an operator. The door opens while held or pushed, and closes by itself.
 
-Contacts: `opened` and `closed` at its end positions, `obstruction` (light curtain), `fire` (the
-building's alarm). Relay: `hold_open`. To press: `push` (a person's button or hand), `obstruction`,
-`fire`.
+The contacts are `opened` and `closed` at its end positions, `obstruction` (light curtain) and `fire`
+(the building's alarm). The relay is `hold_open`. The signals to press are `push` (a person's button or
+hand), `obstruction` and `fire`.
 
 The part `operator` can fail. `off` and `stuck` stand still, `slow` takes five times as long, `wrong`
 inverts each command, and `garbage` stops halfway. At a Modbus module `unit` and `server` can fail as
@@ -36,8 +36,9 @@ def build(
 class DoorPlant(WiredPlant):
     """The door. `position` is 0 when closed and 1 when open.
 
-    `open_s`, `close_s`: the times (s) of a whole travel. `auto_close_s`: the operator's wait (s) before
-    it closes a released door. `parts`: the parts of the controller that can fail.
+    `open_s` and `close_s` are the times (s) of a whole travel. `auto_close_s` is the time (s) that the
+    operator waits before it closes a released door. `parts` are the parts of the controller that can
+    fail.
     """
 
     def __init__(
@@ -62,7 +63,8 @@ class DoorPlant(WiredPlant):
         self._arrives_at = float("inf")
 
     def contact(self, signal: str) -> bool:
-        """Is this contact really asserted? A limit contact opens as soon as the door leaves it."""
+        """Is this contact asserted, before any failure of its wire? A limit contact opens as soon as
+        the door leaves its end position."""
         direction, _ = self._course
         if signal == "opened":
             return self.position == 1.0 and direction == 0
@@ -75,7 +77,7 @@ class DoorPlant(WiredPlant):
         self._held = energised
 
     def run(self) -> None:
-        """Move the door to its position at the present time. Then decide on the next movement."""
+        """Move the door to its position at the present time. Then decide the next movement."""
         self._move()
         in_the_way = self.pressed["obstruction"] and self.position > 0
         wanted = self._held or self.pressed["push"] or in_the_way

@@ -1,6 +1,6 @@
 """A lift with its controller: car, doors, AGV key logic, people, and the hazards that take it from RMF.
 
-- AGV mode begins some time after its request, once people's calls are done, and never under a hazard.
+- AGV mode begins some time after its request, when people's calls are done, and never under a hazard.
   AGV mode ends when the request ends or a hazard comes.
 - With `agv_mode: by_call` a call requests AGV mode. The call counts until the door at its landing is
   open and not held (as in open-rmf/mock-lift-io, firmware/Mock-Lift/src/main.cpp).
@@ -12,7 +12,8 @@
 - If AGV mode is lost on the way, the car stops at the next landing and opens for its dwell time.
 - Overload: the car stays at its landing with its door open.
 
-To press: each wired hazard, `hall_<landing>` (a person's call), `obstruction`, `rear_obstruction`.
+The signals to press are each wired hazard, `hall_<landing>` (a person's call), `obstruction` and
+`rear_obstruction`.
 
 These parts can fail, with these effects. Wires fail as in `hal_fakes/plants/contact.py`.
 
@@ -49,8 +50,8 @@ FAILS: dict[str, tuple[FailureMode, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class LiftPace:
-    """Durations (s): a floor's travel, a door's travel, the granting of AGV mode, and a door's stay at
-    a landing."""
+    """The lift's durations (s): a floor's travel, a door's travel, the granting of AGV mode, and the
+    time that a door stays open at a landing."""
 
     floor_s: float = 2.0
     door_s: float = 1.0
@@ -64,7 +65,7 @@ def build(name: str, settings: DryContactLiftSettings) -> "LiftPlant":
 
 
 class LiftPlant(WiredPlant):
-    """One lift, standing at its lowest landing with its doors closed."""
+    """One lift. At the start the car stands at its lowest landing with its doors closed."""
 
     def __init__(
         self,
@@ -73,7 +74,8 @@ class LiftPlant(WiredPlant):
         pace: LiftPace | None = None,
         links: Sequence[str] = (),
     ) -> None:
-        """Make the lift. `links` are further parts that can fail: those of a wire to the controller."""
+        """Make the lift. `links` are further parts that can fail, such as those of a wire to the
+        controller."""
         self.car = Car()
         self.agv = False
         self._wiring = settings
@@ -98,11 +100,11 @@ class LiftPlant(WiredPlant):
     # ---- WiredPlant's methods
 
     def contact(self, signal: str) -> bool:
-        """Is this contact really asserted?"""
+        """Is this contact asserted, before any failure of its wire?"""
         return self._asserted.get(signal, False)
 
     def actuate(self, signal: str, energised: bool) -> None:
-        """Take a change of our relay. A call counts only after its relay has been stable for a
+        """Take a change of the daemon's relay. A call counts only after its relay has been stable for a
         moment."""
         (self._on.add if energised else self._on.discard)(signal)
         if signal.startswith("call_"):
@@ -147,8 +149,8 @@ class LiftPlant(WiredPlant):
         return any(self.pressed.get(h, False) for h in hazards)
 
     def _called(self) -> int | None:
-        """Return the landing whose call is on. Return None without a call, and for a code that is no
-        landing's."""
+        """Return the landing whose call is on. Return None without a call, and for a code that stands
+        for no landing."""
         code = self._wiring.call_code
         for i, level in enumerate(self._levels):
             lines = code.lines(level) if code else {f"call_{level}": True}
@@ -165,7 +167,7 @@ class LiftPlant(WiredPlant):
                 self._called_for_agv = True
 
     def _grant(self) -> None:
-        """Grant AGV mode after some time, but end it at once."""
+        """Grant AGV mode after some time. End AGV mode at once."""
         failure = self.failures.get("controller")
         taken = self._hazard(*(h for h in Hazard if h is not Hazard.OVERLOAD))
         asked = self._asked() and not taken and failure != "off"
@@ -185,7 +187,7 @@ class LiftPlant(WiredPlant):
                 self._call = self._called()
 
     def _asked(self) -> bool:
-        """Does any of our relays request AGV mode?"""
+        """Does a relay of the daemon request AGV mode?"""
         if self._wiring.agv_mode == "requested":
             return "agv_mode_request" in self._on
         held = bool(self._on & {"door_open", "rear_door_open"}) or self._called() is not None
@@ -290,8 +292,8 @@ class LiftPlant(WiredPlant):
         return codes.lines("service", number, len(code.bits))
 
     def _floor_lines(self) -> dict[str, bool]:
-        """Return the lines of the floor code. If the controller has no code for between floors, it
-        keeps the last code."""
+        """Return the lines of the floor code. Between floors, a controller without a code for this
+        position keeps the last code."""
         shown = self.car.shown
         try:
             self._code = self._wiring.floor_code.show(

@@ -27,12 +27,12 @@ class Car:
 
     @property
     def shown(self) -> int | None:
-        """Return the landing that the floor code shows; None between landings."""
+        """Return the landing that the floor code shows. Return None between landings."""
         return None if self.leg == "between" else self.floor
 
     def run(self, now: float, goal: int | None, floor_s: float | None) -> None:
-        """Travel on until `now`. `floor_s` is the time (s) for a floor; None means that the car is
-        stuck."""
+        """Continue the travel until `now`. `floor_s` is the time (s) for a floor. None means that the
+        car is stuck."""
         if floor_s is None:
             self._frozen = True
             return

@@ -1,8 +1,8 @@
 """The common base of plants: a record of edges, failing wires, failing parts, and a clock.
 
-A kind's plant derives from WiredPlant and adds its physics. Edges are those of the terminal block. For
-a relay, the edge is the change that we drove. For a contact, it is the change that its wire showed. So
-the edge of a cut wire is recorded like any other edge.
+A kind's plant derives from WiredPlant and adds its physics. The edges are changes as seen at the
+terminal block. For a relay, the edge is the change that the daemon made. For a contact, the edge is the
+change that its wire showed. So a cut wire can cause an edge too.
 """
 
 from abc import ABC, abstractmethod
@@ -19,10 +19,12 @@ EDGES_KEPT = 100_000
 class WiredPlant(ABC):
     """Every plant (`hal_fakes.plants.plant.Plant`) without its physics.
 
-    - `wires`: the driver's wiring table of this device. It is empty if the controller has no contacts.
-    - `parts`: the parts that can fail besides wires (`car`, `door_operator`). The plant reads
-      `failures`.
-    - `buttons`: the signals that can be pressed. `pressed`: button -> is it pressed?
+    - `wires` is the driver's wiring table of this device. It is empty if the controller has no
+      contacts.
+    - `parts` are the parts that can fail besides wires (`car`, `door_operator`). The plant looks up
+      their failures in `failures`.
+    - `buttons` are the signals that can be pressed. `pressed` tells for each button whether it is
+      pressed.
 
     Wires to an I/O module add the module's parts `unit` and `server` (`hal_fakes/modbus/`). Other far
     sides add their parts with `add_parts`.
@@ -56,10 +58,10 @@ class WiredPlant(ABC):
 
     @abstractmethod
     def contact(self, signal: str) -> bool:
-        """Is this contact of the controller really asserted?"""
+        """Is this contact of the controller asserted, before any failure of its wire?"""
 
     def actuate(self, signal: str, energised: bool) -> None:  # noqa: B027
-        """Take a change of our relay at `self.now`. Most plants do nothing at this call."""
+        """Take a change of the daemon's relay at `self.now`. Most plants do nothing here."""
 
     @abstractmethod
     def run(self) -> None:
@@ -75,7 +77,7 @@ class WiredPlant(ABC):
     # ---- the Plant protocol
 
     def drive(self, signal: str, asserted: bool, now: float) -> None:
-        """Take a change of our relay."""
+        """Take a change of the daemon's relay."""
         self.advance(now)
         if asserted != self._driven[signal]:
             self._driven[signal] = asserted
@@ -149,7 +151,7 @@ class WiredPlant(ABC):
     def note(
         self, what: Literal["relay", "sensor"], signal: str, value: bool | int | str | float
     ) -> None:
-        """Record an edge at `self.now`, and tell the listeners."""
+        """Record an edge at `self.now`, and call the listeners."""
         edge = Edge(self.now, self.name, what, signal, value)
         self.edges.append(edge)
         if len(self.edges) > EDGES_KEPT:

@@ -17,7 +17,8 @@ CLEARANCE_MM: Final = 60.0
 RISE_MM: Final = 40.0
 RISE_S: Final = 0.4
 HEIGHTS_MM: Final[dict[FailureMode | None, float]] = {"off": 0.0, "garbage": 20.0, "wrong": 52.0}
-"""Failure -> the height (mm) of the pad, which does not reach RISE_MM or rises beyond it."""
+"""The height (mm) of the pad in each failure mode. The pad does not reach RISE_MM, or rises beyond
+it."""
 GAP_MM: Final = (10.0, 30.0)
 """The range of gaps (mm) at which pad and receiver can couple."""
 
@@ -46,8 +47,8 @@ class LiftingPad:
         return GAP_MM[0] <= self.gap_mm() <= GAP_MM[1]
 
     def follow(self, now: float, robot: bool, mode: FailureMode | None, pace: float) -> bool:
-        """Rise to a robot; without a robot, sink. Return True if the pad has just arrived at the
-        top."""
+        """Raise the pad to a robot, or sink it without a robot. Return True if the pad has just arrived
+        at the top."""
         goal = HEIGHTS_MM.get(mode, RISE_MM) if robot else 0.0
         if mode == "stuck" or self._height_mm == goal:
             self.rises_until = NEVER
@@ -77,8 +78,8 @@ class Coil:
         return self._goal + (self._celsius - self._goal) * rest
 
     def trips_at(self) -> float:
-        """Return the time (s) when the coil gets too hot, or cool enough again; inf if neither
-        comes."""
+        """Return the time (s) when the coil gets too hot, or cool enough again. Return inf if neither
+        happens."""
         if (self._goal > TRIP_C) == (self._celsius >= TRIP_C):
             return NEVER
         rest = (self._goal - TRIP_C) / (self._goal - self._celsius)

@@ -13,8 +13,8 @@ FAILURE_MODES: tuple[FailureMode, ...] = ("off", "stuck", "slow", "garbage", "wr
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """One change at `at` (monotonic or virtual s), of a relay that we drove or of a sensor that
-    moved."""
+    """One change of a relay that the daemon drove, or of a sensor that moved. `at` is its time
+    (monotonic or virtual s)."""
 
     at: float
     device: str
@@ -24,7 +24,7 @@ class Edge:
 
 
 class Plant(Protocol):
-    """One lift, door or charger. Signals are asserted or not; levels belong to the wire.
+    """One lift, door or charger. Signals are asserted or not. Only the wire has levels.
 
     A plant is not thread-safe. The far side of the wire makes one call at a time.
     """
@@ -35,17 +35,17 @@ class Plant(Protocol):
 
     @property
     def failures(self) -> Mapping[str, FailureMode]:
-        """Return part -> failure mode. The far side of a bus reads the failures of its own parts from
-        this."""
+        """Return the failure mode of each failing part. From this, the far side of a bus reads the
+        failures of its own parts."""
 
     def drive(self, signal: str, asserted: bool, now: float) -> None:
-        """Take a change of our relay."""
+        """Take a change of the daemon's relay."""
 
     def advance(self, now: float) -> None:
         """Let the physics run until `now`."""
 
     def sense(self, signal: str) -> bool:
-        """Is this contact asserted, as the wire shows it with the wire's failure?"""
+        """Is this contact asserted, as its wire shows it? The wire may have a failure."""
 
     def reading(self) -> object:
         """Return the reading of a controller without contacts. Return None if the plant has only

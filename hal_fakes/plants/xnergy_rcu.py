@@ -12,7 +12,7 @@ from hal_fakes.plants.pad import AMBIENT_C
 from hal_fakes.plants.plant import Plant
 
 SIGNALS: Final = {ENABLE: "power", CHECK_RANGE: "range_check"}
-"""Writable object -> the signal of the plant that it drives."""
+"""The plant's signal that each writable object drives."""
 HANDSHAKE: Final = (1, 2, 3, 4)
 STATES: Final = {
     Activity.IDLE: 0,
@@ -54,21 +54,21 @@ def words(reading: Reading, latched: int = 0) -> dict[str, int]:
 
 
 def state(reading: Reading) -> int:
-    """Return the state code; a handshake has four codes."""
+    """Return the state code. A handshake passes through four codes."""
     if reading.activity is Activity.HANDSHAKE:
         return HANDSHAKE[min(int(reading.progress * len(HANDSHAKE)), len(HANDSHAKE) - 1)]
     return STATES[reading.activity]
 
 
 def rcu_plant(name: str, *links: str) -> ChargerPlant:
-    """Build a charger with this receiver; `links` are the parts of its wire."""
+    """Build a charger with this receiver. `links` are the parts of its wire."""
     return ChargerPlant(name, commanded=True, cleared=False, links=links)
 
 
 class ModbusRcu:
     """The registers and coils of one receiver, with a plant behind them (`hal_fakes.modbus.units`).
 
-    `points`: all cells, with `outputs` among them. `unit`: the receiver's unit id.
+    `points` are all cells, including `outputs`. `unit` is the receiver's unit id.
     """
 
     def __init__(self, plant: Plant, settings: ModbusChargerSettings) -> None:
