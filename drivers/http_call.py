@@ -17,7 +17,7 @@ class Call(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     method: Annotated[http.Method, tells("the HTTP method.")] = "POST"
     body: Annotated[
         Annotated[str, msgspec.Meta(max_length=1024)] | None,
-        tells("the JSON body, as a quoted string; no body when absent."),
+        tells("the JSON body, as a quoted string. Without `body` the request has none."),
     ] = None
 
     def problems(self) -> Remarks:
@@ -69,8 +69,8 @@ def timer_unseen(call: Call, off_s: float) -> str:
     if {off_s, 1000 * off_s}.intersection(map(float, numbers)):
         return ""
     return (
-        f"no timer of {off_s:g} s (switches_off_after_s) can be seen in {written}: compare the command"
-        " with switches_off_after_s"
+        f"the number of the timer (switches_off_after_s: {off_s:g} s) is not in"
+        f" {written}: compare the command with switches_off_after_s"
     )
 
 

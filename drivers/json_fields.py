@@ -1,4 +1,4 @@
-"""Reads typed values from one JSON object. The path of a field is its names with dots between them
+"""Reads typed values from one JSON object. The path to a field has dots between its names
 (`pad.receiver.id`).
 
 Each function returns a value of the type that its caller wants. For any other JSON the function raises
@@ -34,7 +34,7 @@ Value = bool | int | float | str
 
 
 class JsonFlag(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The place of a yes or no in the answer."""
+    """The place of a flag (yes or no) in the answer."""
 
     field: Annotated[
         Field, tells("the field that holds the value, as names with dots between them.")
@@ -50,7 +50,10 @@ class JsonNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     """The place of a measurement in the answer."""
 
     field: Annotated[Field, tells("the field of the answer that holds the number.")]
-    scale: Annotated[float, tells("the factor from the maker's unit to ours (0.001 for mV).")] = 1.0
+    scale: Annotated[
+        float,
+        tells("the factor that turns the maker's unit into this value's unit (0.001 for mV)."),
+    ] = 1.0
 
 
 def flag(answer: Mapping[str, object], place: JsonFlag) -> bool:

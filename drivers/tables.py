@@ -32,8 +32,8 @@ def one_cut(shown: Lines, wires: Mapping[str, Wire]) -> Iterator[tuple[str, dict
 
 
 def told_of_cuts(readings: Sequence[tuple[str, str]]) -> str:
-    """Join pairs (signal, reading with this signal cut) to one text: `L1: floor_bit1; a fault:
-    floor_bit0`."""
+    """Join pairs (signal, reading with this signal cut) to one text:
+    `L1: floor_bit1; a fault: floor_bit0`."""
     by_reading: dict[str, list[str]] = {}
     for signal, reading in readings:
         by_reading.setdefault(reading, []).append(signal)

@@ -61,7 +61,7 @@ def slow_alarms(wires: Iterable[Wire]) -> Remarks:
     """Yield a warning (path, text) for each alarm with a long debounce."""
     for wire in wires:
         if wire.debounce_s is not None and wire.debounce_s > ALARM_WITHIN_S:
-            text = f"{wire.signal} is believed only after {wire.debounce_s:g} s"
+            text = f"{wire.signal} counts only after {wire.debounce_s:g} s"
             yield (*wire.path, "debounce_s"), f"{text}: contacts bounce for 0.05 s"
 
 

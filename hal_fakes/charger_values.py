@@ -27,7 +27,8 @@ NEAREST: Final = {
     Activity.STOPPING: Activity.CHARGING,
     Activity.RELEASED: Activity.IDLE,
 }
-"""The activity to show in place of each activity, if the latter has no code or rule."""
+"""The replacement for each activity that may lack a code and a rule. In this case the replacement is
+shown."""
 
 
 def values(

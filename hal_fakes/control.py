@@ -3,8 +3,8 @@
 The socket is AF_UNIX and carries lines of text. Words with spaces are in quotes. The answer to each
 line is `ok` or `error TEXT`:
 
-- `follow`: from now on every edge is sent as a line of JSON, `{"at": s monotonic, "device": …, "what":
-  "relay"|"sensor", "signal": …, "value": …}`
+- `follow`: from now on every edge is sent as a line of JSON,
+  `{"at": s monotonic, "device": …, "what": "relay"|"sensor", "signal": …, "value": …}`
 - `fail DEVICE PART MODE`: a wire or part fails (`off`, `stuck`, `slow`, `garbage`, `wrong`), or works
   again (`ok`)
 - `press DEVICE SIGNAL on|off`: a person or the building acts

@@ -40,8 +40,8 @@ class Fake(Generic[Settings]):
 class Server(Protocol):
     """A running far side.
 
-    `replace` holds the replacements for the bus's settings, such as `{"tcp": {"host": "127.0.0.1",
-    "port": 41234}}`.
+    `replace` holds the replacements for the bus's settings, such as
+    `{"tcp": {"host": "127.0.0.1", "port": 41234}}`.
     """
 
     replace: dict[str, object]

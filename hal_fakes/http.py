@@ -3,10 +3,10 @@
 Each sort of station has a file that makes its answers, such as `hal_fakes/http_charger.py`. The wire
 has parts that fail in several modes (`hal_fakes.plants.plant.FAILURE_MODES`):
 
-|         | off              | stuck           | slow               | garbage        | wrong         |
-| server  | hangs up at once | the last answer | answers too late   | an HTML page   | state as text |
-| headers | hangs up in them | stops in them   | one byte at a time | is no HTTP     | status 500    |
-| body    | is empty         | stops in it     | one byte at a time | malformed JSON | unknown state |
+|         | off            | stuck               | slow               | garbage        | wrong         |
+| server  | closes at once | repeats last answer | answers too late   | an HTML page   | state as text |
+| headers | closes halfway | stops halfway       | one byte at a time | not HTTP       | status 500    |
+| body    | empty          | stops halfway       | one byte at a time | malformed JSON | unknown state |
 """
 
 import contextlib
@@ -295,7 +295,7 @@ class _Call(BaseHTTPRequestHandler):
         end = time.monotonic() + seconds
         while (left_s := end - time.monotonic()) > 0:
             if select([self.connection], [], [], min(left_s, LOOK_S))[0]:
-                raise ConnectionAbortedError("the caller has hung up")
+                raise ConnectionAbortedError("the caller has closed the connection")
 
     def log_message(self, format: str, *args: object) -> None:
         """Log nothing, because the daemon's own log shows the requests."""

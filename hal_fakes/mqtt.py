@@ -4,9 +4,9 @@ One real MQTT client plays all devices. The devices publish a changed state at o
 They publish states without `ask` three times in `stale_after_s`. A relay with a timer switches itself
 off. The order `fail DEVICE unit|server MODE` lets one device (`unit`) or the broker (`server`) fail:
 
-|        | off    | stuck           | slow           | garbage         | wrong          |
-| unit   | silent | says the same   | obeys too late | publishes noise | publishes `?`  |
-| server | killed | frozen          | answers late   | is no broker    | only remembers |
+|        | off    | stuck              | slow           | garbage         | wrong               |
+| unit   | silent | repeats its states | obeys too late | publishes noise | publishes `?`       |
+| server | killed | frozen             | answers late   | is no broker    | has old states only |
 """
 
 import contextlib

@@ -32,7 +32,8 @@ class DryContactPanelSettings(PanelSettings, frozen=True, kw_only=True, forbid_u
     sources: Annotated[
         dict[Name, Input],
         Meta(min_length=1),
-        tells("the sources of the alarm, each with a name of the site: fire_panel, code_blue."),
+        tells("""the sources of the alarm, by names that the site chooses (`fire_panel`,
+        `code_blue`)."""),
     ]
     drill: Annotated[
         Input | None, tells("a key switch or test contact that begins a drill of `drill_s`.")

@@ -29,7 +29,7 @@ class HttpPanelSettings(PanelSettings, frozen=True, kw_only=True, forbid_unknown
     sources: Annotated[
         dict[Name, JsonFlag],
         Meta(min_length=1),
-        tells("the sources of the alarm, each with a name of the site and its field."),
+        tells("the field of each source of the alarm, by a name that the site chooses."),
     ]
     drill: Annotated[JsonFlag | None, tells("the field that begins a drill of `drill_s`.")] = None
 

@@ -17,7 +17,7 @@ def drill_problems(settings: PanelSettings, sources: Collection[str], drills: bo
     """Yield a problem for each source with a reserved name. Yield a problem for a drill without a
     duration or without a contact."""
     for name in sorted({SILENT, DRILL}.intersection(sources)):
-        yield ("sources", name), f"'{name}' is a word of the panel itself: take another name"
+        yield ("sources", name), f"'{name}' is a reserved name: choose another name"
     if drills and settings.drill_s is None:
         yield ("drill",), "give the duration of a drill: drill_s: 300"
     if settings.drill_s and not drills:

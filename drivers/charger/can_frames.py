@@ -42,7 +42,7 @@ class FrameChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_un
     map: Annotated[FrameMap | None, tells("the map, written here instead of a profile.")] = None
     setpoints: Annotated[
         dict[Name, Volume],
-        tells("name -> value, for the voltages and currents that the map leaves open."),
+        tells("name -> value, for the voltages and currents that the map does not give."),
     ] = msgspec.field(default_factory=dict)
 
     def problems(self) -> Remarks:
@@ -51,7 +51,10 @@ class FrameChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_un
         if self.on_death == "keep":
             yield (
                 ("on_death",),
-                "a charge ends when our frames cease, so it cannot be kept: delete on_death",
+                (
+                    "a charge ends when the daemon's frames cease, so on_death cannot keep it:"
+                    " delete on_death"
+                ),
             )
         before = list(PROFILE.problems(self.profile, self.map))
         yield from before
@@ -140,11 +143,14 @@ def describe(
     """Return the rows (subject, meaning) that `check` prints instead of a wiring table."""
     found = frame_map(settings)
     stops_s = settings.limits.peer_internal_timeout_s
-    after = "a time to be asked of the maker" if stops_s is None else f"{stops_s:g} s"
+    after = "a time that only the maker knows" if stops_s is None else f"{stops_s:g} s"
     return [
         ("bus", can.describe(bus_settings)),
         *rows(found),
-        ("end of the daemon", f"power off is sent; without frames the charger stops after {after}"),
+        (
+            "end of the daemon",
+            f"the driver sends power off; without frames the charger stops after {after}",
+        ),
         *(found.state.codes.rows() if found.state else ()),
     ]
 
@@ -159,7 +165,7 @@ def warnings(settings: FrameChargerSettings) -> Remarks:
     yield from PROFILE.warnings(settings.profile, "watch the first charge")
     found = frame_map(settings)
     if found.receiver is None and settings.receivers:
-        yield ("receivers",), "the map has no receiver: no robot will be charged"
+        yield ("receivers",), "the map has no receiver, so no robot will be charged"
     if settings.limits.peer_internal_timeout_s is None:
         text = (
             "ask the maker how long the charger charges without frames, and pull the plug to check"
@@ -342,12 +348,12 @@ def _said(found: FrameMap, frames: dbc.Dbc) -> dict[str, Said]:
 
 def _heard(values: Values, signal: str) -> float:
     if signal not in values:
-        raise DriverError(f"{signal} is not heard, and a rule tests its value")
+        raise DriverError(f"no frame with {signal} has come, and a rule tests its value")
     return values[signal]
 
 
 def _flag(values: Values, signal: str | None) -> bool | None:
-    """Return the signal as a boolean; None if the map has no such signal."""
+    """Return the signal as a boolean. Return None if the map has no such signal."""
     return None if signal is None else bool(values[signal])
 
 

@@ -53,19 +53,19 @@ class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     on: Annotated[
         dict[Name, float] | None,
         tells(
-            "signal -> value while charging is allowed; when absent, the frame is not sent then."
+            """signal -> value while charging is allowed. Without `on` the frame is sent only while
+        charging is forbidden."""
         ),
     ] = None
     setpoints: Annotated[
         dict[Name, Name],
-        tells(
-            "signal -> the device's setpoint, by name, for this signal while charging is allowed."
-        ),
+        tells("signal -> the name of the setpoint that this signal has while charging is allowed."),
     ] = {}
     off: Annotated[
         dict[Name, float] | None,
         tells(
-            "signal -> value while charging is forbidden; when absent, the frame is not sent then."
+            """signal -> value while charging is forbidden. Without `off` the frame is sent only
+        while charging is allowed."""
         ),
     ] = None
 
@@ -87,7 +87,9 @@ class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 class Wake(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A frame that wakes a silent charger. It must not start a charge."""
 
-    frame: Annotated[Name, tells("the frame's name in the DBC file; not a frame of `send`.")]
+    frame: Annotated[
+        Name, tells("the frame's name in the DBC file. It must not be a frame of `send`.")
+    ]
     every_s: Annotated[WakeEvery, tells("how often the frame is sent while the charger is silent.")]
     says: Annotated[dict[Name, float], tells("signal -> value.")]
 
@@ -112,7 +114,8 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     amps: Annotated[Signal | None, tells("the current into the battery.")] = None
     receiver: Annotated[
         Signal | None,
-        tells("the receiver's id; 0: no receiver. Without its frame there is no reading."),
+        tells("""the receiver's id, or 0 for no receiver. Without this signal's frame there is no
+        reading."""),
     ] = None
     out_of_range: Annotated[
         Signal | None,
@@ -135,7 +138,11 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         dict[Name, Signal],
         tells("name -> a temperature's signal (°C), for status and diagnostics."),
     ] = {}
-    rules: Annotated[list[Rule], tells("the state by other signals; tried before codes.")] = []
+    rules: Annotated[
+        list[Rule],
+        tells("""rules that give the state from other signals. The driver tries them before the
+        codes."""),
+    ] = []
     errors: Annotated[StationErrors, tells("signals that mean an error in any state.")] = (
         StationErrors()
     )

@@ -64,7 +64,7 @@ class CanOpenChargerSettings(
         Literal["required", "none"], tells("`none` for old firmware, which sends no heartbeat.")
     ] = "required"
     heartbeat_timeout_s: Annotated[
-        BeatTimeout, tells("the receiver counts as lost this long after its last heartbeat.")
+        BeatTimeout, tells("the time after the last heartbeat when the receiver counts as lost.")
     ] = 0.5
 
 

@@ -43,7 +43,9 @@ class ChargerInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unkno
 
     charging: Annotated[Input, tells("current flows, also while it ramps down.")]
     ready: Annotated[
-        Input | None, tells("the station can charge the next robot; without this contact, always.")
+        Input | None,
+        tells("""the station can charge the next robot. Without this contact the station counts as
+        ready."""),
     ] = None
     fault: Annotated[Input | None, tells("the station is out of order.")] = None
     at_height: Annotated[
@@ -68,8 +70,8 @@ class DryContactChargerSettings(
 ):
     """One station and its wiring."""
 
-    inputs: Annotated[ChargerInputWiring, tells("the contacts that are read.")]
-    outputs: Annotated[ChargerOutputWiring, tells("the relay that is driven.")]
+    inputs: Annotated[ChargerInputWiring, tells("the contacts that the driver reads.")]
+    outputs: Annotated[ChargerOutputWiring, tells("the relay that the driver switches.")]
 
     def problems(self) -> Remarks:
         """Yield problems that involve more than one field."""
@@ -77,7 +79,7 @@ class DryContactChargerSettings(
         if self.on_death == "keep":
             yield ("on_death",), "without the daemon the relay is off: delete on_death"
         if self.receivers:
-            yield ("receivers",), "contacts show no receiver's id: delete receivers"
+            yield ("receivers",), "contacts cannot give a receiver's id: delete receivers"
         yield from unaccepted(_unsafe(self), self.accept_unsafe)
 
 
@@ -120,19 +122,22 @@ def warnings(settings: DryContactChargerSettings) -> Remarks:
     for wire in wires(settings):
         if wire.debounce_s:
             text = "contacts of a charger are not debounced: the next scan corrects a bounce"
-            yield (*wire.path, "debounce_s"), f"{text}; leave this out"
+            yield (*wire.path, "debounce_s"), f"{text}; delete this key"
         if wire.signal == "charging" and wire.broken_reads() is not True:
             yield (
                 wire.path,
                 "a cut wire reads as no charge: check the wire if a charge never begins",
             )
         if wire.bus:
-            text = f"while the bus '{wire.bus}' is not read, the relay stays as it is: a charge goes on"
-            yield (*wire.path, "bus"), f"{text}, and '{wire.signal}' cannot end it"
+            text = (
+                f"while the bus '{wire.bus}' is not read, the relay keeps its state and a charge"
+                " goes on"
+            )
+            yield (*wire.path, "bus"), f"{text}, and '{wire.signal}' cannot end the charge"
     if settings.inputs.fault is None:
-        yield ("inputs",), "without a fault contact a station that is out of order reads idle"
+        yield ("inputs",), "without a fault contact a station that is out of order reads as idle"
     yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
-    yield (), "contacts show no receiver's id: the robot on the pad is not verified"
+    yield (), "contacts cannot give a receiver's id, so the robot on the pad is not verified"
 
 
 def create(name: str, settings: DryContactChargerSettings, bus: PointsBus) -> "DryContactCharger":

@@ -31,7 +31,9 @@ class HttpChargerSettings(
 
     state_path: Annotated[http.Path, tells("the path that GET reads the state from.")] = "/state"
     clear_error_path: Annotated[
-        http.Path | None, tells("the path where POST clears the error; `null` where there is none.")
+        http.Path | None,
+        tells("""the path where POST clears the error. Write `null` for a station without such a
+        path."""),
     ] = "/clear_error"
     start: Annotated[Call | None, tells("switches the power on for the robot on the pad.")] = None
     stop: Annotated[Call | None, tells("switches the power off.")] = None

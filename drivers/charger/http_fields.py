@@ -24,9 +24,13 @@ WEEK_S: Final = 7 * 86400
 class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The fields of the answer to `state_path`. A field is a path of names that are joined by dots."""
 
-    state: Annotated[Field, tells("the station's state; `codes` has the meanings.")] = "state"
+    state: Annotated[
+        Field, tells("the field of the station's state. `codes` has the meanings.")
+    ] = "state"
     error_text: Annotated[
-        Field, tells("the station's text for an error: any text means an error, in any state.")
+        Field,
+        tells("""the field of the station's error text. Any text means an error, whatever the state
+        is."""),
     ] = "error_msg"
     error_texts: Annotated[
         dict[Word, TextMeans],
@@ -34,7 +38,8 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         means no error (`OK`). For any other text `codes` may give the side."""),
     ] = {}
     receiver_id: Annotated[
-        Field | None, tells('the id of the receiver on the pad; null or "" without a receiver.')
+        Field | None,
+        tells("""the id of the receiver on the pad. Without a receiver the field is null or ""."""),
     ] = None
     in_range: Annotated[JsonFlag | None, tells("the robot stands where charging is possible.")] = (
         None

@@ -32,7 +32,9 @@ class JsonChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unk
         Codes | None, tells("the meanings of the maker's state numbers; not needed with `rules`.")
     ] = None
     rules: Annotated[
-        list[Rule], tells("the state by other fields of the answer; tried before `codes`.")
+        list[Rule],
+        tells("""rules that give the state from other fields of the answer. The driver tries them
+        before `codes`."""),
     ] = msgspec.field(default_factory=list)
     errors: Annotated[StationErrors, tells("fields that mean an error, whatever the state is.")] = (
         StationErrors()
@@ -74,11 +76,14 @@ class JsonChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unk
             text = "receivers needs the field with the id of the receiver that the station sees"
             yield ("fields", "receiver_id"), text
         if self.command("start") and not self.command("stop"):
-            yield ("start",), "needs stop as well: a charge that cannot be stopped is not started"
+            yield (
+                ("start",),
+                "needs stop too, because the driver starts no charge that it cannot stop",
+            )
         if self.command("range_check") and self.fields.in_range is None:
             yield ("fields", "in_range"), "range_check needs the field with the check's result"
         if self.on_death == "keep" and self.command("stop") is None:
-            yield ("on_death",), "this station cannot be stopped: delete on_death"
+            yield ("on_death",), "the driver cannot stop this station: delete on_death"
 
 
 def _place_problems(settings: JsonChargerSettings) -> Remarks:
@@ -102,8 +107,8 @@ def _timer_problems(settings: JsonChargerSettings) -> Remarks:
         yield ("on_death",), "the station switches off when start is not repeated: delete on_death"
     if settings.command("start") and settings.codes is None and timer is None:
         text = (
-            "when the network dies nothing switches the power off: let start set the relay's own"
-            " timer, and write its time as switches_off_after_s"
+            "when the network dies nothing switches the power off: let start set the"
+            " relay's own timer, and write the timer's time as switches_off_after_s"
         )
         yield from unaccepted([(POWER, ("switches_off_after_s",), text)], settings.accept_unsafe)
 
@@ -150,16 +155,19 @@ def warnings(settings: JsonChargerSettings, unseen_timer: Remarks = ()) -> Remar
     if settings.codes and not settings.codes.error:
         yield (
             ("codes",),
-            "no code is listed as an error: an error will be shown as an unknown state",
+            "no code is listed as an error, so an error will be shown as an unknown state",
         )
 
     known = settings.codes.meanings() if settings.codes else {}
     for word, code in settings.state_words.items():
         if word in ("true", "false"):
-            text = f'matches the text "{word}" and no JSON {word}: for that write rules:'
+            text = (
+                f'matches the text "{word}", but not the JSON value {word}: for the JSON value'
+                " write rules:"
+            )
             yield ("state_words", word), text
         if code not in known:
-            yield ("state_words", word), f"{code} is not in codes: an unknown state"
+            yield ("state_words", word), f"{code} is not in codes, so this state is unknown"
 
 
 def _lacks(settings: JsonChargerSettings, what: str) -> bool:

@@ -61,7 +61,10 @@ class MqttChargerSettings(
         for command in COMMANDS:
             message = self.command(command)
             if message and message.topic in states:
-                text = f"{message.topic} is a state topic: the command would be taken for a state"
+                text = (
+                    f"{message.topic} is a state topic: the daemon would take the command for a"
+                    " state"
+                )
                 yield (command, "topic"), text
         if self.start and self.start == self.stop:
             yield ("stop",), "is the same message as start"

@@ -52,7 +52,7 @@ class RegisterChargerSettings(
             text = "the map needs the value receiver: the id of the receiver that the station sees"
             yield ("receivers",), text
         if self.on_death == "keep" and not self.can_stop():
-            yield ("on_death",), "this station cannot be stopped: delete on_death"
+            yield ("on_death",), "the driver cannot stop this station: delete on_death"
 
 
 def charger_map(settings: RegisterChargerSettings) -> ChargerMap:
@@ -96,7 +96,10 @@ def describe(settings: RegisterChargerSettings, bus: object) -> Iterator[tuple[s
             POWER,
             f"{written[POWER]}: {found.power.start} may charge, {found.power.stop} must not",
         )
-        yield "end of the daemon", "off is written" if settings.on_death == "stop" else "nothing"
+        yield (
+            "end of the daemon",
+            "the driver writes off" if settings.on_death == "stop" else "nothing",
+        )
     for name, order in (("clear_error", found.clear_error), ("range_check", found.range_check)):
         if order:
             yield name.replace("_", " "), f"{written[name]}: write {order.write}"
@@ -192,7 +195,7 @@ class RegisterCharger:
             try:
                 self.make_safe()
             except DriverError:
-                return  # `close` does not raise; `make_safe` has already reported the failure
+                return  # do not raise, because `make_safe` has already reported the failure
 
     def _switch(self, on: bool, anyway: bool = False) -> None:
         command = self._map.power

@@ -32,7 +32,9 @@ class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         LongBit | None, tells("only this bit of the number; 0 is the least significant.")
     ] = None
     scale: Annotated[
-        float, tells("the factor from the maker's unit to ours (0.1 for tenths of an ampere).")
+        float,
+        tells("""the factor that turns the maker's unit into this value's unit (0.1 for tenths of an
+        ampere)."""),
     ] = 1.0
 
     def problems(self) -> Remarks:
@@ -41,12 +43,12 @@ class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         yield from super().problems()
         of_registers = (self.words, self.signed, self.bit) != (1, False, None)
         if of_registers and self.is_in("coil", "discrete input"):
-            yield ("at",), "is one bit: leave words, signed and bit out"
+            yield ("at",), "is one bit: delete words, signed and bit"
         if self.bit is not None and self.bit >= BITS * self.words:
             have = "two registers have" if self.words == 2 else "a register has"
             yield ("bit",), f"{have} bits 0 to {BITS * self.words - 1}"
         if self.low_first and self.words == 1:
-            yield ("low_first",), "is for two registers: words: 2"
+            yield ("low_first",), "is for two registers: write words: 2"
 
     def places(self) -> list[str]:
         """Return the addresses of the registers that hold this number, the high word first."""
@@ -81,14 +83,15 @@ class Power(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_fields=True
     start: Annotated[Word, tells("the value that lets the station charge.")]
     stop: Annotated[Word, tells("the value that keeps the station from charging.")]
     read_back: Annotated[
-        bool, tells("false if the command cannot be read back; then every scan writes the command.")
+        bool,
+        tells("false if the command cannot be read back. Then every scan writes the command."),
     ] = True
 
 
 class Order(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A command that the driver writes once for each request."""
 
-    write: Annotated[Word, tells("the value that is written.")] = 1
+    write: Annotated[Word, tells("the value that the driver writes.")] = 1
 
 
 class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -107,7 +110,12 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     codes: Annotated[
         Codes | None, tells("the meanings of `state`'s numbers; not needed with `rules`.")
     ] = None
-    rules: Annotated[list[Rule], tells("the state by other `values`; tried before `codes`.")] = []
+    rules: Annotated[
+        list[Rule],
+        tells(
+            "rules that give the state from other `values`. The driver tries them before `codes`."
+        ),
+    ] = []
     temperatures: Annotated[
         dict[Name, Name],
         tells("name -> the value that is this temperature (°C), shown in status and diagnostics."),
@@ -116,7 +124,10 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         StationErrors()
     )
     power: Annotated[
-        Power | None, tells("lets the station charge; without this it is only observed.")
+        Power | None,
+        tells(
+            "lets the station charge. Without this command the daemon only observes the station."
+        ),
     ] = None
     clear_error: Annotated[Order | None, tells("the command that clears an error.")] = None
     range_check: Annotated[
@@ -129,7 +140,7 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         without a state."""
         yield from by_rules.problems(self.rules, self.codes is not None)
         if self.codes and "state" not in self.values:
-            yield ("values",), "needs 'state', because codes is given"
+            yield ("values",), "needs 'state', because the map has codes"
         looked_at = [(("rules", *path), at) for path, at in by_rules.places(self.rules)]
         looked_at += [(("errors", *path), at) for path, at in self.errors.places()]
         looked_at += [(("temperatures", name), at) for name, at in self.temperatures.items()]

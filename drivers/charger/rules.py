@@ -34,9 +34,9 @@ UNKNOWN: Final[Meaning] = (Activity.UNKNOWN, "")
 class Test(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A test of one value. The test holds if every condition in the YAML holds."""
 
-    one_of: Annotated[list[Value], tells("the value is one of these.")] = []
-    above: Annotated[float | None, tells("the value is greater than this.")] = None
-    below: Annotated[float | None, tells("the value is less than this.")] = None
+    one_of: Annotated[list[Value], tells("the values that pass the test.")] = []
+    above: Annotated[float | None, tells("the value must be greater than this number.")] = None
+    below: Annotated[float | None, tells("the value must be less than this number.")] = None
 
     def problems(self) -> Remarks:
         """Yield a problem for a test without a condition, and for a test that no value passes."""
@@ -67,9 +67,10 @@ class Test(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 class Rule(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One rule for the station's state."""
 
-    means: Annotated[str, tells("the state, by the name of a list of `codes`.")]
+    means: Annotated[str, tells("the state, which is the name of a list of `codes` (`charging`).")]
     when: Annotated[
-        dict[Name, Test], tells("place -> the test of its value; without it the rule always holds.")
+        dict[Name, Test],
+        tells("place -> the test of its value. Without `when` the rule always holds."),
     ] = {}
     text: Annotated[Name | None, tells("the error's text, if `means` is an error.")] = None
 
@@ -85,11 +86,12 @@ class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """An error that the station gives as one number. `check` and the status show an unlisted number
     without a text."""
 
-    at: Annotated[Name, tells("its place.")]
+    at: Annotated[Name, tells("the place of the number.")]
     well: Annotated[tuple[int, ...], tells("the numbers that mean no error.")] = (0,)
     station: Annotated[dict[int, Name], tells("number -> text, for faults of the station.")] = {}
     robot: Annotated[
-        dict[int, Name], tells("number -> text, for faults of the robot, its receiver or place.")
+        dict[int, Name],
+        tells("number -> text, for faults of the robot, of its receiver or of its position."),
     ] = {}
 
     def problems(self) -> Remarks:
@@ -115,13 +117,14 @@ class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Errors that the station gives as bits of one number, such as a flag byte. `check` and the status
     show an unlisted bit by its number."""
 
-    at: Annotated[Name, tells("its place.")]
+    at: Annotated[Name, tells("the place of the number.")]
     ignore: Annotated[list[LongBit], tells("bits that mean no error.")] = []
     station: Annotated[
         dict[LongBit, Name], tells("bit (0: least significant) -> text, for faults of the station.")
     ] = {}
     robot: Annotated[
-        dict[LongBit, Name], tells("bit -> text, for faults of the robot, its receiver or place.")
+        dict[LongBit, Name],
+        tells("bit -> text, for faults of the robot, of its receiver or of its position."),
     ] = {}
 
     def problems(self) -> Remarks:
@@ -145,13 +148,19 @@ class StationErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     in any state."""
 
     station: Annotated[
-        dict[Name, Name], tells("place -> text: a value other than 0 is this fault of the station.")
+        dict[Name, Name],
+        tells("place -> text. A value other than 0 means this fault of the station."),
     ] = {}
     robot: Annotated[
-        dict[Name, Name], tells("place -> text, for faults of the robot, its receiver or place.")
+        dict[Name, Name],
+        tells("place -> text, for faults of the robot, of its receiver or of its position."),
     ] = {}
-    codes: Annotated[list[ErrorNumber], tells("errors as one number each.")] = []
-    bits: Annotated[list[ErrorBits], tells("errors as the bits of a flag byte or word.")] = []
+    codes: Annotated[
+        list[ErrorNumber], tells("errors that the station gives as one number each.")
+    ] = []
+    bits: Annotated[
+        list[ErrorBits], tells("errors that the station gives as bits of a flag byte or word.")
+    ] = []
 
     def found(self, read: Read) -> Found:
         """Return all present errors, the station's first. A value of None is unknown, and counts as no

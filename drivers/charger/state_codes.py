@@ -33,11 +33,13 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     ] = []
     stopping: Annotated[list[Code], tells("current still flows, ramping down.")] = []
     released: Annotated[
-        list[Code], tells("the robot is disconnected; the station is not ready for the next.")
+        list[Code],
+        tells("the robot is disconnected, and the station is not ready for the next robot."),
     ] = []
     error: Annotated[
         list[Code],
-        tells("out of service, also by hand; with `robot_error`, only the errors of the station."),
+        tells("""out of service, by an error or by hand. With `robot_error`, list only errors of the
+        station here."""),
     ] = []
     station_error: Annotated[
         list[Code],
@@ -45,7 +47,7 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         `error` may list errors of either side."""),
     ] = []
     robot_error: Annotated[
-        list[Code], tells("an error of the robot's side: the station itself is well.")
+        list[Code], tells("an error of the robot, with the station itself in order.")
     ] = []
 
     def problems(self) -> Remarks:

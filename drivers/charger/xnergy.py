@@ -91,7 +91,7 @@ ERROR_BITS: Final[Mapping[int, tuple[FaultSide, str]]] = {
     0x0002_0000: ("station", "foreign object on the pad"),
     0x0010_0000: ("robot", "a temperature sensor of the receiver has failed"),
 }
-"""The bits of the 32-bit error number, whose upper half is the high word."""
+"""The bits of the error number. It has 32 bits, and its upper half is the high word."""
 
 IN_RANGE: Final = 1
 """The range check's result for a robot in range. The other results are 0 (the check still runs), 2 (out
@@ -175,8 +175,8 @@ def _units(word: int | None) -> float | None:
 # ---- starting and stopping
 
 RANGE_SETTLE_S: Final = 1.0
-"""The time (s) from a range check until its result is valid. Until then the receiver shows the previous
-result."""
+"""The time (s) after a range check when the result is valid. Before this time the receiver shows the
+previous result."""
 
 
 class Written(Struct, frozen=True):
@@ -309,7 +309,7 @@ class Receiver:
             try:
                 self.make_safe()
             except DriverError:
-                return  # `close` does not raise; `make_safe` has already reported the failure
+                return  # do not raise, because `make_safe` has already reported the failure
 
     def _enable(self, on: bool) -> None:
         self._touched = True
@@ -325,7 +325,7 @@ def rows(settings: ChargerSettings, where: Mapping[str, str]) -> list[tuple[str,
         *((name, f"the same in an error: {where[name]}") for name in IN_ERROR),
         ("power", f"write {where[ENABLE]}: 1 starts from idle, 0 stops"),
         ("range check", f"write {where[CHECK_RANGE]} before each start"),
-        ("clear error", "no place for it is published: cycle the receiver's power"),
+        ("clear error", "the maker publishes no address for it: cycle the receiver's power"),
         ("end of the daemon", "0 is written" if settings.on_death == "stop" else "nothing"),
         *_state_rows(),
     ]
@@ -343,10 +343,14 @@ def warnings(settings: ChargerSettings, wire: str) -> Remarks:
     """Yield a warning (path, text) for each valid setting that may be a mistake. `wire` names the cable
     that the test unplugs."""
     text = (
-        "the maker's published numbers are not tried on hardware: watch the first charge, and pull"
+        "nobody has tried the maker's published numbers on hardware: watch the first"
+        " charge, and pull"
     )
-    yield (), f"{text} the {wire} plug during one"
-    name = "an RCU rides on a robot and is no station"
+    yield (), f"{text} the {wire} plug during a charge"
+    name = "an RCU rides on a robot and is not a station"
     yield (), f"{name}: the device is named after the waypoint where that robot charges"
     if settings.receivers:
-        yield ("receivers",), "this controller gives no receiver's id: no robot will be charged"
+        yield (
+            ("receivers",),
+            "this controller gives no receiver's id, so no robot will be charged",
+        )

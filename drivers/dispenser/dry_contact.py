@@ -39,12 +39,13 @@ class WorkcellInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unkn
         Input,
         tells("the cycle has succeeded. The contact is off before a cycle and on at its end."),
     ]
-    busy: Annotated[Input | None, tells("a cycle runs; its end without `done` is a failure.")] = (
-        None
-    )
+    busy: Annotated[
+        Input | None, tells("a cycle runs. If it ends without `done`, it has failed.")
+    ] = None
     ready: Annotated[
         Input | None,
-        tells("a cycle may start (filled, closed, no jam); always without this contact."),
+        tells("""a cycle may start (filled, closed, no jam). Without this contact a cycle may always
+        start."""),
     ] = None
     fault: Annotated[Input | None, tells("the workcell reports a fault.")] = None
 
@@ -52,7 +53,7 @@ class WorkcellInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unkn
 class WorkcellOutputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The relays that the driver switches."""
 
-    start: Annotated[Output, tells("starts one cycle; `pulse_s` sets how long it is on.")]
+    start: Annotated[Output, tells("starts one cycle. `pulse_s` sets how long it is on.")]
     select: Annotated[
         dict[Name, Output],
         tells("type_guid -> the relay that selects this sort while its cycle runs."),
@@ -64,8 +65,8 @@ class DryContactWorkcellSettings(
 ):
     """A dispenser or ingestor and its wiring."""
 
-    inputs: Annotated[WorkcellInputWiring, tells("the contacts that are read.")]
-    outputs: Annotated[WorkcellOutputWiring, tells("the relays that are driven.")]
+    inputs: Annotated[WorkcellInputWiring, tells("the contacts that the driver reads.")]
+    outputs: Annotated[WorkcellOutputWiring, tells("the relays that the driver switches.")]
 
     def problems(self) -> Remarks:
         """Yield problems that involve more than one field."""
@@ -73,11 +74,11 @@ class DryContactWorkcellSettings(
         select = self.outputs.select
         for name, asked in self.items.items():
             if asked.most > 1:
-                yield ("items", name, "most"), "a contact says no number: leave most out"
+                yield ("items", name, "most"), "a contact carries no number: delete most"
             if len(asked.compartments) > 1:
                 yield ("items", name, "compartments"), "contacts can serve one compartment only"
             if len(self.items) > 1 and name not in select:
-                text = f"needs a relay for {name}: the start is the same for every item"
+                text = f"needs a relay for {name}: without it the start is the same for every item"
                 yield ("outputs", "select"), text
         for name in select.keys() - self.items.keys():
             yield ("outputs", "select", name), "is not one of items"
@@ -119,7 +120,7 @@ def items_table(settings: WorkcellSettings) -> Iterator[Table]:
 def blind(settings: WorkcellSettings, *, busy: bool) -> Remarks:
     """Yield a warning for each state of the workcell that this wiring cannot show."""
     if not busy:
-        text = "without busy a cycle that stops in the middle is seen after cycle_limit_s only"
+        text = "without busy, only cycle_limit_s reveals a cycle that stops in the middle"
         yield (), f"{text} ({settings.limits.cycle_limit_s:g} s)"
 
 

@@ -34,7 +34,7 @@ class WorkcellInputFields(msgspec.Struct, frozen=True, kw_only=True, forbid_unkn
         tells("the cycle has succeeded. The flag is off before a cycle and comes on at its end."),
     ]
     busy: Annotated[
-        JsonFlag | None, tells("a cycle runs; its end without `done` is a failure.")
+        JsonFlag | None, tells("a cycle runs. If it ends without `done`, it has failed.")
     ] = None
     ready: Annotated[
         JsonFlag | None, tells("a cycle may start. Without this field a cycle may always start.")
@@ -69,15 +69,20 @@ class HttpWorkcellSettings(WorkcellSettings, frozen=True, kw_only=True, forbid_u
             ):
                 if wanted and f'"{mark}"' not in body:
                     path = ("items", name, key) if key else ("items",)
-                    yield path, f'the body of start cannot say it: put "{mark}" there'
+                    yield (
+                        path,
+                        f'the body of start does not contain this value: put "{mark}" there',
+                    )
         if self.pulse_s is not None:
-            yield ("pulse_s",), "a start over HTTP is one command: leave pulse_s out"
+            yield ("pulse_s",), "a start over HTTP is one command: delete pulse_s"
         yield from unaccepted(_unsafe(self), self.accept_unsafe)
 
 
 def _unsafe(settings: HttpWorkcellSettings) -> Iterator[Unsafe]:
     if settings.stop is None:
-        text = "nothing ends a cycle that takes too long, or one whose daemon has died: give stop"
+        text = (
+            "nothing ends a cycle that takes too long, or a cycle whose daemon has died: give stop"
+        )
         yield STOP, (), text
 
 

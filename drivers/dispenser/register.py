@@ -94,7 +94,10 @@ class RegisterWorkcellSettings(
         for name, asked in self.items.items():
             path = ("items", name)
             if found.item is None and len(self.items) > 1:
-                yield ("map",), "needs 'item', the number of the type_guid: there are several items"
+                yield (
+                    ("map",),
+                    "needs 'item', the number of the type_guid, because there are several items",
+                )
             if found.item and name not in found.item.codes:
                 yield ("map", "item", "codes"), f"has no number for {name}"
             if found.quantity is None and asked.most > 1:

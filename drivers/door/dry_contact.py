@@ -43,7 +43,7 @@ class DoorInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
     opened: Annotated[Input | None, tells("the door is fully open, by its limit contact.")] = None
     closed: Annotated[Input | None, tells("the door is closed, by its limit contact.")] = None
     obstruction: Annotated[
-        Input | None, tells("somebody is in the doorway: a hold lasts until the doorway is clear.")
+        Input | None, tells("somebody is in the doorway. A hold lasts until the doorway is clear.")
     ] = None
     fire: Annotated[Input | None, tells("the fire alarm; `on_fire` sets its effect.")] = None
 
@@ -68,8 +68,10 @@ class DoorOutputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
 class DryContactDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A door and its wiring."""
 
-    inputs: Annotated[DoorInputWiring, tells("the contacts that are read.")] = DoorInputWiring()
-    outputs: Annotated[DoorOutputWiring, tells("the relay that is driven.")]
+    inputs: Annotated[DoorInputWiring, tells("the contacts that the driver reads.")] = (
+        DoorInputWiring()
+    )
+    outputs: Annotated[DoorOutputWiring, tells("the relay that the driver switches.")]
 
     def problems(self) -> Remarks:
         """Yield problems that involve more than one field."""
@@ -92,10 +94,13 @@ class DryContactDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unk
         if self.outputs.hold_open.flash is None:
             return
         if self.pulse is None:
-            text = "is for pulses: say pulse: {on_s: …, every_s: …}, or leave this out"
+            text = "is for pulses: write pulse: {on_s: …, every_s: …}, or delete flash"
             yield ("outputs", "hold_open", "flash"), text
         elif abs(self.pulse.on_s * 10 - round(self.pulse.on_s * 10)) > 1e-6:
-            text = f"with flash the module counts tenths of a second: not {self.pulse.on_s:g}"
+            text = (
+                f"with flash the module counts whole tenths of a second, and {self.pulse.on_s:g}"
+                " s is none"
+            )
             yield ("pulse", "on_s"), text
 
     def _feedback_problems(self) -> Remarks:

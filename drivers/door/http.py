@@ -35,7 +35,7 @@ class DoorInputFields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
     closed: Annotated[JsonFlag | None, tells("the door is closed.")] = None
     obstruction: Annotated[
         JsonFlag | None,
-        tells("somebody is in the doorway: a hold lasts until the doorway is clear."),
+        tells("somebody is in the doorway. A hold lasts until the doorway is clear."),
     ] = None
     fire: Annotated[JsonFlag | None, tells("the fire alarm; `on_fire` sets its effect.")] = None
 
@@ -50,7 +50,8 @@ class HttpDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_f
         Call, tells("switches this relay off, so that the operator closes the door.")
     ]
     held: Annotated[
-        JsonFlag | None, tells("the relay is on; without this field nothing proves that it is off.")
+        JsonFlag | None,
+        tells("the relay is on. Without this field nothing proves that the relay is off."),
     ] = None
     switches_off_after_s: Annotated[
         Timeout | None,
@@ -86,8 +87,8 @@ class HttpDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_f
 def _unsafe(settings: HttpDoorSettings) -> Iterator[Unsafe]:
     if settings.switches_off_after_s is None:
         text = (
-            "when the network dies nothing releases the door: let hold set the relay's own timer, and"
-            " write its time as switches_off_after_s"
+            "when the network dies nothing releases the door: let hold set the relay's own"
+            " timer, and write the timer's time as switches_off_after_s"
         )
         yield HOLD, ("hold",), text
 

@@ -40,7 +40,8 @@ class DoorPosition(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=
     """The door's position, from 0 (closed) to 100 (open). Any other number counts as a fault."""
 
     unknown: Annotated[
-        Word | None, tells("the number for an unknown position; then only the status counts.")
+        Word | None,
+        tells("the number for an unknown position. At this number only the status counts."),
     ] = None
     open_from: Annotated[
         Percent,
@@ -67,7 +68,7 @@ class OperatorFaults(InRegister, frozen=True, kw_only=True, forbid_unknown_field
 
     bits: Annotated[
         dict[Bit, Name],
-        tells("bit (0: least significant) -> fault; other bits are shown by number."),
+        tells("bit (0: least significant) -> fault. Other bits are shown by their number."),
     ] = msgspec.field(default_factory=dict)
 
 
@@ -97,7 +98,7 @@ class Parts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     errors: Annotated[OperatorFaults | None, tells("the operator's faults.")] = None
     obstruction: Annotated[
         RegisterBit | None,
-        tells("somebody is in the doorway: a hold lasts until the doorway is clear."),
+        tells("somebody is in the doorway. A hold lasts until the doorway is clear."),
     ] = None
     command: Annotated[HoldCommand | None, tells("the command that holds the door open.")] = None
 

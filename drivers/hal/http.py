@@ -43,7 +43,7 @@ JSON = {"Content-Type": "application/json"}
 
 _HINTS = {
     3: "redirects are not followed: put the final address in api_base",
-    4: "check api_base, the path, and token_file or login where the controller wants one",
+    4: "check api_base and the path, and give token_file or login if the controller needs one",
     5: "the controller's own software fails: look at its log",
 }
 
@@ -207,7 +207,7 @@ class HttpBus(Bus):
             return HalError(f"{where} cannot be reached: {failure.strerror or failure}")
         if reason := _tls_failure(error, self._settings.ca_file):
             return HalError(f"TLS with {where} fails: {reason}: check ca_file and api_base")
-        return HalError(f"{url}: no whole HTTP answer ({_cause(error)}): is it an HTTP server?")
+        return HalError(f"{url}: no complete HTTP answer ({_cause(error)}): is it an HTTP server?")
 
 
 def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":
@@ -243,7 +243,7 @@ def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":
     if scheme == "https":
         context = (
             create_urllib3_context()
-        )  # this context trusts no authority yet; each call's `verify` adds authorities
+        )  # trusts no authority yet, because each call's `verify` adds authorities
         context.sslsocket_class = tls_socket(dialler.deadline)
         adapter.poolmanager.connection_pool_kw["ssl_context"] = context
     return adapter

@@ -40,7 +40,8 @@ class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
     ] = None
     token_header: Annotated[
         Header | None,
-        tells("the token's header (`X-API-Key`); `Authorization: Bearer …` when absent."),
+        tells("""the header of the token (`X-API-Key`). Without this key the header is
+        `Authorization: Bearer …`."""),
     ] = None
     login: Annotated[
         Login | None, tells("the user and password of a controller without tokens.")
@@ -84,7 +85,10 @@ class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
             )
             yield ("login",), text
         if self.accept_unencrypted and not readable:
-            yield ("accept_unencrypted",), "no secret goes over the network readably: delete it"
+            yield (
+                ("accept_unencrypted",),
+                "no secret goes over the network unencrypted: delete this key",
+            )
 
 
 def _readable_secret(settings: HttpSettings) -> Literal["login", "token_file", ""]:
@@ -114,10 +118,10 @@ def warnings(settings: HttpSettings) -> Remarks:
 
 
 def needs(settings: HttpSettings) -> Needs:
-    """Return the controller's address as the need."""
+    """Return the permission to reach the controller's address."""
     return Needs(host=base(settings.api_base).host)
 
 
 def where(settings: HttpSettings) -> Where:
-    """Return the controller's address as the place."""
+    """Return the controller's address as the bus's place."""
     return Where(base(settings.api_base).url(""), local=False)

@@ -36,7 +36,7 @@ class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ] = None
     debounce_s: Annotated[
         DebounceSeconds | None,
-        tells("how long a change must last; the kind's default when absent."),
+        tells("how long a change must last. Without this key the kind's default counts."),
     ] = None
     bus: Annotated[
         OtherBus | None,

@@ -54,7 +54,7 @@ def warnings(wiring: LiftWiring) -> Remarks:
             yield path, text
     for signal in ("moving", "stopped", "up", "down"):
         reads_standing = signal == "stopped"
-        for _, path, text in _cut(table, signal, not reads_standing, "the car reads standing"):
+        for _, path, text in _cut(table, signal, not reads_standing, "the car reads as standing"):
             yield path, text
     if not wiring.floor_code.lines:
         yield from counts_down(wiring, wiring.floor_code.codes, ("floor_code", "codes"))
@@ -98,13 +98,14 @@ def notes(settings: LiftSettings, sees: Sees) -> Remarks:
     """Yield a note for each intended choice with side effects that the site should know."""
     if sees(Hazard.FIRE) and settings.alarm == "none":
         text = (
-            "a fire stops this lift for robots, and no topic tells the fleets of it (alarm: none)"
+            "a fire stops this lift for robots, but no topic tells the fleets about it"
+            " (alarm: none)"
         )
         yield ("alarm",), text
     untold = [h for h in ALARMED if sees(h) and h not in settings.alarm_on]
     if untold and settings.alarm != "none":
         many = "stops" if len(untold) == 1 else "stop"
-        text = f"{' and '.join(untold)} {many} this lift for robots, and the fleets are not told"
+        text = f"{' and '.join(untold)} {many} this lift for robots, but nobody tells the fleets"
         yield ("alarm_on",), text
 
 
@@ -181,8 +182,11 @@ def counts_down(settings: LiftSettings, codes: Mapping[int, str], path: tuple[st
         lowest, highest = levels[0], levels[-1]
         yield (
             path,
-            f"these numbers count down from {lowest} to {highest}, and floors has {lowest} as the"
-            " lowest: unless the controller counts from the top, one of the two is reversed",
+            (
+                f"these numbers fall from {lowest} to {highest}, but floors lists {lowest} as"
+                " the lowest: one of the two lists is reversed, if the controller does not count"
+                " from the top"
+            ),
         )
 
 
@@ -257,15 +261,16 @@ def _doors(wiring: LiftWiring) -> Remarks:
         elif needed and not single and not any(two):
             yield ("inputs",), f"no {prefix} contact: {prefix}, or {prefix}_opened and _closed"
         elif not needed and (single or any(two)):
-            yield ("inputs",), "a rear door is wired, and no floor has side: rear"
+            yield ("inputs",), "a rear door is wired, but no floor has side: rear"
         travel_s = wiring.limits.door_travel_s
         if single and wiring.limits.door_timeout_s <= travel_s:
             text = (
-                f"must be longer than door_travel_s ({travel_s:g} s): no opening would be in time"
+                f"must be longer than door_travel_s ({travel_s:g} s), because otherwise no door"
+                " opens in time"
             )
             yield ("limits", "door_timeout_s"), text
     if rear and outputs.door_open and not outputs.rear_door_open:
-        yield ("outputs",), "no rear_door_open, and some floors have side: rear"
+        yield ("outputs",), "no rear_door_open, but some floors have side: rear"
 
 
 def _motion(wiring: LiftWiring) -> Remarks:

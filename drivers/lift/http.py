@@ -89,11 +89,11 @@ def _path(settings: HttpLiftSettings, *below: str) -> tuple[str, ...]:
 def _rear_door(settings: HttpLiftSettings, found: LiftApi) -> Remarks:
     rear = any(stop.side is Side.REAR for stop in settings.stops().values())
     if rear and not found.state.rear_door:
-        yield _path(settings, "state"), "no rear_door, and some floors have side: rear"
+        yield _path(settings, "state"), "no rear_door, but some floors have side: rear"
     if found.state.rear_door and not rear:
         yield _path(settings, "state", "rear_door"), "no floor has side: rear"
     if rear and found.commands.door_open and not found.commands.rear_door_open:
-        text = "no rear_door_open, and some floors have side: rear"
+        text = "no rear_door_open, but some floors have side: rear"
         yield _path(settings, "commands"), text
 
 
@@ -110,8 +110,8 @@ def _unsafe(settings: HttpLiftSettings) -> Iterator[Unsafe]:
     for name, command in api_of(settings).commands.held().items():
         if command.switches_off_after_s is None:
             text = (
-                f"when the network dies nothing ends {name}: let ask set the gateway's own timer, and"
-                " write its time as switches_off_after_s"
+                f"when the network dies nothing ends {name}: let ask set the gateway's own"
+                " timer, and write the timer's time as switches_off_after_s"
             )
             yield name, _path(settings, "commands", name), text
 
@@ -142,15 +142,20 @@ def warnings(settings: HttpLiftSettings) -> Remarks:
     yield from checks.counts_down(settings, numbers(state.floor.values), path)
     yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
     if not state.motion:
-        yield _path(settings, "state"), "no motion: the car counts as standing at every landing"
+        yield (
+            _path(settings, "state"),
+            "no motion, so the car counts as standing at every landing",
+        )
     if not state.online and not state.age:
         text = (
-            "neither online nor age: a gateway that has lost the lift and repeats its last state is"
-            " believed"
+            "neither online nor age: the daemon would believe a gateway that has lost the"
+            " lift and repeats its last state"
         )
         yield _path(settings, "state"), text
     if not commands.cancel:
-        text = "no cancel: a call stays at the lift until it is served, also after a fault"
+        text = (
+            "no cancel: a call stays at the lift until the lift has served it, also after a fault"
+        )
         yield _path(settings, "commands"), text
     for name, command in commands.held().items():
         path = _path(settings, "commands", name)

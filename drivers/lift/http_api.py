@@ -36,15 +36,16 @@ HELD: Final[tuple[Held, ...]] = ("agv_mode_request", "door_open", "rear_door_ope
 class HeldCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A command that the driver switches on and off."""
 
-    ask: Annotated[Call, tells("asks for it.")]
+    ask: Annotated[Call, tells("the request that switches the command on.")]
     release: Annotated[
         Call | None,
-        tells("""ends the request. Without `release` the request lasts only a moment at the gateway,
-        and the driver repeats it in each scan while the command is on."""),
+        tells("""the request that switches the command off. Without `release` the command lasts only
+        a moment at the gateway, and the driver repeats `ask` in each scan while the command
+        is on."""),
     ] = None
     shown: Annotated[
         JsonFlag | None,
-        tells("the command is on; without this field nothing proves that it is off."),
+        tells("the command is on. Without this field nothing proves that the command is off."),
     ] = None
     switches_off_after_s: Annotated[
         Timeout | None,
@@ -81,7 +82,8 @@ class LiftCommands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
         dict[Name, Call], tells("landing -> its request. Give either `calls` or `call`.")
     ] = {}
     cancel: Annotated[
-        Call | None, tells("withdraws the call; without `cancel` a call stays until it is served.")
+        Call | None,
+        tells("withdraws the call. Without `cancel` a call stays until the lift has served it."),
     ] = None
 
     def held(self) -> dict[Held, HeldCommand]:

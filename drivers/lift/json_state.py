@@ -29,10 +29,10 @@ DOOR: Mapping[str | None, DoorReading] = {
 class JsonFloor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The field of the car's position."""
 
-    field: Annotated[Field, tells("the field that holds the position; null between floors.")]
+    field: Annotated[Field, tells("the field of the car's position. Null means between floors.")]
     values: Annotated[
         dict[Name, Value],
-        tells("landing -> its value; without `values` a landing's name is its value."),
+        tells("landing -> its value. Without `values` a landing's name is its value."),
     ] = {}
     between_floors: Annotated[list[Value], tells("the values for a car between floors.")] = []
 
@@ -52,7 +52,7 @@ class ListedStates(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """A field whose values stand for states. Each key except the field's own keys is a state, with a
     list of its values."""
 
-    field: Annotated[Field, tells("the field that holds it.")]
+    field: Annotated[Field, tells("the field of the value.")]
 
     def states(self) -> dict[str, list[Value]]:
         """Return the values of each state that has a value."""
@@ -110,7 +110,8 @@ class JsonLiftState(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     """The fields of a lift's answer. A field is a path of names with dots between them."""
 
     online: Annotated[
-        JsonFlag | None, tells("the gateway reaches the lift; otherwise there is no reading.")
+        JsonFlag | None,
+        tells("the gateway reaches the lift. While this flag is false, there is no reading."),
     ] = None
     age: Annotated[
         JsonNumber | None,

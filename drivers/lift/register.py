@@ -85,12 +85,12 @@ def _rear_door(settings: RegisterLiftSettings) -> Remarks:
     found = settings.map
     has_rear = bool(found.rear_door or found.rear_door_opened)
     if rear and not has_rear:
-        yield ("map",), "no rear_door, and some floors have side: rear"
+        yield ("map",), "no rear_door, but some floors have side: rear"
     if has_rear and not rear:
         path = "rear_door" if found.rear_door else "rear_door_opened"
         yield ("map", path), "no floor has side: rear"
     if rear and found.commands.door_open and not found.commands.rear_door_open:
-        yield ("map", "commands"), "no rear_door_open, and some floors have side: rear"
+        yield ("map", "commands"), "no rear_door_open, but some floors have side: rear"
 
 
 def warnings(settings: RegisterLiftSettings) -> Remarks:

@@ -39,7 +39,7 @@ class LiftCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_field
         then joined, bit by bit."""),
     ]
     ask: Annotated[Word, tells("the value of the request.")] = 1
-    release: Annotated[Word, tells("the value for no request, its safe value.")] = 0
+    release: Annotated[Word, tells("the safe value, which means no request.")] = 0
     read_back: Annotated[bool | None, READ_BACK] = None
     unit: Annotated[Unit | None, UNIT] = None
 
@@ -150,7 +150,10 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield ("calls",), "calls and call are two ways of calling: delete one of the two"
         for at, told in self._read_back().items():
             if len(told) > 1:
-                text = f"is another than for the other commands at {at}, which is read as a whole"
+                text = (
+                    f"differs from the other commands at {at}, but the daemon can only read the"
+                    " whole place back"
+                )
                 yield (*told[False], "read_back"), text
         taken: dict[str, int] = {}
         owners: dict[str, list[str]] = {}
@@ -198,10 +201,12 @@ class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     moving: Annotated[LiftFlag | None, tells("the car moves, up or down.")] = None
     stopped: Annotated[LiftFlag | None, tells("the car stands.")] = None
     up: Annotated[
-        LiftFlag | None, tells("the car moves up; without `up` and `down` the car stands.")
+        LiftFlag | None,
+        tells("the car moves up. The car stands while neither `up` nor `down` is on."),
     ] = None
     down: Annotated[
-        LiftFlag | None, tells("the car moves down; without `up` and `down` the car stands.")
+        LiftFlag | None,
+        tells("the car moves down. The car stands while neither `up` nor `down` is on."),
     ] = None
     service: Annotated[
         ServiceField | None, tells("the lift's service state; it may include hazards and AGV mode.")
@@ -238,7 +243,7 @@ class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
             yield ("up" if self.up else "down",), "up and down belong together: write both"
         ways = [name for name in ("motion", "moving", "stopped", "up") if getattr(self, name)]
         if len(ways) > 1:
-            yield (ways[1],), f"{' and '.join(ways)} are several ways of motion: keep one"
+            yield (ways[1],), f"{' and '.join(ways)} give the motion in several ways: keep one"
 
     def parts(self) -> dict[str, Number | LiftFlag]:
         """Return each part that the driver reads, by its name."""

@@ -15,7 +15,7 @@ from drivers.hal.modbus.registers import REGISTERS, Unit, Word, at
 from drivers.lift.wiring import ServiceState
 from drivers.numbers import Bit
 
-UNIT: Final = tells("the unit with this place, if it is another than the device's `unit`.")
+UNIT: Final = tells("the unit of this place, if it is not the device's `unit`.")
 
 
 class AtUnit(Protocol):
@@ -32,8 +32,8 @@ class AtUnit(Protocol):
 
 
 def place_of(part: AtUnit) -> str:
-    """Return a part's place, such as `coil 0`. If the part has its own unit, return for example `unit 2
-    coil 0`."""
+    """Return a part's place, such as `coil 0`. If the part has its own unit, return for example
+    `unit 2 coil 0`."""
     return part.at if part.unit is None else f"unit {part.unit} {part.at}"
 
 
@@ -56,10 +56,13 @@ class NumberField(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=T
     """A number in a register."""
 
     bits: Annotated[
-        list[Bit], tells("the bits, least significant first; the whole register when absent.")
+        list[Bit],
+        tells("""the bits of the number, least significant first. Without `bits` the number is the
+        whole register."""),
     ] = msgspec.field(default_factory=list)
     valid_when: Annotated[
-        Literal["agv_mode"] | None, tells("`agv_mode` if it is valid only while AGV mode is on.")
+        Literal["agv_mode"] | None,
+        tells("`agv_mode` if the number is valid only while AGV mode is on."),
     ] = None
     unit: Annotated[Unit | None, UNIT] = None
 
@@ -161,7 +164,8 @@ class LiftFlag(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
     bit: Annotated[Bit | None, tells("the bit's number; 0 is the least significant.")] = None
     active: Annotated[Literal["high", "low"], tells("the asserted level; `high` is 1.")]
     valid_when: Annotated[
-        Literal["agv_mode"] | None, tells("`agv_mode` if it is valid only while AGV mode is on.")
+        Literal["agv_mode"] | None,
+        tells("`agv_mode` if the flag is valid only while AGV mode is on."),
     ] = None
     unit: Annotated[Unit | None, UNIT] = None
 
@@ -179,6 +183,6 @@ class LiftFlag(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
         bit."""
         yield from super().problems()
         if self.is_in(*REGISTERS) and self.bit is None:
-            yield ("bit",), "a flag is one bit of a register: say which"
+            yield ("bit",), "a flag is one bit of a register: give the bit"
         if self.is_in("coil", "discrete input") and self.bit is not None:
             yield ("bit",), "is for registers: a coil or discrete input is one bit already"

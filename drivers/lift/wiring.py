@@ -47,7 +47,7 @@ class ParityInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 class MotionCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The car's motion as a number on several lines."""
 
-    bits: Annotated[list[LiftInput], tells("least significant first.")]
+    bits: Annotated[list[LiftInput], tells("the number's lines, least significant first.")]
     codes: Annotated[
         dict[Number, Literal["stopped", "up", "down", "moving"]],
         tells("number -> motion; an unlisted number is a fault."),
@@ -71,7 +71,7 @@ ServiceState = Literal[
 class ServiceCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The lift's service state as a number on several lines."""
 
-    bits: Annotated[list[LiftInput], tells("least significant first.")]
+    bits: Annotated[list[LiftInput], tells("the number's lines, least significant first.")]
     codes: Annotated[
         dict[Number, ServiceState],
         tells("""number -> state. List every number. Write `fault` for a number that the controller
@@ -129,10 +129,12 @@ class LiftInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
     moving: Annotated[LiftInput | None, tells("the car moves, up or down.")] = None
     stopped: Annotated[LiftInput | None, tells("the car stands.")] = None
     up: Annotated[
-        LiftInput | None, tells("the car moves up; without `up` and `down` the car stands.")
+        LiftInput | None,
+        tells("the car moves up. The car stands while neither `up` nor `down` is on."),
     ] = None
     down: Annotated[
-        LiftInput | None, tells("the car moves down; without `up` and `down` the car stands.")
+        LiftInput | None,
+        tells("the car moves down. The car stands while neither `up` nor `down` is on."),
     ] = None
     motion: Annotated[MotionCode | None, tells("motion as a code.")] = None
 
@@ -142,18 +144,18 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
     encoding: Annotated[
         Literal["binary", "gray", "bcd", "one_hot"],
-        tells("how the lines show the landing; `one_hot` is one line for each."),
+        tells("how the lines show the landing. With `one_hot` each landing has a line."),
     ]
     bits: Annotated[list[LiftInput], tells("the number's lines, least significant first.")] = []
     codes: Annotated[dict[Number, Name], tells("number -> landing.")] = {}
     parity: Annotated[ParityInput | None, tells("a line that reveals a broken line.")] = None
     lines: Annotated[
         dict[Name, LiftInput],
-        tells("with `one_hot`, landing -> its line; between floors no line is asserted."),
+        tells("landing -> its line, with `one_hot`. Between floors no line is asserted."),
     ] = {}
     between_floors: Annotated[
         list[Number],
-        tells("the numbers for a car between floors; other unlisted numbers are a fault."),
+        tells("the numbers for a car between floors. Any other unlisted number is a fault."),
     ] = msgspec.field(default_factory=lambda: [0])
 
     def inputs(self) -> Iterator[tuple[str, tuple[str, ...], LiftInput]]:
@@ -218,7 +220,7 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 class CallCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Calls as a binary number on several lines. The number 0 means no call."""
 
-    bits: Annotated[list[Output], tells("least significant first.")]
+    bits: Annotated[list[Output], tells("the number's lines, least significant first.")]
     codes: Annotated[dict[Number, Name], tells("number -> landing.")]
 
     def lines(self, level: str | None) -> dict[str, bool]:

@@ -67,7 +67,7 @@ class Profile(Generic[Content]):
                 self.load(name)
             except SettingsError as error:
                 for problem in error.problems:
-                    yield ("profile",), f"the profile is not right: {problem}"
+                    yield ("profile",), f"the profile has a problem: {problem}"
 
     def warnings(self, name: str | None, advice: str) -> Remarks:
         """Yield a warning for a make's profile that nobody has tried on hardware. `advice` tells the

@@ -1,10 +1,10 @@
 """Xnergy's receiver as a CANopen node: `canopen.LocalNode`, with a plant behind its objects.
 
-Failing parts, in addition to those of plant and bus:
+These parts can fail, in addition to the parts of plant and bus:
 
-|           | off    | stuck              | slow              | garbage        | wrong                |
-| node      | silent | no SDO is answered | answers come late | of five bytes  | about another object |
-| heartbeat | none   | none               | each second       | of three bytes | state `stopped`    |
+|           | off    | stuck          | slow         | garbage            | wrong                  |
+| node      | silent | answers no SDO | answers late | answers five bytes | answers another object |
+| heartbeat | none   | none           | each second  | has three bytes    | state `stopped`        |
 
 A node that is `off` loses its power, and sends its boot-up message when it is back.
 """

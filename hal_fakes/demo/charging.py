@@ -159,7 +159,7 @@ def _wrong_station(world: World, fleets: DemoFleets) -> None:
     _sent(world, ONE, f"charge at {A}")
     fleets.strays(ONE, "dock_b")
     _error(world, B, f"wrong docking: tiny/{ONE}", ONE)
-    world.shows(f"{A} is kept for it", lambda: world.charger_is(A, "ASSIGNED", ONE), 2)
+    world.shows(f"{A} is kept for {ONE}", lambda: world.charger_is(A, "ASSIGNED", ONE), 2)
     _sent(world, ONE, "wait at wait_1")
     _sent(world, ONE, f"charge at {A}")
     _charges(world, A, ONE)
@@ -258,7 +258,7 @@ DEMO: Final = Demo(
         "2 ad-hoc": f"{TWO}'s fleet requested a charge, an operator another for {PORTER}: both charged",
         "3 stacked": f"{TWO} waited, a person was told who blocks {B}, and {TWO} was next there",
         "4 wrong station": f"{B} gave {ONE} no power; {ONE} was sent to {A} and charged there",
-        "5a station faulty": f"{ONE} was charged twice at the other charger, and is not suspected",
+        "5a station faulty": f"{ONE} was charged twice at the other charger: it is not suspected",
         "5b robot faulty": f"{TWO} was tried at two chargers only; {ONE} was charged meanwhile",
     },
 )

@@ -156,7 +156,10 @@ def _lift(journal: Journal) -> Iterable[str]:
     ours = [s for s in states if s.session_id == SESSION]
     opened = _in_order(s.current_floor for s in ours if s.door_state == d.LiftDoor.DOOR_OPEN)
     if opened != [FROM, TO]:
-        yield f"{LIFT} was open for us at {' '.join(opened) or 'no floor'}, expected {FROM} {TO}"
+        yield (
+            f"{LIFT} was open for the robot at {' '.join(opened) or 'no floor'}, expected"
+            f" {FROM} {TO}"
+        )
     sessions = _in_order(s.session_id for s in states)
     if sessions != ["", SESSION, ""]:
         seen = ", ".join(session or "none" for session in sessions)

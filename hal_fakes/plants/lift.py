@@ -116,7 +116,8 @@ class LiftPlant(WiredPlant):
             self._people.append(self._levels.index(signal.removeprefix("hall_")))
 
     def fail(self, part: str, mode: FailureMode | None) -> None:
-        """Make a wire or part fail; None mends it. Raises ValueError with the known names."""
+        """Let a wire or part fail in this mode. The mode None repairs the part. Raises ValueError with
+        the known names."""
         if mode is not None and mode not in FAILS.get(part, (mode,)):
             raise ValueError(f"{part} does not fail by {mode!r}, but by {', '.join(FAILS[part])}")
         super().fail(part, mode)

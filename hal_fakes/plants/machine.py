@@ -113,7 +113,8 @@ class WiredPlant(ABC):
         self._parts |= {*parts}
 
     def fail(self, part: str, mode: FailureMode | None) -> None:
-        """Make a wire or part fail. None mends it. Raises ValueError with the known parts."""
+        """Let a wire or part fail in this mode. The mode None repairs the part. Raises ValueError with
+        the known parts."""
         contact = self._sensors.get(part) or self._relays.get(part)
         if contact is None and part not in self._parts:
             known = ", ".join(self.names()["fail"])

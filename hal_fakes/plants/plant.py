@@ -58,7 +58,8 @@ class Plant(Protocol):
         """Add parts of the far side that can fail for this plant."""
 
     def fail(self, part: str, mode: FailureMode | None) -> None:
-        """Make a signal or part fail. None mends it. Raises ValueError with the known parts."""
+        """Let a wire or part fail in this mode. The mode None repairs the part. Raises ValueError with
+        the known parts."""
 
     def names(self) -> Mapping[str, list[str]]:
         """Return the names for `press` and `fail`."""

@@ -178,4 +178,4 @@ def test_a_charger_is_warned_that_a_charge_goes_on_while_the_other_bus_is_not_re
     text = text.replace("charger_e:", "charger_e:\n    bus: module")
     old = 'fault: {point: "unit 1 discrete input 2", active: low}'
     file.write_text(text.replace(old, "fault: {bus: header, point: BCM4, active: low, pull: down}"))
-    assert "'fault' cannot end it" in " ".join(map(str, load(file).warnings))
+    assert "'fault' cannot end the charge" in " ".join(map(str, load(file).warnings))

@@ -41,8 +41,8 @@ def test_the_door_itself_is_right_and_warns_of_nothing(file: Path) -> None:
 
 
 KEEPS = (
-    "when this machine or the cable dies: arm the watchdog of the module (module_watchdog), or say why"
-    " that is safe (without_watchdog)"
+    "when this machine or the cable dies: arm the watchdog of the module (module_watchdog), or write"
+    " why that is safe (without_watchdog)"
 )
 BARE = door().replace(", without_watchdog: {1: a bench}", "")
 WATCHED = door(f"{TCP}, module_watchdog: {{units: [1], profile: wago-750}}")
@@ -64,7 +64,7 @@ def test_why_a_unit_may_keep_its_outputs_is_noted(file: Path) -> None:
         "5:75: note: bus 'module': unit 1 has no module_watchdog: a bench"
     ]
     assert warnings_of(file, door().replace("{1: a bench}", "{1: a bench, 3: x}")) == [
-        "5:87: warning: bus 'module': nothing is written to unit 3: delete this"
+        "5:87: warning: bus 'module': the daemon writes nothing to unit 3: delete this entry"
     ]
     assert problems_of(file, WATCHED) == [
         "5:125: 'without_watchdog': unit 1 is in module_watchdog too: delete one of the two"
@@ -168,5 +168,5 @@ def test_an_alarm_that_is_believed_late_is_warned_of(file: Path) -> None:
     )
     text = door().replace(fire[0], f"{fire[1]}\n{fire[0]}") + "    on_fire: open\n"
     assert warnings_of(file, text) == [
-        "11:71: warning: 'ward': fire is believed only after 10 s: contacts bounce for 0.05 s"
+        "11:71: warning: 'ward': fire counts only after 10 s: contacts bounce for 0.05 s"
     ]

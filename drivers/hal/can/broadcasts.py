@@ -103,7 +103,7 @@ class Broadcasts:
         )
 
     def check_pace(self, frame: str, every_s: float) -> None:
-        """Raise HalError if scans are too far apart to send this frame on time."""
+        """Raise HalError if `scan_s` is too long to send this frame on time."""
         scan_s = self._bus.settings.scan_s
         if every_s < scan_s:
             raise HalError(
@@ -122,7 +122,7 @@ class Broadcasts:
         return True
 
     def feed_at_once(self) -> None:
-        """Make every frame due at once, because its content changes."""
+        """Make every frame due at once. The caller does this when the contents of the frames change."""
         self._sent_at.clear()
 
     def _hearer(self, name: str, length: int) -> Callable[[Frame, float], None]:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 FRAMES_AT_ONCE: Final = 20_000
 """The maximum number of frames in a reading. A bus at 1 Mbit/s has about 8,000 frames a second."""
 HANG_S: Final = 1.0
-"""The delay (s) between readings that proves that the daemon has hung. The period of scans is added."""
+"""The delay (s) of a reading, beyond the period of scans, from which the daemon counts as hung."""
 ROUTES_MAX: Final = 4096
 RECENT_S: Final = 5.0
 OTHERS_MAX: Final = 64

@@ -50,7 +50,8 @@ class GpioSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
     chip: Annotated[
         Annotated[int, msgspec.Meta(ge=0, le=255)] | None,
-        tells("the number of `/dev/gpiochipN`; found by its label `pinctrl-…` when absent."),
+        tells("""the number N of `/dev/gpiochipN`. Without it the daemon finds the chip by its label
+        `pinctrl-…`."""),
     ] = None
     scan_s: Annotated[Period, tells("how often every input is read.")] = 0.05
 
@@ -61,8 +62,8 @@ def where(settings: GpioSettings) -> Where:
 
 
 def needs(settings: GpioSettings) -> Needs:
-    """Return the chip in the settings as the need. Without a chip in the settings, return every chip,
-    because the bus opens each chip to read its label."""
+    """Return the permission to use the chip in the settings. Without a chip in the settings, return the
+    permission for every chip, because the bus opens each chip to read its label."""
     chip = "char-gpiochip" if settings.chip is None else f"/dev/gpiochip{settings.chip}"
     return Needs((chip,), group="gpio")
 

@@ -56,7 +56,7 @@ def _holder(handle: int, chip: int, line: int) -> str:
     if not label:
         return ""
     names = " or ".join(holders(Path(f"/dev/gpiochip{chip}"))) or repr(label)
-    return f"; it is held by {names}: stop that, or take another pin"
+    return f"; it is held by {names}: stop the holder, or take another pin"
 
 
 def _open(chip: int, dev: Path) -> int:

@@ -10,36 +10,12 @@ from collections.abc import Iterable
 from drivers.hal.points import Wire
 
 # Position -> BCM number, for the 40-pin header. The header is the same on every Raspberry Pi since the
-# B+ (2014). fmt: off
+# B+ (2014).
+# fmt: off
 J8 = {
-    3: 2,
-    5: 3,
-    7: 4,
-    8: 14,
-    10: 15,
-    11: 17,
-    12: 18,
-    13: 27,
-    15: 22,
-    16: 23,
-    18: 24,
-    19: 10,
-    21: 9,
-    22: 25,
-    23: 11,
-    24: 8,
-    26: 7,
-    27: 0,
-    28: 1,
-    29: 5,
-    31: 6,
-    32: 12,
-    33: 13,
-    35: 19,
-    36: 16,
-    37: 26,
-    38: 20,
-    40: 21,
+    3: 2, 5: 3, 7: 4, 8: 14, 10: 15, 11: 17, 12: 18, 13: 27, 15: 22, 16: 23, 18: 24, 19: 10,
+    21: 9, 22: 25, 23: 11, 24: 8, 26: 7, 27: 0, 28: 1, 29: 5, 31: 6, 32: 12, 33: 13, 35: 19,
+    36: 16, 37: 26, 38: 20, 40: 21,
 }
 # fmt: on
 POSITION = {bcm: position for position, bcm in J8.items()}
@@ -113,9 +89,14 @@ def wire_problems(wire: Wire) -> Iterable[str]:
     elif wire.pull is not None:
         yield "an output has no pull"
     elif not wire.read_back:
-        yield "read_back is for the coils of a module; a pin keeps its level: delete read_back"
+        yield (
+            "read_back is for the coils of a module, but a pin keeps its level: delete read_back"
+        )
     elif wire.flash is not None:
-        yield "flash is for modules that time pulses; the daemon times a pin's pulses: leave flash out"
+        yield (
+            "flash is for modules that time pulses, but the daemon times a pin's pulses:"
+            " delete flash"
+        )
     elif name in HAT_EEPROM:
         yield f"{name} belongs to the HAT EEPROM, and the firmware drives it at boot: use another"
 

@@ -75,13 +75,13 @@ class ClearedCalls:
         if self._in_a_row.get(name, 0) >= TWICE and name not in self._told:
             self._told.add(name)
             text = (
-                f"{place} loses each written call within a scan: a controller that takes the call"
-                " clears its place, so write read_back: false at this command; or another master"
-                " writes the place too"
+                f"{place} loses each written call within a scan. If the controller takes each"
+                " call and clears its place, write read_back: false at this command. Otherwise"
+                " another master writes the place too"
             )
             log.warning(pairs("call_cleared", place=place, reason=text))
 
     def _without_call(self, name: str, written: int) -> int:
-        """Return the value that a place has after it has cleared its call."""
+        """Return the value of the place when the call of `written` is cleared."""
         bits = self._clearing[name].bits if name in self._clearing else 0
         return (written & ~bits) | (self._safe[name] & bits)

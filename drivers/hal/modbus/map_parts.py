@@ -80,7 +80,7 @@ class WrittenLevels(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fiel
         not fit the place."""
         yield from super().problems()
         if self.value(True) == self.value(False):
-            yield (self.OFF,), f"is the value of {self.ON}"
+            yield (self.OFF,), f"is the value of {self.ON} too"
         for key in (self.ON, self.OFF):
             if getattr(self, key) > 1 and self.is_in("coil"):
                 yield (key,), "a coil is 0 or 1"

@@ -123,9 +123,7 @@ class SerialLine:
             timeout=0,
             exclusive=True,
         )
-        with suppress(
-            OSError, ValueError
-        ):  # some adapters refuse this; they deliver after up to 16 ms
+        with suppress(OSError, ValueError):  # adapters that refuse this delay bytes by up to 16 ms
             port.set_low_latency_mode(True)
         return port
 

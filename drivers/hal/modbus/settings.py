@@ -78,7 +78,7 @@ def unwatched(settings: ModbusSettings, places: Iterable[str]) -> UnwatchedOutpu
         if unit in written:
             accepted.append((path, f"unit {unit} has no module_watchdog: {why}"))
         else:
-            idle.append((path, f"nothing is written to unit {unit}: delete this"))
+            idle.append((path, f"the daemon writes nothing to unit {unit}: delete this entry"))
     return UnwatchedOutputs([*warned, *idle], accepted)
 
 
@@ -94,8 +94,10 @@ def paced(
     if len(units) > 1 and silent_s + settings.scan_s > stale_s:
         yield (
             ("timeout_s",),
-            f"one silent unit holds up the others for {silent_s:g} s, timeout_s for each try, and their"
-            f" readings are stale after {stale_s:g} s: lower timeout_s or retries",
+            (
+                f"one silent unit delays the others by {silent_s:g} s (timeout_s for each try),"
+                f" but their readings are stale after {stale_s:g} s: lower timeout_s or retries"
+            ),
         )
     line = settings.serial
     if line and (round_s := len(units) * line.least_s) > settings.scan_s:
@@ -119,8 +121,8 @@ def _bare(units: Sequence[int]) -> str:
     if len(units) > 1:
         which, keep = f"units {', '.join(map(str, units))}", "keep their outputs"
     return (
-        f"{which} {keep} when this machine or the cable dies: arm the watchdog of the module"
-        " (module_watchdog), or say why that is safe (without_watchdog)"
+        f"{which} {keep} when this machine or the cable dies: arm the watchdog of the"
+        " module (module_watchdog), or write why that is safe (without_watchdog)"
     )
 
 
@@ -144,7 +146,7 @@ def where(settings: ModbusSettings) -> Where:
 
 
 def needs(settings: ModbusSettings) -> Needs:
-    """Return the line's port, or the module's address."""
+    """Return the permission to use the line's port, or to reach the module's address."""
     if settings.serial:
         return serial_port.needs(settings.serial.port)
     assert settings.tcp  # otherwise `problems` has reported the missing address

@@ -9,7 +9,7 @@ from drivers.hal.modbus import frames
 from drivers.hal.modbus.wire import BadReply, NoReply, UnitReply, UnitRequest, Unreachable
 
 NUMBERS: Final = 0xFFFF
-"""The highest transaction number; the lowest is 1. The number 0 stays free for gateways that do not
+"""The highest transaction number. The lowest is 1. The number 0 stays free for gateways that do not
 number their replies."""
 
 
@@ -77,7 +77,7 @@ class Connection:
         self._socket.settimeout(self._dialler.deadline.left())
         received = self._socket.recv(4096)
         if not received:
-            raise ConnectionResetError("the far side hung up")
+            raise ConnectionResetError("the far side has closed the connection")
         return received
 
     def _unreachable(self, error: OSError) -> str:

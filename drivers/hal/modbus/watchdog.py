@@ -30,7 +30,8 @@ class Refresh(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         list[Word],
         msgspec.Meta(min_length=1),
         tells(
-            "the values, written in turn, because some modules ignore a value equal to the last."
+            """the values, which the daemon writes in turn. Some modules ignore a value that equals
+        the last."""
         ),
     ]
 
@@ -57,14 +58,17 @@ class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ]
     refresh: Annotated[Refresh, tells("the write that prevents a trip.")]
     refresh_s: Annotated[Period, tells("the period of this write; at most half of `time_s`.")]
-    tripped: Annotated[list[Shows], tells("places; at least one matches after a trip.")] = []
+    tripped: Annotated[
+        list[Shows], tells("places, of which at least one matches after a trip.")
+    ] = []
     rearm: Annotated[list[RegisterWrite], tells("the writes that end a trip, before `arm`.")] = []
 
     def problems(self) -> Remarks:
         """Yield a problem for a refresh that would come too late."""
         if self.refresh_s > self.time_s / 2:
             text = (
-                f"one late scan would drop the outputs: at most {self.time_s / 2:g}, half of time_s"
+                f"one late scan would switch the outputs off: write at most {self.time_s / 2:g},"
+                " half of time_s"
             )
             yield ("refresh_s",), text
 
@@ -75,7 +79,8 @@ class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     units: Annotated[list[Unit], msgspec.Meta(min_length=1), tells("the units with a watchdog.")]
     profile: Annotated[Name | None, tells("a file of drivers/profiles/ for the watchdog.")] = None
     habits: Annotated[
-        Habits | None, tells("the use of the watchdog, written here instead of a profile.")
+        Habits | None,
+        tells("the registers and times of the watchdog, written here instead of a profile."),
     ] = None
 
     def problems(self) -> Remarks:

@@ -148,7 +148,7 @@ class MqttBus(Bus):
         """Return the topic's last message in this connection. Return None without a message. Raises
         HalError."""
         if reason := self.up().refused.get(topic):
-            raise HalError(f"the broker does not let us read {topic}: {reason}")
+            raise HalError(f"the broker refuses the subscription to {topic}: {reason}")
         return self._heard.get(topic)
 
     def fresh(self, topic: str, stale_after_s: float = math.inf) -> Heard:

@@ -2,8 +2,8 @@
 is never used again.
 
 Each connection has a client of its own and a clean session, so it sends nothing of an earlier
-connection. paho would repeat unconfirmed messages after a reconnect. But nobody may repeat an "on" of a
-minute ago. A thread serves the connection, and ends with the connection.
+connection. paho would repeat unconfirmed messages after a reconnect. An "on" of a minute
+ago must not be sent again. A thread serves the connection, and ends with the connection.
 
 The protocol allows packets of 256 MB. With MQTT 5 the link tells the broker its limit (Maximum Packet
 Size, section 3.1.2.11.4), and the broker holds longer packets back. MQTT 3.1.1 has no such limit. With
@@ -153,10 +153,13 @@ class Link(threading.Thread):
     def _on_connect(self, _c: Any, _u: Any, flags: Any, reason: ReasonCode, _p: Any) -> None:
         if reason.is_failure:
             self._fail(
-                f"the broker refuses us: {str(reason).lower()}: check user and password_file"
+                f"the broker refuses the connection: {str(reason).lower()}: check user and"
+                " password_file"
             )
         elif flags.session_present:
-            self._fail("the broker has kept an old session, although we asked for a clean one")
+            self._fail(
+                "the broker has kept an old session, although the daemon asked for a clean session"
+            )
         elif self._topics:
             self.subscribe(self._topics)
         else:

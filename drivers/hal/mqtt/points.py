@@ -24,21 +24,25 @@ class MqttPoint(
     """A contact or relay behind a broker. A profile gives the topics, payloads and fields of a make."""
 
     profile: Annotated[
-        Profile | None, tells("the make; when absent, the keys from `topic` on are written here.")
+        Profile | None, tells("the make. Without `profile`, write the keys from `topic` on here.")
     ] = None
     device: Annotated[
         Topic | None,
-        tells("with a profile, the device's name on MQTT, with which its topics begin."),
+        tells(
+            "with a profile, the device's name on MQTT. The device's topics begin with this name."
+        ),
     ] = None
     part: Annotated[
         Name | None, tells("with a profile, the relay or input: `switch:0`, `POWER1`, `contact`.")
     ] = None
     topic: Annotated[Topic | None, tells("where the device publishes the state.")] = None
     field: Annotated[
-        Field | None, tells("the field of the JSON payload; the whole payload when absent.")
+        Field | None,
+        tells("the field of the JSON payload. Without `field` the whole payload is the value."),
     ] = None
     when: Annotated[
-        list[Value], tells("the values that mean on; without them the value must be true or false.")
+        list[Value],
+        tells("the values that mean on. Without `when` the value must be true or false."),
     ] = []
     when_not: Annotated[
         list[Value], tells("with `when`, the values that mean off. Any other value is a fault.")
@@ -135,11 +139,14 @@ def decoded(payload: bytes) -> object:
 
 def _state_problems(point: MqttPoint) -> Remarks:
     if point.topic is None and point.command is None:
-        yield (), "needs topic, for a state, or command, for a relay; or a profile"
+        yield (), "needs topic (for a state), command (for a relay), or a profile"
     if point.topic and point.stale_after_s is None:
         yield (), "needs stale_after_s: the age from which this state is unknown"
     if bool(point.when) != bool(point.when_not):
-        yield ("when",), "when and when_not need each other: any other value is then a fault"
+        yield (
+            ("when",),
+            "when and when_not need each other, because any other value is then a fault",
+        )
     for value in point.when:
         if any(json_fields.same(value, other) for other in point.when_not):
             yield ("when_not",), f"{value} is in when too"

@@ -32,11 +32,14 @@ class BrokerTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         file the public authorities are trusted."""),
     ] = None
     certificate_file: Annotated[
-        AbsolutePath | None, tells("a PEM file with our certificate, for a broker that wants one.")
+        AbsolutePath | None,
+        tells("a PEM file with the daemon's certificate, for a broker that requires one."),
     ] = None
     key_file: Annotated[
         AbsolutePath | None,
-        tells("a PEM file with its private key, which only the daemon may read."),
+        tells(
+            "a PEM file with the private key of this certificate, which only the daemon may read."
+        ),
     ] = None
 
     def problems(self) -> Remarks:
@@ -63,18 +66,19 @@ class MqttSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
     tls: Annotated[BrokerTls | None, tells("encryption, and the authorities that are trusted.")] = (
         None
     )
-    user: Annotated[Name | None, tells("our name at the broker.")] = None
+    user: Annotated[Name | None, tells("the daemon's user name at the broker.")] = None
     password_file: Annotated[
-        Name | None, tells("a file with our password, which only the daemon may read.")
+        Name | None, tells("a file with the user's password, which only the daemon may read.")
     ] = None
     client_id: Annotated[
         Name | None,
-        tells("our client id, for a broker that grants rights by it; a random one when absent."),
+        tells("""the daemon's client id, for a broker that grants rights by client id. Without it the
+        id is random."""),
     ] = None
     keepalive_s: Annotated[
         int,
         msgspec.Meta(ge=1, le=60, extra={"unit": "s"}),
-        tells("after this silence the broker is asked for a sign of life."),
+        tells("the silence after which the daemon asks the broker for a sign of life."),
     ] = 5
     timeout_s: Annotated[
         Confirmation, tells("how long a connection, or the broker's confirmation, may take.")
@@ -109,7 +113,10 @@ class MqttSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
         for name, point in self.points.items():
             off_s = point.switches_off_after_s
             if off_s is not None and off_s < least_s:
-                text = f"is {off_s:g}, but renewed every {self.scan_s:g} s (scan_s): write at least"
+                text = (
+                    f"is {off_s:g}, but the daemon renews it only every {self.scan_s:g} s (scan_s):"
+                    " write at least"
+                )
                 path = ("points", name, "switches_off_after_s")
                 yield path, f"switches_off_after_s {text} {least_s:g}"
 
@@ -131,7 +138,10 @@ def _used_twice(points: Mapping[str, MqttPoint]) -> Remarks:
         for key, topic in _written(point):
             if topic in states:
                 whose = f"{topic} is the state topic of '{states[topic]}'"
-                yield _at(point, name, key), f"{whose}: the {key} would be taken for a state"
+                yield (
+                    _at(point, name, key),
+                    f"{whose}: the daemon would take the {key} for a state",
+                )
 
 
 def _uses(point: MqttPoint) -> Iterator[tuple[str, object]]:
@@ -183,12 +193,12 @@ def warnings(settings: MqttSettings) -> Remarks:
 
 
 def needs(settings: MqttSettings) -> Needs:
-    """Return the broker's address as the need."""
+    """Return the permission to reach the broker's address."""
     return Needs(host=settings.host)
 
 
 def where(settings: MqttSettings) -> Where:
-    """Return the broker's address as the place."""
+    """Return the broker's address as the bus's place."""
     host, port = settings.address()
     return Where(f"{host}:{port}", local=False)
 

@@ -92,7 +92,8 @@ class RelayCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     qos: Annotated[
         Qos,
         tells(
-            "1: the broker confirms the message, and repeats it to the device; 0: it does neither."
+            """1: the broker confirms the message, and repeats it to the device; 0: the broker does
+        neither."""
         ),
     ] = 1
 

@@ -157,8 +157,8 @@ def test_height_and_range_are_signals_of_the_map_and_without_them_there_is_no_re
     [
         ("0008000000000000", "robot", "the receiver is too hot"),
         ("0000010000000000", "robot", "the receiver has lost the station"),
-        ("0000000100000000", "robot", "the receiver misses our frames"),
-        ("0000000000010000", "station", "the station's grid supply is not right"),
+        ("0000000100000000", "robot", "the receiver misses the daemon's frames"),
+        ("0000000000010000", "station", "the station's supply from the grid is faulty"),
         ("0000000000000100", "station", "the pad is not connected to the station"),
         (
             "0008000000000840",

@@ -280,7 +280,7 @@ def test_the_daemons_end_stops_or_keeps_as_the_yaml_says() -> None:
     [
         ("tiny/AMR01", "AMR01", "'AMR01' is not a robot: write FLEET/ROBOT, as RMF names them"),
         ("      receiver_id: pad.receiver", "      #", "receivers needs the field"),
-        ("    stop: {path: /output/off}", "", "needs stop as well"),
+        ("    stop: {path: /output/off}", "", "needs stop too"),
         ("      in_range:", "      #", "range_check needs the field"),
         ("""'{"enabled": true}'""", """'{"enabled": yes}'""", "is not JSON"),
         ("pad.receiver ", "pad..receiver ", "names with dots between them"),

@@ -134,7 +134,7 @@ def test_every_failure_is_a_driver_error(pad: Pad, part: str, mode: FailureMode)
         (
             "stop: {topic: tpu/b/set,",
             "stop: {topic: tpu/b/status,",
-            "tpu/b/status is a state topic: the command would be taken for a state",
+            "tpu/b/status is a state topic: the daemon would take the command for a state",
         ),
         (
             'stop: {topic: tpu/b/set, payload: "OFF"}',

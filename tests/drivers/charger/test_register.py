@@ -93,7 +93,7 @@ def test_two_receivers_with_long_ids_are_two() -> None:
 WRONG: dict[str, tuple[str, str]] = {
     "state: {at: input register 0}": (
         "stat: {at: input register 0}",
-        "'values' needs 'state', because codes is given",
+        "'values' needs 'state', because the map has codes",
     ),
     "{at: flags, ignore": ("{at: flagz, ignore", "unknown value 'flagz': did you mean 'flags'?"),
     "{at: coil 0, start: 1, stop: 0}": (
@@ -108,7 +108,7 @@ WRONG: dict[str, tuple[str, str]] = {
     "amps: {at:": ("aps: {at:", "unknown value 'aps': did you mean 'amps'?"),
     "in_range: {at: discrete input 0}": (
         "in_range: {at: discrete input 0, words: 2}",
-        "'at' is one bit: leave words, signed and bit out",
+        "'at' is one bit: delete words, signed and bit",
     ),
     "    unit: 3\n": (
         "    unit: 3\n    receivers: {a: fleet/robot}\n",

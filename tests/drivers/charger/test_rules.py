@@ -127,7 +127,7 @@ WRONG = {
     "    switches_off_after_s: 30 ": (
         "    #",
         "'charger_d': unsafe: when the network dies nothing switches the power off: let"
-        " start set the relay's own timer, and write its time as switches_off_after_s;"
+        " start set the relay's own timer, and write the timer's time as switches_off_after_s;"
         " or accept_unsafe: {power: <why it is safe here>}",
     ),
     "switches_off_after_s: 30 ": (

@@ -105,12 +105,12 @@ def test_the_shipped_door_is_sound() -> None:
         (
             {"outputs": {"hold_open": FLASHED}},
             "outputs.hold_open.flash",
-            "is for pulses: say pulse: {on_s: …, every_s: …}, or leave this out",
+            "is for pulses: write pulse: {on_s: …, every_s: …}, or delete flash",
         ),
         (
             {"outputs": {"hold_open": FLASHED}, "pulse": {"on_s": 0.75, "every_s": 3.0}},
             "pulse.on_s",
-            "with flash the module counts tenths of a second: not 0.75",
+            "with flash the module counts whole tenths of a second, and 0.75 s is none",
         ),
     ],
 )

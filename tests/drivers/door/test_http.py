@@ -168,7 +168,7 @@ WRONG = {
     "    switches_off_after_s: 10 ": (
         "",
         "unsafe: when the network dies nothing releases the door: let hold set the relay's"
-        " own timer, and write its time as switches_off_after_s;"
+        " own timer, and write the timer's time as switches_off_after_s;"
         " or accept_unsafe: {hold_open: <why it is safe here>}",
     ),
     "switches_off_after_s: 10 ": (

@@ -46,7 +46,7 @@ WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
         {"floors": {**TWO_FLOORS, "Ground": {"level": "G"}}, "inputs": inputs(**REAR)},
         [
             ("floors.Ground", "Ground and G are the same door of landing G"),
-            ("outputs", "no rear_door_open, and some floors have side: rear"),
+            ("outputs", "no rear_door_open, but some floors have side: rear"),
         ],
     ),
     (
@@ -120,7 +120,7 @@ WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
     ),
     (
         {"inputs": inputs(**REAR)},
-        [("inputs", "a rear door is wired, and no floor has side: rear")],
+        [("inputs", "a rear door is wired, but no floor has side: rear")],
     ),
     (
         {"floors": TWO_FLOORS, "outputs": {"rear_door_open": coil(5)}},
@@ -335,7 +335,7 @@ def test_accepting_wiring_that_does_not_exist_is_pointed_out() -> None:
         ({"inputs": inputs(code_blue=alarm(40), overload=line(41), manual_mode=line(42))}, []),
         (
             {"inputs": inputs(moving=line(40))},
-            [("inputs.moving", "with its wire cut, the car reads standing")],
+            [("inputs.moving", "with its wire cut, the car reads as standing")],
         ),
         ({"inputs": inputs(moving=alarm(40))}, []),
         ({"inputs": inputs(stopped=line(40))}, []),
@@ -424,14 +424,14 @@ def test_a_fire_that_no_topic_announces_is_noted_and_not_warned_of() -> None:
     silent = [
         (
             ("alarm",),
-            "a fire stops this lift for robots, and no topic tells the fleets of it (alarm: none)",
+            "a fire stops this lift for robots, but no topic tells the fleets about it (alarm: none)",
         )
     ]
     assert (list(notes(settings())), warned(settings())) == (silent, [])
     assert list(notes(settings(alarm="fire_alarm_trigger"))) == []
     assert list(notes(settings(inputs=inputs(fire_alarm=None)))) == []
     blue = inputs(code_blue={"point": "BCM27", "active": "low", "pull": "down"})
-    untold = "code_blue stops this lift for robots, and the fleets are not told"
+    untold = "code_blue stops this lift for robots, but nobody tells the fleets"
     assert list(notes(settings(alarm="emergency_signal", inputs=blue))) == [(("alarm_on",), untold)]
     both = ["fire_alarm", "code_blue"]
     assert list(notes(settings(alarm="emergency_signal", alarm_on=both, inputs=blue))) == []

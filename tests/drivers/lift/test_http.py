@@ -372,7 +372,7 @@ def test_a_restart_after_a_lost_answer_ends_no_ride() -> None:
             "          switches_off_after_s: 10                  # the same number as in `ask`\n",
             "",
             "unsafe: when the network dies nothing ends agv_mode_request: let ask set the gateway's"
-            " own timer, and write its time as switches_off_after_s; or accept_unsafe:"
+            " own timer, and write the timer's time as switches_off_after_s; or accept_unsafe:"
             " {agv_mode_request: <why it is safe here>}",
         ),
         ('{"floor": "{level}"}', "{}", '"{level}" into its body, or give calls'),

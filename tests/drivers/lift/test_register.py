@@ -219,7 +219,7 @@ CONTACTS = CONFIG.with_name("lift_gateway_contacts.yaml")
          "33:7: 'door_opened' needs both door_opened and door_closed"),
         ("      stopped: {", "      up: {", "35:7: up and down belong together: write both"),
         ("      stopped: {at", "      moving: {at: coil 9, active: high}\n      stopped: {at",
-         "36:7: moving and stopped are several ways of motion: keep one"),
+         "36:7: moving and stopped give the motion in several ways: keep one"),
         ("      stopped: {at", "      door: {at: input register 5, codes: {0: open, 1: closed}}"
          "\n      stopped: {at",
          "33:7: 'door_opened': door and its contacts are two ways: delete one of the two"),
@@ -243,7 +243,7 @@ def test_commands_of_one_register_are_read_back_together_or_not_at_all(tmp_path:
         "ask: 1, release: 0}", "ask: 1, release: 0, read_back: false}"
     )
     found = problems_of(tmp_path / "lift.yaml", text)
-    assert "which is read as a whole" in str(found)
+    assert "can only read the whole place back" in str(found)
 
 
 def test_a_cut_wire_of_an_alarm_at_a_module_is_warned_of(tmp_path: Path) -> None:

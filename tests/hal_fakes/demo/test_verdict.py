@@ -81,7 +81,7 @@ def state_after(states: list[Stated], after: Stated) -> Callable[[Journal], None
         ),
         (
             state_after([replace(OURS, current_floor="L2", door_state=2)], LIFT_STATES[4]),
-            "Lift1 was open for us at L1 L2 L3, expected L1 L3",
+            "Lift1 was open for the robot at L1 L2 L3, expected L1 L3",
         ),
         (
             state_after([replace(FREE, session_id="fleet/other")], LIFT_STATES[0]),

@@ -112,7 +112,7 @@ def test_a_pin_that_another_program_holds_is_named_with_its_holder(lgpio: StandI
     with pytest.raises(HalError) as refused:
         lines.claim()
     assert str(refused.value) == (
-        "BCM23: GPIO busy; it is held by 'gpiomon': stop that, or take another pin"
+        "BCM23: GPIO busy; it is held by 'gpiomon': stop the holder, or take another pin"
     )
     bus.close()
 

@@ -215,8 +215,8 @@ def test_a_post_with_another_status_fails(status: str) -> None:
     ("reply", "text"),
     [
         (answer(status="500 X"), "status 500: the controller's own software fails"),
-        (answer(status="404 X"), "status 404: check api_base, the path, and token_file"),
-        (answer(status="401 X"), "status 401: check api_base, the path, and token_file"),
+        (answer(status="404 X"), "status 404: check api_base and the path, and give token_file"),
+        (answer(status="401 X"), "status 401: check api_base and the path, and give token_file"),
         (answer(status="204 X", body=b""), "status 204: 200 is expected"),
         (
             answer(status="302 X", headers="Location: http://127.0.0.1:1/\r\n"),

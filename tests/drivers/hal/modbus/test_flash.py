@@ -326,7 +326,9 @@ def test_an_impossible_flash_is_reported_where_it_stands(
 
 def test_no_board_times_the_pulses_of_a_pin() -> None:
     wire = Wire("hold_open", "out", "BCM17", "high", flash=Flash("BCM27", 0.5))
-    text = "flash is for modules that time pulses; the daemon times a pin's pulses: leave flash out"
+    text = (
+        "flash is for modules that time pulses, but the daemon times a pin's pulses: delete flash"
+    )
     assert list(gpio.wire_problems(wire)) == [text]
 
 

@@ -289,7 +289,8 @@ SHORT = (
         (
             "{units: [1], habits: " + SHORT % ("0.6", "coil 2") + "}",
             [
-                "7:66: 'refresh_s': one late scan would drop the outputs: at most 0.5, half of time_s"
+                "7:66: 'refresh_s': one late scan would switch the outputs off: write at most 0.5, half"
+                " of time_s"
             ],
         ),
         (

@@ -142,7 +142,7 @@ def test_the_password_is_read_from_its_file_for_each_connection(
 ) -> None:
     file = secret(tmp_path, "wrong")
     with bus_to(guarded.port, user="door", password_file=file) as bus:
-        with pytest.raises(HalError, match="the broker refuses us: not authorized"):
+        with pytest.raises(HalError, match="the broker refuses the connection: not authorized"):
             bus.up()
         secret(tmp_path, "sesame\n")
         bus.insist()
@@ -156,7 +156,10 @@ def test_a_topic_that_we_may_not_read_is_named(guarded: Mosquitto, tmp_path: Pat
         bus.up()
         wait_until(lambda: reason(bus, STATE), "a reason")
         assert reason(bus, STATE).startswith(
-            ("the broker does not let us read relay/state", "nothing has come on relay/state")
+            (
+                "the broker refuses the subscription to relay/state",
+                "nothing has come on relay/state",
+            )
         )
 
 

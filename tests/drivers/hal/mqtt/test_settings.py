@@ -82,7 +82,7 @@ def test_a_command_topic_that_is_a_states_is_refused() -> None:
     assert problems({"a": STATE, "b": relay}) == [
         (
             ("points", "b", "command", "topic"),
-            "a/state is the state topic of 'a': the command would be taken for a state",
+            "a/state is the state topic of 'a': the daemon would take the command for a state",
         )
     ]
 
@@ -90,7 +90,9 @@ def test_a_command_topic_that_is_a_states_is_refused() -> None:
 def test_a_timer_shorter_than_three_scans_and_an_answer_is_refused() -> None:
     [(path, text)] = problems({"a": {**RELAY, "switches_off_after_s": 2}}, scan_s=0.5)
     assert path == ("points", "a", "switches_off_after_s")
-    assert text.endswith("is 2, but renewed every 0.5 s (scan_s): write at least 2.5")
+    assert text.endswith(
+        "is 2, but the daemon renews it only every 0.5 s (scan_s): write at least 2.5"
+    )
 
 
 def test_a_password_needs_a_user_and_a_certificate_its_key() -> None:
