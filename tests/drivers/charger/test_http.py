@@ -323,7 +323,7 @@ def test_a_code_table_that_cannot_be_right_is_refused(
 def test_a_table_without_errors_is_worth_a_warning() -> None:
     [_, (path, text)] = warnings(HttpChargerSettings(codes=Codes(idle=[0], charging=[5])))
     assert path == ("codes",)
-    assert text == "no code is listed as an error: an error will be shown as an unknown state"
+    assert text == "no code is listed as an error, so an error will be shown as an unknown state"
 
 
 def test_check_prints_addresses_and_meanings() -> None:

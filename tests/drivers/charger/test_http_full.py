@@ -303,7 +303,7 @@ def test_keep_needs_a_station_that_can_be_stopped_and_serve_known_needs_receiver
     )
     assert list(seed.problems()) == [
         (("unrequested",), "serve_known needs receivers: without them no robot is known"),
-        (("on_death",), "this station cannot be stopped: delete on_death"),
+        (("on_death",), "the driver cannot stop this station: delete on_death"),
     ]
 
 
@@ -312,7 +312,7 @@ def test_a_whole_profile_has_no_warning_and_each_gap_has_its_own() -> None:
     without = msgspec.structs.replace(FULL, receivers={}, state_words={"READY": 9})
     assert [text for _, text in warnings(without)] == [
         "receiver_id is read, but without receivers no robot is verified",
-        "9 is not in codes: an unknown state",
+        "9 is not in codes, so this state is unknown",
     ]
     only_stop = HttpChargerSettings(codes=FULL.codes, stop=Call(path="/off"))
     assert [text for _, text in warnings(only_stop)] == [

@@ -98,7 +98,7 @@ WRONG: dict[str, tuple[str, str]] = {
     "{at: flags, ignore": ("{at: flagz, ignore", "unknown value 'flagz': did you mean 'flags'?"),
     "{at: coil 0, start: 1, stop: 0}": (
         "{at: coil 0, start: 1, stop: 1}",
-        "'stop' is the value of start",
+        "'stop' is the value of start too",
     ),
     "start: 1, stop: 0": ("start: 1, stop: 2", "'stop': a coil is 0 or 1"),
     "{at: input register 4, scale: 0.01, signed: true}": (

@@ -170,7 +170,10 @@ PROFILED = YAML[: YAML.index("    map:")] + "    profile: generic-register-door\
     [
         ("{command: {at: coil 4, hold: 1, release: 0}}", []),
         ("{command: {at: coil 4, hold: 1}}", ["9:15: 'command' needs 'release'"]),
-        ("{command: {at: coil 4, hold: 1, release: 1}}", ["9:55: 'release' is the value of hold"]),
+        (
+            "{command: {at: coil 4, hold: 1, release: 1}}",
+            ["9:55: 'release' is the value of hold too"],
+        ),
         ("{commands: {at: coil 4}}", ["9:15: unknown key 'commands': did you mean 'command'?"]),
     ],
 )
@@ -223,7 +226,7 @@ def test_a_changed_command_is_claimed_and_its_warning_stands_where_it_is_changed
                 " register 0; or 0x7531 if 30001 really is the address on the wire"
             ],
         ),
-        ("hold: 1, release: 0", "hold: 1, release: 1", ["10:47: 'release' is the value of hold"]),
+        ("hold: 1, release: 0", "hold: 1, release: 1", ["10:47: 'release' is the value of hold too"]),
         ("hold: 1", "hold: 2", ["10:35: 'hold': a coil is 0 or 1"]),
         (
             "unit: 1",

@@ -191,7 +191,7 @@ def test_check_says_what_a_lift_of_the_template_cannot_confirm() -> None:
     told = [text for _, text in warnings(TEMPLATE)]
     assert "no agv_mode: the lift cannot confirm that it serves the robot" in told
     assert "no fire_alarm: a fire recall would not be seen" in told
-    assert any("repeats its last state is believed" in text for text in told)
+    assert any("believe a gateway that has lost the lift" in text for text in told)
 
 
 GOOD: dict[str, Any] = {

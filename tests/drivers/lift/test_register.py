@@ -120,7 +120,7 @@ MODEL = "looks like a number of the data model, which begins at 1"
         (
             "bit: 0, active",
             "active",
-            "41:7: 'overload': a flag is one bit of a register: say which",
+            "41:7: 'overload': a flag is one bit of a register: give the bit",
         ),
         (
             "ask: 2, release: 0",

@@ -170,7 +170,7 @@ def test_a_second_reply_is_never_taken_for_the_next_requests(talk: Conversation)
 def test_a_server_that_hangs_up_at_once_is_not_dialled_twice() -> None:
     with FarEnd(once()) as far:
         bus = bus_to(far.port)
-        with pytest.raises(HalError, match="no whole HTTP answer"):
+        with pytest.raises(HalError, match="no complete HTTP answer"):
             bus.get_json("/state")
         bus.close()
     assert far.connections == 1
@@ -192,7 +192,7 @@ def test_a_post_whose_answer_is_lost_fails_and_is_never_sent_again() -> None:
     with FarEnd(always(answer()), once(), always(answer())) as far:
         bus = bus_to(far.port)
         bus.get_json("/state")
-        with pytest.raises(HalError, match="no whole HTTP answer"):
+        with pytest.raises(HalError, match="no complete HTTP answer"):
             bus.send("/clear_error")
         assert bus.get_json("/state") == {"state": 0}
         bus.close()
@@ -223,7 +223,7 @@ def test_a_post_with_another_status_fails(status: str) -> None:
             "status 302: redirects are not followed",
         ),
         (answer(status="302 X", headers="Location: \xff://[\r\n"), "status 302"),
-        (answer(b'{"state": 5}  ')[:-2], "no whole HTTP answer"),
+        (answer(b'{"state": 5}  ')[:-2], "no complete HTTP answer"),
         (answer(b"<html>", sort="xhtml"), "answered application/xhtml instead of JSON"),
         (b"HTTP/1.1 200 OK\r\n\r\n{}", "answered no content type instead of JSON"),
         (answer(b""), "answered invalid JSON"),
@@ -237,15 +237,15 @@ def test_a_post_with_another_status_fails(status: str) -> None:
         (answer(b"5"), "JSON that is not an object: 5"),
         (answer(b"\x1f\x8b\x08", headers="Content-Encoding: gzip\r\n"), "invalid JSON"),
         (answer(b" " * 65_537), "answered more than 64 KiB"),
-        (b"SSH-2.0-OpenSSH_9.2\r\n", "no whole HTTP answer"),
-        (b"\x00\xff" * 40, "no whole HTTP answer"),
-        (b"HTTP/1.1 200 OK\r\nContent-Length: 99\r\n\r\n{}", "no whole HTTP answer"),
-        (b"HTTP/1.1 200 OK\r\n" + b"X: y\r\n" * 200 + b"\r\n", "no whole HTTP answer"),
-        (b"HTTP/1.1 200 OK\r\nX: " + b"y" * 70_000 + b"\r\n\r\n", "no whole HTTP answer"),
-        (b"", "no whole HTTP answer"),
-        *((CHUNKED + size + b"\r\n{}", "no whole HTTP answer") for size in CHUNK_SIZES),
-        (CHUNKED + b"2\r\n{}\r\n-2\r\n{}\r\n0\r\n\r\n", "no whole HTTP answer"),
-        (answer(headers="Content-Length: -5\r\n"), "no whole HTTP answer"),
+        (b"SSH-2.0-OpenSSH_9.2\r\n", "no complete HTTP answer"),
+        (b"\x00\xff" * 40, "no complete HTTP answer"),
+        (b"HTTP/1.1 200 OK\r\nContent-Length: 99\r\n\r\n{}", "no complete HTTP answer"),
+        (b"HTTP/1.1 200 OK\r\n" + b"X: y\r\n" * 200 + b"\r\n", "no complete HTTP answer"),
+        (b"HTTP/1.1 200 OK\r\nX: " + b"y" * 70_000 + b"\r\n\r\n", "no complete HTTP answer"),
+        (b"", "no complete HTTP answer"),
+        *((CHUNKED + size + b"\r\n{}", "no complete HTTP answer") for size in CHUNK_SIZES),
+        (CHUNKED + b"2\r\n{}\r\n-2\r\n{}\r\n0\r\n\r\n", "no complete HTTP answer"),
+        (answer(headers="Content-Length: -5\r\n"), "no complete HTTP answer"),
     ],
 )
 def test_an_answer_that_is_not_a_json_object_is_an_error_that_says_what_to_look_at(
@@ -439,7 +439,7 @@ def test_the_second_address_is_tried_when_the_first_is_dead() -> None:
         dead = gone.getsockname()
     with FarEnd(once(b"?"), always(answer())) as far:
         bus = named(lambda *_, **__: [tcp(*dead), tcp("127.0.0.1", far.port)])
-        with pytest.raises(HalError, match="no whole HTTP answer"):
+        with pytest.raises(HalError, match="no complete HTTP answer"):
             bus.get_json("/state")
         assert bus.get_json("/state") == {"state": 0}
         bus.close()
@@ -477,7 +477,7 @@ def test_a_failure_to_connect_is_not_remembered_as_the_next_calls_reason() -> No
         bus = named(lambda *_, **__: next(addresses))
         with pytest.raises(HalError, match="the name has no address"):
             bus.get_json("/state")
-        with pytest.raises(HalError, match="no whole HTTP answer"):
+        with pytest.raises(HalError, match="no complete HTTP answer"):
             bus.get_json("/state")
         bus.close()
 
@@ -520,7 +520,7 @@ def test_after_a_failure_calls_fail_at_once_until_it_is_time_again() -> None:
         tried_at = []
         while now[0] < 100.0:
             before = far.connections
-            with pytest.raises(HalError, match="no whole HTTP answer"):
+            with pytest.raises(HalError, match="no complete HTTP answer"):
                 bus.get_json("/state")
             if far.connections != before:
                 tried_at.append(now[0])
@@ -543,7 +543,7 @@ def test_a_call_that_insists_is_not_held_back_by_the_pause_after_a_failure() -> 
     with FarEnd(once(b"?"), always(answer())) as far:
         bus = bus_to(far.port, clock=lambda: 0.0)
         for _ in range(2):
-            with pytest.raises(HalError, match="no whole HTTP answer"):
+            with pytest.raises(HalError, match="no complete HTTP answer"):
                 bus.send("/stop")
         assert far.connections == 1
         bus.insist()

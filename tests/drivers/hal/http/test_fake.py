@@ -116,11 +116,11 @@ def test_a_path_that_does_not_exist_is_not_found() -> None:
 
 
 ANSWERED = [
-    ("server", "off", "no whole HTTP answer"),
+    ("server", "off", "no complete HTTP answer"),
     ("server", "garbage", "answered text/html instead of JSON"),
     ("server", "wrong", "'state' is '0', and a whole number is expected"),
     ("headers", "off", "answered no content type"),
-    ("headers", "garbage", "no whole HTTP answer"),
+    ("headers", "garbage", "no complete HTTP answer"),
     ("headers", "wrong", "answered status 500"),
     ("body", "off", "answered invalid JSON"),
     ("body", "garbage", "answered invalid JSON"),

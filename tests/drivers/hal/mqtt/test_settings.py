@@ -39,7 +39,7 @@ def test_a_state_needs_its_age() -> None:
 
 
 def test_the_values_for_on_and_off_need_each_other_and_differ() -> None:
-    text = "when and when_not need each other: any other value is then a fault"
+    text = "when and when_not need each other, because any other value is then a fault"
     assert point_problems(**STATE, when=["ON"]) == [(("when",), text)]
     both = point_problems(**STATE, when=["ON", 1], when_not=[1])
     assert both == [(("when_not",), "1 is in when too")]

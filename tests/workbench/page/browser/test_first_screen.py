@@ -171,7 +171,7 @@ def test_an_old_card_with_a_fault_looks_as_strong_as_a_fault(
 def test_a_long_fault_is_told_whole_with_an_action(
     tab: Page, address: str, graph: Graph, overloaded: str, until: Until
 ) -> None:
-    why = "http://192.168.1.70/rpc/Shelly.GetStatus: no whole HTTP answer: is it an HTTP server?"
+    why = "http://192.168.1.70/rpc/Shelly.GetStatus: no complete HTTP answer: is it an HTTP server?"
     graph.faults["Lift1"] = {"INPUTS_NOT_FRESH": f"{why * 3} END"}
     tab.goto(address)
     until(lambda: "END" in tab.locator("#wrong").inner_text(), "the whole detail")
