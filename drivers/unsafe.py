@@ -58,7 +58,7 @@ def unsafe_wires(wires: list[Wire], must_read: Mapping[str, tuple[bool, str]]) -
 
 
 def slow_alarms(wires: Iterable[Wire]) -> Remarks:
-    """Yield a warning (path, text) for each alarm with a long debounce."""
+    """Yield a warning, with its path in the YAML, for each alarm with a long debounce."""
     for wire in wires:
         if wire.debounce_s is not None and wire.debounce_s > ALARM_WITHIN_S:
             text = f"{wire.signal} counts only after {wire.debounce_s:g} s"
@@ -66,7 +66,8 @@ def slow_alarms(wires: Iterable[Wire]) -> Remarks:
 
 
 def needlessly_accepted(found: Iterable[Unsafe], accepted: Mapping[str, str]) -> Remarks:
-    """Yield a problem (path, text) for each signal that `accept_unsafe` names although it is safe."""
+    """Yield a problem, with its path in the YAML, for each signal that `accept_unsafe` names although
+    it is safe."""
     for signal in accepted.keys() - {signal for signal, _, _ in found}:
         yield ("accept_unsafe", signal), f"nothing is unsafe about {signal}: delete this entry"
 

@@ -66,8 +66,8 @@ def debounce(settings: DryContactPanelSettings) -> Mapping[str, float]:
 
 
 def warnings(settings: DryContactPanelSettings) -> Remarks:
-    """Yield a warning (path, text) for each valid setting to review before the panel goes into
-    service."""
+    """Yield a warning, with its path in the YAML, for each valid setting to review before the panel
+    goes into service."""
     yield from slow_alarms(w for w in wires(settings) if w.signal != DRILL)
     yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
 
@@ -95,7 +95,7 @@ def create(name: str, settings: DryContactPanelSettings, bus: PointsBus) -> "Dry
 
 
 class DryContactPanel(OnPoints):
-    """`drivers.Driver` for one panel."""
+    """The driver of one panel (`drivers.Driver`)."""
 
     def read(self) -> PanelSample:
         """Read every contact now."""

@@ -51,7 +51,7 @@ def describe(settings: HttpPanelSettings, bus: http.HttpSettings) -> Iterator[tu
 
 
 class HttpPanel:
-    """`drivers.Driver` for one panel."""
+    """The driver of one panel (`drivers.Driver`)."""
 
     def __init__(self, settings: HttpPanelSettings, bus: InsistentCalls) -> None:
         self._settings = settings

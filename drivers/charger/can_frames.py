@@ -140,7 +140,8 @@ def claims(settings: FrameChargerSettings) -> Iterator[tuple[str, tuple[str, ...
 def describe(
     settings: FrameChargerSettings, bus_settings: can.CanSettings
 ) -> list[tuple[str, str]]:
-    """Return the rows (subject, meaning) that `check` prints instead of a wiring table."""
+    """Return the rows that `check` prints instead of a wiring table. Each row is a subject and its
+    meaning."""
     found = frame_map(settings)
     stops_s = settings.limits.peer_internal_timeout_s
     after = "a time that only the maker knows" if stops_s is None else f"{stops_s:g} s"
@@ -161,7 +162,7 @@ def frame_tables(settings: FrameChargerSettings) -> Iterator[Table]:
 
 
 def warnings(settings: FrameChargerSettings) -> Remarks:
-    """Yield a warning (path, text) for each valid setting that may be a mistake."""
+    """Yield a warning, with its path in the YAML, for each valid setting that may be a mistake."""
     yield from PROFILE.warnings(settings.profile, "watch the first charge")
     found = frame_map(settings)
     if found.receiver is None and settings.receivers:
@@ -179,7 +180,7 @@ def create(name: str, settings: FrameChargerSettings, bus: can.CanBus) -> "Frame
 
 
 class FrameDriver:
-    """`drivers.Driver` for one charger."""
+    """The driver of one charger (`drivers.Driver`)."""
 
     def __init__(self, settings: FrameChargerSettings, bus: can.CanBus) -> None:
         self._setpoints = settings.setpoints

@@ -240,7 +240,8 @@ def _lacks(found: dbc.Dbc, path: tuple[str, ...], frame: str, signal: str = "") 
 
 
 def rows(found: FrameMap) -> Iterator[tuple[str, str]]:
-    """Yield rows (subject, meaning) for `check` about the signals that the driver reads."""
+    """Yield rows for `check`, each a subject and its meaning, about the signals that the driver
+    reads."""
     frames = dbc.load(found.dbc)
     yield "frames", str(dbc.path(found.dbc))
     for path, signal in found.signals():

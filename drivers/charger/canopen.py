@@ -76,7 +76,8 @@ def claims(settings: CanOpenChargerSettings) -> Iterable[tuple[str, tuple[str, .
 def describe(
     settings: CanOpenChargerSettings, bus_settings: can.CanSettings
 ) -> list[tuple[str, str]]:
-    """Return the rows (subject, meaning) that `check` prints instead of a wiring table."""
+    """Return the rows that `check` prints instead of a wiring table. Each row is a subject and its
+    meaning."""
     rows = [("bus", f"{can.describe(bus_settings)}; node {settings.node}")]
     if settings.heartbeat == "required":
         lost = f"lost after {settings.heartbeat_timeout_s:g} s"
@@ -85,7 +86,7 @@ def describe(
 
 
 def warnings(settings: CanOpenChargerSettings) -> Remarks:
-    """Yield a warning (path, text) for each valid setting that may be a mistake."""
+    """Yield a warning, with its path in the YAML, for each valid setting that may be a mistake."""
     found = list(xnergy.warnings(settings, "CAN"))
     if settings.heartbeat == "none":
         found.append(

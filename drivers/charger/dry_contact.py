@@ -117,8 +117,8 @@ def _means(shown: Mapping[str, bool]) -> str:
 
 
 def warnings(settings: DryContactChargerSettings) -> Remarks:
-    """Yield a warning (path, text) for each valid setting to review before the station goes into
-    service."""
+    """Yield a warning, with its path in the YAML, for each valid setting to review before the station
+    goes into service."""
     for wire in wires(settings):
         if wire.debounce_s:
             text = "contacts of a charger are not debounced: the next scan corrects a bounce"
@@ -146,7 +146,7 @@ def create(name: str, settings: DryContactChargerSettings, bus: PointsBus) -> "D
 
 
 class DryContactCharger(OnPoints):
-    """`drivers.Driver` for one station."""
+    """The driver of one station (`drivers.Driver`)."""
 
     def __init__(self, points: Points) -> None:
         super().__init__(points)

@@ -82,7 +82,8 @@ def claims(settings: HttpChargerSettings) -> Iterator[tuple[str, tuple[str, ...]
 def describe(
     settings: HttpChargerSettings, bus_settings: http.HttpSettings
 ) -> list[tuple[str, str]]:
-    """Return the rows (subject, meaning) that `check` prints instead of a wiring table."""
+    """Return the rows that `check` prints instead of a wiring table. Each row is a subject and its
+    meaning."""
     api = http.base(bus_settings.api_base)
     rows = [("state", f"GET {api.url(settings.state_path)} every {bus_settings.scan_s:g} s")]
     for what in ("start", "stop", "range_check"):
@@ -96,8 +97,8 @@ def describe(
 
 
 def warnings(settings: HttpChargerSettings) -> Remarks:
-    """Yield a warning (path, text) for each missing ability. Yield a warning for each valid setting
-    that may be a mistake."""
+    """Yield a warning, with its path in the YAML, for each missing ability. Yield a warning for each
+    valid setting that may be a mistake."""
     off_s, unseen = settings.switches_off_after_s, []
     if settings.start and off_s is not None and (text := timer_unseen(settings.start, off_s)):
         unseen = [(("start", "path"), text)]

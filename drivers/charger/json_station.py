@@ -114,7 +114,8 @@ def _timer_problems(settings: JsonChargerSettings) -> Remarks:
 
 
 def rows(settings: JsonChargerSettings) -> list[tuple[str, str]]:
-    """Return rows (subject, meaning) for `check` about the fields and about the meanings of states."""
+    """Return rows for `check`, each a subject and its meaning, about the fields and about the meanings
+    of states."""
     found = [*settings.fields.rows(has_codes=settings.codes is not None)]
     found += [(f"word {word}", str(code)) for word, code in settings.state_words.items()]
     found += rules.rows(settings.rules, settings.errors)
@@ -134,8 +135,8 @@ def power_off(settings: JsonChargerSettings, scan_s: float) -> Iterator[tuple[st
 
 
 def warnings(settings: JsonChargerSettings, unseen_timer: Remarks = ()) -> Remarks:
-    """Yield a warning (path, text) for each missing ability. Yield a warning for each valid setting
-    that may be a mistake.
+    """Yield a warning, with its path in the YAML, for each missing ability. Yield a warning for each
+    valid setting that may be a mistake.
 
     `unseen_timer` is the warning about a `start` command that does not contain the timer's number.
     """
@@ -193,7 +194,7 @@ class JsonStation(Protocol):
 
 
 class JsonCharger:
-    """`drivers.Driver` for one station.
+    """The driver of one station (`drivers.Driver`).
 
     The driver treats the power as a level. It repeats `start` while the station stays idle, and `stop`
     while the station still charges.

@@ -53,12 +53,13 @@ def claims(settings: ModbusChargerSettings) -> Iterator[tuple[str, tuple[str, ..
 def describe(
     settings: ModbusChargerSettings, bus_settings: modbus.ModbusSettings
 ) -> list[tuple[str, str]]:
-    """Return the rows (subject, meaning) that `check` prints instead of a wiring table."""
+    """Return the rows that `check` prints instead of a wiring table. Each row is a subject and its
+    meaning."""
     return xnergy.rows(settings, {name: str(point) for name, point in points(settings).items()})
 
 
 def warnings(settings: ModbusChargerSettings) -> Remarks:
-    """Yield a warning (path, text) for each valid setting that may be a mistake."""
+    """Yield a warning, with its path in the YAML, for each valid setting that may be a mistake."""
     return xnergy.warnings(settings, "bus")
 
 

@@ -99,7 +99,8 @@ def claims(settings: MqttChargerSettings) -> Iterator[tuple[str, tuple[str, ...]
 
 
 def describe(settings: MqttChargerSettings, bus: MqttSettings) -> list[tuple[str, str]]:
-    """Return the rows (subject, meaning) that `check` prints instead of a wiring table."""
+    """Return the rows that `check` prints instead of a wiring table. Each row is a subject and its
+    meaning."""
     rows = [
         (f"topic {name}", f"{state.topic}, unknown after {state.stale_after_s:g} s")
         for name, state in settings.topics.items()
@@ -147,7 +148,7 @@ class MqttStation:
 
 
 class MqttCharger(JsonCharger):
-    """`drivers.Driver` for one station."""
+    """The driver of one station (`drivers.Driver`)."""
 
     def __init__(self, settings: MqttChargerSettings, station: MqttStation) -> None:
         super().__init__(settings, station)

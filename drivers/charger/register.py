@@ -113,7 +113,7 @@ def tables(settings: RegisterChargerSettings) -> Iterator[Table]:
 
 
 def warnings(settings: RegisterChargerSettings) -> Remarks:
-    """Yield a warning (path, text) for each valid setting that may be a mistake."""
+    """Yield a warning, with its path in the YAML, for each valid setting that may be a mistake."""
     yield from PROFILE.warnings(settings.profile, "watch the first charge")
     found = charger_map(settings)
     if found.power is None:
@@ -130,8 +130,8 @@ def create(name: str, settings: RegisterChargerSettings, bus: ModbusBus) -> "Reg
 
 
 class RegisterCharger:
-    """`drivers.Driver` for one station. `_power` is the present level of the power, or None while the
-    level is unknown."""
+    """The driver of one station (`drivers.Driver`). `_power` is the present level of the power, or None
+    while the level is unknown."""
 
     def __init__(self, settings: RegisterChargerSettings, bus: ModbusBus) -> None:
         self._settings = settings

@@ -262,7 +262,7 @@ class ReceiverAccess(Protocol):
 
 
 class Receiver:
-    """`drivers.Driver` for one receiver."""
+    """The driver of one receiver (`drivers.Driver`)."""
 
     def __init__(self, settings: ChargerSettings, wire: ReceiverAccess) -> None:
         self._settings = settings
@@ -340,8 +340,8 @@ def _state_rows() -> Iterator[tuple[str, str]]:
 
 
 def warnings(settings: ChargerSettings, wire: str) -> Remarks:
-    """Yield a warning (path, text) for each valid setting that may be a mistake. `wire` names the cable
-    that the test unplugs."""
+    """Yield a warning, with its path in the YAML, for each valid setting that may be a mistake. `wire`
+    names the cable that the test unplugs."""
     text = (
         "nobody has tried the maker's published numbers on hardware: watch the first"
         " charge, and pull"

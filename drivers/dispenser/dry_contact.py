@@ -99,8 +99,8 @@ def debounce(settings: DryContactWorkcellSettings) -> Mapping[str, float]:
 
 
 def warnings(settings: DryContactWorkcellSettings) -> Remarks:
-    """Yield a warning (path, text) for each valid setting to review before the workcell goes into
-    service."""
+    """Yield a warning, with its path in the YAML, for each valid setting to review before the workcell
+    goes into service."""
     yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
     yield from blind(settings, busy=settings.inputs.busy is not None)
 
@@ -130,8 +130,8 @@ def create(name: str, settings: DryContactWorkcellSettings, bus: PointsBus) -> "
 
 
 class DryContactWorkcell(OnPoints):
-    """`drivers.Driver` for one dispenser or ingestor. `_selected` is the guid of the request whose sort
-    the relays select."""
+    """The driver of one dispenser or ingestor (`drivers.Driver`). `_selected` is the guid of the
+    request whose sort the relays select."""
 
     def __init__(self, points: Points) -> None:
         super().__init__(points)

@@ -105,8 +105,8 @@ def describe(settings: HttpWorkcellSettings, bus: http.HttpSettings) -> Iterator
 
 
 def warnings(settings: HttpWorkcellSettings) -> Remarks:
-    """Yield a warning (path, text) for each valid setting to review before the workcell goes into
-    service."""
+    """Yield a warning, with its path in the YAML, for each valid setting to review before the workcell
+    goes into service."""
     yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
     yield from blind(settings, busy=settings.inputs.busy is not None)
 
@@ -117,8 +117,8 @@ def create(name: str, settings: HttpWorkcellSettings, bus: InsistentCalls) -> "H
 
 
 class HttpWorkcell:
-    """`drivers.Driver` for one dispenser or ingestor. `_sent` is the guid of the last request whose
-    start the driver sent. `_on` is True until the cycle of this request has ended."""
+    """The driver of one dispenser or ingestor (`drivers.Driver`). `_sent` is the guid of the last
+    request whose start the driver sent. `_on` is True until the cycle of this request has ended."""
 
     def __init__(self, settings: HttpWorkcellSettings, bus: InsistentCalls) -> None:
         self._settings = settings

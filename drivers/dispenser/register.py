@@ -155,7 +155,7 @@ def create(name: str, settings: RegisterWorkcellSettings, bus: ModbusBus) -> "Re
 
 
 class RegisterWorkcell:
-    """`drivers.Driver` for one dispenser or ingestor."""
+    """The driver of one dispenser or ingestor (`drivers.Driver`)."""
 
     def __init__(self, found: WorkcellMap, lines: ModbusLines) -> None:
         self._map = found

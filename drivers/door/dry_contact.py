@@ -140,8 +140,8 @@ def tables(settings: DryContactDoorSettings) -> Iterator[Table]:
 
 
 def warnings(settings: DryContactDoorSettings) -> Remarks:
-    """Yield a warning (path, text) for each valid setting to review before the door goes into
-    service."""
+    """Yield a warning, with its path in the YAML, for each valid setting to review before the door goes
+    into service."""
     for wire in wires(settings):
         if wire.signal == "closed" and wire.broken_reads() is not False:
             yield (
@@ -162,8 +162,8 @@ def create(name: str, settings: DryContactDoorSettings, bus: PointsBus) -> "DryC
 
 
 class DryContactDoor(OnPoints):
-    """`drivers.Driver` for one door. `flashes` means that the module times the pulses of the hold
-    relay."""
+    """The driver of one door (`drivers.Driver`). `flashes` means that the module times the pulses of
+    the hold relay."""
 
     def __init__(self, points: Points, flashes: bool = False) -> None:
         super().__init__(points)

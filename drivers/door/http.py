@@ -123,8 +123,8 @@ def _renewed(settings: HttpDoorSettings, bus: http.HttpSettings) -> str:
 
 
 def warnings(settings: HttpDoorSettings) -> Remarks:
-    """Yield a warning (path, text) for each valid setting to review before the door goes into
-    service."""
+    """Yield a warning, with its path in the YAML, for each valid setting to review before the door goes
+    into service."""
     if settings.switches_off_after_s is not None:
         text = "pull the network plug while the door is held: it must be released within this time"
         yield ("switches_off_after_s",), text
@@ -143,8 +143,8 @@ def create(name: str, settings: HttpDoorSettings, bus: InsistentCalls) -> "HttpD
 
 
 class HttpDoor:
-    """`drivers.Driver` for one door. `_told` is the relay's state that the driver commanded last, or
-    None if this state is unknown."""
+    """The driver of one door (`drivers.Driver`). `_told` is the relay's state that the driver commanded
+    last, or None if this state is unknown."""
 
     def __init__(self, settings: HttpDoorSettings, bus: InsistentCalls) -> None:
         self._settings = settings

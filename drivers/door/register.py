@@ -118,8 +118,8 @@ def tables(settings: RegisterDoorSettings) -> Iterator[Table]:
 
 
 def warnings(settings: RegisterDoorSettings) -> Remarks:
-    """Yield a warning (path, text) for each valid setting to review before the door goes into
-    service."""
+    """Yield a warning, with its path in the YAML, for each valid setting to review before the door goes
+    into service."""
     yield from PROFILE.warnings(settings.profile, "watch the door move")
     if not door_map(settings).command.read_back:
         written = _command_in(settings)
@@ -144,7 +144,7 @@ def create(name: str, settings: RegisterDoorSettings, bus: ModbusBus) -> "Regist
 
 
 class RegisterDoor:
-    """`drivers.Driver` for one door."""
+    """The driver of one door (`drivers.Driver`)."""
 
     def __init__(self, found: DoorMap, lines: ModbusLines) -> None:
         self._map = found

@@ -104,7 +104,7 @@ def _readable_secret(settings: HttpSettings) -> Literal["login", "token_file", "
 
 
 def warnings(settings: HttpSettings) -> Remarks:
-    """Yield a warning (path, text) for each valid setting that may be a mistake."""
+    """Yield a warning, with its path in the YAML, for each valid setting that may be a mistake."""
     readable = _readable_secret(settings)
     if readable and settings.accept_unencrypted:
         text = f"the secret goes over the network unencrypted: {settings.accept_unencrypted}"

@@ -47,7 +47,7 @@ wires, debounce, warnings = lift_table.wires, lift_table.debounce, lift_checks.w
 
 
 def notes(settings: DryContactLiftSettings) -> Remarks:
-    """Yield a note (path below the device, text) for each intended choice with side effects."""
+    """Yield a note, with its path below the device, for each intended choice with side effects."""
     return lift_checks.notes(settings, partial(lift_checks.sees, settings))
 
 
@@ -57,7 +57,7 @@ def create(name: str, settings: DryContactLiftSettings, bus: PointsBus) -> "DryC
 
 
 class DryContactLift(OnPoints):
-    """`drivers.Driver[LiftSample, LiftOutputs]` for one lift."""
+    """The driver of one lift (`drivers.Driver[LiftSample, LiftOutputs]`)."""
 
     def __init__(self, settings: DryContactLiftSettings, bus: PointsBus) -> None:
         super().__init__(Points(wires(settings), bus))

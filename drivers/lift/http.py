@@ -129,8 +129,8 @@ def claims(settings: HttpLiftSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
 
 
 def warnings(settings: HttpLiftSettings) -> Remarks:
-    """Yield a warning (path, text) for each valid setting to review before the lift goes into
-    service."""
+    """Yield a warning, with its path in the YAML, for each valid setting to review before the lift goes
+    into service."""
     found = api_of(settings)
     state, commands = found.state, found.commands
     told, fire = state.shows("agv_mode"), state.shows(Hazard.FIRE)
@@ -170,7 +170,7 @@ def warnings(settings: HttpLiftSettings) -> Remarks:
 
 
 def notes(settings: HttpLiftSettings) -> Remarks:
-    """Yield a note (path below the device, text) for each intended choice with side effects."""
+    """Yield a note, with its path below the device, for each intended choice with side effects."""
     return checks.notes(settings, api_of(settings).state.shows)
 
 
@@ -230,7 +230,7 @@ def create(name: str, settings: HttpLiftSettings, bus: GatewayCalls) -> "HttpLif
 
 
 class HttpLift:
-    """`drivers.Driver[LiftSample, LiftOutputs]` for one lift.
+    """The driver of one lift (`drivers.Driver[LiftSample, LiftOutputs]`).
 
     `_told` holds the state that the driver last commanded for each held command. A command whose state
     is in doubt is missing. `_called` is the landing of the last call that was not withdrawn. `_sure` is

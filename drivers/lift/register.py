@@ -94,7 +94,7 @@ def _rear_door(settings: RegisterLiftSettings) -> Remarks:
 
 
 def warnings(settings: RegisterLiftSettings) -> Remarks:
-    """Yield a warning (path below the device, text) for each valid setting that may be a mistake."""
+    """Yield a warning, with its path below the device, for each valid setting that may be a mistake."""
     found, commands = settings.map, settings.map.commands
     fire, told = found.shows(Hazard.FIRE), found.shows("agv_mode")
     asks, holds = bool(commands.agv_mode_request), bool(commands.door_open)
@@ -118,7 +118,7 @@ def warnings(settings: RegisterLiftSettings) -> Remarks:
 
 
 def notes(settings: RegisterLiftSettings) -> Remarks:
-    """Yield a note (path below the device, text) for each intended choice with side effects."""
+    """Yield a note, with its path below the device, for each intended choice with side effects."""
     return checks.notes(settings, settings.map.shows)
 
 
@@ -220,7 +220,7 @@ def create(name: str, settings: RegisterLiftSettings, bus: ModbusBus) -> "Regist
 
 
 class RegisterLift:
-    """`drivers.Driver[LiftSample, LiftOutputs]` for one lift."""
+    """The driver of one lift (`drivers.Driver[LiftSample, LiftOutputs]`)."""
 
     def __init__(self, found: LiftMap, lines: ModbusLines) -> None:
         self._map = found

@@ -77,7 +77,7 @@ class CanSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 def warnings(settings: CanSettings) -> Remarks:
-    """Yield a warning (path, text) for each valid setting that may be a mistake."""
+    """Yield a warning, with its path in the YAML, for each valid setting that may be a mistake."""
     if settings.slcan and not settings.slcan.port.startswith("/dev/serial/by-"):
         port = settings.slcan.port
         text = f"{port} may be another adapter after a reboot: use a path of /dev/serial/by-id"

@@ -59,7 +59,7 @@ class ModbusSettings(
 
 
 def warnings(settings: ModbusSettings) -> Remarks:
-    """Yield a warning (path, text) for each valid setting that may be a mistake."""
+    """Yield a warning, with its path in the YAML, for each valid setting that may be a mistake."""
     for path, text in settings.serial.warnings() if settings.serial else ():
         yield ("serial", *path), text
     for path, text in settings.module_watchdog.warnings() if settings.module_watchdog else ():

@@ -166,7 +166,7 @@ def _at(point: MqttPoint, name: str, key: str) -> tuple[str, ...]:
 
 
 def warnings(settings: MqttSettings) -> Remarks:
-    """Yield a warning (path, text) for each valid setting that may be a mistake."""
+    """Yield a warning, with its path in the YAML, for each valid setting that may be a mistake."""
     if settings.password_file and not settings.tls:
         text = "the password goes over the network unencrypted: add tls where the broker has it"
         yield ("password_file",), text
