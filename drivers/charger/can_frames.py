@@ -243,7 +243,7 @@ class FrameDriver:
         except HalError:
             for wake in self._map.wake:
                 payload = functools.partial(self._dbc.encode, wake.frame, wake.says)
-                with suppress(HalError):  # the error of the reading tells more than this error
+                with suppress(HalError):  # the reading's own error follows, and tells more
                     self._frames.feed(self._dbc.id(wake.frame), wake.every_s, payload)
             raise
 

@@ -233,7 +233,7 @@ raises DriverError while one of these inputs is unknown."""
 
 
 def _not_read() -> Mapping[str, bool]:
-    raise DriverError("the inputs on its other bus are not read here")
+    raise DriverError("nothing here reads the inputs on another bus")
 
 
 class Points:

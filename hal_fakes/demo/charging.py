@@ -255,7 +255,7 @@ DEMO: Final = Demo(
     right="each scenario went as planned; never two robots at one charger.",
     outcomes={
         "1 scheduled": f"{ONE} came home at 92 %, was called by the schedule and charged",
-        "2 ad-hoc": f"{TWO}'s fleet requested a charge, an operator another for {PORTER}: both charged",
+        "2 ad-hoc": f"{TWO}'s fleet and an operator (for {PORTER}) requested a charge: both charged",
         "3 stacked": f"{TWO} waited, a person was told who blocks {B}, and {TWO} was next there",
         "4 wrong station": f"{B} gave {ONE} no power; {ONE} was sent to {A} and charged there",
         "5a station faulty": f"{ONE} was charged twice at the other charger: it is not suspected",

@@ -97,7 +97,7 @@ class CoilEcho(WriteSingleCoilResponse):
     def decode(self, data: bytes) -> None:
         """Decode address and value. Raises ValueError for a wrong number of bytes."""
         if len(data) != 4:
-            raise ValueError("the value is not a coil's")
+            raise ValueError("the echo of a coil must have four bytes")
         super().decode(data)
         self.registers = [int.from_bytes(data[2:], "big")]
 
@@ -108,7 +108,7 @@ class RegisterEcho(WriteSingleRegisterResponse):
     def decode(self, data: bytes) -> None:
         """Decode address and value. Raises ValueError for a wrong number of bytes."""
         if len(data) != 4:
-            raise ValueError("the value is not a register's")
+            raise ValueError("the echo of a register must have four bytes")
         super().decode(data)
 
 
