@@ -183,7 +183,7 @@ def counts_down(settings: LiftSettings, codes: Mapping[int, str], path: tuple[st
         yield (
             path,
             (
-                f"these numbers fall from {lowest} to {highest}, but floors lists {lowest} as"
+                f"these numbers count down from {lowest} to {highest}, but floors lists {lowest} as"
                 " the lowest: one of the two lists is reversed, if the controller does not count"
                 " from the top"
             ),

@@ -185,7 +185,7 @@ def test_letting_go_of_a_receiver_that_does_not_answer_raises_nothing(receiver: 
 def test_the_canopen_example_is_right_and_says_what_is_untried() -> None:
     [no_station, untried] = load(EXAMPLE).warnings
     assert "is not a station" in str(no_station)
-    assert "not tried on hardware" in str(untried)
+    assert "nobody has tried" in str(untried)
 
 
 def test_facts_that_the_yaml_cannot_supply_are_warned_of() -> None:
