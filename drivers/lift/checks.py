@@ -184,8 +184,8 @@ def counts_down(settings: LiftSettings, codes: Mapping[int, str], path: tuple[st
             path,
             (
                 f"these numbers count down from {lowest} to {highest}, but floors lists {lowest} as"
-                " the lowest: one of the two lists is reversed, if the controller does not count"
-                " from the top"
+                " the lowest: one of the two lists is reversed, or the controller counts from the"
+                " top"
             ),
         )
 
