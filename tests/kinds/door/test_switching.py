@@ -5,12 +5,10 @@ The grace may lengthen a hold, but never refuses a hold.
 
 import pytest
 
-from bridges.kinds.door.signals import CloseRequested, DoorOutputs, OpenRequested
+from bridges.kinds.door.signals import DoorOutputs
 from bridges.kinds.shared.decision import IoFailed, RivalSeen
-from tests.kinds.door.test_core import limits
-from tests.kinds.door.virtual import CLOSED, OPEN, CoreAlone
+from tests.kinds.door.virtual import CLOSED, CLOSES, OPEN, OPENS, CoreAlone, limits
 
-OPENS, CLOSES = OpenRequested("door_supervisor"), CloseRequested("door_supervisor")
 HELD, OFF = DoorOutputs(hold_open=True), DoorOutputs(hold_open=False)
 
 
