@@ -6,8 +6,9 @@ The command takes these steps:
 2. It stops a running instance, which switches the instance's outputs off. This comes first, because the
    new drop-in may forbid access to the old relay.
 3. It copies the file to /etc/rmf-bridges.
-4. It writes the instance's drop-in (`bridges/runtime/drop_in.py`).
-5. It starts the instance.
+4. It makes a user for the instance, and makes this user the owner of the file's secrets.
+5. It writes the instance's drop-in (`bridges/runtime/drop_in.py`).
+6. It starts the instance.
 
 If a step fails, the results of the earlier steps stay. The command then starts an instance again that
 ran before.
@@ -25,18 +26,21 @@ from bridges.runtime.services import (
     CONFIG,
     INSTANCE,
     NO_INSTANCE,
+    GiveSecret,
     Run,
     Step,
     WriteFile,
     add_root,
     carry_out,
     drop_in_file,
+    make_user,
+    numbers,
     switch_off,
     unit,
 )
-from bridges.settings.cross_file_checks import taken
+from bridges.settings.cross_file_checks import SECRETS, named_files, shared_secrets, taken
 from bridges.settings.load import Config, Problem, SettingsError, load
-from bridges.system.directories import GROUPS
+from bridges.system.directories import GROUPS, user_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -61,7 +65,9 @@ def run(args: argparse.Namespace) -> int:
     if problems := list(_taken(config, args.root)):
         return _wrong(problems)
     if args.drop_in:
-        print(drop_in.text(config, groups(args.root)), end="")
+        user = user_of(args.file.stem)
+        known = user if user in numbers(args.root / "etc/passwd") else ""
+        print(drop_in.text(config, groups(args.root), known), end="")
         return 0
     for problem in config.warnings:
         print(problem, file=sys.stderr)
@@ -75,12 +81,16 @@ def steps(config: Config, root: Path, present: Collection[str]) -> Iterator[Step
     """Yield the steps that make a service of this file, in order. `present`: the groups that this
     machine has."""
     name = config.path.stem
+    user = user_of(name)
     target = root / CONFIG / f"{name}.yaml"
     yield Run(("systemctl", "stop", unit(name)), running_only=True)
     yield switch_off(name)
     if not target.exists() or not target.samefile(config.path):
         yield WriteFile(target, config.text, config.path)
-    yield WriteFile(root / drop_in_file(name), drop_in.text(config, present).encode())
+    yield make_user(name)
+    for secret in _secrets(config, root):
+        yield GiveSecret(secret, user)
+    yield WriteFile(root / drop_in_file(name), drop_in.text(config, present, user).encode())
     yield Run(("systemctl", "daemon-reload"), running_only=True)
     yield Run(("systemctl", "enable", "rmf-bridges.target", unit(name)))
     yield Run(("systemctl", "start", unit(name)), running_only=True)
@@ -88,16 +98,22 @@ def steps(config: Config, root: Path, present: Collection[str]) -> Iterator[Step
 
 def groups(root: Path) -> set[str]:
     """Return the groups of this machine that a service may join."""
-    with suppress(OSError):
-        lines = (root / "etc/group").read_text("utf-8", "replace").splitlines()
-        return {line.partition(":")[0] for line in lines} & set(GROUPS)
-    return set()
+    return set(numbers(root / "etc/group")) & set(GROUPS)
+
+
+def _secrets(config: Config, root: Path) -> Iterator[Path]:
+    """Yield the secret files that exist. A link is left as it is, because its place may change."""
+    for secret in named_files(config, SECRETS):
+        path = root / secret.what.lstrip("/")
+        if path.is_file() and not path.is_symlink():
+            yield path
 
 
 def _taken(config: Config, root: Path) -> Iterator[Problem]:
-    """Yield a problem for each resource that this file shares with another service's file."""
-    others = list(_neighbours(root, config.path.stem))
-    return (p for p in taken([*others, config]) if p.file == str(config.path))
+    """Yield a problem for each resource or secret that this file shares with another service's file."""
+    all_files = [*_neighbours(root, config.path.stem), config]
+    found = (*taken(all_files), *shared_secrets(all_files))
+    return (problem for problem in found if problem.file == str(config.path))
 
 
 def _neighbours(root: Path, name: str) -> Iterator[Config]:

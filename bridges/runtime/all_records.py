@@ -1,8 +1,9 @@
 """`outputs-off --all-records` switches off all outputs that the services' records name.
 
-The command runs at boot, after a power cut and before the daemons start. One process loads the program,
-and then forks a child for each service. So a wire that hangs delays no other service, and each record
-uses its own profiles.
+The command runs at boot, after a power cut and before the daemons start. It begins as root, and then
+forks a child for each service. Each child becomes the service's user before it reads the service's
+files. So a wire that hangs delays no other service, and a service's files can do no more than their
+owner could.
 
 This machine's pins come first, because they depend on no other device. The command has a time limit,
 because every daemon waits for the command. Each daemon switches off the remaining outputs when it
@@ -22,7 +23,7 @@ from pathlib import Path
 from bridges.runtime import dead_daemon
 from bridges.runtime.record import PATTERN, read
 from bridges.system import log
-from bridges.system.directories import SERVICE_STATE
+from bridges.system.directories import SERVICE_RUN, SERVICE_STATE, Directories, act_as_owner
 from bridges.system.log import pairs
 from bridges.yaml.problems import SettingsError
 from drivers.profiles import texts
@@ -37,49 +38,81 @@ outputs come first."""
 
 
 def switch_off_all(
-    state: Path = SERVICE_STATE, own_s: float = OWN_S, others_s: float = OTHERS_S
+    state: Path = SERVICE_STATE,
+    run: Path = SERVICE_RUN,
+    files: Path = Path("/etc/rmf-bridges"),
+    own_s: float = OWN_S,
+    others_s: float = OTHERS_S,
 ) -> int:
-    """Return 0 if every output in the records is verified off, else 1."""
+    """Return 0 if every output in the records is verified off, else 1. `files`: the services' YAMLs."""
     log.start()
-    own, others = list[Path](), list[Path]()
-    for path in sorted(state.glob(f"*/{PATTERN}")):
-        if record := read(path):
-            file = Path(record.file)
-            with suppress(SettingsError):  # the service's child logs the error
-                record.config()  # imports the modules once, for all children
-            (own if OWN_PINS.search(record.yaml) else others).append(file)
+    own, others = list[Directories](), list[Directories]()
+    for folder in sorted({path.parent for path in state.glob(f"*/{PATTERN}")}):
+        yaml = _loaded(files / f"{folder.name}.yaml")
+        (own if OWN_PINS.search(yaml) else others).append(Directories(run / folder.name, folder))
     texts.give({})
-    left = _off(own, own_s) | _off(set(others) - set(own), others_s)
-    for file in sorted(left):
-        logging.warning(pairs("left_to_its_daemon", file=file))
+    left = _off(own, own_s) | _off(others, others_s)
+    for name in sorted(left):
+        logging.warning(pairs("left_to_its_daemon", service=name))
     return 1 if left else 0
 
 
-def _off(files: Collection[Path], within_s: float) -> set[Path]:
-    """Switch these services' outputs off in parallel. Return the files with outputs that are not
-    verified off."""
+def _loaded(file: Path) -> bytes:
+    """Return a YAML's text, and import the modules that it needs. Each child inherits these modules."""
+    from bridges.settings.load import understood
+
+    with suppress(OSError, SettingsError):  # the child that uses the record logs its errors
+        yaml = file.read_bytes()
+        understood(file, yaml)
+        return yaml
+    return b""
+
+
+def _off(services: Collection[Directories], within_s: float) -> set[str]:
+    """Switch these services' outputs off in parallel. Return the names of those services whose outputs
+    are not verified off."""
     give_up_at = time.monotonic() + within_s
-    running = {_forked(file): file for file in dict.fromkeys(files)}
+    running = {_forked(places): places.state.name for places in services}
     left = set(running.values())
     while running and time.monotonic() < give_up_at:
         pid, ended = os.waitpid(-1, os.WNOHANG)
         if pid == 0:
             time.sleep(LOOK_EVERY_S)
-        elif (file := running.pop(pid)) and ended == 0:
-            left.discard(file)
+        elif (name := running.pop(pid)) and ended == 0:
+            left.discard(name)
     for pid in running:
         os.kill(pid, signal.SIGKILL)
         os.waitpid(pid, 0)
     return left
 
 
-def _forked(file: Path) -> int:
-    """Start a child process that switches off a service's outputs, and return the child's pid. The
-    child exits with 0 on success."""
+def _forked(places: Directories) -> int:
+    """Switch a service's outputs off in a child process, which exits with 0 on success. Return the
+    child's pid."""
     if pid := os.fork():
         return pid
     code = 1
     try:
-        code = dead_daemon.switch_off(argparse.Namespace(file=file, runtime_dir=None, record=[]))
+        code = _switched_off(places)
+    except BaseException:
+        logging.exception(pairs("outputs_off_failed", service=places.state.name))
     finally:
         os._exit(code)
+
+
+def _switched_off(places: Directories) -> int:
+    """Become the service's user, and switch off the outputs in the service's records."""
+    _make_runtime(places)
+    act_as_owner(places)
+    os.environ |= {"RUNTIME_DIRECTORY": str(places.runtime), "STATE_DIRECTORY": str(places.state)}
+    files = {Path(record.file) for record in map(read, places.state.glob(PATTERN)) if record}
+    told = [argparse.Namespace(file=file, runtime_dir=None, record=[]) for file in sorted(files)]
+    return max(map(dead_daemon.switch_off, told), default=1)
+
+
+def _make_runtime(places: Directories) -> None:
+    """Make the directory for the lock, as systemd makes it for the service that starts later."""
+    owner = places.state.stat()
+    with suppress(FileExistsError):
+        places.runtime.mkdir(mode=0o750, parents=True)
+        os.chown(places.runtime, owner.st_uid, owner.st_gid)

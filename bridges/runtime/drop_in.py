@@ -26,13 +26,15 @@ WITHOUT_OUTPUTS_S: Final = 10.0
 LOCAL: Final = ("localhost", "multicast")
 
 
-def text(config: Config, groups: Collection[str]) -> str:
-    """Return the drop-in's text. `groups`: the groups that this machine has. The text names only these
-    groups, because a unit with an unknown group does not start."""
+def text(config: Config, groups: Collection[str], user: str = "") -> str:
+    """Return the drop-in's text. `groups`: the machine's groups. `user`: the service's own user; "" for
+    the unit's user. A unit with an unknown user or group does not start, so the text names no other
+    group. The user is not one of the needs in `fits`, so a drop-in of an older version still fits."""
     head = (
         f"# Written by `rmf-bridge enable` for {config.path.name}. After a change enable it again."
     )
     service = [f"Environment={FITS}={fits(config)}", *_service(config, groups)]
+    service = [f"User={user}", *service] if user else service
     return "\n".join([head, *_unit(config), "[Service]", *service, ""])
 
 

@@ -7,12 +7,13 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from bridges.runtime.record import PATTERN
-from bridges.system.directories import SERVICE_STATE
+from bridges.system.directories import SERVICE_STATE, SERVICE_USER, user_of
 from bridges.system.files import replace
 
 CONFIG: Final = Path("etc/rmf-bridges")
@@ -71,13 +72,37 @@ class WriteFile:
 
 
 @dataclass(frozen=True, slots=True)
+class GiveSecret:
+    """A step that makes this user the owner of a secret file, which only its owner may read."""
+
+    path: Path
+    user: str
+
+
+@dataclass(frozen=True, slots=True)
 class Remove:
     """A step that removes a file. The step also removes the file's directory if it is then empty."""
 
     path: Path
 
 
-Step = Run | SwitchOff | WriteFile | Remove
+Step = Run | SwitchOff | WriteFile | GiveSecret | Remove
+
+
+def make_user(name: str) -> Run:
+    """Return the step that makes the service's own user, unless the user exists. Its group is the
+    common group, whose members may read the files of every service."""
+    home = SERVICE_STATE / name
+    line = f'u {user_of(name)} -:{SERVICE_USER} "Open-RMF bridge {name}" {home} /usr/sbin/nologin'
+    return Run(("systemd-sysusers", "--inline", f"g {SERVICE_USER} -", line))
+
+
+def numbers(table: Path) -> dict[str, int]:
+    """Return the number of each user or group in a system's table; {} without a table."""
+    with suppress(OSError):
+        rows = (line.split(":") for line in table.read_text("utf-8", "replace").splitlines())
+        return {row[0]: int(row[2]) for row in rows if len(row) > 2 and row[2].isdecimal()}
+    return {}
 
 
 def switch_off(name: str) -> SwitchOff:
@@ -129,6 +154,8 @@ def _show(step: Step) -> None:
         case WriteFile(path, content):
             print(f"write {path}:")
             print("".join(f"    {line}\n" for line in content.decode().splitlines()), end="")
+        case GiveSecret(path, user):
+            print(shlex.join(["chown", user, str(path)]))
         case Remove(path):
             print(f"rm {path}")
 
@@ -153,6 +180,11 @@ def _taken(step: Step, root: Path) -> int:
             path.parent.mkdir(parents=True, exist_ok=True)
             replace(path, content)
             path.chmod(0o644)
+        case GiveSecret(path, user):
+            known = numbers(root / "etc/passwd")
+            if user not in known:
+                raise OSError(f"{root / 'etc/passwd'} has no user {user}")
+            os.chown(path, known[user], -1, follow_symlinks=False)
         case Remove(path):
             path.unlink(missing_ok=True)
             if path.parent.is_dir() and not any(path.parent.iterdir()):

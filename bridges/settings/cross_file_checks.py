@@ -4,9 +4,11 @@ Files that are checked together belong to one site. They are for one machine, un
 otherwise.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 from msgspec import Struct
+from msgspec.structs import asdict
 
 from bridges.kinds import kind_called
 from bridges.kinds.shared.graph_kind import GraphKind
@@ -17,6 +19,9 @@ from bridges.yaml.spelling import unknown
 from drivers.hal import Where
 
 Path = tuple[str, ...]
+
+SECRETS = ("private_key", "key_file", "password_file", "token_file")
+"""The keys of files that only one user may read."""
 
 
 class Found(Struct, frozen=True):
@@ -60,6 +65,34 @@ def taken(configs: Sequence[Config], one_machine: bool = True) -> Iterator[Probl
     claims = (c for config in configs for c in _claims(config, one_machine))
     rest = (c for c in claims if not any(c.what.endswith(f" of {b}") for b in busy))
     yield from map(_taken, (*lines, *_twice(rest)))
+
+
+def shared_secrets(configs: Sequence[Config]) -> Iterator[Problem]:
+    """Yield a problem for each secret file that two services use: a secret has one owner, and each
+    service has a user of its own."""
+    for claim, other in _twice(use for one in configs for use in named_files(one, SECRETS)):
+        text = "give each service a copy, because each has a user of its own"
+        yield _said(claim, f"{claim.what} is the secret of {other.config.path} too: {text}")
+
+
+def named_files(config: Config, keys: Sequence[str]) -> Iterator[ExclusiveUse]:
+    """Yield each file that a YAML names under one of these keys, at any depth."""
+    kind = kind_called(config.kind)
+    sections = {"rmf": config.rmf, "buses": config.buses, kind.devices_key: config.devices}
+    for path, file in _files_at(sections, keys):
+        yield ExclusiveUse(config, file, path)
+
+
+def _files_at(settings: Any, keys: Sequence[str], path: Path = ()) -> Iterator[tuple[Path, str]]:
+    """Yield each of these keys that has a value, with its path, at any depth of these settings."""
+    if isinstance(settings, Struct):
+        settings = asdict(settings)
+    if isinstance(settings, Mapping):
+        for key, value in settings.items():
+            if key in keys and value:
+                yield (*path, key), str(value)
+            else:
+                yield from _files_at(value, keys, (*path, str(key)))
 
 
 def _twice(claims: Iterable[ExclusiveUse]) -> Iterator[tuple[ExclusiveUse, ExclusiveUse]]:

@@ -12,8 +12,10 @@ from the command line serves as `runtime` and as `state`.
 """
 
 import grp
+import hashlib
 import os
 import pwd
+import re
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -26,8 +28,16 @@ SERVICE_STATE = Path("/var/lib/rmf-bridge")
 USERS_RUN = Path("/run/user")
 TMP = Path("/tmp")
 SERVICE_USER = "rmf-bridge"
+"""The user of the recorder, and of a service whose drop-in names no user. The group of this name may
+read the files of every service."""
 GROUPS = ("gpio", "dialout")
-"""The additional groups that a drop-in may give to the service's user (`drop_in.py`)."""
+"""The additional groups that a drop-in may give a service's user (`drop_in.py`)."""
+_OF_SERVICE = re.compile(SERVICE_USER + "(-[0-9a-f]{8})?")
+
+
+def user_of(service: str) -> str:
+    """Return the name of a service's own user. A hash keeps the name short and free of capitals."""
+    return f"{SERVICE_USER}-{hashlib.sha256(service.encode()).hexdigest()[:8]}"
 
 
 class Directories(Struct, frozen=True):
@@ -195,14 +205,13 @@ def _become(uid: int, gid: int) -> None:
 
 
 def _groups(uid: int, gid: int) -> list[int]:
-    """Return the user's groups. For the service's user, add the groups that a unit may give to this
-    user."""
+    """Return the user's groups. For a service's user, add the groups that a unit may give it."""
     try:
         user = pwd.getpwuid(uid)
     except KeyError:
         return [gid]
     groups = os.getgrouplist(user.pw_name, gid)
-    if user.pw_name == SERVICE_USER:
+    if _OF_SERVICE.fullmatch(user.pw_name):
         groups += [g.gr_gid for g in grp.getgrall() if g.gr_name in GROUPS]
     return groups
 

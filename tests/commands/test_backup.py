@@ -13,6 +13,7 @@ import pytest
 from bridges import cli
 from bridges.commands.backup import FRESH_S
 from bridges.runtime.runtime_directory import KEPT
+from bridges.runtime.services import make_user
 
 ROOT = Path(__file__).parents[2]
 WANTS = "etc/systemd/system/rmf-bridges.target.wants"
@@ -82,7 +83,8 @@ def test_a_restored_machine_has_the_same_files_and_services_and_no_secret_was_sa
     assert drop_in in after
     assert {name: after[name] for name in after if name != drop_in} == before
     assert calls == [
-        ["systemctl", f"--root={new}", "enable", "rmf-bridges.target", "rmf-bridge@ward.service"]
+        ["systemd-sysusers", f"--root={new}", *make_user("ward").words[1:]],
+        ["systemctl", f"--root={new}", "enable", "rmf-bridges.target", "rmf-bridge@ward.service"],
     ]
     assert (new / "etc/rmf-bridges/page.users").stat().st_mode & 0o777 == 0o600
 

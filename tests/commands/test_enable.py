@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -11,12 +12,22 @@ import pytest
 from bridges.cli import main
 from bridges.commands import disable, enable
 from bridges.runtime import drop_in, services
-from bridges.runtime.services import Remove, Run, WriteFile, carry_out, switch_off
+from bridges.runtime.services import (
+    GiveSecret,
+    Remove,
+    Run,
+    WriteFile,
+    carry_out,
+    make_user,
+    switch_off,
+)
 from bridges.settings.load import load
+from bridges.system.directories import user_of
 
 CONFIG = Path(__file__).parents[2] / "config"
 LIFT = CONFIG / "lift_dry_contact.yaml"
 UNIT = "rmf-bridge@lift_dry_contact.service"
+USER = user_of("lift_dry_contact")
 DROP_IN = f"etc/systemd/system/{UNIT}.d/10-enable.conf"
 TARGET = "etc/rmf-bridges/lift_dry_contact.yaml"
 
@@ -43,7 +54,8 @@ def test_an_instance_is_stopped_and_off_before_its_file_and_drop_in_change(tmp_p
         Run(("systemctl", "stop", UNIT), running_only=True),
         switch_off("lift_dry_contact"),
         WriteFile(tmp_path / TARGET, LIFT.read_bytes(), LIFT),
-        WriteFile(tmp_path / DROP_IN, drop_in.text(config, ["gpio"]).encode()),
+        make_user("lift_dry_contact"),
+        WriteFile(tmp_path / DROP_IN, drop_in.text(config, ["gpio"], USER).encode()),
         Run(("systemctl", "daemon-reload"), running_only=True),
         Run(("systemctl", "enable", "rmf-bridges.target", UNIT)),
         Run(("systemctl", "start", UNIT), running_only=True),
@@ -75,7 +87,7 @@ def test_a_system_that_is_not_running_gets_file_drop_in_and_links(
     (tmp_path / "etc/group").write_text("gpio:x:99:\nwheel:x:1:\n")
     assert main(["enable", str(LIFT), "--root", str(tmp_path)]) == 0
     written = (tmp_path / DROP_IN).read_text()
-    assert written == drop_in.text(load(LIFT), ["gpio"])
+    assert written == drop_in.text(load(LIFT), ["gpio"], USER)
     assert (tmp_path / TARGET).read_bytes() == LIFT.read_bytes()
     assert (tmp_path / TARGET).stat().st_mode & 0o777 == 0o644
     assert main(["disable", "lift_dry_contact", "--root", str(tmp_path)]) == 0
@@ -83,6 +95,7 @@ def test_a_system_that_is_not_running_gets_file_drop_in_and_links(
     assert (tmp_path / TARGET).exists()
     root = f"--root={tmp_path}"
     assert calls == [
+        ["systemd-sysusers", root, *make_user("lift_dry_contact").words[1:]],
         ["systemctl", root, "enable", "rmf-bridges.target", UNIT],
         ["systemctl", root, "disable", UNIT],
     ]
@@ -120,13 +133,14 @@ def test_a_dry_run_prints_every_step_and_does_nothing(
     assert main(["enable", str(LIFT), "--root", str(tmp_path), "--dry-run"]) == 0
     printed = capsys.readouterr().out.splitlines()
     off = f"{sys.executable} -P -m bridges.cli outputs-off /{TARGET}"
-    assert printed[:7] == [
+    assert printed[:8] == [
         f"systemctl stop {UNIT}",
         f"systemctl disable {UNIT}",
         f"{off}   # if a record is left in /var/lib/rmf-bridge/lift_dry_contact",
         f"rm /{DROP_IN}",
         "systemctl daemon-reload",
         f"install -m 644 {LIFT} {tmp_path / TARGET}",
+        shlex.join(make_user("lift_dry_contact").words),
         f"write {tmp_path / DROP_IN}:",
     ]
     assert (calls, list(tmp_path.iterdir())) == ([], [])
@@ -211,3 +225,49 @@ def test_a_step_that_fails_after_the_stop_ends_with_the_service_started_again(
     assert carry_out([full, Remove(tmp_path / "never")], live, keeps=UNIT) == os.EX_IOERR
     assert calls == [["systemctl", "--quiet", "is-active", UNIT], ["systemctl", "start", UNIT]]
     assert "the steps after the failed step were not taken" in capsys.readouterr().err
+
+
+def with_token(file: Path) -> Path:
+    """Write a door that needs a token, with a name of its own."""
+    text = (CONFIG / "door_http.yaml").read_text().replace("side_door", file.stem)
+    text = text.replace(
+        "# token_file: /etc/rmf-bridges/relay.key", "token_file: /etc/rmf-bridges/relay.key"
+    )
+    file.write_text(text.replace("192.168.1.70", f"192.168.1.{len(file.stem)}"))
+    return file
+
+
+def test_a_secret_becomes_the_services_own(tmp_path: Path, calls: list[list[str]]) -> None:
+    secret = tmp_path / "etc/rmf-bridges/relay.key"
+    file = with_token(tmp_path / "ward.yaml")
+    given = GiveSecret(secret, user_of("ward"))
+    assert given not in list(enable.steps(load(file), tmp_path, []))
+    secret.parent.mkdir(parents=True)
+    secret.touch()
+    assert given in list(enable.steps(load(file), tmp_path, []))
+    secret.rename(secret.with_suffix(".old"))
+    secret.symlink_to(secret.with_suffix(".old"))
+    assert given not in list(enable.steps(load(file), tmp_path, []))
+
+
+def test_two_services_cannot_have_one_secret(
+    tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    first, second = with_token(tmp_path / "ward.yaml"), with_token(tmp_path / "kitchen.yaml")
+    assert main(["enable", str(first), "--root", str(tmp_path)]) == 0
+    assert main(["enable", str(second), "--root", str(tmp_path)]) == os.EX_CONFIG
+    told = capsys.readouterr().err
+    wanted = f"/etc/rmf-bridges/relay.key is the secret of {tmp_path}/etc/rmf-bridges/ward.yaml too"
+    assert f"{second}:15:17: {wanted}: give each service a copy" in told
+
+
+def test_a_packages_upgrade_keeps_the_services_user(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    printed = []
+    (tmp_path / "etc").mkdir()
+    for table in ("", f"{USER}:x:990:991::/:/usr/sbin/nologin\n"):
+        (tmp_path / "etc/passwd").write_text(table)
+        assert main(["enable", str(LIFT), "--drop-in", "--root", str(tmp_path)]) == 0
+        printed.append(f"User={USER}\n" in capsys.readouterr().out)
+    assert printed == [False, True]

@@ -175,6 +175,33 @@ class Rollouts:
         done = self._roll("install", self.old)
         self._expect("the first installation", done == 0, self._versions() == [self.old] * 2)
         self._expect("every daemon serves", *self._serving())
+        self._users()
+
+    def _users(self) -> None:
+        """Each service has a user of its own, also after a power cut."""
+        state = "/var/lib/rmf-bridge"
+        owners = [
+            self._on(SECOND, f"stat -c %U {state}/{name}") for name in ("door2", "door_supervisor")
+        ]
+        self._expect("each service has a user of its own", owners[0] != owners[1])
+        write = f"su -s /bin/sh {owners[1].strip()} -c 'echo > {state}/door2/kept.json'; echo $?"
+        self._expect("no service writes another's state", self._on(SECOND, write).strip() != "0")
+        self._on(
+            FIRST,
+            f"cd {state}/door1; cp -p claimed-*.json /run; systemctl stop rmf-bridge@door1;"
+            " mv /run/claimed-*.json .; rm -rf /run/rmf-bridge/door1;"
+            " systemctl restart rmf-bridge-outputs-off",
+        )
+        left = self._on(FIRST, f"ls {state}/door1")
+        made = self._on(FIRST, f"stat -c %U /run/rmf-bridge/door1 {state}/door1").split()
+        self._expect(
+            "at boot the outputs of a lost daemon go off, by its own user",
+            "claimed-" not in left,
+            len(set(made)) == 1,
+            made != ["root"] * 2,
+        )
+        self._on(FIRST, "systemctl start rmf-bridge@door1")
+        self._expect("the daemon serves again", *self._serving())
 
     def _in_use(self, bases: dict[str, str]) -> None:
         self._send("open")

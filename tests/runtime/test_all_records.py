@@ -62,13 +62,14 @@ def port(file: Path) -> int:
 
 
 def booted(state: Path) -> subprocess.CompletedProcess[str]:
-    """Run the command of the unit that runs at boot, with the state directories of this user's
-    daemons."""
+    """Run the command of the unit that runs at boot, with the state directories and YAMLs in this
+    folder."""
     code = (
         "import pathlib, sys; from bridges.runtime.all_records import switch_off_all;"
-        f"sys.exit(switch_off_all(pathlib.Path({str(state / 'rmf-bridge')!r}), 20, 20))"
+        f"here = pathlib.Path({str(state)!r});"
+        "sys.exit(switch_off_all(here / 'rmf-bridge', here / 'run', here, 20, 20))"
     )
-    env = environment(XDG_STATE_HOME=str(state), XDG_RUNTIME_DIR=str(state / "run"))
+    env = environment()
     return subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True)
 
 
@@ -84,7 +85,7 @@ def test_a_relay_goes_off_though_another_services_module_never_answers(
         done = booted(tmp_path)
     wait_until(lambda: module.relay()[-1:] == [False], "the relay is off")
     assert (done.returncode, answers.exists(), never.exists()) == (1, False, True)
-    assert f"left_to_its_daemon file={dead}" in done.stderr
+    assert "left_to_its_daemon service=dead_door" in done.stderr
 
 
 @pytest.mark.long(25)

@@ -70,9 +70,10 @@ def test_no_shipped_file_needs_a_service_that_is_more_exposed_than_this(
 @needs_systemd
 @pytest.mark.parametrize(
     ("service", "most"),
-    [(RECORDER, 1.0), (PAGE, 1.5), (EXPORTER, 1.5), (NOTIFY, 1.5), (EARLY, MOST)],
+    # EARLY begins as root, because each of its children becomes the user of another service.
+    [(RECORDER, 1.0), (PAGE, 1.5), (EXPORTER, 1.5), (NOTIFY, 1.5), (EARLY, 3.0)],
 )
-def test_the_other_units_are_no_more_exposed_than_a_daemon(
+def test_the_other_units_are_no_more_exposed_than_this(
     tmp_path: Path, service: Path, most: float
 ) -> None:
     units = tmp_path / "etc/systemd/system"

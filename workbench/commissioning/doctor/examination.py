@@ -48,9 +48,9 @@ def examined(
     config: Config, building: "BuildingMap | None", machine: Machine, options: Options
 ) -> Iterator[Finding]:
     """Yield every finding as soon as it is made."""
-    file, who = config.path.absolute(), user(machine)
+    file, who = config.path.absolute(), user(machine, config.path.stem)
     yield from _file(config, building)
-    yield from users(machine)
+    yield from users(machine, who)
     yield from health.clock(machine)
     yield from health.watchdog(machine)
     try:

@@ -7,13 +7,14 @@ neither good nor bad.
 
 import re
 import stat
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
 from bridges.kinds.shared.rmf_section import Rmf, Zenoh
 from bridges.settings.config import Config
-from bridges.system.directories import SERVICE_USER
+from bridges.settings.cross_file_checks import SECRETS, named_files
+from bridges.system.directories import SERVICE_USER, user_of
 from workbench.commissioning.doctor.finding import Finding, note, ok, unknown, warning, wrong
 from workbench.commissioning.doctor.machine import Machine
 
@@ -25,11 +26,11 @@ FILES: Final = "Files"
 USERS: Final = "Users"
 UPDATES: Final = "Updates"
 PAGE: Final = "docs/how-to/harden.md"
+ENABLE: Final = "rmf-bridge enable FILE"
 ENCRYPTED: Final = ("tls/", "quic/", "https://")
 OTHERS_WRITE: Final = stat.S_IWGRP | stat.S_IWOTH
 OTHERS_READ: Final = stat.S_IRWXG | stat.S_IRWXO
-SECRETS: Final = ("private_key", "password_file", "token_file")
-READABLE: Final = ("ca", "certificate", "ca_file")
+READABLE: Final = ("ca", "certificate", "ca_file", "certificate_file")
 LISTENS: Final = {"tcp": "0A", "udp": "07"}
 """Protocol -> number in /proc/net of an open socket without peer (include/net/tcp_states.h)."""
 LOOPBACK: Final = re.compile("(0{16}FFFF0000)?[0-9A-F]{6}7F|0{24}01000000")
@@ -47,7 +48,7 @@ def hardening(config: Config, machine: Machine) -> Iterator[Finding]:
     yield _ports({name: machine.text(f"/proc/net/{name}") for name in _tables()})
     yield _root(machine.text("/proc/mounts"))
     yield from _files(config, machine)
-    yield _runs_as(service)
+    yield _runs_as(service, user_of(config.path.stem))
     yield _logins(machine.printed("sshd", "-T"), machine.at("/usr/sbin/sshd").exists())
     yield _updates(machine.printed("apt-config", "dump", "APT::Periodic::Unattended-Upgrade"))
 
@@ -201,11 +202,13 @@ def _root(mounts: str | None) -> Finding:
 def _files(config: Config, machine: Machine) -> Iterator[Finding]:
     """Judge the modes of the YAML and its folder, and of each file that the YAML names."""
     file = config.path.absolute()
-    named = [config.rmf.zenoh, config.rmf.zenoh and config.rmf.zenoh.tls, *config.buses.values()]
-    secrets = _named(named, SECRETS)
+    secrets, readable = (
+        list(dict.fromkeys(Path(use.what) for use in named_files(config, keys)))
+        for keys in (SECRETS, READABLE)
+    )
     bad = 0
     for path, forbidden in [
-        *((one, OTHERS_WRITE) for one in (file.parent, file, *_named(named, READABLE))),
+        *((one, OTHERS_WRITE) for one in (file.parent, file, *readable)),
         *((one, OTHERS_READ) for one in secrets),
     ]:
         try:
@@ -223,18 +226,16 @@ def _files(config: Config, machine: Machine) -> Iterator[Finding]:
         yield ok(FILES, "the YAML and its files are closed to other users")
 
 
-def _named(settings: Iterable[object], keys: Iterable[str]) -> list[Path]:
-    found = [getattr(one, key, None) for one in settings for key in keys]
-    return [Path(path) for path in dict.fromkeys(found) if path]
-
-
-def _runs_as(service: dict[str, str] | None) -> Finding:
+def _runs_as(service: dict[str, str] | None, own: str) -> Finding:
     if service is None:
         return unknown(USERS, "the daemon's user: no service of this file is installed here")
-    if (name := service["User"]) == SERVICE_USER:
-        return ok(USERS, f"the daemon runs as {name}")
+    if (name := service["User"]) == own:
+        return ok(USERS, f"the daemon runs as {name}, a user of its own")
+    if name == SERVICE_USER:
+        shared = "an intruder in one daemon could change the files of all daemons of this user"
+        return warning(USERS, f"the daemon shares the user {name}", shared, ENABLE)
     means = "an intruder in the daemon would have this user's rights"
-    return wrong(USERS, f"the daemon runs as {name or 'root'}", means, "rmf-bridge enable FILE")
+    return wrong(USERS, f"the daemon runs as {name or 'root'}", means, ENABLE)
 
 
 def _logins(said: str | None, there: bool) -> Finding:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from bridges.system.directories import GROUPS, SERVICE_USER
+from bridges.system.directories import GROUPS, SERVICE_USER, user_of
 from workbench.commissioning.doctor.finding import Finding, note, ok, wrong
 from workbench.commissioning.doctor.machine import Machine
 
@@ -46,26 +46,24 @@ def has_unit(machine: Machine) -> bool:
     return any(machine.at(f"{place}/{UNIT}").exists() for place in UNITS)
 
 
-def user(machine: Machine) -> User:
-    """Return the daemon's user."""
+def user(machine: Machine, service: str) -> User:
+    """Return the daemon's user: the service's own user, or the unit's user before `enable` made one."""
     if not has_unit(machine):
         return User(_name(machine, machine.uid), machine.uid, machine.gids, service=False)
-    ids = _passwd(machine).get(SERVICE_USER, (-1, -1))
+    name = user_of(service) if user_of(service) in _passwd(machine) else SERVICE_USER
+    ids = _passwd(machine).get(name, (-1, -1))
     groups = _groups(machine)
-    gids = {
-        gid for name, (gid, members) in groups.items() if name in GROUPS or SERVICE_USER in members
-    }
-    return User(SERVICE_USER, ids[0], frozenset({ids[1], *gids}), service=True)
+    gids = {gid for group, (gid, members) in groups.items() if group in GROUPS or name in members}
+    return User(name, ids[0], frozenset({ids[1], *gids}), service=True)
 
 
-def users(machine: Machine) -> Iterator[Finding]:
-    """Examine `user`: do the unit's user and that user's groups exist?"""
+def users(machine: Machine, who: User) -> Iterator[Finding]:
+    """Examine `user`: do the unit's user and the groups for devices exist?"""
     subject = "user"
-    if not has_unit(machine):
-        name = _name(machine, machine.uid)
+    if not who.service:
         yield note(
             subject,
-            f"the unit {UNIT} is not installed; the findings below are for {name}",
+            f"the unit {UNIT} is not installed; the findings below are for {who.name}",
             "the daemon does not start at boot, and nobody restarts the daemon",
             "docs/how-to/install.md",
         )
@@ -87,7 +85,7 @@ def users(machine: Machine) -> Iterator[Finding]:
             + "; then sudo rmf-bridge enable FILE",
         )
     if not missing and SERVICE_USER in _passwd(machine):
-        yield ok(subject, f"the service runs as {SERVICE_USER}, in the groups {', '.join(GROUPS)}")
+        yield ok(subject, f"the service runs as {who.name}, in the groups {', '.join(GROUPS)}")
 
 
 def join(who: User, group: str) -> str:

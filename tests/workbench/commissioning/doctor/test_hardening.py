@@ -9,6 +9,7 @@ import pytest
 from bridges import cli
 from bridges.settings.config import Config
 from bridges.settings.load import load, understood
+from bridges.system.directories import user_of
 from tests.workbench.commissioning.doctor.made_up import MadeUp
 from workbench.commissioning.doctor import hardening as points
 from workbench.commissioning.doctor.hardening import hardening
@@ -225,9 +226,10 @@ def test_files_are_judged_by_their_modes(made: MadeUp) -> None:
 
 
 @pytest.mark.parametrize(
-    ("user", "wanted"), [("rmf-bridge", "ok"), ("root", "wrong"), ("", "wrong")]
+    ("user", "wanted"),
+    [(user_of("lift"), "ok"), ("rmf-bridge", "warning"), ("root", "wrong"), ("", "wrong")],
 )
-def test_a_daemon_that_runs_as_root_is_wrong(made: MadeUp, user: str, wanted: str) -> None:
+def test_a_daemon_needs_a_user_of_its_own(made: MadeUp, user: str, wanted: str) -> None:
     made.command("systemctl", f"User={user}\nEnvironment=\nLoadState=loaded\n")
     assert levels(made, points.USERS)[0] == wanted
 

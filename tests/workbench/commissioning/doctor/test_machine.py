@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridges.system.directories import Directories
+from bridges.system.directories import Directories, user_of
 from tests.workbench.commissioning.doctor.made_up import OTHERS, OURS, MadeUp
 from workbench.commissioning.doctor import health
 from workbench.commissioning.doctor.can import interface
@@ -36,17 +36,17 @@ def test_the_exit_code_is_that_of_the_worst_finding() -> None:
 
 
 def test_without_the_unit_the_user_who_asks_counts_as_the_daemons(made: MadeUp) -> None:
-    assert told(list(users(made.machine))) == [
+    assert told(list(users(made.machine, user(made.machine, "lift")))) == [
         ("note", f"the unit {UNIT} is not installed; the findings below are for pi")
     ]
-    assert (user(made.machine).name, user(made.machine).service) == ("pi", False)
+    assert [(who := user(made.machine, "lift")).name, who.service] == ["pi", False]
 
 
 def test_a_unit_whose_user_and_groups_are_missing_cannot_start(made: MadeUp) -> None:
     made.write(f"/etc/systemd/system/{UNIT}")
     made.write("/etc/group", "root:x:0:\n")
     groups = "sudo groupadd --system gpio; sudo groupadd --system dialout"
-    assert [(one.level, one.do) for one in users(made.machine)] == [
+    assert [(one.level, one.do) for one in users(made.machine, user(made.machine, "lift"))] == [
         ("wrong", "sudo useradd --system --no-create-home rmf-bridge"),
         ("wrong", f"{groups}; then sudo rmf-bridge enable FILE"),
     ]
@@ -55,10 +55,18 @@ def test_a_unit_whose_user_and_groups_are_missing_cannot_start(made: MadeUp) -> 
 def test_the_services_user_has_the_groups_of_the_unit(made: MadeUp) -> None:
     made.write(f"/etc/systemd/system/{UNIT}")
     made.write("/etc/passwd", "rmf-bridge:x:990:991::/:/usr/sbin/nologin\n")
-    assert told(list(users(made.machine))) == [
+    assert told(list(users(made.machine, user(made.machine, "lift")))) == [
         ("ok", "the service runs as rmf-bridge, in the groups gpio, dialout")
     ]
-    assert user(made.machine).gids == {991, OURS}
+    assert user(made.machine, "lift").gids == {991, OURS}
+
+
+def test_a_service_that_was_enabled_has_a_user_of_its_own(made: MadeUp) -> None:
+    made.write(f"/etc/systemd/system/{UNIT}")
+    own = user_of("lift")
+    made.write("/etc/passwd", f"rmf-bridge:x:990:991::/:/x\n{own}:x:989:991::/:/x\n")
+    names = [user(made.machine, service).name for service in ("lift", "door")]
+    assert names == [own, "rmf-bridge"]
 
 
 @pytest.mark.parametrize(
