@@ -35,7 +35,7 @@ NARROW = 60
 TO_TRY = (
     "every output is off while the unit is off, and after the machine has started",
     "every output is off 10 s after the daemon was killed (kill -9)",
-    "the network is unplugged: RMF is told, and every output is as the settings say",
+    "the controller's cable is unplugged: the device is offline, its outputs are as the settings say",
 )
 
 
