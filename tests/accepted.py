@@ -1,5 +1,7 @@
-"""Accepts requests as the daemon's service does, for stories in which a core runs without the
-service."""
+"""Accepts requests as the daemon's service does.
+
+Some stories run a core without the service.
+"""
 
 from typing import Any
 
@@ -13,8 +15,11 @@ from bridges.runtime.device import AnyNode
 def accepted(
     node: AnyNode, kind: AnyDeviceKind, settings: Any, *heard: tuple[Topic[Any], Message]
 ) -> list[Any]:
-    """Return the events that the kind makes of these requests. `heard`: each request with its topic. A
-    refused request makes no event; the node counts the refusal."""
+    """Return the events that the kind makes from these requests. `heard` has each topic with its
+    request.
+
+    A refused request makes no event. Instead the node counts the refusal.
+    """
     events = []
     for topic, request in heard:
         try:

@@ -18,13 +18,13 @@ from tests.processes import end_with_us
 ON_WIRES = ("commands", "drivers", "hal_fakes", "transports", "runtime", "site", "workbench")
 """Folders whose tests use threads, processes and sockets. Other tests run in virtual time."""
 WIRES_HANG_AFTER_S = 900
-"""Time limit of a test on wires (s). No passing test takes this long, even on a busy machine."""
+"""The time limit of a test on wires (s). Even on a busy machine no passing test takes this long."""
 
 if not DEEP and missing_of_ros():
     os.environ.setdefault("TRANSPORT", "zenoh")
-"""The transport between processes in tests of other subjects is zenoh, as on a Raspberry Pi. With zenoh
-a daemon starts on half the CPU that dds takes. `make deep`, and a run beside ROS, use dds where dds
-is installed."""
+"""Between processes, tests of other subjects use the zenoh transport, as on a Raspberry Pi. On zenoh a
+daemon starts with half the CPU time that it needs on dds. Where dds is installed, `make deep` and
+runs beside ROS use dds."""
 
 settings.register_profile(
     "here",
@@ -34,7 +34,8 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("here")
-"""Draw the same examples in each run. No wall clock limits the drawing or trying of an example."""
+"""Every run draws the same examples. No time limit applies to the drawing or to the test of an
+example."""
 
 signal.signal(
     signal.SIGHUP, signal.SIG_DFL
@@ -42,8 +43,8 @@ signal.signal(
 
 gc.disable()
 atexit.register(gc.freeze)
-"""The garbage collector is off during the collection of tests, which makes no garbage, and at a
-worker's end."""
+"""The garbage collector is off while pytest collects the tests, because the collection makes no
+garbage. It is off again when a worker ends."""
 
 end_with_us()
 
@@ -88,18 +89,18 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Freeze the collected objects. They live until the end, so the garbage collector need not scan
-    them."""
+    """Freeze the collected objects. They live until the run ends, so the garbage collector need not
+    scan them."""
     gc.freeze()
     gc.enable()
 
 
-@pytest.hookimpl(optionalhook=True)  # optional: a run without xdist lacks this hook
+@pytest.hookimpl(optionalhook=True)  # without xdist this hook does not exist
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
     """With `--dist loadscope`, run a test with all its parameters on one worker.
 
-    Each module's fixture (an echo process, a schema) is then made once. Any other test goes to the next
-    free worker.
+    So each module's fixture (an echo process, a schema) starts only once. Any other test goes to the
+    next free worker.
     """
     from xdist.scheduler import LoadScopeScheduling  # type: ignore[import-untyped]
 
@@ -113,8 +114,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
 def _mixed(items: list[pytest.Item]) -> list[pytest.Item]:
     """Mix waiting tests with computing tests, to keep all cores busy.
 
-    The mix keeps files whole, and is the same each time. The long tests come in the first quarter, the
-    longest first.
+    A file's tests stay together, and every run has the same mix. The long tests are in the first
+    quarter, and the longest test is the first.
     """
     random = Random(1)
     place = {path: random.random() for path in sorted({item.path for item in items})}
@@ -124,7 +125,8 @@ def _mixed(items: list[pytest.Item]) -> list[pytest.Item]:
 
 
 def _seconds(item: pytest.Item) -> float:
-    """Return the time (s) of the test when it runs alone, from its mark, or 0 without a mark."""
+    """Return the seconds that the test takes when it runs alone. Return 0 for a test without the mark
+    `long`."""
     mark = item.get_closest_marker("long")
     return float(mark.args[0]) if mark else 0.0
 
@@ -141,7 +143,7 @@ def pytest_deselected(items: Sequence[pytest.Item]) -> None:
 def pytest_terminal_summary(
     terminalreporter: pytest.TerminalReporter, config: pytest.Config
 ) -> None:
-    """Report the tests left out, because a green run without ROS has not tested the ros2 transport."""
+    """Report the tests that did not run. A green run without ROS has not tested the ros2 transport."""
     if missing := missing_of_dds():
         terminalreporter.write_line(f"not run: the tests of the dds transport, as {missing}")
     if _deselected and config.getoption("markexpr") == "not ros and not browser":

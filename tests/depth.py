@@ -1,4 +1,4 @@
-"""The depth of walks and the number of examples: a part by default, all in `make deep`."""
+"""The depth of walks and the number of examples. Only `make deep` runs everything."""
 
 import os
 from collections.abc import Sequence
@@ -10,17 +10,17 @@ T = TypeVar("T")
 
 
 def depth(default: T, deep: T) -> T:
-    """Return `default` in `make test` and `deep` in `make deep`, for the depth or least number of a
-    walk."""
+    """Return `default` in `make test` and `deep` in `make deep`, as the depth of a walk or the fewest
+    states that it must reach."""
     return deep if DEEP else default
 
 
 def part(of: Sequence[T], one_in: int, first: int = 0) -> Sequence[T]:
-    """Return all items in `make deep`. Otherwise return every `one_in`-th item from number `first`
-    on."""
+    """Return all items in `make deep`. Otherwise return every `one_in`-th item, beginning at the index
+    `first`."""
     return of if DEEP else of[first::one_in]
 
 
 def examples(deep: int) -> int:
-    """Return the number of examples that Hypothesis draws."""
+    """Return the number of examples that Hypothesis draws. `deep` is the number in `make deep`."""
     return deep if DEEP else max(deep // 4, 10)

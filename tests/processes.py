@@ -1,4 +1,4 @@
-"""Finds processes that a test has left, and ends all processes of a killed run."""
+"""Finds the processes that a test has left behind. Ends all processes of a killed run."""
 
 import os
 from contextlib import suppress
@@ -7,7 +7,8 @@ from secrets import token_hex
 from typing import Final
 
 RUN: Final = "TEST_RUN"
-"""The environment variable with the name of the test run. Every process of the run has it."""
+"""The environment variable with the name of the test run. Every process of the run inherits the
+variable."""
 REAPER: Final = """
 read -r _
 for round in 1 2 3 4 5 6 7 8 9 10; do
@@ -18,18 +19,18 @@ for round in 1 2 3 4 5 6 7 8 9 10; do
     done
 done
 """
-"""A program that waits until the run closes its end of the pipe, and then kills the run's processes.
+"""A shell program that waits until the run closes the pipe. Then it kills the run's processes.
 
-The guard of a killed daemon may have started another process in the meantime, so the program looks
-again.
+A killed daemon's guard may have started another process in the meantime. So the program looks again.
 """
 
 
 def end_with_us() -> None:
-    """End all later children of this process, and their children, when this process ends.
+    """Let all later children and grandchildren of this process end when this process ends.
 
-    The children end after SIGKILL too. PR_SET_PDEATHSIG would not suffice, because its signal comes
-    when the starting thread ends, and because grandchildren do not inherit it.
+    The children also end when this process dies from SIGKILL. PR_SET_PDEATHSIG would not suffice: its
+    signal already comes when the thread ends that started the child, and grandchildren do not inherit
+    it.
     """
     if RUN in os.environ:
         return  # the run that started this worker ends the worker's processes

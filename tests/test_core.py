@@ -1,4 +1,4 @@
-"""The core imports no extra, and needs only its own libraries (decision 0123)."""
+"""The core's imports. It imports no extra, and only its own libraries (decision 0123)."""
 
 import sys
 import tomllib
@@ -17,7 +17,7 @@ BUSES = ("can", "gpio", "http", "modbus")
 PACKAGES = (
     "bridges", "bridges.commands", "bridges.kinds", "bridges.transports", "drivers", "drivers.hal",
 )  # fmt: skip
-"""Folders of the core. CORE lists their contents one by one."""
+"""The core's folders. INSIDE lists the core's part of each folder."""
 INSIDE = {
     "bridges": "blackbox cli exit_codes messages observe runtime settings system yaml",
     "bridges.commands": "backup check completion disable enable incident log migrate outputs_off"
@@ -32,24 +32,24 @@ INSIDE = {
     " serial_port",
 }
 CORE = [f"{package}.{name}" for package, listed in INSIDE.items() for name in listed.split()]
-"""Modules and whole folders of the core. A driver in them that knows only an extra's bus is an
-extra."""
+"""Modules and whole folders of the core. A driver in these folders is an extra if it knows only the bus
+of an extra."""
 LIBRARIES = {
     "argcomplete": "argcomplete", "can": "python-can", "canopen": "canopen", "cantools": "cantools",
     "cyclonedds": "cyclonedds", "gpiozero": "gpiozero", "lgpio": "lgpio", "mcap": "mcap",
     "msgspec": "msgspec", "pymodbus": "pymodbus", "requests": "requests", "serial": "pyserial",
     "urllib3": "requests", "xxhash": "xxhash", "yaml": "PyYAML", "zenoh": "eclipse-zenoh",
 }  # fmt: skip
-"""The distribution that brings each module of the core's libraries."""
+"""The PyPI name of the library that contains each module. The core needs these libraries."""
 FLEET = ("bridges.runtime.fleet", "bridges.settings.fleet_site", "bridges.settings.nav_graph")
-"""Modules for a fleet's rooms. They stand in the core's folders, but are extras."""
+"""Modules for a fleet's rooms. They are extras, although they lie in the core's folders."""
 ON_REQUEST = {
     ("drivers.hal.http", "drivers.hal.http_push"),
     ("bridges.runtime.service", "bridges.runtime.fleet.service"),
     ("bridges.commands.run", "bridges.settings.fleet_site"),
     ("bridges.commands.check", "bridges.settings.fleet_site"),
 }
-"""Extras that the core imports only if a YAML asks for them."""
+"""Imports of extras in the core. They happen only if a YAML asks for the extra."""
 OF_ROS = {"rclpy", "launch", "launch_ros", "_typeshed"}
 
 
@@ -60,7 +60,7 @@ def graph() -> grimp.ImportGraph:
 
 @cache
 def extra_drivers() -> set[str]:
-    """Return the drivers in the core's folders that know only an extra's buses."""
+    """Return the drivers in the core's folders that know only the buses of extras."""
     return {
         f"drivers.{kind}.{name}"
         for kind in DEVICES

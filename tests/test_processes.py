@@ -1,4 +1,4 @@
-"""All processes that a test run started end with the run, whether the run finishes or is killed."""
+"""Processes of a test run. All of them end when the run finishes or is killed."""
 
 import os
 import subprocess
@@ -22,8 +22,8 @@ starts.start()
 starts.join()
 sys.stdin.read()
 """
-"""A program that starts a child in its own session from a thread. The thread ends. The child has a
-child."""
+"""A program with one thread, which starts a child in its own session and then ends. The child starts a
+child too."""
 
 
 def test_what_a_killed_run_has_started_is_killed(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Waits for events outside this thread: in a real process, on a real socket, on DDS."""
+"""Waits for events outside this thread. Such an event occurs in a process, on a socket or on DDS."""
 
 import re
 import threading
@@ -17,16 +17,17 @@ TOO_LATE = re.compile(
     r" within [\d.]+ s\b|first bytes are not the echo|echo came late|is half a frame"
     r"|is not a frame: a collision"
 )
-"""A bus's words for a late answer, or for two answers that collide on a serial line."""
+"""Error texts of a bus whose answer came late, or of a serial line on which two answers collided."""
 
 LEASE_S = 9.5
-"""A wait (s) below the 10 s after which DDS notices that a node left without a farewell."""
+"""A wait (s) slightly below the lease. After 10 s DDS notices a node that left without a farewell."""
 
 
 def wait_until(condition: Callable[[], object], what: str, patience_s: float = PATIENCE_S) -> None:
-    """Look repeatedly until the condition holds. If it never holds, fail with the name `what`.
+    """Check the condition again and again until it holds. If it never holds, fail, and name `what`.
 
-    The pauses grow with the time waited, because each look costs CPU that the awaited process needs.
+    The pauses grow with the time waited, because each check costs CPU time that the awaited process
+    needs.
     """
     pause = threading.Event()
     began = time.monotonic()
@@ -37,9 +38,10 @@ def wait_until(condition: Callable[[], object], what: str, patience_s: float = P
 
 
 def at_last(step: Callable[[], T], what: str, between: Callable[[], object] = lambda: None) -> T:
-    """Return the result of a step on a wire. Repeat the step on late answers, which busy machines give.
+    """Return the result of a step on a wire. Repeat the step after a late answer, as from a busy
+    machine.
 
-    `between` runs before each repetition. Any DriverError other than a late answer is raised.
+    `between` runs before each repetition. Any DriverError that means no late answer is raised.
     """
     done: list[T] = []
 

@@ -8,11 +8,11 @@ W = TypeVar("W")
 M = TypeVar("M")
 
 Seen = Callable[[Any], None]
-"""A function that gets every step on the way."""
+"""A function that a walk calls with every step."""
 
 
 def unseen(step: object) -> None:
-    """Ignore the step, for walks that check no steps."""
+    """Ignore the step, in walks that check no steps."""
 
 
 def reached(
@@ -21,9 +21,9 @@ def reached(
     neighbours: Callable[[W], Iterable[W]],
     key: Callable[[W], Hashable] = lambda state: state,
 ) -> list[W]:
-    """Return every state within `depth` steps of the roots once, breadth first.
+    """Return every state within `depth` steps from the roots. Each state comes once, the nearest first.
 
-    States that cannot behave differently have the same `key`.
+    States with the same `key` cannot behave differently.
     """
     found = {key(root): root for root in roots}
     edge = list(found.values())
@@ -42,7 +42,8 @@ def reached(
 def histories(
     state: W, moves: Sequence[M], depth: int, after: Callable[[W, M], W]
 ) -> Iterator[tuple[W, tuple[M, ...]]]:
-    """Yield (last state, moves) of each history of `depth` moves. `after` returns a new state."""
+    """Yield (last state, moves) for each history with `depth` moves. `after` applies a move to a
+    state."""
     if depth == 0:
         yield state, ()
         return
@@ -53,7 +54,7 @@ def histories(
 
 @dataclass(frozen=True)
 class Walker(Generic[W, M]):
-    """The steps of a world: moves, which take no time, and waits (s). `seen` gets each step."""
+    """The steps of a world. Moves take no time, and waits take seconds. `seen` gets each step."""
 
     moves: Mapping[str, M]
     waits: Sequence[float]
@@ -71,11 +72,11 @@ class Walker(Generic[W, M]):
         return world
 
     def neighbours(self, world: W, seen: Seen = unseen) -> Iterator[W]:
-        """Yield every state one step away."""
+        """Yield every state that is one step away."""
         steps: list[str | float] = [*self.moves, *self.waits]
         for step in steps:
             yield self.path(world, step, seen=seen)
 
     def walk(self, roots: Iterable[W], depth: int, seen: Seen = unseen) -> list[W]:
-        """Return every state within `depth` steps of the roots once."""
+        """Return every state within `depth` steps from the roots. Each state comes once."""
         return reached(roots, depth, lambda world: self.neighbours(world, seen), self.key)

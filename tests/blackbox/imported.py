@@ -1,4 +1,7 @@
-"""`python -m tests.blackbox.imported run FILE …` runs the command and prints the imported modules."""
+"""A program that runs a command and prints the imported modules.
+
+Usage: `python -m tests.blackbox.imported run FILE …`.
+"""
 
 import sys
 

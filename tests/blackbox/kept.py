@@ -1,4 +1,4 @@
-"""The soak test's site with a ring for each daemon. A day's recordings serve the replays."""
+"""The soak test's site, with a ring for each daemon. The replay tests use a day's recordings."""
 
 from collections.abc import Callable
 from functools import partial
@@ -28,7 +28,7 @@ BUSES: dict[str, Any] = {
 
 
 def head(name: str, kind: str, content: dict[str, Any]) -> Head:
-    """Return the head of a run with this YAML."""
+    """Return the head of a recording for a daemon with this YAML."""
     text = yaml.safe_dump({"kind": kind, **content}, sort_keys=False).encode()
     return Head(
         name, 1, __version__, kind, f"/etc/{name}.yaml", text, {}, True, {}, RecordingSettings()
@@ -53,7 +53,8 @@ def of_graph(name: str, kind: AnyGraphKind, settings: Any) -> Head:
 
 
 def keep(site: Site, folder: Path, size: int) -> dict[str, Path]:
-    """Let each daemon of a site write a ring of this size. Return each daemon's ring path."""
+    """Let each daemon of a site write a ring of this size. Return the path of each ring by the daemon's
+    name."""
     found = {}
     for daemon in (*site.daemons.values(), *site.nodes):
         if isinstance(daemon, DeviceDaemon):
@@ -71,6 +72,6 @@ def keep(site: Site, folder: Path, size: int) -> dict[str, Path]:
 
 
 def writer(timeline: Timeline, make: Callable[[], Ring], site: Site) -> RingWriter:
-    """Return a ring writer in virtual time."""
+    """Return a ring writer that runs in virtual time."""
     clock = Clock(lambda: timeline.now, lambda: EPOCH + timeline.now)
     return RingWriter(make, clock, lambda: site.air.release)

@@ -1,6 +1,7 @@
-"""Wrong recordings and rings that still decode: wrong types, times, releases, versions and nesting.
+"""Wrong recordings and rings that the decoder still reads.
 
-Each mutant is a valid recording of `corpus` with some changed values.
+Each mutant is a valid recording of `corpus` with some changed values. Types, times, releases, versions
+or the nesting may be wrong.
 """
 
 import io
@@ -70,7 +71,7 @@ TREES: Final[tuple[Any, ...]] = (
     [{"": "core.decision.Fault", "code": "X", "detail": 3}],
 )
 KEPT: Final = 70
-"""The number of entries kept of each recording. With so few entries a change hits most of them."""
+"""The number of entries that a recording keeps. With so few entries a change hits most of them."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ class Plain:
 
 
 def corpus() -> list[Plain]:
-    """Return the soak test's incidents, each with the messages among its entries."""
+    """Return recordings of the soak test's incidents. The entries include the messages."""
     return [_plain(path) for path in sorted(CORPUS.glob("*.mcap"))]
 
 
@@ -169,7 +170,7 @@ class Mutator:
         return _copy(self._rng.choice((*NUMBERS, *TEXTS, *TREES)))
 
     def _version(self, told: Plain) -> None:
-        """Replace a name of a type, field or topic, as another version could."""
+        """Replace the name of a type, field or topic, as another version might."""
         entry = self._rng.choice(told.entries)
         if is_message(entry):
             entry[self._rng.choice((3, 4, 5))] = self._rng.choice((*TEXTS, *MESSAGES, *RELEASES))
@@ -230,7 +231,7 @@ def _places(tree: Any) -> Iterator[tuple[Any, Any]]:
 
 
 def as_ring(told: Plain) -> bytes:
-    """Return a ring with these entries in one segment."""
+    """Return a ring whose only segment has the recording's entries."""
     head = msgspec.msgpack.encode(told.head)
     content = b"".join(_frame(msgspec.msgpack.encode(one), 1) for one in told.entries)
     size = -(-(MARK.size + len(content) + FRAME.size) // PAGE) * PAGE
@@ -245,7 +246,7 @@ def _frame(content: bytes, number: int) -> bytes:
 
 
 def write_file(told: Plain, path: Path) -> None:
-    """Write the recording as the recorder writes its files."""
+    """Write the recording in the format of the recorder's files."""
     with path.open("wb") as out:
         writer = Writer(out, compression=CompressionType.ZSTD)
         writer.start("ros2", "rmf-bridges 1")
@@ -291,9 +292,9 @@ JUDGES: Final[Codes] = READS | {os.EX_UNAVAILABLE}
 
 
 def commands(told: Plain, folder: Path) -> Iterator[tuple[tuple[str, ...], Codes]]:
-    """Yield each command that reads a recording or a ring, with its permitted exit codes.
+    """Yield each command that reads recordings or rings, with the exit codes that it may give.
 
-    All files go into `folder`.
+    The function writes all files into `folder`.
     """
     run = folder / "run"
     run.mkdir(parents=True, exist_ok=True)
@@ -323,8 +324,8 @@ def ended(words: Sequence[str]) -> tuple[int, str]:
 
 
 def endings(mutator: Mutator, times: int, folder: Path) -> Counter[str]:
-    """Count the exit codes of the commands over `times` wrong recordings. Raise an error at a wrong
-    ending."""
+    """Run the commands on `times` wrong recordings, and count the exit codes. Raise an error if a
+    command gives any other exit code."""
     found: Counter[str] = Counter()
     for _ in range(times):
         told = mutator.next()

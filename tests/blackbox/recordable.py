@@ -1,4 +1,4 @@
-"""All types that a daemon can record, found from the arguments and results of the cores."""
+"""All types that a daemon can record. The search starts at the arguments and results of the cores."""
 
 import enum
 import types
@@ -17,14 +17,14 @@ from bridges.messages.definitions import Message
 PLAIN: dict[Any, Any] = {bool: True, int: 1, float: 1.5, str: "a", None: None, type(None): None}
 BOXES: dict[Any, Any] = {tuple: tuple, frozenset: frozenset, set: frozenset}
 Bound = Mapping[Any, Any]
-"""A concrete type for each parameter of a generic type."""
+"""The concrete type for each type parameter of a generic type."""
 
 
 @cache
 def recordable() -> tuple[Any, ...]:
     """Return the types inside any memory, event, output, report or message of a kind.
 
-    A generic type comes with its parameters filled in.
+    A generic type comes with concrete types for its parameters.
     """
     found: dict[Any, None] = {}
     for start in _starts():
@@ -62,7 +62,8 @@ def _walk(hint: Any, bound: Bound, found: dict[Any, None]) -> None:
 
 
 def fields(one: Any) -> dict[str, Any]:
-    """Return the fields of a struct. A generic struct has its parameters filled in."""
+    """Return the type of each field of a struct. Concrete types replace the parameters of a generic
+    struct."""
     plain = typing.get_origin(one) or one
     if _is_enum(plain):
         return {}
@@ -72,7 +73,7 @@ def fields(one: Any) -> dict[str, Any]:
 
 
 def _filled(hint: Any, bound: Bound) -> Any:
-    """Return a hint with its parameters filled in."""
+    """Return a type hint in which concrete types replace the parameters."""
     if isinstance(hint, typing.TypeVar):
         return bound.get(hint, None)
     names = getattr(hint, "__parameters__", ())
@@ -80,7 +81,7 @@ def _filled(hint: Any, bound: Bound) -> Any:
 
 
 def _single(hint: Any) -> Iterator[Any]:
-    """Yield each part of a union. An annotated type comes without its annotation."""
+    """Yield each part of a union. An annotated type loses its annotation."""
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
         for part in typing.get_args(hint):
             yield from _single(part)
@@ -95,7 +96,8 @@ def _is_enum(one: Any) -> bool:
 
 
 def specimens(one: Any) -> list[Any]:
-    """Return every member of an enumeration, or one instance of a struct with every field filled."""
+    """Return every member of an enumeration, or one instance of a struct with a value in every
+    field."""
     plain = typing.get_origin(one) or one
     if _is_enum(plain):
         return list(plain)

@@ -1,4 +1,4 @@
-"""The rings of real daemons survive a kill. Writing a ring needs no library."""
+"""The rings of real daemons. Rings survive a kill, and a daemon needs no library to write a ring."""
 
 import os
 import shutil
@@ -20,7 +20,7 @@ def lift(tmp_path: Path) -> Path:
 
 
 def spoken(ring: Path) -> list[str]:
-    """Return the topics of the sent messages in the ring."""
+    """Return the topics of the messages in the ring that the daemon sent."""
     try:
         return [
             one.topic for one in RingContent(ring).entries() if isinstance(one, Spoken) and one.sent

@@ -1,4 +1,5 @@
-"""Counts of this machine's devices for each day: from the rings to the file, the table and the CSV."""
+"""The counts for each day of this machine's devices, from the rings to the file, the table and the
+CSV."""
 
 from datetime import date
 from pathlib import Path

@@ -1,5 +1,4 @@
-"""Recordings of earlier versions stay readable. Each recordable type of this version has a fixed
-name."""
+"""Recordings of earlier versions, which stay readable. Each recordable type has a fixed name."""
 
 import gzip
 import subprocess
@@ -31,7 +30,7 @@ ENDED = {
     "lift.memory.Session.own_stamp",
     "lift.signals.FromAdapter.stamp",
 }
-"""Fields that no core has any more. A reader drops the values of these fields."""
+"""Fields that no core has any more. A reader drops their values."""
 
 
 def files(pattern: str) -> list[Path]:
@@ -46,7 +45,8 @@ def _own_texts() -> Iterator[None]:
 
 
 def test_every_type_that_a_daemon_can_record_has_a_name_and_comes_back() -> None:
-    """Add a missing name to `RECORDED` of the kind, or of `bridges/kinds/shared/recorded.py`."""
+    """If this test fails, add the missing name to `RECORDED` of the kind, or of
+    `bridges/kinds/shared/recorded.py`."""
     nameless = []
     for one in recordable():
         kind = typing.get_origin(one) or one
@@ -74,8 +74,8 @@ def test_a_name_is_given_once_to_a_type_that_a_daemon_records_and_begins_with_it
 
 @pytest.mark.parametrize("day", DAYS, ids=lambda day: day.name)
 def test_no_name_and_no_field_of_an_earlier_version_is_lost(day: Path) -> None:
-    """A renamed type keeps its name in the table. A renamed field keeps it through
-    `msgspec.field(name=…)`."""
+    """A renamed type keeps its old name in the table `RECORDED`. A renamed field keeps its old name
+    through `msgspec.field(name=…)`."""
     told = msgspec.json.decode((day / "values.json").read_bytes())
     lost = set()
     for earlier in chain.from_iterable(told.values()):
@@ -112,7 +112,8 @@ def test_a_ring_of_an_earlier_version_is_read_and_replayed(file: Path, tmp_path:
 
 
 def _is_read(file: Path) -> None:
-    """Check that every value is known. Decisions are not compared, because later cores may differ."""
+    """Check that this version can read and replay the file. Decisions may differ, because later cores
+    may decide differently."""
     notes = Notes()
     head, entries = opened(file, notes)
     everything = list(entries)

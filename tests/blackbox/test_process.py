@@ -37,7 +37,7 @@ class Told(NamedTuple):
 
 
 def bridge(*words: str | Path) -> Told:
-    """Run a command to its end, in the folder of its file."""
+    """Run a command in the folder of its file. Wait until the command ends."""
     out, error = io.StringIO(), io.StringIO()
     with redirect_stdout(out), redirect_stderr(error), chdir(Path(words[1]).parent):
         code = cli.main([str(word) for word in words])

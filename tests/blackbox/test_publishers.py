@@ -1,4 +1,4 @@
-"""A recording names the publisher of each message, in the ring and in the file."""
+"""The publisher's name for each recorded message, in the ring and in the recording's file."""
 
 from pathlib import Path
 
@@ -40,7 +40,8 @@ def nodes(heard: list[Heard]) -> list[str | None]:
 
 
 def test_the_ring_and_the_file_name_each_publisher(tmp_path: Path) -> None:
-    """Discovery may give the node's name after its first message, but before the ring is written."""
+    """Discovery may give a node's name after the node's first message, but before the ring is
+    written."""
     clock = Clock(lambda: 0.0, lambda: 1e9)
     writer = RingWriter(lambda: Ring(tmp_path, HEAD, 100_000), clock, lambda: KILTED)
     found_later, unknown = Sender(), Sender()

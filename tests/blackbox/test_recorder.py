@@ -1,4 +1,4 @@
-"""The recorder: the reasons for a file, the file's content, and the number of kept files."""
+"""The recorder. It has reasons to write a file, and limits the number of files."""
 
 import os
 import re
@@ -83,12 +83,13 @@ class Machine:
         self.writer.flush()
 
     def say(self, topic: str, message: Message, *, sent: bool = False) -> None:
-        """Record a message in the ring."""
+        """Record a message in the ring. With `sent` the daemon has sent the message."""
         self.writer.spoken(topic, message, sent=sent)
         self.writer.flush()
 
     def live(self, seconds: int, each: Callable[[], None] = lambda: None) -> None:
-        """Let time pass. Each second the daemon decides on a reading, and the recorder looks."""
+        """Let time pass. Each second the daemon decides on a reading, and then the recorder checks the
+        ring."""
         for _ in range(seconds):
             self.now += 1.0
             self.decide(SAMPLE)

@@ -1,4 +1,4 @@
-"""The ring: entries survive a kill, and a torn last entry is never read."""
+"""The ring. Entries survive a kill, and a reader ignores a torn last entry."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The ring's writer: a failed ring disturbs no scan, and the ring holds only the truth."""
+"""The writer of rings. A failed ring disturbs no scan, and the ring holds only true entries."""
 
 import errno
 import os
@@ -37,7 +37,7 @@ HEAD = Head("r", 1, "1", "lift", "/l.yaml", b"", {}, False, {}, RecordingSetting
 
 
 class Daemon:
-    """The part of a daemon that gives events to the writer, in virtual time."""
+    """A stand-in for the part of a daemon that gives events to the writer, in virtual time."""
 
     def __init__(self, folder: Path, make: Callable[[], Ring] | None = None) -> None:
         self.now, self.step_s = 100.0, 0.0
@@ -167,7 +167,7 @@ def test_what_cannot_be_recorded_is_lost_and_no_scan_with_it(
 ) -> None:
     daemon = Daemon(tmp_path)
     for _ in range(3):
-        daemon.memory = object()  # an object that no core returns: a defect of the program
+        daemon.memory = object()  # a defect of the program: no core returns such an object
         daemon.scan()
 
     assert [r.getMessage().split(" ")[0] for r in caplog.records] == ["not_written"]
@@ -193,7 +193,7 @@ def test_a_flood_takes_no_more_than_its_bound_and_each_decision_is_kept(tmp_path
     daemon.now += 1.0
     daemon.say(LiftState())
 
-    found = daemon.entries()  # only the last seconds, because the flood has filled the ring
+    found = daemon.entries()  # the flood has filled the ring, so only the last seconds remain
     kept = Counter(one.at for one in found if isinstance(one, Spoken))
     assert [kept[at] for at in (104.0, 105.0, 106.0)] == [200, 200, 1]
     assert {one.number for one in found if isinstance(one, EntriesLost)} == {9_800}

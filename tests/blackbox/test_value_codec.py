@@ -1,4 +1,5 @@
-"""Values of cores become trees, and trees become the same values. Decoding a tree cannot run code."""
+"""Values of cores become trees, and the trees become the same values again. Decoding a tree runs no
+code."""
 
 from typing import Any
 

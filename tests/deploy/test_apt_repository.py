@@ -18,7 +18,7 @@ Description: a package for a test
 
 @pytest.fixture
 def key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Make a signing key in a separate keyring, and return the key."""
+    """Make a signing key in a separate keyring. Return the key's name."""
     home = tmp_path / "gpg"
     home.mkdir(mode=0o700)
     monkeypatch.setenv("GNUPGHOME", str(home))
@@ -48,7 +48,7 @@ FOLDERS = (
 
 
 class Machine:
-    """A root directory with apt's and dpkg's own folders, and one source."""
+    """A root directory with one source of packages. apt and dpkg have their own folders in it."""
 
     def __init__(self, root: Path, repository: Path, suite: str) -> None:
         self.root = root
@@ -62,13 +62,13 @@ class Machine:
         (root / "apt.conf").write_text(f'Dir "{root}";\n{dpkg}\n')
 
     def apt(self, *words: str) -> subprocess.CompletedProcess[str]:
-        """Run apt-get in this root."""
+        """Run apt-get on this root directory."""
         line = ["apt-get", "-y", "-q", "-o", "APT::Sandbox::User=root", *words]
         config = {"APT_CONFIG": str(self.root / "apt.conf")}
         return subprocess.run(line, env=os.environ | config, capture_output=True, text=True)
 
     def version(self) -> str:
-        """Return the installed version."""
+        """Return the installed package's version."""
         return (self.root / "usr/share/rmf-test/version").read_text()
 
 

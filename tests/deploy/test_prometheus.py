@@ -1,4 +1,5 @@
-"""A real Prometheus scrapes a real site, and its alert rules report the troubles."""
+"""Alerts on a real site. A real Prometheus scrapes the site, and its alert rules report the
+troubles."""
 
 import json
 import os
@@ -60,13 +61,13 @@ def started(line: list[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
 
 
 class Prometheus:
-    """Prometheus's HTTP API."""
+    """A client of Prometheus's HTTP API."""
 
     def __init__(self, port: int) -> None:
         self._base = f"http://127.0.0.1:{port}/api/v1"
 
     def value(self, query: str) -> float | None:
-        """Return the query's only value, or None without a series or an answer."""
+        """Return the only value of the query. Return None if no series or no answer comes."""
         try:
             found = self._get(f"query?{urllib.parse.urlencode({'query': query})}")["result"]
         except OSError:
@@ -74,7 +75,7 @@ class Prometheus:
         return float(found[0]["value"][1]) if found else None
 
     def alerts(self) -> dict[str, str]:
-        """Return each present alert with its state, pending or firing."""
+        """Return the state of each present alert by the alert's name: pending or firing."""
         found = self._get("alerts")["alerts"]
         return {one["labels"]["alertname"]: one["state"] for one in found}
 
@@ -133,7 +134,7 @@ def test_a_killed_door_daemon_is_an_alert_in_a_real_prometheus(
 
 
 def named(text: str) -> set[str]:
-    """Return the metrics that a text names. A histogram's series come without their endings."""
+    """Return the metrics that a text names. The names of a histogram's series lose their endings."""
     found = re.findall(r"rmf_bridge_[a-z_]+", text)
     return {re.sub(r"_(bucket|count|sum|total)$", "", one) for one in found}
 

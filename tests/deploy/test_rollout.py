@@ -1,5 +1,6 @@
-"""The collection: its rules, the order of its steps, and its syntax as Ansible reads it. `make
-test-rollout` rolls out to machines.
+"""The Ansible collection. The tests check its rules, the order of its steps, and its syntax.
+
+`make test-rollout` rolls out to machines.
 """
 
 import importlib.util
@@ -115,7 +116,7 @@ def test_nothing_is_changed_before_the_devices_are_idle_and_the_old_version_is_k
     assert names.index("Keep the old version and the old configuration") < len(tasks) - 2
     idle, change = tasks[-2:]
     assert idle["ansible.builtin.command"]["argv"] == ["rmf-bridge", "status", "--idle"]
-    assert "failed_when" not in idle  # after the last try the rollout ends
+    assert "failed_when" not in idle  # the rollout ends when the last try fails
     assert [*change["rescue"][-1]] == ["name", "ansible.builtin.fail"]
     assert change["rescue"][-2]["ansible.builtin.include_tasks"] == "put_back.yml"
 

@@ -1,7 +1,7 @@
-"""A stand-in for rclpy in a folder of its own. A daemon can start on the stand-in and refuse.
+"""A stand-in for rclpy in a separate folder. With it a daemon starts and then refuses.
 
-At the interpreter's end the stand-in prints whether its executor's thread still runs. With such a
-thread the real rclpy aborts the process (SIGABRT): its C++ objects go when the thread still uses them.
+When the interpreter ends, the stand-in prints whether its executor's thread still runs. In that case
+the real rclpy aborts the process (SIGABRT): the thread still uses C++ objects that are already gone.
 """
 
 from pathlib import Path
@@ -90,7 +90,7 @@ PACKAGES = (
 
 
 def write(folder: Path) -> None:
-    """Write the stand-in, and message packages without messages."""
+    """Write the stand-in for rclpy, and empty message packages."""
     for name, text in MODULES.items():
         (folder / "rclpy").mkdir(exist_ok=True)
         (folder / "rclpy" / f"{name}.py").write_text(text)

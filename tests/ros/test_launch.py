@@ -1,4 +1,4 @@
-"""The launch files, with stand-ins for ROS's `launch`, in a Python with only ROS's packages."""
+"""The launch files. Stand-ins replace ROS's `launch`, and Python has only ROS's packages."""
 
 import subprocess
 import sys
@@ -45,8 +45,10 @@ LIFT = ROOT / "config" / "lift_dry_contact.yaml"
 
 
 def launched(kind: str, file: Path) -> str:
-    """Return the command that `ros2 launch rmf_bridges KIND.launch.py config:=FILE simulate:=true`
-    starts."""
+    """Return the command that a launch file starts.
+
+    The launch command is `ros2 launch rmf_bridges KIND.launch.py config:=FILE simulate:=true`.
+    """
     launch_file = str(ROOT / "ros" / "launch" / f"{kind}.launch.py")
     command = [sys.executable, "-c", LAUNCHED, launch_file, str(file)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)

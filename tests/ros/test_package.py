@@ -1,4 +1,5 @@
-"""The files for colcon and `ros2 launch` agree with the project, and setup.py includes all of them."""
+"""The files for colcon and `ros2 launch`. They agree with the project, and setup.py includes them
+all."""
 
 import ast
 import subprocess

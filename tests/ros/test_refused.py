@@ -1,6 +1,6 @@
 """A refused start on `ros2`, with a stand-in for rclpy. The exit code is 69, and the thread has ended.
 
-With ROS itself 2 of 4 such starts ended in SIGABRT. The stand-in cannot repeat that.
+With the real ROS 2 of 4 such starts ended in SIGABRT. The stand-in cannot abort.
 """
 
 import os

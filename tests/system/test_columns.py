@@ -1,4 +1,4 @@
-"""Tables and sentences fit into the terminal. A table cuts a word only if nothing else helps."""
+"""Tables and sentences that fit into the terminal. A table cuts a word only if nothing else helps."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Without the workbench the daemons' commands work. The other commands name the package to install.
+"""Commands without the workbench. The daemons' commands work. Other commands name the missing package.
 
 `tests/deb/test_apart.py` checks the texts from our Debian packages.
 """
@@ -15,7 +15,7 @@ LACKS = "not installed: in the clone, .venv/bin/pip install .\n"
 
 
 def alone(*words: str) -> subprocess.CompletedProcess[str]:
-    """Run `rmf-bridge WORDS` in an environment with only the daemons."""
+    """Run `rmf-bridge WORDS` in an environment that has only the daemons."""
     return subprocess.run([sys.executable, "-c", ALONE, *words], capture_output=True, text=True)
 
 

@@ -1,4 +1,4 @@
-"""Log lines use the field's terms, and show nothing of Python."""
+"""Log lines that use the field's terms and show nothing of Python."""
 
 import json
 import logging

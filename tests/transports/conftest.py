@@ -25,7 +25,7 @@ ROS2 = pytest.param("ros2", marks=pytest.mark.ros)
 
 @pytest.fixture(params=["memory", DDS, "zenoh", ROS2])
 def join(request: pytest.FixtureRequest) -> Iterator[Join]:
-    """Yield one graph for the test. The test runs on each transport in turn."""
+    """Yield a function that opens nodes on one graph. The test runs on each transport in turn."""
     network = MemoryNetwork()
     on: dict[str, Join] = {
         "memory": lambda name: MemoryTransport(network, name),
@@ -38,38 +38,40 @@ def join(request: pytest.FixtureRequest) -> Iterator[Join]:
 
 @pytest.fixture(params=[DDS, "zenoh", ROS2])
 def join_any_wire(request: pytest.FixtureRequest) -> Iterator[Join]:
-    """Yield one graph for the test. The test runs on each transport that has a wire."""
+    """Yield a function that opens nodes on one graph. The test runs on each transport with a wire."""
     yield from _graph(joining(request.param, domain_of_this_run()))
 
 
 @pytest.fixture(params=["dds", ROS2])
 def join_wire(request: pytest.FixtureRequest) -> Iterator[Join]:
-    """Yield one graph for the test. The test runs on each transport whose wire is DDS."""
+    """Yield a function that opens nodes on one graph. The test runs on each transport with a DDS
+    wire."""
     yield from _graph(joining(request.param, domain_of_this_run()))
 
 
 @pytest.fixture
 def join_dds() -> Iterator[Join]:
-    """Yield one graph for the test, on DDS."""
+    """Yield a function that opens nodes on one DDS graph."""
     yield from _graph(joining("dds", domain_of_this_run()))
 
 
 @pytest.fixture
 def join_zenoh() -> Iterator[Join]:
-    """Yield one graph for the test, on zenoh."""
+    """Yield a function that opens nodes on one zenoh graph."""
     yield from _graph(joining("zenoh", domain_of_this_run()))
 
 
 @pytest.fixture
 def join_ros() -> Iterator[Join]:
-    """Yield one graph for the test, on ROS. Only tests that are marked for ROS may use it."""
+    """Yield a function that opens nodes on one ROS graph. Only tests marked for ROS may use this
+    fixture."""
     yield from _graph(joining("ros2", domain_of_this_run()))
 
 
 @pytest.fixture
 def observer(join_dds: Join) -> Iterator[Any]:
-    """Yield a plain DDS participant in the same process and domain, which uses no code of this
-    project."""
+    """Yield a plain DDS participant in the test's process and domain. The participant uses no code of
+    this project."""
     join_dds("keeps_the_domain")
     from cyclonedds.domain import DomainParticipant
 

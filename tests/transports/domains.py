@@ -1,4 +1,4 @@
-"""The DDS domain of one run of the tests."""
+"""A DDS domain for each run of the tests."""
 
 from functools import cache
 
@@ -7,5 +7,5 @@ from hal_fakes.domain import free_domain
 
 @cache
 def domain_of_this_run() -> int:
-    """Return the domain of this process's tests. A test may have its own domain instead."""
+    """Return the DDS domain of the tests in this process. A single test may choose another domain."""
     return free_domain()

@@ -1,8 +1,8 @@
-"""RMF's messages written for cyclonedds by hand, without `bridges/transports/dds/idl.py`.
+"""RMF's messages as cyclonedds types, written by hand without `bridges/transports/dds/idl.py`.
 
-The messages come from the .msg files of rmf_internal_msgs 3d4df02, std_msgs and builtin_interfaces. So
-they look as on the wire of another node. This file has no `from __future__ import annotations`, because
-cyclonedds cannot read such annotations.
+The fields come from the .msg files of rmf_internal_msgs 3d4df02, std_msgs and builtin_interfaces. So
+these types look like those of another node on the wire. This file has no `from __future__ import
+annotations`, because cyclonedds cannot read such annotations.
 """
 
 from dataclasses import dataclass
@@ -325,7 +325,7 @@ class DiagnosticArray(IdlStruct, typename="diagnostic_msgs.msg.dds_.DiagnosticAr
 
 
 def to_idl(value: Any) -> Any:
-    """Return one of our messages as the class of the same name in this file."""
+    """Return a message of this project as an object of the class with the same name in this file."""
     if isinstance(value, tuple):
         return [to_idl(element) for element in value]
     if not isinstance(value, Struct):

@@ -1,4 +1,4 @@
-"""Functions that open nodes on loopback, by the name of a transport."""
+"""Functions that open nodes on loopback. The caller names the transport."""
 
 import importlib
 from collections.abc import Callable
@@ -11,14 +11,14 @@ from bridges.transports.transport import Transport
 from bridges.transports.zenoh.transport import ZenohTransport
 
 RELEASE = NEWEST if missing_of_ros() else installed()
-"""The release of the tests' messages on every wire. If ROS is installed, it is the release of ROS."""
+"""The release of RMF whose messages the tests send. An installed ROS decides the release."""
 
 Join = Callable[[str], Transport]
-"""A function that opens a node of this name on one graph."""
+"""A function that opens a node on one graph. The argument is the node's name."""
 
 
 def on_fast_dds() -> bool:
-    """Does ROS use Fast DDS? Raises ImportError without ROS."""
+    """Return whether ROS uses Fast DDS. Raise ImportError if ROS is missing."""
     utilities = importlib.import_module(
         "rclpy.utilities"
     )  # imported here, because ROS may be missing
@@ -26,13 +26,14 @@ def on_fast_dds() -> bool:
 
 
 ZENOH = {"zenoh": Zenoh(), "zenoh_ros2dds": Zenoh(keys="ros2dds")}
-"""The two key formats on zenoh."""
+"""The settings for each of the two key formats on zenoh."""
 
 
 def joining(
     transport: str, domain: int, release: Release | None = RELEASE, *, loopback: bool = True
 ) -> Join:
-    """Return a function that opens nodes of this transport in this domain, by default on loopback."""
+    """Return a function that opens nodes on this transport and domain. Nodes stay on loopback by
+    default."""
 
     def join(name: str) -> Transport:
         if transport.startswith("zenoh"):

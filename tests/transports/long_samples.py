@@ -1,10 +1,10 @@
-"""A DDS node with Cyclone's own settings, like RMF's nodes, so that its samples have no size limit.
+"""A DDS node with Cyclone's own settings, like RMF's nodes. So its samples have no size limit.
 
 `python -m tests.transports.long_samples DOMAIN BYTES SECONDS` sends on every topic that a daemon hears.
-The names in its messages have that many bytes. It prints the number of samples.
+Each message has a text of that many bytes. In the end the program prints the number of sent samples.
 
-With DOMAIN alone it answers each state of a door until its stdin ends. The answer is a request with the
-same time.
+With DOMAIN alone the program answers each state of a door until its stdin ends. The answer is a request
+with the time of the state.
 """
 
 import sys
@@ -27,7 +27,7 @@ from bridges.transports.cyclone import FOUND_AGAIN, INTERNAL, LOOPBACK
 from bridges.transports.dds.idl import sample_type
 
 AS_RMF: Final = LOOPBACK.replace(INTERNAL, "").replace(FOUND_AGAIN, "")
-"""A configuration for loopback. All other settings are Cyclone's defaults, as in RMF's own nodes."""
+"""The configuration for loopback. All other settings are Cyclone's defaults, as in RMF's own nodes."""
 RELIABLE: Final = (
     Policy.Reliability.Reliable(1_000_000_000),
     Policy.History.KeepLast(20),
@@ -38,7 +38,7 @@ QOS_LIVE: Final = Qos(Policy.Durability.Volatile, *RELIABLE)
 
 
 def main(domain: int, length: int, seconds: float) -> None:
-    """Send on each topic in turn, as fast as possible."""
+    """Send on all topics in turn, as fast as possible."""
     kept = Domain(domain, AS_RMF)
     participant = DomainParticipant(domain)
     pairs: list[tuple[DataWriter, Any]] = []
@@ -53,7 +53,7 @@ def main(domain: int, length: int, seconds: float) -> None:
     while time.monotonic() < until:
         for writer, message in pairs:
             if writer.get_matched_subscriptions():
-                with suppress(DDSException):  # a full history makes a write fail after 1 s
+                with suppress(DDSException):  # with a full history a write fails after 1 s
                     writer.write(message)
                     sent += 1
         time.sleep(0.001)

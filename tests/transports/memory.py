@@ -1,10 +1,10 @@
 """The `memory` transport between nodes of one process, for tests in virtual time.
 
-The transport has no thread, and the only clock that it reads is the wall clock. `publish` delivers a
-message before it returns, in the order in which the subscriptions were made.
+The transport has no thread, and reads no clock but the wall clock. `publish` delivers a message before
+`publish` returns. The oldest subscription gets the message first.
 
-Ends match as in DDS, if name and type are the same. A subscription that wants retained messages hears
-only publishers that retain messages.
+Publisher and subscription match as in DDS, if name and type are equal. A subscription that wants
+retained messages hears only publishers that retain messages.
 """
 
 import time
@@ -21,7 +21,7 @@ from bridges.transports.transport import M, Receive, TransportError, any_type
 
 
 class MemoryNetwork:
-    """The network of one test. It has the publishers and subscriptions of all nodes, by topic."""
+    """The network of one test: the publishers and subscriptions of all nodes, by topic."""
 
     def __init__(self) -> None:
         self.publishers: dict[str, list[_Publisher]] = defaultdict(list)
@@ -29,7 +29,7 @@ class MemoryNetwork:
 
 
 class MemoryTransport:
-    """One node on a MemoryNetwork. Callbacks run on the thread that publishes."""
+    """One node on a MemoryNetwork. Callbacks run on the publishing thread."""
 
     speaks = "memory"
     domain_id = 0
@@ -60,16 +60,16 @@ class MemoryTransport:
         return subscription
 
     def sender(self) -> Sender | None:
-        """Return the publisher of the message that is now being delivered."""
+        """Return the publisher of the message that a callback is reading now."""
         return self.heard_from
 
     @property
     def lives(self) -> bool:
-        """Is this node still open?"""
+        """Return whether this node is still open."""
         return not self._closed
 
     def faults(self) -> list[tuple[str, str]]:
-        """Return no fault, because all nodes have one process and one release."""
+        """Return no fault, because all nodes belong to one process and one release."""
         return []
 
     def wall(self) -> float:
@@ -77,7 +77,7 @@ class MemoryTransport:
         return time.time()
 
     def close(self) -> None:
-        """Leave the network. The messages that this node retained are then lost."""
+        """Leave the network. The messages that this node retained are lost."""
         self._closed = True
         for ends in self._network.publishers.values():
             ends[:] = [end for end in ends if end.node is not self]
@@ -99,7 +99,7 @@ class _Publisher:
         self._heard_by = network.subscriptions[topic.name]
 
     def publish(self, message: Message) -> None:
-        """Deliver a message at once. Raises CdrError for a message that no wire could carry."""
+        """Deliver a message at once. Raise CdrError for a message that no wire could carry."""
         if self not in self._ends:
             raise TransportError(f"topic {self.topic.name}: the node has left the graph")
         cdr.encode(self.topic.type, message, self.node.release)
@@ -136,7 +136,8 @@ class _Subscription:
         self._others_only = others_only
 
     def hears(self, publisher: _Publisher) -> bool:
-        """Would DDS match this publisher and this subscription, whose topic names are equal?"""
+        """Return whether DDS would match this publisher with this subscription. Their topic names are
+        equal."""
         theirs, ours = publisher.topic, self.topic
         return (
             theirs.type == ours.type
@@ -146,12 +147,12 @@ class _Subscription:
         )
 
     def hand_on(self, message: Message, sender: Sender) -> None:
-        """Deliver a message. A subscriber's exception does not reach the publisher, as on a wire."""
+        """Deliver a message. The subscriber's exceptions do not reach the publisher, as on a wire."""
         self.node.heard_from = sender
         notices.hand_on(self.node.dropped, self.topic, self.received, message)
 
     def catch_up(self) -> None:
-        """Receive the newest `depth` retained messages of each publisher."""
+        """Deliver the newest `depth` retained messages of each publisher to this subscription."""
         if self.topic.subscribe.durability == "volatile":
             return
         for publisher in self._hears:

@@ -1,5 +1,5 @@
-"""Tools to read the ends that nodes announce, through a DDS participant without code of this
-project."""
+"""Tools that read announced publishers and subscriptions through a DDS participant. The participant
+uses no code of this project."""
 
 from typing import Any
 
@@ -14,11 +14,11 @@ SUBSCRIPTION = builtin.BuiltinTopicDcpsSubscription
 
 
 def seen(observer: Any, kind: Any, topic: Topic[Any]) -> Any:
-    """Return the announced end of a topic, which must be the only one."""
+    """Return the announced publisher or subscription of a topic. The topic must have exactly one."""
     found: list[Any] = []
 
     def look() -> bool:
-        reader = BuiltinReader(observer, kind)  # a new reader gets all present ends
+        reader = BuiltinReader(observer, kind)  # a new reader gets everything that is announced now
         found[:] = [end for end in reader.take(100) if end.topic_name == f"rt/{topic.name}"]
         return len(found) == 1
 

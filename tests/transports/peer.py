@@ -1,7 +1,7 @@
 """Another process on the graph: `python -m tests.transports.peer WHAT DOMAIN TRANSPORT`.
 
-The process ends when its stdin ends. `echo` returns each message of `ping_<topic>` on `pong_<topic>`,
-for every topic. `hostile` is a node that sends forged samples as LiftRequests.
+The process ends when its stdin ends. WHAT is `echo` or `hostile`. `echo` returns each message of
+`ping_<topic>` on `pong_<topic>`, for every topic. `hostile` sends forged samples as LiftRequests.
 """
 
 import socket
@@ -28,7 +28,7 @@ TOPICS: dict[str, Topic[Any]] = {
 
 @contextmanager
 def running(what: str, domain: int, transport: str = "dds") -> Iterator[None]:
-    """Run the peer as a child process, until the end of the block."""
+    """Run the peer as a child process until the `with` block ends."""
     command = [sys.executable, "-m", "tests.transports.peer", what, str(domain), transport]
     with subprocess.Popen(command, stdin=subprocess.PIPE) as child:
         try:
@@ -40,7 +40,7 @@ def running(what: str, domain: int, transport: str = "dds") -> Iterator[None]:
 
 
 def echo(domain: int, transport: str) -> None:
-    """Send every message of every topic back, on the topic's other name."""
+    """Return every message of `ping_<topic>` on `pong_<topic>`, for every topic."""
     node = joining(transport, domain)("echo")
     for topic in TOPICS.values():
         back = node.publisher(topic.named(f"pong_{topic.name}"))
@@ -52,7 +52,7 @@ def echo(domain: int, transport: str) -> None:
 def sent(publisher: Publisher[Any], message: Any) -> bool:
     """Publish the message, and return False.
 
-    As a condition this repeats the message until the peer finds the publisher.
+    In the condition of `wait_until` this function repeats the message until the condition holds.
     """
     publisher.publish(message)
     return False
@@ -70,7 +70,7 @@ DECODED_BY_NOBODY = {
     "a string without its NUL": GOOD.replace(b"Lift1\0", b"Lift1x"),
     "a string longer than the sample": GOOD.replace(b"\6\0\0\0Lift", b"\xff\xff\xff\xffLift"),
 }
-"""Samples that Cyclone's C library refuses."""
+"""Forged samples, by their defect. Cyclone's C library refuses these samples."""
 
 COUNTED_AS_DROPPED = {
     "not UTF-8": GOOD.replace(b"Lift1", b"\xff\xfe\x80ft"),
@@ -78,14 +78,15 @@ COUNTED_AS_DROPPED = {
     "more than a LiftRequest": GOOD + b"\1\2\3\4\5\6\7\x08",
     "another encoding": b"\0\x07" + GOOD[2:],
 }
-"""Samples that Cyclone's C library accepts and our decoder refuses."""
+"""Forged samples, by their defect. Cyclone's C library accepts these samples. Our decoder refuses
+them."""
 
 
 def hostile(domain: int, transport: str) -> None:
-    """Match like an honest node, then send forged samples under the writer's own id.
+    """Match as an honest writer does, then send forged samples under that writer's id.
 
-    Forged samples use up sequence numbers of the writer's next samples. So only the later ones of its
-    fifty good samples arrive.
+    The forged samples use up the writer's next sequence numbers. So the first of its fifty good samples
+    are lost, and only the later samples arrive.
     """
     if transport == "zenoh":
         zenoh_hostile.main(*zenoh_hostile.arguments(domain))
@@ -106,7 +107,7 @@ def hostile(domain: int, transport: str) -> None:
     writer = DataWriter(participant, topic, qos=qos)
     wait_until(writer.get_matched_subscriptions, "somebody listens")
     writer.write(idl_types.LiftRequest("before", idl_types.Time(0, 0), "", 0, "", 0))
-    writer.wait_for_acks(10_000_000_000)  # now the other side knows the writer
+    writer.wait_for_acks(10_000_000_000)  # afterwards the listener knows the writer
     forged = [GOOD, *DECODED_BY_NOBODY.values(), *COUNTED_AS_DROPPED.values()]
     for number, sample in enumerate(forged, start=2):
         _send_raw(domain, _data_packet(writer.guid.bytes, number, sample))
@@ -117,14 +118,14 @@ def hostile(domain: int, transport: str) -> None:
 
 
 def _data_packet(guid: bytes, number: int, sample: bytes) -> bytes:
-    """Return an RTPS 2.1 message with one DATA submessage from this writer to all its readers."""
+    """Return an RTPS 2.1 message with one DATA submessage. The submessage goes to all readers."""
     header = b"RTPS\x02\x01\x01\x10" + guid[:12]
     body = struct.pack("<HHI", 0, 16, 0) + guid[12:] + struct.pack("<iI", 0, number) + sample
     return header + struct.pack("<BBH", 0x15, 0x05, len(body)) + body
 
 
 def _send_raw(domain: int, packet: bytes) -> None:
-    """Send the packet to the unicast data port of each of the domain's first four processes."""
+    """Send the packet to the first four processes of the domain, to each unicast data port."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         for index in range(4):
             sender.sendto(packet, ("127.0.0.1", 7400 + 250 * domain + 11 + 2 * index))

@@ -1,14 +1,14 @@
-"""Another program on zenoh, written only from the documents of rmw_zenoh and zenoh-bridge-ros2dds.
+"""An independent program on zenoh, written from the documents of rmw_zenoh and zenoh-bridge-ros2dds.
 
-`python tests/transports/rmw_zenoh_reader.py ENDPOINT ORDER…` carries out the orders one after the
-other. It ends with its stdin, and shares no code with `bridges/`. Each line of its output is JSON.
+`python tests/transports/rmw_zenoh_reader.py ENDPOINT ORDER…` carries out one order after the other. The
+program shares no code with `bridges/`. It ends when its stdin ends. Each line of its output is JSON.
 
-- `tokens PATTERN` prints each token under a key, when it comes and when it goes.
+- `tokens PATTERN` prints each liveliness token that matches, when the token comes and when it goes.
 - `samples KEY` prints each sample under a key. zenoh's own deserializer decodes the attachment.
 - `history KEY DEPTH` prints the same as `samples`, but subscribes to retained messages as rmw_zenoh
   does.
-- `say KEY TOKEN HEX [DEPTH]` publishes once somebody listens, as rmw_zenoh does. With a depth it
-  retains.
+- `say KEY TOKEN HEX [DEPTH]` waits for a subscriber, and then publishes as rmw_zenoh does. With DEPTH
+  the publisher retains messages.
 """
 
 import json
@@ -90,7 +90,7 @@ def tell_sample(sample: zenoh.Sample) -> None:
 
 
 def gid(token: str) -> bytes:
-    """Return the token's XXH3 as liveliness_utils.cpp makes it, with both halves in memory order."""
+    """Return the token's XXH3 hash, with both halves in memory order, as liveliness_utils.cpp does."""
     both = xxhash.xxh3_128_intdigest(token.encode())
     return struct.pack("<QQ", both & (1 << 64) - 1, both >> 64)
 
@@ -112,7 +112,7 @@ def say(session: zenoh.Session, key: str, token: str, payload: str, depth: str =
         while not publisher.matching_status:
             time.sleep(0.01)
     attachment = ext.z_serialize((ext.Int64(1), ext.Int64(time.time_ns()), gid(token)))
-    is_bridge = token.startswith("@/")  # samples of a bridge have no attachment
+    is_bridge = token.startswith("@/")  # a bridge's samples have no attachment
     publisher.put(bytes.fromhex(payload), attachment=None if is_bridge else attachment)
     tell(said=key)
     return publisher, alive

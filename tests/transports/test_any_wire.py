@@ -1,6 +1,7 @@
 """Duties of every transport with a wire, in one process.
 
-The tests check threads, ends that do not fit, and that nothing remains after closing.
+The tests check threads, publishers and subscriptions that do not fit, and that closing leaves nothing
+behind.
 """
 
 import os
@@ -34,7 +35,7 @@ def test_nodes_that_come_and_go_leave_no_thread_no_file_and_no_complaint_behind(
         node.publisher(LIFT_STATES).publish(d.LiftState())
         node.close()
 
-    for _ in range(5):  # a library may keep its first threads and files
+    for _ in range(5):  # a library may keep the threads and files of its first use
         come_and_go()
     before = _threads_and_files()
     for _ in range(10):

@@ -85,13 +85,13 @@ def test_a_range_in_which_nobody_is_found_is_refused(text: str) -> None:
 
 @pytest.fixture
 def no_ros(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Hide ROS, as on a machine without ROS."""
+    """Let the test run as on a machine without ROS."""
     monkeypatch.setitem(sys.modules, "rclpy", None)
 
 
 @pytest.fixture
 def bare_rclpy(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Hide RMF's packages, but not rclpy."""
+    """Let the test run as on a machine that has rclpy but not RMF's packages."""
     for package in set(PACKAGES.values()) | {"rclpy"}:
         monkeypatch.setitem(sys.modules, package, ModuleType(package))
     found = ModuleSpec("found", None)
@@ -155,7 +155,7 @@ def test_auto_opens_ros2_where_all_of_it_is_here_and_says_why(
 def test_without_cyclonedds_the_error_says_how_to_get_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setitem(sys.modules, "cyclonedds", None)  # as if it was not installed
+    monkeypatch.setitem(sys.modules, "cyclonedds", None)  # as if cyclonedds were not installed
     monkeypatch.delitem(sys.modules, "cyclonedds.core", raising=False)
     with pytest.raises(TransportError, match="write `transport: zenoh` with `keys: ros2dds`, or"):
         open_transport(Rmf(transport="dds"), "node", localhost=True)
@@ -179,7 +179,7 @@ def test_auto_opens_dds_without_ros_and_says_why(
 def test_auto_opens_zenoh_where_neither_ros_nor_cyclonedds_is_and_says_why(
     no_ros: None, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setitem(sys.modules, "cyclonedds", None)  # as on arm64
+    monkeypatch.setitem(sys.modules, "cyclonedds", None)  # as on arm64, which lacks cyclonedds
     monkeypatch.delitem(sys.modules, "cyclonedds.core", raising=False)
     caplog.set_level(logging.INFO)
     domain = domain_of_this_run()

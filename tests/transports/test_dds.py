@@ -1,4 +1,4 @@
-"""Properties of `dds` alone: noise on its ports, its node in ROS's graph, and its configuration."""
+"""Properties of `dds` alone: bad input on its ports, its node in ROS's graph, and its configuration."""
 
 import random
 import socket
@@ -75,7 +75,7 @@ def test_a_peer_with_another_type_is_named_once(
 def test_an_end_that_is_declared_while_rmfs_release_changes_has_the_new_release(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """During the subscription a fleet adapter appears, whose release is not our default."""
+    """A fleet adapter appears while our node subscribes. The adapter's release is not our default."""
     create, heard = (
         DdsSubscription.create,
         Announced(
@@ -92,7 +92,7 @@ def test_an_end_that_is_declared_while_rmfs_release_changes_has_the_new_release(
             node._peers.seen("an adapter", heard)
             thread = threading.Thread(target=node._follow_release)
             thread.start()
-            thread.join(timeout=0.2)  # the thread ends early only if it does not wait
+            thread.join(timeout=0.2)  # if the thread ends within this time, it has not waited
             return create(*given)
 
         monkeypatch.setattr(DdsSubscription, "create", found_meanwhile)

@@ -1,4 +1,4 @@
-"""A stranger who sends datagrams cannot fill the log."""
+"""A log that stays short while a stranger sends many datagrams."""
 
 import os
 import socket

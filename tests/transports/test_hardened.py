@@ -24,7 +24,7 @@ DOMAIN = 7
 
 
 def block(language: str) -> str:
-    """Return the page's code block in this language. The page has exactly one."""
+    """Return the page's only code block in this language."""
     (found,) = re.findall(rf"^```{language}\n(.*?)^```$", PAGE, re.M | re.S)
     return str(found)
 
@@ -40,7 +40,8 @@ def papers(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def flat(config: dict[str, Any], path: tuple[str, ...] = ()) -> Iterator[tuple[str, Any]]:
-    """Yield (`a__b`, value) for each setting of a configuration. Access control stays one value."""
+    """Yield (`a__b`, value) for each setting of a nested configuration. Access control stays one
+    value."""
     for key, value in config.items():
         if isinstance(value, dict) and key != "access_control":
             yield from flat(value, (*path, key))
@@ -61,7 +62,7 @@ def router(papers: Path) -> Iterator[Router]:
 
 @pytest.fixture
 def nodes(router: Router, papers: Path) -> Iterator[dict[str, ZenohTransport]]:
-    """Yield three nodes by name, each a client of the router."""
+    """Yield three nodes by name. Each node is a client of the router."""
     opened = {name: node(router, papers, name) for name in ("rmf", "lift", "viewer")}
     yield opened
     for each in opened.values():
@@ -82,11 +83,11 @@ def node(router: Router, papers: Path, name: str, own: bool = True) -> ZenohTran
 def test_only_rmf_may_ask_and_only_the_lift_may_answer(
     nodes: dict[str, ZenohTransport],
 ) -> None:
-    heard: set[tuple[str, str, str]] = set()  # (listener, speaker, topic)
+    heard: set[tuple[str, str, str]] = set()  # (listener's name, speaker's name, topic)
 
     def listen(listener: str, topic: AnyTopic) -> Subscription:
         def note(message: Any) -> None:
-            if message.session_id != listener:  # a node's own messages bypass the router
+            if message.session_id != listener:  # a node hears its own messages without the router
                 heard.add((listener, message.session_id, topic.name))
 
         return nodes[listener].subscribe(topic, note)
@@ -98,7 +99,7 @@ def test_only_rmf_may_ask_and_only_the_lift_may_answer(
     ears = [listen(name, topic) for name in nodes for topic in topics]
     mouths = [
         (nodes[name].publisher(topic), made(lift_name="Lift1", session_id=name))
-        for name in ("viewer", "lift", "rmf")  # nodes without permission come first
+        for name in ("viewer", "lift", "rmf")  # the nodes without permission publish first
         for topic, made in topics.items()
     ]
     wanted = {

@@ -1,6 +1,6 @@
-"""A node with a type that has the name of our type but other fields.
+"""A foreign type with the name of our type but with other fields.
 
-Such a node has another release of RMF, or lies.
+Either the sender has another release of RMF, or the sender lies.
 """
 
 from collections.abc import Iterator
@@ -31,7 +31,7 @@ class LiftRequest(IdlStruct, typename="rmf_lift_msgs.msg.dds_.LiftRequest_"):
 
 
 class Lift:
-    """A node that hears requests, with the list of these requests."""
+    """A lift's node, and the list of the requests that it has heard."""
 
     def __init__(self, domain: int) -> None:
         self.domain = domain

@@ -1,4 +1,4 @@
-"""A machine whose network comes, goes and changes, and ROS's environment variables that name peers."""
+"""A machine whose network comes, goes and changes, and ROS's environment variables for peers."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -73,7 +73,7 @@ def test_on_loopback_a_node_has_the_same_settings() -> None:
 
 
 class Machine:
-    """The machine's network addresses, which the test sets."""
+    """The machine's network addresses. The test sets them."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self._monkeypatch = monkeypatch
@@ -87,17 +87,18 @@ class Machine:
         self.addresses = frozenset()
 
     def comes_back(self) -> None:
-        """Bring the network back, which is loopback."""
+        """Bring the network back. The network is loopback."""
         self._monkeypatch.delenv("ROS_STATIC_PEERS", raising=False)
         self._monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
 
 
 @pytest.fixture
 def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
-    """Return a machine with made-up addresses. Its nodes follow the addresses, but stay on loopback."""
+    """Return a machine with made-up addresses. Its nodes react to these addresses, but stay on
+    loopback."""
     made = Machine(monkeypatch)
     monkeypatch.setattr(addresses, "addresses", lambda: made.addresses)
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")  # for Fast DDS
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")  # Fast DDS reads this variable
     made.comes_back()
     return made
 
@@ -115,7 +116,7 @@ class Echoed:
         self.alarm = self.node.publisher(ALARM)
 
     def comes_back(self, number: int) -> bool:
-        """Send this state, and return whether it has come back."""
+        """Send the state with this number. Return whether that state has come back."""
         state = d.DoorState(d.Time(number), "ward")
         with suppress(TransportError):
             self.states.publish(state)

@@ -14,7 +14,7 @@ TOPICS = {topic.name: topic for topic in vars(topics).values() if isinstance(top
 
 
 def typed(qos: topics.Qos) -> Qos:
-    """Return a QoS in the golden table's form. `topics.Qos` has only RELIABLE and KEEP_LAST."""
+    """Return a QoS in the form of the golden table. `topics.Qos` is always RELIABLE and KEEP_LAST."""
     return Qos("RELIABLE", qos.durability.upper(), "KEEP_LAST", qos.depth)
 
 
@@ -39,7 +39,7 @@ def test_a_lifts_node_hears_adapters_without_what_they_retain() -> None:
 def test_on_the_memory_transport_a_late_subscriber_hears_what_the_golden_depths_retain(
     name: str,
 ) -> None:
-    """Publisher and subscription match if, and only if, they match in the golden table."""
+    """Publisher and subscription match for each topic, as in the golden table."""
     topic: Topic[Any] = TOPICS[name]
     _, publish, subscribe = GOLDEN[name]
     network = MemoryNetwork()

@@ -60,8 +60,10 @@ def test_our_table_has_the_constants_of_the_installed_package(enum: Any) -> None
     lacking = NOT_IN_JAZZY.get(enum, set()) if RELEASE is JAZZY else set()
     ours = {name: c.value for name, c in enum.__members__.items() if name not in lacking}
     if not ours:
-        return  # this release has no such message
-    message_name = enum.__doc__.partition(".")[0]  # "LiftState.door_state."
+        return  # this release lacks the message
+    message_name = enum.__doc__.partition(".")[
+        0
+    ]  # the docstring begins with "LiftState.door_state."
     found = installed(getattr(d, message_name))
     prefix = os.path.commonprefix(list(ours))
     public = [name for name in dir(type(found)) if name.isupper() and name[0] != "_"]
@@ -170,7 +172,7 @@ def _subscriptions(looking: Any, topic: Topic[Any]) -> list[Any]:
 def test_ros_has_nothing_to_warn_about_when_a_dds_node_joins(
     domain: int, monkeypatch: pytest.MonkeyPatch, breaks: str, warns: bool
 ) -> None:
-    if breaks:  # proves that a warning would be seen
+    if breaks:  # a broken type hash proves that the test would see a warning
         monkeypatch.setattr("bridges.transports.dds.ends.type_hash", lambda kind, release: "none")
     command = [sys.executable, "-m", "tests.transports.peer", "echo", str(domain), "ros2"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as ros:
@@ -220,7 +222,7 @@ def test_ros_args_that_ros_does_not_understand_are_refused(ros_args: list[str]) 
 def test_on_fast_dds_a_node_shares_no_memory_unless_its_environment_says_so(
     monkeypatch: pytest.MonkeyPatch, given: str | None, wanted: str
 ) -> None:
-    """RMF runs as another user. With shared memory the nodes found each other, but no sample
+    """RMF runs as another user. With shared memory the two nodes found each other, but no sample
     arrived."""
     from bridges.transports.ros2.stay import FAST_DDS_SPEAKS, Stay
 
@@ -253,7 +255,7 @@ def test_stamps_follow_the_simulated_clock_where_use_sim_time_says_so(domain: in
     node = Ros2Transport("node", domain, loopback=True, ros_args=simulated)
     gazebo: Any = joining("ros2", domain)("gazebo")
     try:
-        assert stamp(node.wall()) == d.Time()  # no message on /clock so far
+        assert stamp(node.wall()) == d.Time()  # no message has come on /clock
         clock = gazebo.node.create_publisher(Clock, "/clock", QoSProfile(depth=1))
 
         def told() -> bool:

@@ -1,4 +1,7 @@
-"""The release of RMF that `ros2` finds in installed packages or on ROS's graph. ROS is a stand-in."""
+"""The release of RMF that `ros2` finds in installed packages or on ROS's graph.
+
+A stand-in replaces ROS.
+"""
 
 import sys
 from dataclasses import dataclass, field
@@ -47,7 +50,7 @@ def test_a_message_that_the_release_lacks_is_named(monkeypatch: pytest.MonkeyPat
 
 @dataclass
 class Info:
-    """A TopicEndpointInfo of rclpy with only the parts that our code reads."""
+    """A stand-in for rclpy's TopicEndpointInfo, with only the parts that our code reads."""
 
     topic_type: str
     topic_type_hash: object
@@ -55,7 +58,7 @@ class Info:
 
 
 class Graph:
-    """An rclpy node that sees exactly one publisher of fleet_states."""
+    """A stand-in for an rclpy node that sees exactly one publisher of fleet_states."""
 
     def __init__(self, hashed: str) -> None:
         self.infos = [Info("rmf_fleet_msgs/msg/FleetState", hashed)]

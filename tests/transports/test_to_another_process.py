@@ -32,7 +32,7 @@ RETAINED = {"EMERGENCY_SIGNAL", "FIRE_ALARM_TRIGGER", "ADAPTER_LIFT_REQUESTS"} &
 
 
 class Here:
-    """Our node in its own domain. `theirs` is the transport of the other process."""
+    """A node of this project in its own domain. `theirs` is the transport of the other process."""
 
     def __init__(self, pair: Pair, domain: int) -> None:
         (self.ours, self.theirs), self.domain = pair, domain
@@ -48,7 +48,7 @@ def here(request: pytest.FixtureRequest, domain: int) -> Iterator[Here]:
 
 @pytest.fixture(scope="module", params=PAIRS)
 def echoed(request: pytest.FixtureRequest, module_domain: int) -> Iterator[Transport]:
-    """Yield a node whose messages a second process sends back."""
+    """Yield a node. A second process returns the messages that this node sends."""
     made = Here(request.param, module_domain)
     with peer.running("echo", made.domain, made.theirs):
         yield made.node
@@ -104,7 +104,7 @@ def test_what_a_supervisor_retained_is_not_replayed_to_a_lift_that_starts_later(
         wait_until(
             lambda: after in received or peer.sent(publisher, after), "a new message comes back"
         )
-    # Fast DDS asks Cyclone for earlier messages, and Cyclone sends them: docs/how-to/ros.md.
+    # Fast DDS asks Cyclone for earlier messages, and Cyclone sends them (docs/how-to/ros.md).
     replays = (here.ours, here.theirs) == ("dds", "ros2") and on_fast_dds()
     assert set(received) - ({before} if replays else set()) == {after}
 
@@ -116,8 +116,8 @@ def test_a_process_that_leaves_is_gone_at_once_for_the_others(here: Here) -> Non
         wait_until(
             lambda: publisher.matched() and subscription.matched(), "the other process is found"
         )
-    # A process that says no farewell is missed only after its lease. Fast DDS does not hear Cyclone's
-    # farewell.
+    # Fast DDS does not hear Cyclone's farewell. Without a farewell a node notices the departure only
+    # when the lease ends.
     unheard = (here.ours, here.theirs) == ("ros2", "dds") and on_fast_dds()
     wait_until(
         lambda: not publisher.matched() and not subscription.matched(),

@@ -137,7 +137,7 @@ def test_others_only_leaves_out_the_nodes_own_messages(join: Join) -> None:
     assert sorted(numbers(echoed)) == [1, 2]
     assert numbers(from_others) == [2]
     our_voice.publish(numbered(3))
-    other_voice.publish(numbered(3))  # the same text, but another node
+    other_voice.publish(numbered(3))  # the text of the third message, but from another node
     wait_until(lambda: len(echoed) == 4 and len(from_others) == 2, "all messages have arrived")
     assert numbers(from_others) == [2, 3]
     assert (everything.matched(), others_only.matched()) == (2, 1)

@@ -1,4 +1,4 @@
-"""Steps of the wall clock. When the clock is set back, `dds` and `ros2` join the graph again."""
+"""Steps of the wall clock. After a step backwards, `dds` and `ros2` join the graph again."""
 
 import logging
 from contextlib import suppress
@@ -53,8 +53,8 @@ def test_a_node_whose_clock_is_set_back_joins_again_with_all_its_ends(
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    """On loopback the node's thread waits for messages without a time limit. So the step must wake
-    it."""
+    """On loopback the node's thread waits for messages without a time limit. So the clock's step must
+    wake the thread."""
     caplog.set_level(logging.INFO)
     ahead = [0.0]
     monkeypatch.setattr(threaded, "ahead_s", lambda: ahead[-1])
@@ -66,7 +66,7 @@ def test_a_node_whose_clock_is_set_back_joins_again_with_all_its_ends(
 
     def comes_back(number: int) -> bool:
         state = d.DoorState(d.Time(number), "ward")
-        with suppress(TransportError):  # during the join
+        with suppress(TransportError):  # the node cannot publish while it joins again
             states.publish(state)
         return state in heard
 

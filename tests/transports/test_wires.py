@@ -33,7 +33,7 @@ def test_forged_samples_are_dropped_and_the_good_ones_after_them_arrive(
         wait_until(lambda: received[-1:] == [d.LiftRequest("after")], "a good message arrives")
     names = [request.lift_name for request in received]
     assert names[names.index("Lift1") :] == ["Lift1"] + ["after"] * names.count("after")
-    # cyclonedds refuses some samples before our code gets them. rclpy gives us every sample.
+    # cyclonedds refuses four of the samples before our code gets them. rclpy gives us all samples.
     by_us, first = {
         "DdsTransport": (4, "a string is not UTF-8: 'utf-8' codec can't decode byte 0xff"),
         "Ros2Transport": (8, "cut short: unpack_from requires a buffer of at least 24 bytes"),
@@ -46,7 +46,7 @@ def test_forged_samples_are_dropped_and_the_good_ones_after_them_arrive(
 @annotations.final
 @dataclass
 class OtherLiftRequest(IdlStruct, typename="rmf_lift_msgs.msg.dds_.LiftRequest_"):  # type: ignore[misc, call-arg]
-    """Another type under the name of RMF's LiftRequest."""
+    """A foreign type with the name of RMF's LiftRequest and with other fields."""
 
     number: uint32
     lift_name: str
@@ -100,7 +100,7 @@ def test_each_end_has_the_type_the_type_hash_and_the_qos_of_the_golden_table(
 
 
 def as_ros_shows(qos: Any) -> golden_qos.Qos:
-    """Return an end's QoS on DDS in the golden table's form."""
+    """Return a DDS QoS in the form of the golden table."""
     names = {
         "Reliable": "RELIABLE",
         "Volatile": "VOLATILE",

@@ -13,7 +13,7 @@ from tests.transports.zenoh_hostile import FLOOD, GOOD, arguments
 from tests.waiting import wait_until
 
 BY_HAND = 8
-"""The number of forged samples before the flood that must be counted.
+"""The number of forged samples that the node must count before the flood.
 
 - One has no attachment.
 - Two have malformed attachments.
@@ -21,8 +21,8 @@ BY_HAND = 8
 - Two have 10 MB each.
 - One is a deletion.
 
-After these come a sample under a wrong hash, which is another key, and one under a wildcard, which is
-counted too.
+Two more samples follow. The node does not hear the first, because a wrong hash makes another key. It
+counts the second, which has a wildcard in its key.
 """
 
 
@@ -47,15 +47,17 @@ def test_forged_samples_are_dropped_and_counted_and_the_good_ones_after_them_arr
     finally:
         node.close()
     assert set(map(repr, received)) == {repr(GOOD)}
-    # The newest hundred samples of the flood wait for our thread. The other samples are dropped unread.
+    # Up to a hundred samples of the flood wait for our thread. The transport drops the others unread.
     assert BY_HAND + 1 < node.dropped["lift_requests"] <= BY_HAND + 1 + FLOOD
-    # The log has one line about the flood. On a busy machine the first forged samples may be missing.
+    # The whole flood makes one line in the log. On a busy machine the line may name a later sample than
+    # the first forged one.
     (said,) = caplog.messages
     assert said.startswith("sample_dropped topic=lift_requests reason=")
 
 
 def test_nothing_forged_is_taken_for_a_message(domain: int) -> None:
-    """A key with a wrong hash is none of our keys, and a key with a wildcard is none either."""
+    """Our node reads only its own keys. A key with a wrong hash or with a wildcard is not among
+    them."""
     received: list[d.LiftRequest] = []
     node = ZenohTransport("listener", domain, loopback=True)
     liar = ZenohTransport("liar", domain, loopback=True)

@@ -54,7 +54,7 @@ def bridged() -> Iterator[ZenohTransport]:
 
 
 def session_of(tokens: list[str], at: int) -> str:
-    """Return the session's id, which is the same in all these tokens at the position `at`."""
+    """Return the session's id from the position `at` of the tokens. All tokens have the same id."""
     (session,) = {token.split("/")[at] for token in tokens}
     assert int(session, 16) > 0
     return session
@@ -148,9 +148,9 @@ def test_what_we_retain_reaches_a_late_subscriber_of_rmw_zenoh_as_deep_as_it_wan
 def heard_from(
     node: ZenohTransport, topic: Any, key: str, token: str, message: Any, depth: str = ""
 ) -> list[Any]:
-    """Return the messages that our subscription hears.
+    """Return the messages that our subscription hears from another program.
 
-    Another program publishes under this key, and its token describes its publisher.
+    The other program publishes `message` under `key`. `token` describes its publisher.
     """
     received: list[Any] = []
     subscription = node.subscribe(topic, received.append)

@@ -58,7 +58,7 @@ def site() -> Iterator[Site]:
 
 
 class Talk:
-    """A lift's states, which one node sends and another node hears."""
+    """A conversation: one node sends a lift's states, and another node hears them."""
 
     def __init__(self, speaker: ZenohTransport, listener: ZenohTransport) -> None:
         self.heard: list[str] = []
@@ -68,7 +68,7 @@ class Talk:
         self.publisher = speaker.publisher(LIFT_STATES)
 
     def arrives(self, text: str) -> bool:
-        """Send this state, and return whether it has arrived."""
+        """Send a state with this text. Return whether that state has arrived."""
         with suppress(TransportError):
             self.publisher.publish(d.LiftState(lift_name=text))
         return text in self.heard
@@ -91,7 +91,9 @@ def test_a_node_that_starts_before_its_router_is_there_as_soon_as_it_is(
     lift, rmf = site.node("lift", endpoint, mode=mode), site.node("rmf", endpoint, mode=mode)
     talk = Talk(lift, rmf)
     alarm = lift.publisher(FIRE_ALARM_TRIGGER)
-    with suppress(TransportError):  # a client reports a missing session, but keeps the message
+    with suppress(
+        TransportError
+    ):  # a client without a session reports an error, but keeps the message
         alarm.publish(d.Bool(True))
     rang: list[d.Bool] = []
     rmf.subscribe(FIRE_ALARM_TRIGGER, rang.append)
@@ -154,7 +156,7 @@ def test_with_two_routers_each_message_comes_once_and_one_of_them_is_enough(site
 
 
 class Machine:
-    """The machine's network addresses, which the test sets."""
+    """The machine's network addresses. The test sets them."""
 
     def __init__(self) -> None:
         self.addresses: addresses.Addresses = frozenset({(2, "10.0.0.7")})
@@ -167,7 +169,7 @@ def test_a_node_on_zenoh_joins_another_address_and_what_was_retained_goes_out_ag
     machine = Machine()
     monkeypatch.setattr(addresses, "addresses", lambda: machine.addresses)
     router = site.router()
-    # The kernel takes 0.0.0.0 for this machine. Our code does not count 0.0.0.0 as loopback.
+    # The kernel sends packets for 0.0.0.0 to this machine. Our code does not count 0.0.0.0 as loopback.
     anywhere = router.endpoint.replace("127.0.0.1", "0.0.0.0")
     lift = site.node("lift", anywhere)
     rmf = site.node("rmf", router.endpoint, mode="client")
@@ -224,7 +226,7 @@ class Papers:
         self.directory = directory
 
     def file(self, name: str) -> str:
-        """Return the path of a file of this name."""
+        """Return the path of the file with this name."""
         return str(self.directory / name)
 
     @staticmethod
@@ -350,7 +352,8 @@ def test_a_node_on_loopback_takes_no_notice_of_the_settings_and_opens_no_other_a
 
 
 def listening(pid: int) -> set[tuple[str, str]]:
-    """Return each TCP socket on which a process listens, as (address, port) in hexadecimal digits."""
+    """Return the (address, port) of each TCP socket on which a process listens, in hexadecimal
+    digits."""
     inodes = set()
     for descriptor in Path(f"/proc/{pid}/fd").iterdir():
         with suppress(OSError):

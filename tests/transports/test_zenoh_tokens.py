@@ -22,7 +22,8 @@ from tests.waiting import wait_until
 
 
 class Stranger:
-    """A session of another program. It declares tokens for publishers that it does not have."""
+    """A session of another program. It declares tokens for publishers and subscriptions that do not
+    exist."""
 
     def __init__(self, domain: int) -> None:
         config = zenoh.Config()
@@ -37,7 +38,7 @@ class Stranger:
     def claims(
         self, kind: str, topic: str, type_text: str, numbers: range, qos: str = "::"
     ) -> None:
-        """Declare ends of a topic."""
+        """Declare a token for each number, as if the session had an end of this topic."""
         for number in numbers:
             ids = f"@ros2_lv/{self._domain}/{self.session.zid()}/0/{number}/{kind}"
             token = f"{ids}/%/%/stranger/%{topic}/{type_text}/{qos},10:,:,:,,"
@@ -171,11 +172,11 @@ def test_many_ends_that_do_not_fit_are_one_line(
 
 
 class PanicException(BaseException):
-    """An exception like the one that pyo3 raises for a panic in Rust."""
+    """A stand-in for the exception that pyo3 raises when Rust code panics."""
 
 
 class Panics:
-    """An end of a topic whose library panics at each call."""
+    """A stand-in for a publisher whose library panics at each call."""
 
     def put(self, *sample: object, **more: object) -> None:
         raise PanicException("called `Result::unwrap()` on an `Err` value")
@@ -229,7 +230,8 @@ def test_samples_bear_no_time_of_zenohs_clock_which_panics_before_1970(
 
 
 class BusyThread(RmwZenoh):
-    """Keys that block the thread on which zenoh delivers present tokens, until `go_on` is set."""
+    """Keys that stop zenoh's thread at the first token. The test sets `go_on` to let the thread
+    continue."""
 
     def __init__(self, domain: int) -> None:
         super().__init__(domain, "", "lift")

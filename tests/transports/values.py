@@ -21,13 +21,13 @@ NUMBERS: dict[str, st.SearchStrategy[Any]] = {
 TEXTS = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=20)
 
 repeatable = settings(max_examples=examples(40))
-"""Hypothesis settings that give the same values in every run."""
+"""Settings with which Hypothesis gives the same values in every run."""
 
 MESSAGE_TYPES: tuple[Any, ...] = typing.get_args(d.Message)
 
 
 def values(kind: Any, release: Release = NEWEST) -> st.SearchStrategy[Any]:
-    """Return a strategy for values of this field or message type that this release can carry."""
+    """Return a strategy for values of this field type or message type. Each value fits the release."""
     if typing.get_origin(kind) is typing.Annotated:
         return NUMBERS[kind.__metadata__[0]]
     if typing.get_origin(kind) is tuple:

@@ -1,7 +1,8 @@
 """A hostile program: `python -m tests.transports.zenoh_hostile ENDPOINT KEY GOOD TOKEN`.
 
-Under KEY it first sends samples that no ROS node sends. Then it sends ten thousand more, as fast as it
-can. In the end it sends GOOD (in hexadecimal digits) as a ROS node does, until its stdin ends.
+First the program sends, under KEY, some samples that no ROS node sends. Then it sends ten thousand
+malformed samples as fast as possible. In the end it sends GOOD (hexadecimal digits) again and again, as
+a ROS node does, until its stdin ends.
 """
 
 import json

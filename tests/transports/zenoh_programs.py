@@ -1,4 +1,4 @@
-"""Other programs on zenoh. Each program runs in its own process, on 127.0.0.1."""
+"""Foreign programs on zenoh. Each program runs in a separate process, on 127.0.0.1."""
 
 import json
 import socket
@@ -16,7 +16,7 @@ READER = Path(__file__).with_name("rmw_zenoh_reader.py")
 
 
 def meeting(domain: int) -> str:
-    """Return the endpoint where our nodes of a domain meet on this machine."""
+    """Return the endpoint on this machine where our nodes of a domain meet."""
     return f"tcp/127.0.0.1:{LOOPBACK_PORT + domain}"
 
 
@@ -28,19 +28,19 @@ def free_port() -> int:
 
 
 class Written:
-    """The output lines of a program."""
+    """The lines that a program has written."""
 
     def __init__(self) -> None:
         self.lines: list[dict[str, Any]] = []
 
     def values(self, key: str) -> list[Any]:
-        """Return the value of this key from each line that has the key."""
+        """Return the value of `key` from each line that has this key."""
         return [line[key] for line in self.lines if key in line]
 
 
 @contextmanager
 def reading(endpoint: str, *orders: str) -> Iterator[Written]:
-    """Run the reader in rmw_zenoh_reader.py until the end of the block."""
+    """Run rmw_zenoh_reader.py until the `with` block ends."""
     written = Written()
     command = [sys.executable, str(READER), endpoint, *orders]
     with subprocess.Popen(
@@ -64,9 +64,9 @@ def _collect(lines: Any, written: Written) -> None:
 
 
 class Router:
-    """A zenoh router of the zenoh library, in a process that can be killed and started again.
+    """A router of the zenoh library. The test can kill and restart the router's process.
 
-    `config` has further settings besides the endpoint.
+    `config` has all settings except the endpoint.
     """
 
     def __init__(self, endpoint: str | None = None, **config: Any) -> None:
@@ -95,7 +95,7 @@ class Router:
         assert self._child.stdout.readline() == "listening\n"
 
     def leave(self) -> None:
-        """End the router with a farewell to its peers, as an operator does."""
+        """End the router. The router says farewell to its peers, as when an operator stops it."""
         if self._child:
             assert self._child.stdin is not None
             assert self._child.stdout is not None

@@ -1,6 +1,6 @@
-"""`python -m tests.blackbox.earlier DAY` writes the files of this version to a new folder.
+"""A program that writes this version's files to a new folder: `python -m tests.blackbox.earlier DAY`.
 
-Run this module before a version that moves or renames recorded types. Older folders stay unchanged.
+Run the program before a change moves or renames recorded types. Older folders stay unchanged.
 """
 
 import gzip
@@ -29,7 +29,7 @@ CONFIG = Path(__file__).parents[3] / "config"
 CLAIMED = ("lift_dry_contact", "door_register", "charger_http", "charger_wiferion")
 SEED, HOURS = 6, 0.6
 CHOSEN = ("Lift1", "store", "bay1", "coordinator", "door_supervisor", "lift_supervisor")
-"""The parties whose files are saved. The list has a daemon of each kind."""
+"""The names whose files are saved: one device or node for each kind of daemon."""
 LOOK_S = 5.0
 RING = 8 * 8192
 LAST_S = 10.0
@@ -55,8 +55,8 @@ def _records(folder: Path) -> None:
 
 
 def _day(folder: Path) -> None:
-    """Write a day's rings, the recorder's files of these rings, and each node's largest memory on
-    disk."""
+    """Write a day's rings, the recorder's files from these rings, and the largest memory that each node
+    had on disk."""
     with tempfile.TemporaryDirectory(dir="/dev/shm") as scratch:
         site = Site(SEED)
         rings = keep(site, Path(scratch), RING)
@@ -87,7 +87,7 @@ def _ring(path: Path, ring: Path) -> None:
 
 
 def main(day: str) -> int:
-    """Write the folder of this day."""
+    """Write the folder for this day."""
     folder = HERE / day
     folder.mkdir()
     (folder / "values.json").write_bytes(_values())
