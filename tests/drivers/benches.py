@@ -1,4 +1,4 @@
-"""The bench and the buses in the contract tests of lift, door and charger drivers."""
+"""The bench and the buses for the contract tests of drivers."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
@@ -31,8 +31,8 @@ Outputs = TypeVar("Outputs")
 
 
 class Bench(Generic[Sample, Outputs]):
-    """One driver on one bus, with a plant behind the bus. `clock` gives the time for the bus's
-    pauses."""
+    """One driver on one bus, with a simulated device behind the bus. The bus measures its pauses with
+    `clock`."""
 
     def __init__(
         self, driver: Driver[Sample, Outputs], plant: Plant, clock: Time | None = None
@@ -42,7 +42,7 @@ class Bench(Generic[Sample, Outputs]):
         self.clock = clock or Time()
 
     def relays(self) -> list[tuple[str, object]]:
-        """Return every edge of every output so far."""
+        """Return (signal, value) for every edge of every output so far."""
         return [(edge.signal, edge.value) for edge in self.plant.edges if edge.what == "relay"]
 
     def open(self) -> None:
@@ -58,7 +58,7 @@ class Bench(Generic[Sample, Outputs]):
         at_last(lambda: self.driver.write(outputs), "the outputs are written", self.a_moment)
 
     def a_moment(self) -> None:
-        """Let time pass until no pause of the bus is left."""
+        """Let so much time pass that every pause of the bus ends."""
         self.clock.now += 60.0
 
     def patiently(self) -> Sample | str:
@@ -72,9 +72,9 @@ class Bench(Generic[Sample, Outputs]):
     def until_it_fails(
         self, part: str, mode: FailureMode, makes_no_sense: Callable[[Sample], bool]
     ) -> list[Sample]:
-        """Let a part fail, and return the readings after that.
+        """Let a part fail, and return the readings after the failure.
 
-        The list ends when a reading raises an error or when `makes_no_sense` holds for it.
+        The list ends when a reading raises an error, or when `makes_no_sense` holds for a reading.
         """
         self.plant.fail(part, mode)
         seen: list[Sample] = []
@@ -94,11 +94,11 @@ B = TypeVar("B", bound="Bench[Any, Any]")
 
 
 class Contract(ABC, Generic[B]):
-    """Tests in which each test has its own bench."""
+    """A class of tests. Each test has its own bench."""
 
     @abstractmethod
     def benches(self) -> AbstractContextManager[B]:
-        """Yield a bench with an idle plant. Bus and driver are not open yet."""
+        """Yield a bench with an idle device. Bus and driver are not open."""
 
     @pytest.fixture
     def bench(self) -> Iterator[B]:
@@ -118,7 +118,8 @@ def on_modbus(
     serial: modbus.Serial | None = None,
     timeout_s: float = TIMEOUT_S,
 ) -> Iterator[tuple[modbus.ModbusBus, Time]]:
-    """Yield a bus to a simulated gateway or line with these devices."""
+    """Yield a bus to a simulated gateway or serial line with these devices, and the clock of the
+    bus."""
     clock = Time()
     server = (
         RtuLine(far_sides, serial, slow_s=2.2 * timeout_s)
@@ -139,7 +140,7 @@ def on_modbus(
 def on_http(
     world: RealTime, station: HttpStation, timeout_s: float
 ) -> Iterator[tuple[http.HttpBus, Time]]:
-    """Yield a bus to a simulated controller that answers HTTP."""
+    """Yield a bus to a simulated controller that answers HTTP, and the clock of the bus."""
     clock = Time()
     server = HttpServer([station], "", timeout_s)
     plain = {"type": "http", "timeout_s": timeout_s, **server.replace}
@@ -156,7 +157,7 @@ def on_http(
 def on_mqtt(
     world: RealTime, wirings: Sequence[PlantWiring], points: dict[str, object], timeout_s: float
 ) -> Iterator[mqtt.MqttBus]:
-    """Yield a bus to a real broker with these devices behind it. The bus has a real clock."""
+    """Yield a bus to a real broker with these simulated devices. The bus measures real time."""
     plain: dict[str, object] = {
         "type": "mqtt",
         "host": "x",

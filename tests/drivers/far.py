@@ -1,8 +1,8 @@
 """The far side of every bus in virtual time, in place of `drivers/hal/`.
 
-A bus whose `down` has a text raises HalError with that text, as the HAL does after its timeout. The
-module behind that bus drops its outputs after WATCHDOG_S, like a module with a watchdog. Only a bus can
-be lost, so the GPIO header cannot.
+If `down` has a text, the bus raises HalError with this text, as the HAL does after its timeout. After
+WATCHDOG_S the module behind that bus drops its outputs, like a module with a watchdog. Only a bus can
+be lost. The GPIO header is no bus, so it cannot be lost.
 """
 
 import json
@@ -41,7 +41,7 @@ class Cells(Protocol):
 
 
 class PointsFar:
-    """Contacts and relays on a header or at a module (`drivers.hal.points.PointsBus`)."""
+    """Contacts and relays on a header or at a module, in place of a `drivers.hal.points.PointsBus`."""
 
     def __init__(self, clock: Clocked, plant: Plant, wires: Iterable[Wire]) -> None:
         self.down = ""
@@ -60,7 +60,7 @@ class PointsFar:
         return _Lines(self, dict(outputs))
 
     def watchdog(self) -> None:
-        """Drop the outputs if the bus has been down for WATCHDOG_S."""
+        """Drop the outputs if the bus is down. The caller has waited WATCHDOG_S."""
         if self.down:
             self.drive(self._safe)
 
@@ -106,7 +106,8 @@ class _Lines:
 
 
 class RegisterFar:
-    """A controller's registers, with the part of `drivers.hal.modbus.ModbusBus` that drivers use."""
+    """A controller's registers, in place of a `drivers.hal.modbus.ModbusBus`. Drivers need no other
+    part."""
 
     def __init__(self, clock: Clocked, cells: Cells) -> None:
         self.down = ""
@@ -126,7 +127,7 @@ class RegisterFar:
         """Do nothing, because this bus makes no pauses."""
 
     def watchdog(self) -> None:
-        """Restore the first values if the bus has been down for WATCHDOG_S."""
+        """Restore the first values if the bus is down. The caller has waited WATCHDOG_S."""
         if self.down:
             for point, value in self._first.items():
                 self._cells.set(point, value, self.now())
@@ -145,7 +146,7 @@ class RegisterFar:
 
 
 class HttpFar:
-    """A charging station's HTTP (`drivers.charger.http.Calls`)."""
+    """A charging station that answers HTTP, in place of `drivers.charger.http.Calls`."""
 
     def __init__(self, clock: Clocked, plant: ChargerPlant, settings: Any) -> None:
         self.down = ""
@@ -154,7 +155,7 @@ class HttpFar:
         self._station = FakeHttpCharger(plant, settings)
 
     def watchdog(self) -> None:
-        """Do nothing, because this station has no timeout of its own."""
+        """Do nothing, because this station has no timeout."""
 
     def get_json(self, path: str) -> dict[str, Any]:
         self._plant.advance(self._clock.now)
@@ -172,7 +173,7 @@ class HttpFar:
     def _answers(self, failures: Mapping[str, Any]) -> None:
         """Raise HalError for every failure.
 
-        The driver cannot distinguish a deadline, a refusal and nonsense.
+        The driver cannot distinguish a timeout, a refusal and nonsense.
         """
         server, body = failures.get("server"), failures.get("body")
         broken = server in ("off", "slow", "garbage") or "headers" in failures

@@ -1,4 +1,5 @@
-"""New files alone add drivers, kinds and bus types, because `check` and `run` find them by name."""
+"""Drivers, kinds and bus types in new files. `check` and `run` find them by name, so no other file
+changes."""
 
 import json
 import shutil
@@ -80,8 +81,11 @@ class Site:
         self.point_at({})
 
     def point_at(self, replace: dict[str, Any]) -> None:
-        """Write the YAML file with the address of this far side in its bus."""
-        bus = json.dumps(self._bus | replace).replace('"1":', "1:")  # JSON has no numbers as keys
+        """Write the YAML file. `replace` has the address of the far side, and replaces settings of the
+        bus."""
+        bus = json.dumps(self._bus | replace).replace(
+            '"1":', "1:"
+        )  # JSON cannot have numbers as keys
         self.file.write_text(self._text.format(domain=self._domain, bus=bus))
 
     def check(self) -> list[str]:
@@ -94,7 +98,7 @@ class Site:
 
     @contextmanager
     def far_side(self) -> Iterator[dict[str, Any]]:
-        """Run the far side of the bus in its own process. Yield the settings for the bus."""
+        """Run the far side of the bus in a separate process. Yield the settings for the bus."""
         socket = ["--socket", str(self.here / "plant.sock")]
         child = [sys.executable, "-m", "hal_fakes", str(self.file), "b", *socket]
         pipe = subprocess.PIPE
@@ -105,7 +109,8 @@ class Site:
             running.stdin.close()
 
     def served(self, *options: str) -> dict[str, Any]:
-        """Serve the door until its state is known, and end cleanly. Return the status file."""
+        """Serve the door until its state is known. End the daemon cleanly, and return the status
+        file."""
         status = self.here / "run" / "status.json"
         with daemon(self.file, self.here / "run", *options) as running:
             running.wait_for("ready")

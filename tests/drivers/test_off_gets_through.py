@@ -1,7 +1,7 @@
-"""A failing register, unit or reply keeps no output on, because off is written in any case.
+"""Failing registers, units and replies. They keep no output on, because off is always written.
 
-Each story has an output that is on. A part of the same device, or a neighbour on the bus, cannot be
-read once or ever again.
+In each story one output is on. Something cannot be read: a part of the same device, or a neighbour on
+the bus. The failure happens once or lasts for ever.
 """
 
 import struct
@@ -36,9 +36,9 @@ SERVER_FAILURE, ILLEGAL_ADDRESS = 4, 2
 
 
 class Registers:
-    """A module with units of registers and coils, which answers as a test orders.
+    """A module with units of registers and coils. The test controls its answers.
 
-    `refused` is (unit, reading function, address) -> the exception code. The code 0 means silence.
+    `refused` has the exception code for each (unit, reading function, address). Code 0 means silence.
     """
 
     def __init__(self, module: Module) -> None:
@@ -48,7 +48,7 @@ class Registers:
         module.reply = self.answer
 
     def answer(self, request: bytes) -> bytes:
-        """Answer functions 1 to 6 as the Modbus specification says."""
+        """Answer functions 1 to 6 according to the Modbus specification."""
         unit, function, address, value = struct.unpack(">BBHH", request[6:12])
         reads = {5: 1, 6: 3}.get(function, function)
         count = value if function < 5 else 1
@@ -101,7 +101,7 @@ CONTACT_DOOR = msgspec.convert(
 
 
 def tried(step: Callable[[], object]) -> bool:
-    """Did the step succeed?"""
+    """Return whether the step succeeds."""
     try:
         step()
     except DriverError:
@@ -164,7 +164,7 @@ def test_a_relay_goes_off_while_the_inputs_of_its_unit_fail_for_ever(
     door.read()
     door.write(HELD)
     registers.refused[1, 2, 0] = code
-    for _ in range(20):  # the pause is long now, and each reading starts a new pause
+    for _ in range(20):  # the pause is long, and each reading begins a new pause
         clock.now += 30.0
         assert not tried(door.read)
     door.write(RELEASED)
@@ -266,7 +266,7 @@ def test_a_charge_on_canopen_is_stopped_while_its_state_is_not_answered() -> Non
 
 
 class HttpStation:
-    """A station that answers /state as a test orders, and accepts commands."""
+    """A station that accepts commands. The test controls its answers to /state."""
 
     def __init__(self) -> None:
         station = self
@@ -331,7 +331,7 @@ def test_a_pin_that_cannot_be_written_keeps_no_other_pin_on() -> None:
     lines.claim()
     lines.write({"BCM17": True, "BCM18": True})
     broken = factory.pin(17)
-    broken.function = "input"  # from now on gpiozero refuses to drive the pin
+    broken.function = "input"  # from here on gpiozero refuses to drive the pin
     assert not tried(lambda: lines.write({"BCM17": False, "BCM18": False}))
     assert factory.pin(18).state == 0
     bus.close()

@@ -1,4 +1,5 @@
-"""Each driver on contacts reads the same sample whichever bus has its inputs, and none without them."""
+"""Drivers on contacts whose inputs are on another bus. The sample is the same, and without the inputs
+there is no sample."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,7 +24,7 @@ DRIVEN: Final = ("outputs", "calls", "call_code")
 
 
 def on_contacts() -> Iterator[str]:
-    """Yield the shipped files with inputs on contacts of one bus."""
+    """Yield the shipped files whose inputs are contacts of one bus."""
     for path in PATHS:
         content = yaml.safe_load(path.read_text())
         if content.get("driver") == "dry_contact" and len(content["buses"]) == 1:
@@ -35,7 +36,7 @@ class Now:
 
 
 def moved(part: Any) -> None:
-    """Put each input below this part onto the bus `other`."""
+    """Put each input inside this part onto the bus `other`."""
     if isinstance(part, dict):
         if "point" in part:
             part["bus"] = "other"
@@ -47,7 +48,7 @@ def moved(part: Any) -> None:
 
 
 def split(name: str, folder: Path) -> Config:
-    """Load this file with every input on another bus of the same type."""
+    """Load this file, but put every input onto a second bus of the same type."""
     content = yaml.safe_load((CONFIG / name).read_text())
     (own,) = content["buses"]
     settings = content["buses"][own]

@@ -1,2 +1,1 @@
-"""Example files that the tests add to a copy of the project. No file of the project itself is
-edited."""
+"""Example files that the tests add to a copy of the project. The project's own files stay unchanged."""

@@ -1,4 +1,4 @@
-"""Every driver of an alarm panel keeps the same contract, on every bus."""
+"""The contract of alarm panel drivers, tried with every driver on every bus."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -28,7 +28,7 @@ Bench = benches.Bench[PanelSample, PanelOutputs]
 
 
 def wired(points: list[str], **pull: str) -> dry_contact.DryContactPanelSettings:
-    """Return a panel on these points. A cut loop of `fire` or `blue` reads as an alarm."""
+    """Return a panel on these points. A cut wire of `fire` or `blue` reads as an alarm."""
     active = "high" if pull else "low"
     fire, blue, drill = ({"point": point, "active": active, **pull} for point in points)
     plain = {**BASE, "sources": {"fire": fire, "blue": blue}, "drill": {**drill, "active": "high"}}
@@ -58,7 +58,8 @@ class PanelContract(Contract[Bench]):
 
 
 class LinkedPanelContract(PanelContract):
-    """Duties of a driver whose link can fail. `parts` has the parts of its far side that can be off."""
+    """Duties of a driver whose link can fail. `parts` names the parts on the far side that may be
+    off."""
 
     parts: ClassVar[tuple[str, ...]] = ("unit", "server")
 

@@ -1,6 +1,6 @@
 """Duties of every driver of a switchable charger, on any bus.
 
-A test class derives from `ChargerContract` and builds its benches.
+A test class derives from `ChargerContract` and implements `benches`.
 """
 
 import time
@@ -26,15 +26,16 @@ from tests.waiting import wait_until
 
 ON, OFF, AS_IT_IS = ChargerOutputs(True), ChargerOutputs(False), ChargerOutputs(None)
 PACE = 20.0
-"""The speed of a simulated charger, so high that no test has to wait for the charger."""
+"""The factor by which a simulated charger runs faster. With this factor no test waits for the
+charger."""
 
 ChargerDriver = Driver[ChargerSample, ChargerOutputs]
 OnDeath = Literal["stop", "keep"]
 
 
 class Bench(benches.Bench[ChargerSample, ChargerOutputs]):
-    """A bench with a charger. `new` makes a second driver for the same charger, with the given
-    `on_death`."""
+    """A bench with a charger. `new` makes a second driver for the same charger. The argument of `new`
+    is `on_death`."""
 
     switch: ClassVar[str] = "power"
 
@@ -43,11 +44,13 @@ class Bench(benches.Bench[ChargerSample, ChargerOutputs]):
         self.new = new
 
     def press(self, signal: str, there: bool = True) -> None:
-        """Let a robot or another object come to the pad or go."""
+        """Let an object come to the pad, or leave the pad if `there` is false. `signal` names the
+        object."""
         self.plant.press(signal, there, time.monotonic())
 
     def switched(self, signal: str = "") -> list[object]:
-        """Return every command so far for this signal. The default signal is the power."""
+        """Return every command so far for this signal. Without a signal, return the commands for
+        `switch`."""
         wanted = signal or self.switch
         return [value for name, value in self.relays() if name == wanted]
 
@@ -68,9 +71,9 @@ class Bench(benches.Bench[ChargerSample, ChargerOutputs]):
 
 
 def behind(driver: Any, settings: Any, canonical: Callable[[str], str] = str) -> tuple[Any, Any]:
-    """Return a fast world with this driver's own fake, and the far side for the bus.
+    """Return a fast world with this driver's simulated charger, and the far side for the bus.
 
-    The far side is the fake's station, or the fake's wires if the fake has no station.
+    The far side is the simulated station. Without a station, the far side consists of wires.
     """
     table = list(driver.DRIVER.wires(settings))
     fake: Fake[Any] = import_module(driver.DRIVER.fake or "hal_fakes.plants.charger").FAKE
@@ -95,19 +98,19 @@ def news(driver: Any, settings: Any, bus: Bus) -> Callable[[OnDeath], ChargerDri
 
 
 class ChargerContract(Contract[Bench]):
-    """The contract on any bus. A bench begins with an empty pad."""
+    """The contract on any bus. Each bench begins with an empty pad."""
 
     link: ClassVar[str]
-    """The part of the plant whose failure breaks the wire."""
+    """The part of the simulated charger whose failure breaks the wire."""
     cut: ClassVar[str] = ""
-    """A part whose failure `off` breaks the wire and leaves the station alone.
+    """A part whose failure `off` breaks the wire and does not disturb the station.
 
-    The value is "" if `link` is such a part.
+    The value "" means that `link` is such a part.
     """
     measures: ClassVar[bool] = True
     """Does the station measure the current?"""
     foreign_object: ClassVar[str] = "foreign object"
-    """The station's words for a foreign object."""
+    """The error text of the station for a foreign object."""
 
     def test_an_idle_station_is_sent_nothing(self, bench: Bench) -> None:
         bench.open()
@@ -182,7 +185,7 @@ class ChargerContract(Contract[Bench]):
         assert len(self.checks(bench)) == 2
 
     def checks(self, bench: Bench) -> list[object]:
-        """Return the range checks that the driver has ordered."""
+        """Return every command so far that orders a range check."""
         return bench.switched("range_check")
 
     @pytest.mark.parametrize("mode", ["off", "slow", "garbage", "wrong"])
@@ -217,10 +220,10 @@ def _is_unknown(sample: ChargerSample) -> bool:
 
 
 class MovingPadContract(Contract[Bench]):
-    """The contract of a driver that reads the pad's height and whether a robot is in range."""
+    """The contract of a driver that reads the pad's height and the robot's range."""
 
     celsius: ClassVar[tuple[str, ...]] = ()
-    """The temperatures that the driver reads, by name."""
+    """The names of the temperatures that the driver reads."""
 
     def test_height_and_range_are_read_as_they_are(self, bench: Bench) -> None:
         bench.open()
@@ -240,7 +243,7 @@ class MovingPadContract(Contract[Bench]):
         assert all(20 <= celsius <= 30 for _, celsius in found)
 
     def pad(self, bench: Bench, wanted: tuple[bool, bool]) -> bool:
-        """Wait until the driver reads these values for height and range."""
+        """Wait until the driver reads these values. `wanted` is (at height, range ok)."""
 
         def shown() -> bool:
             bench.write(OFF)

@@ -1,4 +1,7 @@
-"""The driver of makers' frames: its bytes as published, its pace of sending, and wrong maps."""
+"""The driver of makers' frames: its bytes, its sending pace, and wrong maps.
+
+The makers have published the bytes.
+"""
 
 import itertools
 from collections.abc import Iterator
@@ -47,7 +50,7 @@ KEPT_OFF = [(CONTROL, "0000000000000000"), (DISABLE, "aa00000000000000")]
 class Charger:
     """Wiferion's charger in virtual time.
 
-    It sends its frames when the test says so, and logs the frames that the driver sends.
+    The charger sends a frame only when the test calls `says`. `got` has the frames from the driver.
     """
 
     def __init__(self) -> None:
@@ -69,12 +72,12 @@ class Charger:
         self.far.coming.append(can.Message(arbitration_id=frame_id, is_extended_id=True, data=data))
 
     def status(self, state: int = 0) -> None:
-        """Send a whole status without voltage and current."""
+        """Send a complete status with this state, without voltage and current."""
         self.says(0x1FFD0101, "0000126700000000")
         self.says(0x18FF50E5, f"00000000000000{state:02x}")
 
     def scan(self, outputs: ChargerOutputs, for_s: float = 0.05) -> list[tuple[int, str]]:
-        """Send a status, read, write, and let a scan's time pass.
+        """Send a status, read, write, and let `for_s` seconds pass.
 
         Return the frames that the driver sent, as (id, payload in hexadecimal digits).
         """
@@ -102,7 +105,7 @@ def test_the_driver_stands_on_can_and_has_no_wires() -> None:
 
 def test_a_published_status_frame_is_what_it_says(charger: Charger) -> None:
     charger.says(0x1FFD0101, "0000126700000000")
-    charger.says(0x18FF50E5, "01c8014100000002")  # 456 is 45.6 V, 321 is 32.1 A
+    charger.says(0x18FF50E5, "01c8014100000002")  # 456 means 45.6 V, and 321 means 32.1 A
     assert charger.driver.read() == ChargerSample(
         Activity.CHARGING, 2, "", Measured(receiver_id="4711", volts=45.6, amps=32.1)
     )
@@ -125,8 +128,8 @@ def test_the_temperatures_of_the_map_are_read_and_one_without_a_reading_is_left_
     charger: Charger,
 ) -> None:
     charger.status()
-    charger.says(0x1FFD0102, "0000000056000000")  # 0x56 is 24.5 degrees
-    charger.says(0x1FFD0103, "00ff000000000000")  # 0xFF is no reading
+    charger.says(0x1FFD0102, "0000000056000000")  # 0x56 means 24.5 °C
+    charger.says(0x1FFD0103, "00ff000000000000")  # 0xFF means no reading
     assert charger.driver.read().measured.temperatures == (("heatsink", 24.5),)
     charger.status()
     charger.says(0x1FFD0103, "0060000000000000")
@@ -165,7 +168,7 @@ def test_height_and_range_are_signals_of_the_map_and_without_them_there_is_no_re
             "station",
             "the station is too hot; the receiver is too hot",
         ),
-        ("0000000000000010", "", ""),  # frames of ours block the charger: no error
+        ("0000000000000010", "", ""),  # no error, because our own frames block the charger
     ],
 )
 def test_error_bits_name_the_fault_and_its_side(
@@ -324,7 +327,7 @@ def test_closing_takes_away_what_was_given_and_nothing_else(charger: Charger) ->
     assert charger.got == KEPT_OFF
 
 
-# ---- a charger that is silent
+# ---- a silent charger
 
 
 def test_without_a_status_frame_there_is_no_state(charger: Charger) -> None:

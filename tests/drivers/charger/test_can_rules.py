@@ -64,7 +64,7 @@ class Charger:
     def shows(self, payload: str) -> tuple[Activity, int | str, str, str, bool]:
         """Return the driver's reading of a status.
 
-        The tuple is (activity, code, text, side at fault, does current flow).
+        The reading is (activity, code, error text, side at fault, whether current flows).
         """
         for frame_id, said in ((0x100, payload), (0x101, "00 00 12 67")):
             data = bytes.fromhex(said)
@@ -138,7 +138,8 @@ def test_a_map_must_say_in_some_way_what_the_state_is() -> None:
 
 
 class TestTheFakeShowsIt(Frames):
-    """The fake with the same map, so that the driver must read the plant's true state."""
+    """The contract with a simulated charger that has this map. The driver must read the charger's true
+    state."""
 
     foreign_object = "foreign object"
     settings: ClassVar = {"map": MAP}

@@ -1,4 +1,4 @@
-"""A charger on CAN that stays silent until it is woken, as CANopen nodes do after an NMT reset."""
+"""A charger on CAN that stays silent until a frame wakes it, as CANopen nodes do after an NMT reset."""
 
 import itertools
 from typing import Any
@@ -26,9 +26,9 @@ START, STOP, CHARGE = (0x000, "010a"), (0x200, "00"), (0x200, "01")
 
 
 class Sleeper:
-    """A charger in virtual time that speaks only after it was woken.
+    """A charger in virtual time. It broadcasts its status only while the test sets `awake`.
 
-    `got` has (s, (id, payload)) of each frame from the driver.
+    `got` has (time in s, (id, payload)) for each frame from the driver.
     """
 
     def __init__(self) -> None:
@@ -47,9 +47,10 @@ class Sleeper:
         return []
 
     def scans(self, for_s: float, power: bool | None) -> list[tuple[float, tuple[int, str]]]:
-        """Scan for `for_s` seconds, and return the frames that the driver sent.
+        """Scan for `for_s` seconds. Return (time in s, (id, payload)) for each frame that the driver
+        sent.
 
-        Outputs are written only after the first good reading.
+        The outputs are written only after the first good reading.
         """
         self.got.clear()
         until = self.far.now + for_s
@@ -84,7 +85,7 @@ def test_one_that_falls_asleep_in_a_charge_is_told_to_stop_and_woken_and_gets_no
     sleeper.awake = True
     sleeper.scans(2.0, power=True)
     sleeper.awake = False
-    sleeper.scans(1.5, power=True)  # a status stays fresh for 1 s
+    sleeper.scans(1.5, power=True)  # a status counts as fresh for 1 s
     assert {frame for _, frame in sleeper.scans(3.0, power=True)} == {START, STOP}
 
 

@@ -1,4 +1,4 @@
-"""The driver of the CANopen charger: its writes, the times of its writes, and the output of `check`."""
+"""The driver of the CANopen charger: its writes and their times, and the output of `check`."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,8 +25,8 @@ ENABLE, DISABLE, CHECK = "2f00200101000000", "2f00200100000000", "2f002002010000
 
 
 class Receiver:
-    """An RCU with its objects. `words` is by (index, subindex), and objects in `silent` give no
-    answer."""
+    """A CANopen receiver (RCU). `words` has the value of each object (index, subindex). Objects in
+    `silent` give no answer."""
 
     def __init__(self) -> None:
         self.far = Reactive()
@@ -39,7 +39,7 @@ class Receiver:
         self.driver = self.made()
 
     def made(self, on_death: str = "stop") -> xnergy.Receiver:
-        """Return a second driver of this RCU."""
+        """Return a new driver for this RCU."""
         return create("c", CanOpenChargerSettings(node=10, on_death=on_death), self.bus)  # type: ignore[arg-type]
 
     def answer(self, request: can.Message) -> list[can.Message]:
@@ -122,7 +122,7 @@ def test_a_start_without_an_answer_may_have_been_heard_and_is_taken_back(
     assert failure(lambda: receiver.scan(ON)).endswith("write 0x2000:01: no reply within 0.05 s")
     receiver.silent = set()
     receiver.far.now += 0.6
-    receiver.words[0x2002, 0x0A] = 2  # the station begins its handshake
+    receiver.words[0x2002, 0x0A] = 2  # in state 2 the station begins its handshake
     receiver.scan(OFF)
     assert receiver.writes == [DISABLE, ENABLE, DISABLE]
 

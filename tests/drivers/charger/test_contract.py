@@ -1,4 +1,4 @@
-"""Every driver of a switchable charger keeps the same contract."""
+"""The contract of switchable chargers, tried with every driver."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -85,13 +85,13 @@ class TestAnyMakeOnRegisters(ChargerContract):
 
 
 class ContactBench(Bench):
-    """A bench whose command is a relay."""
+    """A bench on which the power command is a relay with the name `enable`."""
 
     switch: ClassVar = "enable"
 
 
 class TestContactsAtAModule(ChargerContract):
-    """A relay at a module. The module drops the relay when the daemon has gone."""
+    """A charger whose relay is at a module. The module drops the relay when the daemon has died."""
 
     link: ClassVar = "unit"
     measures: ClassVar = False

@@ -1,4 +1,4 @@
-"""Chargers on CAN: the contract of every charger, and further rules for a robot on the pad."""
+"""Chargers on CAN. They obey the contract of every charger, and more rules for a robot on the pad."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -34,7 +34,7 @@ WIFERION: dict[str, Any] = {
 
 
 class PadBench(Bench):
-    """A bench for range checks. The result of a check counts after 1 s."""
+    """A bench for range checks. A check's result is valid 1 s after the check."""
 
     def sample(self, outputs: ChargerOutputs) -> ChargerSample | None:
         """Run one scan, and return the reading, or None if the station cannot be read."""
@@ -46,7 +46,7 @@ class PadBench(Bench):
         return sample
 
     def fault(self) -> ChargerSample:
-        """Scan until the station is in error, and return the reading with the error."""
+        """Scan until the station shows an error, and return the reading with this error."""
         found: list[ChargerSample] = []
 
         def failed() -> bool:
@@ -89,7 +89,7 @@ def on_a_bus(driver: Any, plain: dict[str, Any], medium: Medium, bus: CanBus) ->
 
 
 class CanContract(ChargerContract):
-    """The contract on CAN, for a driver and its settings."""
+    """The contract on CAN. A subclass chooses the driver and its settings."""
 
     cut = "bus"
     parts: ClassVar[tuple[str, ...]] = ("node", "bus")
@@ -199,7 +199,7 @@ class OnAnAdapter(CanContract):
 
 
 class CanOpen(CanContract):
-    """Xnergy's receiver."""
+    """The contract with Xnergy's receiver on CANopen."""
 
     link = "heartbeat"
     parts = ("node", "heartbeat", "bus")
@@ -228,7 +228,8 @@ class TestACanOpenReceiverBehindAnAdapter(CanOpen, OnAnAdapter):
 
 
 class Frames(CanContract):
-    """Wiferion's charger, which reports no foreign object and checks the range by itself."""
+    """The contract with Wiferion's charger. It reports no foreign object, and checks the range by
+    itself."""
 
     link = "node"
     foreign_object = "the station is too hot"

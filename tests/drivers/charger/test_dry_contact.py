@@ -1,4 +1,4 @@
-"""A charger on contacts: what its contacts mean together, and the warnings of `check`."""
+"""A charger on contacts: the meaning of its contacts in combination, and the warnings of `check`."""
 
 from pathlib import Path
 

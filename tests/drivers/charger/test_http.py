@@ -1,4 +1,7 @@
-"""The driver of the HTTP charger: its readings from JSON, and error clearings, each sent once."""
+"""The driver of the HTTP charger.
+
+The driver reads JSON, and sends each command that clears an error only once.
+"""
 
 import json
 from pathlib import Path
@@ -30,7 +33,7 @@ EXAMPLE = Path(__file__).parents[3] / "config" / "charger_http.yaml"
 
 
 class Station:
-    """A bus on which every request gets `answer`."""
+    """A bus that gives `answer` to every request."""
 
     def __init__(self, answer: Any = None) -> None:
         self.answer = answer

@@ -1,4 +1,4 @@
-"""Another make's JSON with a YAML map alone: fields, words, commands, and unreadable answers."""
+"""The JSON of another make, described only by a map in YAML: fields, words, commands, bad answers."""
 
 from pathlib import Path
 from typing import Any
@@ -185,9 +185,9 @@ def test_whatever_json_comes_it_is_a_driver_error_or_a_sample_and_charging_only_
 
 
 def driver() -> tuple[Station, Any]:
-    """Return a station, and a function `scan(outputs, state)`.
+    """Return a station, and the function `scan(outputs, state)`.
 
-    The function reads the state, writes the outputs, and returns the driver's commands.
+    `scan` reads the state, writes the outputs, and returns the driver's commands.
     """
     station = Station(answer())
     made = create("a", FULL, station)

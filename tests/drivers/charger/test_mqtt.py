@@ -24,7 +24,7 @@ ON, OFF = ChargerOutputs(power=True), ChargerOutputs(power=False)
 
 
 class Pad:
-    """The station of the example with its driver and a real broker."""
+    """The station of the example file, with its driver and a real broker."""
 
     def __init__(self) -> None:
         config = load(EXAMPLE)
@@ -50,7 +50,7 @@ class Pad:
         self.world.close()
 
     def reads(self, wanted: Callable[[ChargerSample], bool], what: str) -> ChargerSample:
-        """Read until a reading is as wanted, and return the reading."""
+        """Read until a reading satisfies `wanted`, and return that reading."""
         found: list[ChargerSample] = []
 
         def read() -> bool:

@@ -1,4 +1,4 @@
-"""Stations that move their pads: height, range and temperatures, on every bus with these values."""
+"""Stations that move their pads, on every bus that carries height, range and temperatures."""
 
 import contextlib
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A charger on registers with a map: what its words mean, and wrong maps."""
+"""A charger on registers with a map: the meaning of its words, and wrong maps."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,5 @@
-"""Rules that find a charger's state, and numbers and bits that name its errors, on any protocol."""
+"""Rules for chargers on any protocol. They find the charger's state, and name errors by numbers and
+bits."""
 
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from drivers.charger.http import HttpChargerSettings, create
 from drivers.charger.rules import ErrorBits, ErrorNumber, StationErrors
 from drivers.charger.rules import (
     Test as Condition,
-)  # pytest would collect a class named Test
+)  # pytest would collect a class with the name Test
 from hal_fakes.charger_values import values
 from tests.drivers.charger.test_http import Station
 from tests.settings.reading import changed, texts_of

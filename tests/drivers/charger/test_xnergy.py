@@ -1,6 +1,6 @@
-"""Xnergy's numbers.
+"""Xnergy's codes and commands.
 
-Every code has a meaning, every error has a side at fault, and every start orders a range check.
+Every code has a meaning, and every error has a side at fault. Every start orders a range check.
 """
 
 import pytest
@@ -131,7 +131,7 @@ def test_whatever_the_words_are_only_state_5_without_an_error_is_charging(
 
 
 def run(*scans: tuple[float, ChargerOutputs, int]) -> list[tuple[float, Orders]]:
-    """Return each order that is not empty, with its time (s). A scan is (time, outputs, state)."""
+    """Return each order that is not empty, with its time (s). Each scan is (time, outputs, state)."""
     given_, written = [], Written()
     for now, outputs, code in scans:
         written, orders = steer(written, outputs, code, now)

@@ -13,18 +13,18 @@ REST = WorkcellOutputs()
 
 
 class Bench(benches.Bench[WorkcellSample, WorkcellOutputs]):
-    """A bench with a workcell whose cycle is so short that no test waits for it."""
+    """A bench with a workcell. Its cycle is so short that no test waits for it."""
 
     def moved(self) -> int:
         """Return the number of items that left the workcell."""
         return sum(edge.signal == "moved" for edge in self.plant.edges)
 
     def starts(self) -> list[object]:
-        """Return every edge of the start so far."""
+        """Return every edge of the start signal so far."""
         return [value for signal, value in self.relays() if signal == "start"]
 
     def is_done(self) -> bool:
-        """Does the driver read `done` after all pauses?"""
+        """Return whether the driver reads `done` after all pauses."""
         found = self.patiently()
         return isinstance(found, WorkcellSample) and found.done is True
 
@@ -72,7 +72,7 @@ class WorkcellContract(Contract[Bench]):
 
 
 class WiredWorkcellContract(WorkcellContract):
-    """The contract on a bus whose far side can fail. The far side is the plant's part `server`."""
+    """The contract on a bus whose far side can fail. The part `server` is the far side."""
 
     @pytest.mark.parametrize("mode", ["off", "garbage", "wrong", "slow"])
     def test_every_failure_is_a_driver_error_and_never_reads_done(

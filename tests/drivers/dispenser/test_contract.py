@@ -1,4 +1,4 @@
-"""Every driver of a dispenser or ingestor keeps the same contract."""
+"""The contract of dispensers and ingestors, tried with every driver."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -29,7 +29,8 @@ def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def dry(inputs: tuple[str, str, str], outputs: tuple[str, str], **pull: str) -> Any:
-    """Return a workcell on contacts. The points are done, busy and fault, then start and the sort."""
+    """Return a workcell on contacts. `inputs` has the points of done, busy and fault. `outputs` has the
+    points of start and of the item `box`."""
     signals = dict(zip(("done", "busy", "fault"), inputs, strict=True))
     plain = {
         "items": {"box": {}},

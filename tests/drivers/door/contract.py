@@ -1,6 +1,6 @@
 """Duties of every driver of a door, on any bus. Each test has its own bench.
 
-A test class builds its bench and derives from `DoorContract`. If the link can fail, the class derives
+A test class implements `benches`, and derives from `DoorContract`. A class whose link can fail derives
 from `WiredDoorContract`.
 """
 
@@ -28,18 +28,18 @@ class Pace(TypedDict):
 
 
 QUICK: Pace = {"open_s": 0.05, "close_s": 0.05, "auto_close_s": 0.05}
-"""The times of a simulated door (s), so short that no test has to wait."""
+"""The times of a simulated door (s). They are so short that no test waits for the door."""
 
 
 Ends = tuple[bool | None, bool | None]
-"""(reads open?, reads closed?)"""
+"""(the driver reads open, the driver reads closed)"""
 
 
 class Bench(benches.Bench[DoorSample, DoorOutputs]):
     """A bench with a door."""
 
     def relay(self) -> list[object]:
-        """Return every edge of the hold so far."""
+        """Return every edge of the output `hold_open` so far."""
         return [value for _, value in self.relays()]
 
     def ends(self) -> Ends:
@@ -47,7 +47,7 @@ class Bench(benches.Bench[DoorSample, DoorOutputs]):
         return ends(self.read())
 
     def reads(self, wanted: Ends) -> bool:
-        """Does the driver give these readings after all pauses?"""
+        """Return whether the driver gives these readings after all pauses."""
         found = self.patiently()
         return isinstance(found, DoorSample) and ends(found) == wanted
 
@@ -114,7 +114,7 @@ class DoorContract(Contract[Bench]):
 
 
 class WiredDoorContract(DoorContract):
-    """The contract on a bus whose far side can fail: the plant's parts `server` and `unit`."""
+    """The contract on a bus whose far side can fail. Its parts are `server` and `unit`."""
 
     @pytest.mark.parametrize("part", ["server", "unit"])
     def test_a_link_that_is_gone_is_a_driver_error_and_a_hold_survives_it(
@@ -145,5 +145,5 @@ class WiredDoorContract(DoorContract):
 
 
 def quick(name: str, wires: Iterable[Wire]) -> DoorPlant:
-    """Return a door that reaches either end in 0.05 s."""
+    """Return a simulated door that moves from end to end in 0.05 s."""
     return DoorPlant(name, wires, **QUICK)

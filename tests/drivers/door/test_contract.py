@@ -1,4 +1,4 @@
-"""Every driver of a door keeps the same contract."""
+"""The contract of doors, tried with every driver."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,7 +20,7 @@ from tests.drivers.door.contract import Bench, DoorContract, WiredDoorContract, 
 def dry(
     points: tuple[str, str, str], flash: dict[str, str] | None = None, **pull: str
 ) -> door_dry_contact.DryContactDoorSettings:
-    """Return a door on contacts at these points: opened, closed, hold."""
+    """Return a door on contacts. `points` has the points of opened, closed and hold."""
     opened, closed, hold = points
     pulse = {"pulse": {"on_s": 300.0, "every_s": 600.0}} if flash else {}
     plain = {
@@ -73,7 +73,7 @@ class TestDryContactsOnGpio(DoorContract):
 
 
 class MqttBench(Bench):
-    """A bench whose bus has a real clock, so no test can pass over a pause of the bus."""
+    """A bench whose bus measures real time. So the test must ask the bus to end a pause."""
 
     bus: MqttBus
 

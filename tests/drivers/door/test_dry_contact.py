@@ -23,7 +23,7 @@ FLASHED = {"point": "unit 1 coil 0", "active": "high", "flash": "unit 1 coil 0x2
 
 
 class Noted(PointsFar):
-    """A bus that notes each write to its module."""
+    """A bus that records each write to its module."""
 
     def __init__(self, *place: Any) -> None:
         super().__init__(*place)

@@ -89,7 +89,7 @@ class TestAShortTimer(HttpContract):
 
 
 class Relay:
-    """A bus whose far side answers with these inputs and the state of this relay."""
+    """A bus to a relay with two inputs. The test sets the inputs and the relay's state `held`."""
 
     def __init__(self, opened: Any = False, held: Any = False) -> None:
         self.inputs, self.held = [opened, not opened], held

@@ -1,4 +1,4 @@
-"""A door on registers: what its numbers mean, its YAML and its profiles."""
+"""A door on registers: the meaning of its numbers, its YAML and its profiles."""
 
 import re
 from pathlib import Path

@@ -1,1 +1,1 @@
-"""Drivers of robots, on real wires against robots that drive."""
+"""Drivers of robots, on real wires. The simulated robots drive."""

@@ -1,4 +1,4 @@
-"""Robots behind an HTTP interface: the tutorial's manager, and interfaces of other forms."""
+"""Robots behind an HTTP interface. One is the tutorial's manager, and others have other forms."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -55,7 +55,8 @@ START = Pose("L1", 1.0, 2.0, 0.5)
 
 @dataclass
 class Bench:
-    """Robots of one manager, each with its driver, on one bus whose pauses `clock` ends."""
+    """The robots of one manager on one bus, each with its driver. `clock` ends the pauses of the
+    bus."""
 
     plants: dict[str, RobotPlant]
     drivers: dict[str, HttpRobot]

@@ -34,7 +34,7 @@ class Bench:
     site: VdaSite
 
     def read(self) -> RobotSample | str:
-        """Read the robot; return the error's text if that fails."""
+        """Read the robot. If that fails, return the text of the error."""
         try:
             return self.driver.read()
         except DriverError as error:
@@ -55,7 +55,7 @@ class Bench:
         return found[-1]
 
     def send(self, command: RobotCommand, **until: Any) -> RobotSample:
-        """Write this command in each scan until the sample has these values."""
+        """Write this command in each scan, until the sample has these values."""
 
         def seen() -> bool:
             self.driver.write(RobotOutputs(command))
@@ -68,7 +68,7 @@ class Bench:
         return self.until(**until)
 
     def until_error(self, words: str) -> None:
-        """Read until the error has these words."""
+        """Read until an error contains these words."""
         wait_until(lambda: words in str(self.read()), words)
 
 
@@ -208,7 +208,7 @@ def test_a_robot_that_drops_off_the_net_has_no_place(bench: Bench) -> None:
 def test_noise_and_another_robots_state_are_no_place(bench: Bench) -> None:
     bench.until(moving=False)
     bench.plant.fail("unit", "garbage")
-    bench.plant.press("manual", True, bench.plant.now)  # an event, so that a state is published
+    bench.plant.press("manual", True, bench.plant.now)  # this event makes the robot publish a state
     bench.until_error("is no JSON")
     bench.plant.fail("unit", "wrong")
     bench.plant.press("manual", False, bench.plant.now)
@@ -224,7 +224,7 @@ def test_a_killed_broker_is_an_error_and_its_return_mends_it(bench: Bench) -> No
 
 
 class Scripted:
-    """A bus with these states, at its own time."""
+    """A bus whose messages and time are set by the test."""
 
     def __init__(self) -> None:
         self.clock = Time()

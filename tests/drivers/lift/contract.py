@@ -1,6 +1,6 @@
 """Duties of every driver of a lift, on any bus. Each test has its own bench.
 
-A test class builds its bench and derives from `LiftContract`. If the link can fail, the class derives
+A test class implements `benches`, and derives from `LiftContract`. A class whose link can fail derives
 from `WiredLiftContract`.
 
 The lift has the landings B1, G and 1, and stands at B1 with its door closed. The wires are
@@ -21,7 +21,7 @@ from tests.drivers.benches import Contract
 from tests.waiting import wait_until
 
 QUICK = LiftPace(floor_s=0.2, door_s=0.05, agv_s=0.02, dwell_s=0.1)
-"""The times of a simulated lift (s), so short that no test has to wait."""
+"""The times of a simulated lift (s). They are so short that no test waits for the lift."""
 
 IDLE = LiftSample("B1", DoorReading.CLOSED, motion=Motion.STOPPED, agv=False)
 OFF, AGV = LiftOutputs(), LiftOutputs(agv_request=True)
@@ -32,7 +32,7 @@ class Bench(benches.Bench[LiftSample, LiftOutputs]):
     """A bench with a lift."""
 
     def until(self, holds: Callable[[LiftSample], bool], what: str) -> list[LiftSample]:
-        """Read until the condition holds, and return all readings on the way."""
+        """Read until the condition holds. Return all readings."""
         seen: list[LiftSample] = []
 
         def look() -> bool:
@@ -43,7 +43,7 @@ class Bench(benches.Bench[LiftSample, LiftOutputs]):
         return seen
 
     def rides(self) -> list[LiftSample]:
-        """Ride to landing 1 in AGV mode, and hold the door open at that landing.
+        """Ride to landing 1 in AGV mode. Then hold the door open.
 
         Return all readings since the call.
         """
@@ -147,7 +147,7 @@ class LiftContract(Contract[Bench]):
 
 
 class WiredLiftContract(LiftContract):
-    """The contract on a bus whose far side can fail: the plant's parts `server` and `unit`."""
+    """The contract on a bus whose far side can fail. Its parts are `server` and `unit`."""
 
     @pytest.mark.parametrize("part", ["server", "unit"])
     def test_a_link_that_is_gone_is_a_driver_error_and_the_outputs_survive_it(

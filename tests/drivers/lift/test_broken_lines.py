@@ -1,4 +1,5 @@
-"""A code with one cut or shorted line must never read as a safer state than the true state."""
+"""A code on lines. With one line cut or shorted, the code must never read as a state that is safer than
+the true state."""
 
 from typing import Any
 
@@ -18,7 +19,7 @@ from tests.drivers.lift.wirings import settings as wired
 def service(
     codes: dict[int, str], lines: list[dict[str, Any]] | None = None
 ) -> DryContactLiftSettings:
-    """Return a lift whose AGV mode and hazards are one code."""
+    """Return a lift with one service code for AGV mode and hazards."""
     width = max(codes).bit_length()
     code = {"bits": lines or bits(width, 60), "codes": codes}
     return wired(inputs=inputs(agv_mode=None, fire_alarm=None, service=code))
@@ -122,7 +123,7 @@ def test_what_the_site_accepts_is_not_refused() -> None:
 
 
 SAFEST = ("agv_mode", "normal", "fire_alarm")
-"""Three states of a service code, from most permissions to none."""
+"""Three states of a service code. The first gives the most permissions, and the last gives none."""
 
 
 @given(

@@ -1,5 +1,4 @@
-"""What `check` says of a lift's wiring: refusals, refusals that a file may accept by name, and
-warnings."""
+"""`check` on a lift's wiring: errors, errors that a file may accept by name, and warnings."""
 
 from pathlib import Path
 from typing import Any
@@ -274,7 +273,7 @@ def test_a_safe_choice_of_pins_is_not_refused() -> None:
 
 
 def test_the_first_public_wiring_is_possible_when_its_two_unsafe_places_are_accepted() -> None:
-    """The wiring has two unsafe places. The door contact reads open when its wire is cut.
+    """The wiring has two unsafe places. The contact of the door reads open when its wire is cut.
 
     The door opens on a low level, and the pin is low from boot on.
     """

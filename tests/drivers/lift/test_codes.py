@@ -10,7 +10,8 @@ from tests.drivers.lift.wirings import FLOORS, bits, line, settings
 
 
 def on(text: str) -> list[bool]:
-    """Return the lines of a binary number. `011` is 3, because the most significant bit comes first."""
+    """Return the lines of a binary number. `011` is 3, because the first line is the most significant
+    bit."""
     return [c == "1" for c in reversed(text)]
 
 

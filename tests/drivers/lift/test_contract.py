@@ -1,4 +1,4 @@
-"""Every driver of a lift keeps the same contract."""
+"""The contract of lifts, tried with every driver."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -38,7 +38,7 @@ class TestDryContactsOnModbus(WiredLiftContract):
 
 
 class MqttBench(Bench):
-    """A bench whose bus has a real clock, so no test can pass over a pause of the bus."""
+    """A bench whose bus measures real time. So the test must ask the bus to end a pause."""
 
     bus: MqttBus
 
@@ -47,7 +47,7 @@ class MqttBench(Bench):
 
 
 class TestWordsOnMqtt(WiredLiftContract):
-    """A gateway that publishes words in one JSON object. Each command to the gateway is a word."""
+    """A gateway that publishes words in one JSON object. Each command to the gateway is a word too."""
 
     @contextmanager
     def benches(self) -> Iterator[Bench]:
@@ -82,7 +82,7 @@ def _point(wire: Wire) -> dict[str, object]:
 
 
 def on_topics(part: Any, names: list[str]) -> Any:
-    """Return the same wiring, in which each point is replaced by a name."""
+    """Return the same wiring. A name replaces each point."""
     if not isinstance(part, dict):
         return part
     if "point" in part:
@@ -152,7 +152,7 @@ class TestDryContactsOnRs485(TestDryContactsOnModbus):
 
 
 def in_registers(part: Any) -> Any:
-    """Return the same wiring, in which each contact is a bit of a gateway's register."""
+    """Return the same wiring. Each contact becomes a bit in a register of the gateway."""
     if not isinstance(part, dict):
         return part
     if "point" in part and "discrete input" in part["point"]:
@@ -170,7 +170,7 @@ class TestContactsAsBitsOfRegisters(TestDryContactsOnModbus):
 
 
 def on_header(part: Any, pins: Iterator[int]) -> Any:
-    """Return the same wiring, in which each point is the next of these pins."""
+    """Return the same wiring. Each point becomes the next of these pins."""
     if not isinstance(part, dict):
         return part
     if "point" in part:
@@ -195,8 +195,8 @@ def contact(number: int, active: str = "high") -> dict[str, Any]:
 
 
 class TestRegistersBesideContacts(TestRegistersWithCallsAsNumbers):
-    """A lift whose floor is a number in the gateway, unit 3. All other signals are at a module, unit
-    4."""
+    """A lift on two units. Gateway unit 3 has the floor as a number, and module unit 4 has all other
+    signals."""
 
     serial: ClassVar[modbus.Serial | None] = None
 

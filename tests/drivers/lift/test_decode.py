@@ -1,4 +1,4 @@
-"""A lift's lines: truth tables from asserted signals to a sample, and from outputs back to lines."""
+"""A lift's lines. Truth tables turn signals into a sample, and outputs into levels of lines."""
 
 from itertools import product
 from typing import Any

@@ -205,7 +205,7 @@ GOOD: dict[str, Any] = {
 
 
 class Gateway:
-    """A bus whose far side gives `answer`. `broken` has the commands that fail."""
+    """A bus that gives `answer` to every request. The commands in `broken` fail."""
 
     def __init__(self, **changes: Any) -> None:
         self.answer: dict[str, Any] = {**GOOD, **changes}
@@ -287,7 +287,7 @@ def test_held_commands_with_a_timer_are_renewed_in_each_scan_and_a_call_is_sent_
         lift.write(outputs)
         gateway.answer["out"] = {"agv": outputs.agv_request}
     assert gateway.sent == [
-        *("/call/none", "/door/off"),  # at the claim, where AGV mode is off already
+        *("/call/none", "/door/off"),  # the claim sends these, because AGV mode is already off
         *("/agv/on", '/call{"to": 1}'),
         "/agv/on",
         *("/call/none", "/agv/on", "/door/on"),
@@ -431,7 +431,7 @@ def test_check_shows_every_request_and_field() -> None:
 
 
 def test_the_call_waits_for_nothing_and_the_gateway_is_the_plants() -> None:
-    """The lift is the example's own lift, with its own numbers and words."""
+    """The lift has the numbers and words of the example file."""
     world = RealTime({"lift": build("lift", SETTINGS, QUICK)})
     station = FakeHttpLift(world.plants["lift"], SETTINGS)
     with on_http(world, station, timeout_s=0.5) as (bus, clock):

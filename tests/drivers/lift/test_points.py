@@ -15,7 +15,7 @@ WIRES = (
 
 
 class Recorded:
-    """A bus with lines that notes every write in order. If `broken` is set, writes fail."""
+    """A bus that records every write in order. With `broken`, writes fail."""
 
     def __init__(self) -> None:
         self.claims: list[tuple[Mapping[str, Pull | None], Mapping[str, bool]]] = []

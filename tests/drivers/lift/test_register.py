@@ -1,4 +1,4 @@
-"""A lift on a gateway's registers: what its numbers mean, refused maps, and the writes of each
+"""A lift on a gateway's registers: the meaning of its numbers, refused maps, and the writes of each
 command."""
 
 from pathlib import Path
@@ -22,7 +22,8 @@ def shipped() -> RegisterLiftSettings:
 
 
 def sample(**words: int) -> LiftSample:
-    """Return a reading of the shipped gateway in AGV mode at L1, with some words changed."""
+    """Return a reading of the shipped gateway, which is in AGV mode at L1. `words` replaces some
+    words."""
     plain = {"floor": 1, "motion": 1, "door": 0, "service": 1, "overload": 0}
     return decode(shipped().map, plain | words)
 
@@ -160,7 +161,7 @@ def test_commands_that_cannot_be_read_back_are_warned_of() -> None:
 
 
 def told(title: str) -> list[tuple[str, ...]]:
-    """Return the rows of one table of the shipped lift."""
+    """Return the rows of this table that `check` prints for the shipped lift."""
     return next(list(table.rows) for table in tables(shipped()) if table.title == title)
 
 

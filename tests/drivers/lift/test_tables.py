@@ -1,6 +1,6 @@
 """The tables of `check` for a lift's codes.
 
-A likely mistake in the file changes a table, and the tables list each cut line.
+The tables list the effect of each cut line. A likely mistake in the file changes a table.
 """
 
 from pathlib import Path
@@ -25,7 +25,7 @@ DOOR_OPEN = '      door_open: {point: "J8:36", active: high}\n'
 
 
 def table(tmp_path: Path, title: str, *changes: tuple[str, str]) -> list[str]:
-    """Return one table of the shipped lift after these changes to its file."""
+    """Return one table for the shipped lift, after these changes to its file."""
     text = SHIPPED.read_text()
     for old, new in changes:
         assert old in text

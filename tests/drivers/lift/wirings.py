@@ -25,7 +25,7 @@ def coil(number: int) -> dict[str, Any]:
 
 
 def whole(**changes: Any) -> dict[str, Any]:
-    """Return a correct wiring. `changes` replaces whole sections."""
+    """Return a correct wiring. Each section in `changes` replaces a whole section."""
     return {
         "floors": FLOORS,
         "inputs": {
@@ -49,7 +49,7 @@ def settings(**changes: Any) -> DryContactLiftSettings:
 
 
 def inputs(**more: Any) -> dict[str, Any]:
-    """Return the inputs of `whole` with the inputs in `more`. None removes an input."""
+    """Return the inputs of `whole`, changed by `more`. None removes an input."""
     return {k: v for k, v in {**whole()["inputs"], **more}.items() if v is not None}
 
 

@@ -1,4 +1,4 @@
-"""The far side of a `line` bus: a real server on 127.0.0.1, which asks each station in turn."""
+"""The far side of a `line` bus. A real server on 127.0.0.1 gives each question to all stations."""
 
 import socketserver
 import threading
@@ -9,14 +9,14 @@ from hal_fakes.fake import Outside
 
 
 class Station(Protocol):
-    """A station on the line, which may answer a question."""
+    """A station on the line. It answers only questions that name the station."""
 
     def answer(self, question: str) -> str:
-        """Return one line, or "" if the question is for another station."""
+        """Return one line of text, or "" if the question is for another station."""
 
 
 class LineServer:
-    """The running server."""
+    """A server that runs until `close`."""
 
     def __init__(self, stations: Sequence[Station]) -> None:
         class Answer(socketserver.StreamRequestHandler):

@@ -1,4 +1,4 @@
-"""A fake door that answers in words. It moves like every simulated door."""
+"""A simulated door that answers in words. It moves like every simulated door."""
 
 import time
 from typing import Any
@@ -16,14 +16,14 @@ CONTACTS = [
 
 
 class LineDoor:
-    """One station."""
+    """The station of one door."""
 
     def __init__(self, plant: Plant, called: str) -> None:
         self._plant = plant
         self._called = called
 
     def answer(self, question: str) -> str:
-        """Return the door's place, or a confirmation of the command."""
+        """Return the door's position, or a confirmation of the command."""
         name, _, verb = question.rpartition(" ")
         if name != self._called:
             return ""

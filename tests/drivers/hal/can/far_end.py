@@ -1,4 +1,4 @@
-"""A `virtual` CAN bus of python-can, and tools for the other end of the bus."""
+"""Tools for tests of the CAN bus: a `virtual` bus of python-can, and its far end."""
 
 import itertools
 import time
@@ -21,30 +21,30 @@ def channel() -> str:
 
 
 class Clock(Time):
-    """Real time with jumps ahead. `now` is the sum of the jumps (s)."""
+    """Real time plus jumps into the future. `now` is the sum of the jumps (s)."""
 
     def __call__(self) -> float:
         return time.monotonic() + self.now
 
 
 def data_frame(frame_id: int, payload: str, extended: bool = False) -> can.Message:
-    """Return a data frame with this payload in hex digits."""
+    """Return a data frame. The payload has hexadecimal digits."""
     data = bytes.fromhex(payload)
     return can.Message(arbitration_id=frame_id, is_extended_id=extended, data=data)
 
 
 class FarEnd:
-    """The other end of the bus, which sends any frame and hears our frames."""
+    """The far end of the bus. It can send any frame, and hears our frames."""
 
     def __init__(self, channel: str) -> None:
         self._bus = can.Bus(channel, interface="virtual")
 
     def send(self, frame_id: int, payload: str = "", extended: bool = False) -> None:
-        """Send a data frame with this payload in hex digits."""
+        """Send a data frame. The payload has hexadecimal digits."""
         self._bus.send(data_frame(frame_id, payload, extended))
 
     def trouble(self, error_id: int) -> None:
-        """Send an error frame like SocketCAN's report of a controller's trouble."""
+        """Send an error frame, as SocketCAN does to report trouble of a controller."""
         data = bytes(8)
         self._bus.send(can.Message(arbitration_id=error_id, is_error_frame=True, data=data, dlc=8))
 
@@ -67,7 +67,7 @@ class FarEnd:
 def bus_on(
     channel: str, clock: Callable[[], float] | None = None, *, timeout_s: float = 0.1
 ) -> CanBus:
-    """Return our bus. Its pauses follow the clock and have no jitter."""
+    """Return our bus. It measures its pauses with `clock`, and adds no jitter."""
     settings = CanSettings(socketcan="can0", timeout_s=timeout_s, scan_s=0.05)
     vendor = lambda: can.Bus(channel, interface="virtual")  # noqa: E731
     return CanBus(settings, clock or time.monotonic, lambda: 0.0, vendor)
@@ -75,9 +75,9 @@ def bus_on(
 
 @contextmanager
 def two_ends(clock: Time | None = None) -> Iterator[tuple[CanBus, FarEnd, Time]]:
-    """Yield our bus, its far end and a clock.
+    """Yield our bus, its far end, and the clock of our bus.
 
-    The clock stands still, so a busy machine causes no timeout.
+    The clock stands still. So no timeout expires on a busy machine.
     """
     name, clock = channel(), clock or Time()
     far, bus = FarEnd(name), bus_on(name, clock, timeout_s=0.05)
@@ -90,9 +90,9 @@ def two_ends(clock: Time | None = None) -> Iterator[tuple[CanBus, FarEnd, Time]]
 
 
 class Reactive(can.BusABC):
-    """A bus in virtual time. Its stations answer at once, and a wait only adds to `now`.
+    """A bus in virtual time. Its stations answer at once. A wait takes no real time, but adds to `now`.
 
-    `later` has frames that arrive only while our side waits.
+    The frames in `later` arrive only during a wait.
     """
 
     def __init__(self) -> None:
@@ -111,7 +111,7 @@ class Reactive(can.BusABC):
         return None
 
     def say(self, frame_id: int, payload: str = "", extended: bool = False) -> None:
-        """Let a station send this frame unasked. The payload is in hexadecimal digits."""
+        """Let a station send this frame without a request. The payload has hexadecimal digits."""
         self.coming.append(data_frame(frame_id, payload, extended))
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
@@ -122,12 +122,12 @@ class Reactive(can.BusABC):
         return CanBus(place, lambda: self.now, lambda: 0.0, lambda: self)
 
     def shutdown(self) -> None:
-        """Keep the bus, so that the next opening finds the same bus."""
+        """Keep the bus alive, so that the driver can open the same bus again."""
         self._is_shutdown = True
 
 
 def failure(call: Callable[[], object]) -> str:
-    """Return the text of the DriverError that this call raises, or ""."""
+    """Return the text of the DriverError that this call raises, or "" without an error."""
     try:
         call()
     except DriverError as error:

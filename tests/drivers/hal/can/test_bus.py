@@ -1,4 +1,4 @@
-"""The CAN bus: frames reach their listeners, a silent bus is noticed, and a lost bus recovers."""
+"""The CAN bus. Frames reach their listeners, errors name a silent bus, and a lost bus recovers."""
 
 import errno
 from collections.abc import Iterator
@@ -32,7 +32,7 @@ def ends() -> Iterator[Ends]:
 
 
 def heard_by(bus: CanBus, *wanted: FrameFilter) -> list[Frame]:
-    """Return a list that gets each arriving frame that a filter in `wanted` accepts."""
+    """Return a list that grows with each arriving frame that matches a filter."""
     heard: list[Frame] = []
     bus.listen(wanted, lambda frame, at: heard.append(frame))
     return heard
@@ -163,7 +163,7 @@ def test_pauses_grow_while_the_bus_stays_off_and_are_short_again_after_a_frame(e
     bus, far, clock = ends
 
     def pause() -> float:
-        """Return for how many seconds calls fail at once after a bus-off."""
+        """Return the length (s) of the pause after a bus-off. During the pause calls fail at once."""
         far.trouble(0x40)
         assert failure(bus.take)
         begun_at = clock()
@@ -198,7 +198,7 @@ def test_minor_faults_of_the_controller_are_named_where_a_station_is_silent(
 
 
 class Broken(can.BusABC):
-    """An open interface on which one kind of call fails."""
+    """An open interface whose call `where` fails."""
 
     def __init__(self, error: Exception, where: str) -> None:
         super().__init__("broken")
@@ -218,7 +218,7 @@ class Broken(can.BusABC):
 
 
 def wrapped(code: int) -> Exception:
-    """Return python-can's exception for an error of a system call."""
+    """Return python-can's exception for a failed system call with this error code."""
     return can.CanOperationError("Failed", error_code=code)
 
 

@@ -1,4 +1,5 @@
-"""Drivers and arbitrary frames: a driver raises only DriverErrors, and never sees a charge in noise."""
+"""Drivers and arbitrary frames. A driver raises only DriverErrors, and never reads noise as a
+charge."""
 
 from collections.abc import Callable
 
@@ -20,7 +21,7 @@ SERIAL = 0x1FFD0001
 
 
 def attempt(far: Reactive, step: Callable[[], object]) -> object:
-    """Take the step after all pauses, and return its result. A DriverError gives None."""
+    """Wait for all pauses, run the step, and return its result, or None after a DriverError."""
     far.now += 0.9
     try:
         return step()
@@ -65,7 +66,7 @@ WIFERION = msgspec.convert(
 
 
 def says_charging(message: can.Message) -> bool:
-    """Is this a whole status frame with a number that means charging?"""
+    """Return whether this is a complete status frame whose number means charging."""
     plain = not (message.is_error_frame or message.is_remote_frame)
     status = message.arbitration_id == STATUS and message.is_extended_id and len(message.data) == 8
     return plain and status and message.data[7] & 0x0F in (1, 2, 3, 4, 5)
@@ -124,7 +125,7 @@ STATE_5 = bytes.fromhex("02200a0500")
 
 
 def good(request: can.Message) -> can.Message:
-    """Return the answer of a healthy and idle RCU, which answers 0 to every question."""
+    """Return the answer of a healthy and idle RCU. It answers 0 to every question."""
     asked = bytes(request.data)
     command = 0x4B if asked[0] == 0x40 else 0x60
     return frame(0x58A, bytes((command,)) + asked[1:4] + bytes(4))

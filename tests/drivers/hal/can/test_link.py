@@ -1,4 +1,4 @@
-"""Waiting for frames of one bus. The bus here has a file descriptor, like the kernel's interfaces."""
+"""Waits for the frames of one bus. The bus has a file descriptor, like the kernel's interfaces."""
 
 import socket
 from typing import Any
@@ -14,9 +14,9 @@ HOUR_S = 3600.0
 
 
 class Interface(can.BusABC):
-    """A bus with a file descriptor. Each byte in the file is the id of a frame.
+    """A bus with a file descriptor. Each byte in the file is one frame, and is the frame's id.
 
-    `waits` has the length (s) of each wait in `recv`.
+    `waits` has the time limit (s) of each call of `recv`.
     """
 
     def __init__(self) -> None:
@@ -31,14 +31,14 @@ class Interface(can.BusABC):
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         self.waits.append(timeout)
         if timeout:
-            return None, False  # the test's clock shows how long this wait is
+            return None, False  # only the test's clock decides how long this wait is
         return can.Message(arbitration_id=self._near.recv(1)[0], is_extended_id=False), False
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Do nothing, because no test here sends."""
 
     def shutdown(self) -> None:
-        """Close both ends."""
+        """Close both ends of the file."""
         super().shutdown()
         self._near.close()
         self.far.close()

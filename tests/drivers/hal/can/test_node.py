@@ -1,4 +1,4 @@
-"""A CANopen node: which answers count, and which frames show that the node lives."""
+"""A CANopen node: valid answers, and frames that show that the node is alive."""
 
 import struct
 from collections.abc import Callable
@@ -17,12 +17,12 @@ Answer = Callable[[bytes], list[str]]
 
 
 def value(request: bytes, number: int, command: int = 0x4B) -> str:
-    """Return the reply to a read, which carries a number of two octets (expedited transfer)."""
+    """Return the reply to a read. It carries a number of two octets (expedited transfer)."""
     return (bytes((command,)) + request[1:4] + struct.pack("<I", number)).hex()
 
 
 class Node:
-    """A far end that answers requests to node 10. An answer is a list of payloads in hexadecimal
+    """A far end that answers the requests to node 10. Each answer is a list of payloads in hexadecimal
     digits."""
 
     def __init__(self, far: Reactive) -> None:
@@ -141,7 +141,7 @@ def test_a_late_answer_is_never_the_answer_to_the_next_question(side: Side) -> N
     node.answer = lambda request: []
     assert failure(lambda: ours.read(*STATE))
     far.now += 0.6
-    far.say(0x580 + NODE, "4b02200a05000000")  # a late answer: state 5
+    far.say(0x580 + NODE, "4b02200a05000000")  # a late answer to an earlier request, with state 5
     node.answer = lambda request: [value(request, 238)]
     assert ours.read(*STATE) == 238
 
@@ -150,7 +150,7 @@ def test_a_node_that_owes_an_answer_is_asked_nothing(side: Side) -> None:
     ours, node, far, _ = side
     node.answer = lambda request: []
     assert failure(lambda: ours.read(*STATE))
-    ours._sdo_pause.mended()  # end the pause, in which no request would be sent
+    ours._sdo_pause.mended()  # the bus would send no request during the pause, so the test ends it
     assert failure(lambda: ours.read(*STATE)) == (f"{NAME}, read 0x2002:0A: no reply within 0.05 s")
     assert len(node.asked) == 1
     far.now += 0.2
@@ -196,9 +196,9 @@ def test_a_heartbeat_that_stays_away_is_a_loss_and_its_return_ends_it(side: Side
 
 
 def test_a_node_that_was_lost_counts_as_restarted(side: Side) -> None:
-    """The bus may have missed a boot-up frame while the node was lost.
+    """A lost node may have restarted, and the bus may have missed its boot-up frame.
 
-    So a node that is back must get all orders again.
+    So a node that returns must get all orders again.
     """
     ours, _, far, _ = side
     far.say(0x70A, "05")

@@ -1,4 +1,4 @@
-"""The far side of `run --simulate`: the chargers of `config/` on CAN, each behind an adapter."""
+"""The far side of `run --simulate`. Each CAN charger of `config/` is behind an adapter."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,7 +24,7 @@ ON, OFF = ChargerOutputs(True), ChargerOutputs(False)
 
 
 class Site:
-    """One file of `config/`, simulated."""
+    """The simulated devices of one file of `config/`."""
 
     def __init__(self, shipped: tuple[str, Any, str], directory: Path) -> None:
         file, driver, name = shipped

@@ -1,4 +1,4 @@
-"""An slcan adapter on a pseudo-terminal: CAN frames on a serial port, and the port's failures."""
+"""An slcan adapter on a pseudo-terminal. It carries CAN frames on a serial port, which can fail."""
 
 import os
 import threading
@@ -17,7 +17,7 @@ from tests.waiting import PATIENCE_S, wait_until
 
 
 class Echo:
-    """A station that returns each frame with the next higher id."""
+    """A station that answers each frame. The answer's id is higher by one."""
 
     def __init__(self) -> None:
         self.plant: Plant = ChargerPlant("echo", links=["bus"])
@@ -34,7 +34,7 @@ class Echo:
 
 
 class Desk:
-    """Our bus at an adapter, and the frames that the bus has heard."""
+    """Our bus behind an adapter, and the frames that the bus has heard."""
 
     def __init__(self) -> None:
         self.echo = Echo()
@@ -61,7 +61,7 @@ class Desk:
         )
 
     def text(self) -> str:
-        """Return the reason why the bus does not work, or ""."""
+        """Return why the bus does not work, or "" if it works."""
         return failure(self.bus.take)
 
     def close(self) -> None:

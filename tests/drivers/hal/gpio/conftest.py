@@ -1,4 +1,4 @@
-"""A fixture that runs the pin factory for real hardware on a stand-in for lgpio."""
+"""A stand-in for lgpio. With it the tests run the pin factory for real hardware."""
 
 import sys
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from tests.drivers.hal.gpio.lgpio_stand_in import StandIn
 
 @pytest.fixture
 def lgpio(monkeypatch: pytest.MonkeyPatch) -> Iterator[StandIn]:
-    """Yield a stand-in that the real factory imports in place of lgpio."""
+    """Yield a stand-in. The pin factory for real hardware imports it in place of lgpio."""
     stand_in = StandIn()
     monkeypatch.setitem(sys.modules, "lgpio", stand_in)
     forget()
@@ -20,7 +20,7 @@ def lgpio(monkeypatch: pytest.MonkeyPatch) -> Iterator[StandIn]:
 
 
 def forget() -> None:
-    """Remove every module that has imported lgpio from `sys.modules`."""
+    """Remove every module that imports lgpio from `sys.modules`."""
     sys.modules.pop("gpiozero.pins.lgpio", None)
     for name in ("pins", "bare", "chip"):
         sys.modules.pop(f"drivers.hal.gpio.{name}", None)

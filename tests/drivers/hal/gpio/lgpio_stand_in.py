@@ -19,7 +19,7 @@ class error(Exception):
 
 
 class Callback:
-    """The return value of `lgpio.callback`."""
+    """A stand-in for the object that `lgpio.callback` returns."""
 
     def __init__(self, calls: list[Call], gpio: int) -> None:
         self._calls = calls
@@ -32,8 +32,8 @@ class Callback:
 class StandIn(ModuleType):
     """The stand-in module.
 
-    `chips` is number -> label, `holders` is gpio -> its holder, and `levels` is gpio -> the level to
-    read.
+    `chips` has the label of each chip number. `holders` has the program that holds each GPIO, and
+    `levels` has the level that a read returns for each GPIO.
     """
 
     SET_PULL_UP, SET_PULL_DOWN, SET_PULL_NONE = 32, 64, 128

@@ -1,6 +1,6 @@
-"""The pins of a process that only switches off.
+"""The pins of a process whose only task is to switch outputs off.
 
-The process makes the same lgpio calls as the daemon's pins, but without gpiozero.
+Without gpiozero the process makes the same lgpio calls as the daemon.
 """
 
 import pytest

@@ -1,4 +1,4 @@
-"""The GPIO bus on gpiozero's mock pins, with a plant that has contacts and relays and no physics."""
+"""The GPIO bus on gpiozero's mock pins. Behind the pins are contacts and relays without physics."""
 
 from collections.abc import Iterator, Sequence
 
@@ -19,7 +19,7 @@ WIRES = (
 
 
 class Contacts(WiredPlant):
-    """A plant without physics."""
+    """A simulated device without physics."""
 
     def __init__(self, wires: Sequence[Wire] = WIRES) -> None:
         super().__init__("plant", wires, buttons=[wire.signal for wire in wires])
@@ -35,7 +35,7 @@ class Contacts(WiredPlant):
 
 
 class Bench:
-    """A header with a plant behind it. Both follow the time `now`."""
+    """A header with a simulated device. Both measure time with `now`."""
 
     def __init__(self) -> None:
         self.now = 0.0

@@ -1,4 +1,4 @@
-"""The dead-man switch, a thread beside the loop. Only that thread is real, and time is virtual."""
+"""The dead-man switch, a thread beside the loop. The thread is real, and time is virtual."""
 
 import pytest
 
@@ -19,7 +19,7 @@ def bench() -> Bench:
 def test_outputs_drop_when_scans_stop_and_stay_dropped_until_an_operator_resets() -> None:
     now, drops = [0.0], []
     dead_man = GpioDeadMan(lambda: drops.append(now[0]), lambda: now[0])
-    assert not dead_man.check()  # the switch begins with the first scan
+    assert not dead_man.check()  # before the first scan the switch does not count time
     dead_man.fed()
     now[0] = AFTER_S
     assert not dead_man.check()
@@ -36,7 +36,7 @@ def test_a_look_after_the_last_scan_is_too_old_drops_the_outputs() -> None:
     dead_man = GpioDeadMan(lambda: drops.append(now[0]), lambda: now[0])
     dead_man.fed()
     now[0] = AFTER_S + 0.1
-    dead_man.check()  # the switch's own thread may have looked earlier
+    dead_man.check()  # the switch's thread may have checked earlier
     dead_man.close()
     assert drops == [AFTER_S + 0.1]
 
@@ -52,7 +52,7 @@ def test_the_relays_fall_and_neither_reads_nor_writes_work_until_a_reset(bench: 
         bench.points.write({"call": False, "hold": True})
     edges = len(bench.relays())
     bench.points.make_safe()
-    bench.points.open()  # as an operator's reset does
+    bench.points.open()  # an operator's reset opens the points too
     bench.points.read()
     bench.points.write({"call": True})
     assert bench.relays()[edges:] == [("call", True)]

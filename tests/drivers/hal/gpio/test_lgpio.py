@@ -1,4 +1,4 @@
-"""The pin factory for real hardware, call by call, on a stand-in that records lgpio's calls."""
+"""The pin factory for real hardware. A stand-in records each of its lgpio calls."""
 
 import os
 import sys
@@ -121,7 +121,9 @@ def test_a_claim_that_fails_half_way_lets_go_of_all_and_can_be_tried_again(lgpio
     lgpio.holders[23] = "gpiomon"
     bus = header()
     lines = bus.lines({"BCM4": "down"}, {"BCM22": False, "BCM23": True})
-    with pytest.raises(HalError) as refused:  # `refused` keeps the half-made object alive
+    with pytest.raises(
+        HalError
+    ) as refused:  # the error in `refused` keeps the half-made object alive
         lines.claim()
     with pytest.raises(HalError, match="BCM4 = J8:7 is not claimed"):
         lines.read()

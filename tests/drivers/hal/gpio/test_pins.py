@@ -1,4 +1,4 @@
-"""Names of pins, and wirings of pins that are impossible."""
+"""Names of pins, and impossible wirings of pins."""
 
 import re
 from typing import Any

@@ -1,4 +1,4 @@
-"""Raw servers on 127.0.0.1, whose answers a test gives byte by byte."""
+"""Servers on 127.0.0.1 without an HTTP library. A test chooses each byte of the answers."""
 
 import contextlib
 import socket
@@ -9,7 +9,7 @@ Conversation = Callable[["Caller"], None]
 
 
 class Caller:
-    """One connection as the server sees it."""
+    """One connection, from the server's side."""
 
     def __init__(self, sock: socket.socket, closing: threading.Event) -> None:
         self._sock = sock
@@ -26,24 +26,24 @@ class Caller:
         return head
 
     def send(self, *parts: bytes) -> None:
-        """Send each part in its own segment."""
+        """Send each part in a separate TCP segment."""
         for part in parts:
             self._sock.sendall(part)
 
     def for_ever(self, part: bytes, every_s: float = 0.01) -> None:
-        """Send this part again and again until the caller hangs up."""
+        """Send this part again and again, until the caller hangs up."""
         while not self._closing.wait(every_s):
             self._sock.sendall(part)
 
     def hold(self) -> None:
-        """Keep the connection open and silent until the caller hangs up."""
+        """Keep the connection open and send nothing, until the caller hangs up."""
         self._sock.recv(1)
 
 
 class FarEnd:
-    """A server with one conversation for each connection, in order.
+    """A server that takes the next conversation for each new connection.
 
-    Further connections get the last conversation. `requests` has the heads of all requests, and
+    After the last conversation the server repeats it. `requests` has the heads of all requests, and
     `connections` is the number of connections.
     """
 
@@ -99,13 +99,13 @@ class FarEnd:
 def answer(
     body: bytes = b'{"state": 0}', status: str = "200 OK", headers: str = "", sort: str = "json"
 ) -> bytes:
-    """Return a whole HTTP answer."""
+    """Return a complete HTTP answer."""
     head = f"HTTP/1.1 {status}\r\nContent-Type: application/{sort}\r\n{headers}"
     return f"{head}Content-Length: {len(body)}\r\n\r\n".encode("latin-1") + body
 
 
 def always(*parts: bytes) -> Conversation:
-    """Return a conversation that answers every request of a connection with these parts."""
+    """Return a conversation that gives this answer to every request of a connection."""
 
     def talk(caller: Caller) -> None:
         while caller.request():
@@ -115,7 +115,7 @@ def always(*parts: bytes) -> Conversation:
 
 
 def once(*parts: bytes) -> Conversation:
-    """Return a conversation that answers one request with these parts and then hangs up."""
+    """Return a conversation that gives this answer to one request, and then hangs up."""
 
     def talk(caller: Caller) -> None:
         caller.request()

@@ -1,4 +1,4 @@
-"""The `http` bus against real servers that fail in every possible way."""
+"""The `http` bus with real servers, which fail in every possible way."""
 
 import contextlib
 import itertools
@@ -26,17 +26,17 @@ from tests.drivers.hal.http.far_end import (
 )
 
 TIMEOUT_S = 0.3
-"""Timeout of a call that is expected to fail (s)."""
+"""The timeout (s) for a call that the test expects to fail."""
 
 
 class Clock:
-    """A clock for the bus's pauses after failures."""
+    """A clock that lets every pause of the bus end before the next call."""
 
     def __init__(self) -> None:
         self.now = 0.0
 
     def __call__(self) -> float:
-        self.now += 1000.0  # so no pause is left at the next call
+        self.now += 1000.0  # the longest pause ends within this time
         return self.now
 
 
@@ -57,7 +57,7 @@ def failure(talk: Conversation, timeout_s: float = 5.0) -> str:
 
 CHUNKED = b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
 CHUNK_SIZES = [b"-1", b"-5", b"-" + b"f" * 16, b"-" + b"f" * 5000, b"f" * 5000, b"zz", b""]
-"""Sizes that no chunk can have."""
+"""Invalid sizes of a chunk."""
 
 # ---- good answers
 
@@ -138,11 +138,12 @@ def test_cookies_are_not_kept() -> None:
     assert b"Cookie" not in far.requests[1]
 
 
-# ---- replies to another request
+# ---- replies that belong to another request
 
 
 def _answers_twice(caller: Caller) -> None:
-    """Answer each request with its own reply, followed by the previous reply."""
+    """Answer each request twice: with the right reply, and then with the reply to the request
+    before."""
     last = answer(b'{"state": 0}')
     for n in itertools.count(1):
         if not caller.request():
@@ -152,7 +153,8 @@ def _answers_twice(caller: Caller) -> None:
 
 
 def _answers_the_last_one_late(caller: Caller) -> None:
-    """Send each second reply only after the next request has arrived."""
+    """Answer the first request. After the second request send the first answer again, then the right
+    one."""
     if caller.request():
         caller.send(answer(b'{"state": 1}'))
     if caller.request():
@@ -271,7 +273,7 @@ def test_no_bytes_of_a_server_raise_anything_but_a_hal_error(noise: bytes, start
             bus.close()
 
 
-# ---- servers that never finish: each of these tests hangs if a call is unbounded
+# ---- servers that never finish (without a time limit of the call, each test here would hang)
 
 
 def _says_nothing(caller: Caller) -> None:
@@ -389,7 +391,8 @@ def test_a_refused_connection_says_so() -> None:
 
 @contextlib.contextmanager
 def full_server() -> Iterator[Any]:
-    """Yield the address of a server that neither accepts nor refuses a further connection."""
+    """Yield the address of a server with a full queue. It neither accepts nor refuses more
+    connections."""
     with contextlib.ExitStack() as opened:
         full = opened.enter_context(socket.create_server(("127.0.0.1", 0), backlog=0))
         for _ in range(4):
@@ -484,7 +487,7 @@ def test_a_failure_to_connect_is_not_remembered_as_the_next_calls_reason() -> No
 
 @pytest.fixture
 def dns() -> Iterator[threading.Event]:
-    """Yield an event. The name servers answer only after the event is set."""
+    """Yield an event. The name server answers only after the test has set the event."""
     event = threading.Event()
     yield event
     event.set()

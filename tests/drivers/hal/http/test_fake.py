@@ -1,4 +1,4 @@
-"""The fake HTTP charger, a real server. The real driver reads the server in each of its failures."""
+"""The simulated HTTP charger is a real server. The real driver reads it in each of its failures."""
 
 import contextlib
 import json
@@ -29,7 +29,7 @@ IDLE = ChargerSample(Activity.IDLE, 0)
 
 
 class Fake:
-    """The station of the example with its server, bus and driver. The bus makes no pauses."""
+    """The example's station with its server, bus and driver. The bus makes no pauses."""
 
     def __init__(self, config: Config, timeout_s: float) -> None:
         settings = msgspec.structs.replace(config.buses["tpu"], timeout_s=timeout_s)
@@ -45,7 +45,7 @@ class Fake:
         self.plant.press(signal, asserted, time.monotonic())
 
     def read_until(self, activity: Activity) -> set[int | str]:
-        """Poll until the station shows this activity, and return all numbers seen before."""
+        """Read until the station shows this activity. Return all codes that the station has shown."""
         seen: set[int | str] = set()
 
         def says_so() -> bool:

@@ -1,4 +1,7 @@
-"""Logins with user and password: digest at a server that checks it (RFC 7616), basic, and refusals."""
+"""Logins with user and password: digest (RFC 7616), basic, and refused logins.
+
+The server verifies each digest.
+"""
 
 import hashlib
 import re
@@ -25,10 +28,9 @@ def hashed(*parts: str) -> str:
 
 
 class DigestServer(ThreadingHTTPServer):
-    """A server that answers signed requests.
+    """A server that answers only requests with a correct digest.
 
-    `nonce` is the nonce that is valid now. `done` has the accepted requests, each with the counter of
-    its nonce.
+    `nonce` is the valid nonce. `done` has the accepted requests, each with the nonce's counter.
     """
 
     daemon_threads = True

@@ -1,6 +1,6 @@
 """A controller's WebSocket.
 
-A message wakes the daemon, and no failure of the WebSocket makes a reading wrong.
+A message on the WebSocket wakes the daemon. No failure of the WebSocket makes a reading wrong.
 """
 
 import json
@@ -27,7 +27,7 @@ from tests.waiting import PATIENCE_S, wait_until
 
 
 class Wakes:
-    """A counter of calls from any thread."""
+    """A thread-safe counter of calls."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -57,9 +57,9 @@ def listening(port: int, **more: Any) -> Iterator[tuple[http.HttpBus, Wakes]]:
 def pushing(
     talk: Callable[[ServerConnection], None], port: int = 0
 ) -> Iterator[tuple[int, list[str]]]:
-    """Yield a server's port and the Authorization headers that it received.
+    """Yield a server's port and the Authorization headers that the server has received.
 
-    The server holds this talk on every connection.
+    The server runs `talk` on every connection.
     """
     asked: list[str] = []
 
@@ -82,7 +82,7 @@ def test_a_message_wakes_the_daemon_and_the_state_is_read_by_a_request() -> None
     plant = world.plants["lift"]
     server = HttpServer([FakeHttpLift(plant, settings)], "", 0.5, "/ws")
     with listening(server.replace["api_base"].rpartition(":")[2]) as (bus, wakes):  # type: ignore[attr-defined]
-        wakes.more_than(1)  # one for the connection, one for the state
+        wakes.more_than(1)  # the connection wakes once, and the state wakes once
         lift = create("lift", settings, bus)
         assert not lift.read().hazards
         before = wakes.count

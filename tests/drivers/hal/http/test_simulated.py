@@ -1,5 +1,5 @@
-"""The HTTP charger of `--simulate`, a child process. The test commands it through its control
-socket."""
+"""The simulated HTTP charger of `--simulate`. It is a child process, and the test sends commands
+through its control socket."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""An HTTP bus with TLS: the trusted authorities, and the deadline of a call, which includes TLS."""
+"""An HTTP bus with TLS: trusted authorities, and the time limit of a call. The limit includes TLS."""
 
 import ssl
 import threading
@@ -15,7 +15,7 @@ from drivers.hal.http import HttpBus, HttpSettings
 
 
 class Answers(BaseHTTPRequestHandler):
-    """A handler that answers each request, and notes its path and key."""
+    """A handler that answers each request, and records its path and key."""
 
     def do_GET(self) -> None:
         server: Any = self.server
@@ -33,7 +33,7 @@ class Answers(BaseHTTPRequestHandler):
 
 
 class Site:
-    """A server with a certificate for 127.0.0.1, and the file of the authority that signed it."""
+    """A server with a certificate for 127.0.0.1. `ca_file` is the file of its authority."""
 
     def __init__(self, tmp_path: Path) -> None:
         authority = trustme.CA()

@@ -1,6 +1,6 @@
 """A bearer token from a file.
 
-The bus reads the file for each call, and refuses a file that others can read or write. The bus never
+The bus reads the file for each call. It refuses a file that other users can read or write, and never
 shows the token.
 """
 

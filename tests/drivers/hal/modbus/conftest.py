@@ -10,7 +10,7 @@ from tests.drivers.hal.modbus.module import Module, opened
 
 @pytest.fixture
 def module() -> Iterator[Module]:
-    """Yield a module that answers as the Modbus specification says."""
+    """Yield a module that answers according to the Modbus specification."""
     started = Module()
     yield started
     started.close()
@@ -18,7 +18,7 @@ def module() -> Iterator[Module]:
 
 @pytest.fixture(params=[Module, SerialModule], ids=["tcp", "rtu"])
 def either(request: pytest.FixtureRequest) -> Iterator[Module]:
-    """Yield a module. Each test runs twice: on TCP and on a serial line."""
+    """Yield a module. Each test runs twice, once on TCP and once on a serial line."""
     started: Module = request.param()
     yield started
     started.close()

@@ -1,4 +1,4 @@
-"""A serial line in sixty lines on a pseudo-terminal, written from the Modbus specification.
+"""A serial line on a pseudo-terminal, in sixty lines of code from the Modbus specification.
 
 The units answer as in `module.py`, in RTU frames. A frame takes no time on the wire.
 """
@@ -16,7 +16,7 @@ from tests.drivers.hal.modbus.module import Module, Reply
 
 
 def crc(frame: bytes) -> bytes:
-    """Return the CRC of a frame, low byte first (Modbus over Serial Line V1.02, 6.2.2)."""
+    """Return the CRC of a frame, with the low byte first (Modbus over Serial Line V1.02, 6.2.2)."""
     value = 0xFFFF
     for byte in frame:
         value ^= byte
@@ -26,16 +26,16 @@ def crc(frame: bytes) -> bytes:
 
 
 def rtu(frame: str) -> bytes:
-    """Return the frame with these hexadecimal digits and its CRC."""
+    """Return the frame with these hexadecimal digits, followed by its CRC."""
     return bytes.fromhex(frame) + crc(bytes.fromhex(frame))
 
 
 class SerialModule(Module):
     """A module on a line.
 
-    `reply` gets and returns frames with a TCP header, as in the base class. If `on_wire` is set, it
-    answers instead of `reply`. `on_wire` gets the bytes of a request, and returns all bytes that follow
-    on the wire. `frames` has each request as it was on the wire.
+    `reply` gets and returns frames with a TCP header, as in the base class. If a test sets `on_wire`,
+    `on_wire` answers instead. It gets the bytes of a request, and returns the bytes that follow on the
+    wire. `frames` has each request as it was on the wire.
     """
 
     def __init__(self, reply: Reply | None = None) -> None:
@@ -46,11 +46,11 @@ class SerialModule(Module):
         super().__init__(reply)
 
     def say(self, heard: bytes) -> None:
-        """Put bytes onto the line unasked."""
+        """Send bytes on the line without a request."""
         os.write(self._pty[0], heard)
 
     def pull(self) -> None:
-        """Pull the adapter out."""
+        """Unplug the adapter."""
         self._link.unlink()
         os.write(self._stop[1], b".")
         self._threads.pop().join()
@@ -58,7 +58,7 @@ class SerialModule(Module):
             os.close(descriptor)
 
     def plug(self) -> None:
-        """Plug the adapter in again, as another device under the same path."""
+        """Plug the adapter in again. It becomes another device under the same path."""
         self._pty = pty.openpty()
         self._stop = os.pipe()
         tty.setraw(self._pty[1])
@@ -67,7 +67,7 @@ class SerialModule(Module):
         self._threads[-1].start()
 
     def hang_up(self) -> None:
-        """Pull the adapter out, and plug it in again."""
+        """Unplug the adapter, and plug it in again."""
         self.pull()
         self.plug()
 

@@ -1,6 +1,6 @@
-"""An I/O module in fifty lines of sockets, written from the Modbus specification, not from pymodbus.
+"""An I/O module in fifty lines on sockets, written from the Modbus specification without pymodbus.
 
-`asked` has the bytes of each request. A test can give the module any answer.
+`asked` has the bytes of each request. A test can choose any answer.
 """
 
 import socket
@@ -19,14 +19,15 @@ from drivers.hal.points import HalError
 from tests.waiting import at_last
 
 Reply = Callable[[bytes], bytes | None]
-"""A function from a request's bytes to the answer's bytes. None hangs up."""
+"""A function that gets a request's bytes and returns the answer's bytes. With None the module hangs
+up."""
 
 
 class Module:
-    """A module whose units have coils and inputs, behind one listening socket.
+    """A module behind one listening socket. Its units have coils and inputs.
 
     A test may replace `reply`. With `hangs_up` the module hangs up after each reply. `where` is the
-    module's name in the bus's texts.
+    name by which the bus's texts call the module.
     """
 
     def __init__(self, reply: Reply | None = None) -> None:
@@ -55,7 +56,7 @@ class Module:
         return [request[6] for request in self.asked]
 
     def answer(self, request: bytes) -> bytes:
-        """Return the answer by Modbus Application Protocol V1.1b3, 6.1, 6.2 and 6.5.
+        """Return the answer that Modbus Application Protocol V1.1b3, 6.1, 6.2 and 6.5 demand.
 
         Other requests get no answer.
         """
@@ -73,7 +74,7 @@ class Module:
         return bits_reply(request, packed.to_bytes((value + 7) // 8, "little"))
 
     def hang_up(self) -> None:
-        """Close every connection, and go on listening."""
+        """Close every connection, but continue to listen."""
         for end in self._ends:
             with suppress(OSError):
                 end.shutdown(socket.SHUT_RDWR)
@@ -120,7 +121,7 @@ class Module:
 
 
 def frame(request: bytes, pdu: bytes) -> bytes:
-    """Return a reply to this request: an MBAP header with the right length, and this PDU."""
+    """Return a reply to this request. It has this PDU and an MBAP header with the right length."""
     return request[:4] + struct.pack(">H", len(pdu) + 1) + request[6:7] + pdu
 
 
@@ -147,21 +148,21 @@ def door(module: Module, unit: int = 1) -> None:
 
 
 def fails(bus: ModbusBus, point: str) -> str:
-    """Return the text of the HalError that reading this point raises."""
+    """Return the text of the HalError that occurs when the bus reads this point."""
     with pytest.raises(HalError) as caught:
         bus.lines({point: None}, {}).read()
     return str(caught.value)
 
 
 def serial(port: str, ignore_echo: bool = False) -> Serial:
-    """Return a fast line."""
+    """Return a serial line with 115200 baud."""
     return Serial(port=port, baudrate=115200, parity="none", stopbits=1, ignore_echo=ignore_echo)
 
 
 def proven(
     module: Module, clock: Time | None = None, *, timeout_s: float = 2.0, retries: int = 1
 ) -> ModbusBus:
-    """Return a bus whose unit 1 has answered once, because only then the bus retries.
+    """Return a bus whose unit 1 has answered once. The bus retries only requests to such a unit.
 
     `asked` is empty again.
     """
@@ -174,7 +175,7 @@ def proven(
 
 
 opened: list[ModbusBus] = []
-"""The buses from `bus_to`. The conftest closes them after each test."""
+"""The buses that `bus_to` has opened. The conftest closes them after each test."""
 
 
 def bus_to(
@@ -186,7 +187,8 @@ def bus_to(
     ignore_echo: bool = False,
     module_watchdog: dict[str, Any] | None = None,
 ) -> ModbusBus:
-    """Return a bus to this port of this machine. Its pauses follow the clock and have no jitter."""
+    """Return a bus to a port of this machine. It measures its pauses with `clock`, and adds no
+    jitter."""
     settings = ModbusSettings(
         tcp=Tcp(host="127.0.0.1", port=port) if isinstance(port, int) else None,
         serial=serial(port, ignore_echo) if isinstance(port, str) else None,

@@ -1,6 +1,6 @@
-"""The contract of the Modbus bus, with our own module on TCP and on a serial line.
+"""The contract of the Modbus bus. The far side is our own module, on TCP and on a serial line.
 
-Stories about TCP alone are in `test_bus.py`, and stories about the line alone in `test_rtu.py`.
+Stories about TCP alone are in `test_bus.py`, and stories about the line alone are in `test_rtu.py`.
 """
 
 import pytest

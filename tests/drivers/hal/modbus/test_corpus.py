@@ -1,4 +1,5 @@
-"""Recorded replies of modules. The corpus says whether the driver must believe or refuse each reply."""
+"""Replies of modules, recorded or written by hand. The corpus says whether the driver must accept each
+reply."""
 
 from itertools import chain, repeat
 from pathlib import Path
@@ -32,7 +33,7 @@ class Recorded(NamedTuple):
 
 
 def recorded(framing: str) -> list[Recorded]:
-    """Return the corpus of one framing, which is the name of its file."""
+    """Return the corpus of one framing. The framing is also the name of the file."""
     text = (Path(__file__).parent / "corpus" / f"{framing}.txt").read_text("utf-8")
     lines = [line.split("|") for line in text.splitlines() if not line.startswith("#")]
     return [
@@ -46,7 +47,7 @@ def _bytes(reply: str, request: bytes = b"") -> bytes:
 
 
 def _check(module: Module, case: Recorded) -> None:
-    """Check how the driver reads a recorded reply, and then a healthy module."""
+    """Check how the driver reads the recorded replies. Afterwards it must read a healthy module."""
     clock = Time()
     bus = bus_to(module.port, clock, timeout_s=0.05 if case.outcome == "lost" else 2.0, retries=0)
     driver = create("door", DOOR, bus)

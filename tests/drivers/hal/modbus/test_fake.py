@@ -1,4 +1,4 @@
-"""The real driver and bus at the fake gateway or line, during each failure and after it."""
+"""The real driver and bus with the simulated gateway or line, during each failure and afterwards."""
 
 from collections.abc import Iterator
 
@@ -40,7 +40,8 @@ def door_at(unit: int) -> DryContactDoorSettings:
 
 
 class Site:
-    """Two doors at units 1 and 2 of one gateway or line, and one bus with its own clock."""
+    """Two doors on one bus. They are units 1 and 2 of one gateway or line, and `clock` drives the
+    bus."""
 
     def __init__(self, serial: modbus.Serial | None) -> None:
         self.settings = {"front": door_at(1), "ward": door_at(2)}
@@ -76,7 +77,7 @@ class Site:
             return str(error)
 
     def reads(self, name: str) -> DoorSample:
-        """Return a reading, as in the daemon's next scan."""
+        """Return a reading, as the daemon's next scan would get it."""
         return at_last(self.doors[name].read, "the door is read", self.a_moment)
 
     def write(self, name: str, outputs: DoorOutputs) -> None:
@@ -84,7 +85,7 @@ class Site:
         at_last(lambda: self.doors[name].write(outputs), "the outputs are written", self.a_moment)
 
     def a_moment(self) -> None:
-        """Let time pass, but less than the bus's pause after a silent unit."""
+        """Let time pass. The bus's pause after a silent unit is longer."""
         self.clock.now += 1.0
 
     def close(self) -> None:
@@ -108,7 +109,7 @@ SERIAL = {
 @pytest.fixture(params=SERIAL)
 def site(request: pytest.FixtureRequest) -> Iterator[Site]:
     built = Site(SERIAL[request.param])
-    for door in built.doors.values():  # the bus retries only at a unit that has answered
+    for door in built.doors.values():  # the bus retries only requests to a unit that has answered
         at_last(door.open, "the driver opens", built.a_moment)
     yield built
     built.close()
@@ -168,7 +169,7 @@ WAYS: dict[str, dict[FailureMode, tuple[str, ...]]] = {
         "garbage": ("half a frame", "CRC of "),
     },
 }
-"""The error texts for each failure of the whole far side."""
+"""The possible error texts for each failure of the whole far side."""
 
 
 @pytest.mark.parametrize("mode", ["wrong", "garbage"])

@@ -1,4 +1,4 @@
-"""Pulses that the module times: the frames byte for byte, one frame for each pulse, and a door."""
+"""Pulses whose length the module measures. The tests check each byte, and one frame for each pulse."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -37,7 +37,8 @@ SCAN_S = 0.125
 
 
 def pulsed(on_s: float = 0.7, every_s: float = 3.0) -> DryContactDoorSettings:
-    """Return a door whose operator needs pulses. The pulses are on relay 0 of unit 1."""
+    """Return the settings of a door whose operator needs pulses. The pulses are on relay 0 of unit
+    1."""
     plain = {
         "inputs": {
             "opened": {"point": "unit 1 discrete input 0", "active": "high"},
@@ -50,7 +51,7 @@ def pulsed(on_s: float = 0.7, every_s: float = 3.0) -> DryContactDoorSettings:
 
 
 def claimed(module: Module, **settings: Any) -> DryContactDoor:
-    """Return a driver that has been opened. The module's `asked` is empty again."""
+    """Return an open driver. The module's `asked` is empty again."""
     door(module)
     driver = create("door", pulsed(), bus_to(module.port, **settings))
     driver.open()
@@ -66,12 +67,12 @@ def writes(module: Module) -> list[str]:
 
 
 def loses_replies(module: Module) -> None:
-    """Let the module obey writes, but lose the answers to writes."""
+    """Let the module obey writes, but lose its answers to writes."""
     module.reply = lambda request: b"" if request[7] == 5 else module.answer(request)
 
 
 def answers(driver: DryContactDoor, clock: Time) -> bool:
-    """Can the driver read the door after all pauses?"""
+    """Return whether the driver can read the door after all pauses."""
     clock.now += 60.0
     try:
         driver.read()
@@ -81,9 +82,10 @@ def answers(driver: DryContactDoor, clock: Time) -> bool:
 
 
 def held(module: Module, *, lost_at: float | None = None) -> list[tuple[float, str]]:
-    """Let RMF open a door at 1 s and close the door at 6 s. Return (s, PDU) of each write.
+    """Let RMF open a door at 1 s and close the door at 6 s. Return (time in s, PDU) of each write.
 
-    Core and driver are scanned as by the loop. In the scan at `lost_at` no reply to a write arrives.
+    As in the daemon's loop, each scan runs driver and core. In the scan at `lost_at` all replies to
+    writes are lost.
     """
     clock, settings = Time(), pulsed()
     driver = claimed(module, clock=clock, timeout_s=1.0)
@@ -117,7 +119,8 @@ def held(module: Module, *, lost_at: float | None = None) -> list[tuple[float, s
 def test_a_flash_has_the_frames_of_the_makers_manual(
     line: SerialModule, relay: int, on_s: float, told: str
 ) -> None:
-    """The frames are in the manual of the Waveshare Modbus RTU Relay: "flash on", 700 ms and 800 ms."""
+    """The manual of the Waveshare Modbus RTU Relay has these frames: "flash on" for 700 ms and 800
+    ms."""
     line.on_wire = lambda heard: heard
     coil = f"unit 1 coil {relay}"
     lines = bus_to(line.port).lines({}, {coil: False})
@@ -244,7 +247,7 @@ def test_a_pulse_whose_failure_the_core_has_heard_of_is_not_repeated_either(
 
 @contextmanager
 def site(serial: modbus.Serial | None, on_s: float) -> Iterator[tuple[DryContactDoor, DoorPlant]]:
-    """Yield a driver at the fake module, and the quick door behind the module."""
+    """Yield a driver, and the quick simulated door behind the simulated module."""
     settings = pulsed(on_s, every_s=600.0)
     plant = DoorPlant("door", wires(settings), open_s=0.05, close_s=0.05, auto_close_s=0.05)
     world = RealTime({"door": plant})

@@ -1,5 +1,5 @@
-"""Arbitrary replies on TCP and on a line cause only HalErrors, no false open door and no false
-pulse."""
+"""Arbitrary replies on TCP and on a line. They cause only HalErrors, and never a false open door or a
+false pulse."""
 
 import itertools
 from collections.abc import Callable, Iterator
@@ -33,7 +33,7 @@ DOOR = msgspec.convert(
 )
 
 Spoil = Callable[[bytes, bytes], bytes | None]
-"""A function from a request and its good reply to the bytes that are sent instead."""
+"""A function that gets a request and its good reply. It returns the bytes that are sent instead."""
 
 
 def _flipped(good: bytes, at: int, mask: int) -> bytes:
@@ -66,8 +66,8 @@ def one_module() -> Iterator[Module]:
 
 
 class Spoiled:
-    """A closed door's answers on TCP. Each spoil changes one answer. After the last spoil the door
-    hangs up."""
+    """The answers of a closed door on TCP. Each spoil changes one answer. After the last spoil the
+    module hangs up."""
 
     def __init__(self, module: Module, spoils: list[Spoil]) -> None:
         module.inputs.update({(1, 0): False, (1, 1): True})
@@ -144,7 +144,8 @@ def one_line() -> Iterator[SerialModule]:
 
 
 class SpoiledLine:
-    """A closed door's answers on a line. The spoils change the answers in turn, over and over."""
+    """The answers of a closed door on a line. The spoils change the answers in turn, again and
+    again."""
 
     def __init__(self, line: SerialModule, spoils: list[Spoil]) -> None:
         line.inputs.update({(1, 0): False, (1, 1): True})
@@ -218,7 +219,7 @@ def test_a_register_reads_as_what_was_sent_or_not_at_all(sort: type[Module], pdu
         good = b"\x01\x03\x02" + pdu[2:4]
         if sort is Module:
             assert b"\x01" + pdu == good
-        else:  # the first bytes were a whole frame with its CRC, and the later bytes are noise
+        else:  # the first bytes were a complete frame with its CRC, and noise followed
             assert (b"\x01" + pdu + crc(b"\x01" + pdu)).startswith(good + crc(good))
 
 

@@ -1,4 +1,4 @@
-"""The spelling of Modbus points, impossible wirings, and points that one request reads together."""
+"""The spelling of Modbus points, impossible wirings, and points that share one request."""
 
 import re
 

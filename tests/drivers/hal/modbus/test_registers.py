@@ -1,4 +1,4 @@
-"""Registers on the wire: requests byte for byte, and which replies count as answers."""
+"""Registers on the wire: requests byte by byte, and valid replies."""
 
 import struct
 
@@ -52,7 +52,7 @@ def test_a_coil_is_written_and_read_as_one(either: Module) -> None:
         "0300",
         "03020001ff",  # one byte more than the byte count says
         "03030001ff",  # an odd number of bytes
-        "04020001",  # a reply for another table
+        "04020001",  # a reply from another table
         "0602000900",
         "060009abcd",
     ],
@@ -124,7 +124,7 @@ def test_a_base_moves_every_address() -> None:
 
 
 def test_a_gap_that_a_unit_lacks_is_asked_for_once(module: Module) -> None:
-    """Coils 0 and 5 exist, and the coils between 0 and 5 do not. Each write is read back."""
+    """Coils 0 and 5 exist, and the coils between them do not. The bus reads back each write."""
     module.coils.update({(1, 0): False, (1, 5): False})
     zero, five = "unit 1 coil 0", "unit 1 coil 5"
     lines = bus_to(module.port).lines({}, {zero: False, five: False})

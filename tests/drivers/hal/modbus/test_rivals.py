@@ -1,6 +1,6 @@
-"""A second master writes our coil.
+"""A second master that writes our coil.
 
-The error names the second master. Our writes grow rarer, but off is written at once.
+The error names the second master. We write more rarely, but we still write off at once.
 """
 
 import itertools
@@ -33,7 +33,8 @@ NAMED = "another master writes unit 1 coil 0 too: its readings contradict the wr
 
 
 class Door:
-    """A door that is scanned as by the loop. A second master may write after each scan."""
+    """A door that the test scans as the daemon's loop does. A second master may write after each
+    scan."""
 
     def __init__(self, module: Module) -> None:
         module.inputs.update({(1, 0): False, (1, 1): True})
@@ -53,7 +54,7 @@ class Door:
         return decision.outputs
 
     def scan(self) -> str:
-        """Run one scan, and return its error or ""."""
+        """Run one scan. Return its error, or "" without an error."""
         fault = ""
         try:
             outputs = self.decide(Sampled(self.driver.read()))
@@ -74,7 +75,7 @@ class Door:
         return [self.scan() for _ in range(round(for_s / SCAN_S))]
 
     def written(self) -> list[int]:
-        """Return the values written to the coil since the last call."""
+        """Return the values that were written to the coil since the last call."""
         asked = [request for request in self.module.asked if request[7] == 5]
         self.module.asked.clear()
         return [struct.unpack(">H", request[10:12])[0] >> 8 & 1 for request in asked]

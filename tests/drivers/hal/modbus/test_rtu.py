@@ -1,4 +1,4 @@
-"""The Modbus bus on a serial line: frames byte for byte, and every disturbance of a line."""
+"""The Modbus bus on a serial line: frames byte by byte, and every disturbance of a line."""
 
 import os
 import threading
@@ -19,13 +19,13 @@ IS_0, IS_1 = rtu("01020100"), rtu("01020101")
 
 
 def coils(bus: ModbusBus, count: int) -> list[int]:
-    """Return the first coils of unit 1."""
+    """Return the values of the first `count` coils of unit 1."""
     return list(bus.read(ranges(parse(f"unit 1 coil {i}") for i in range(count))[0]).values())
 
 
 def test_the_frames_are_those_of_the_makers_manual(line: SerialModule) -> None:
-    """The manual of the Waveshare Modbus RTU Relay has frames for relay 0 on, relay 0 off, and all
-    states."""
+    """The frames come from the manual of the Waveshare Modbus RTU Relay. They switch relay 0 on and
+    off, and read all states."""
     said = {
         "01050000ff008c3a": "01050000ff008c3a",
         "010500000000cdca": "010500000000cdca",
@@ -40,7 +40,8 @@ def test_the_frames_are_those_of_the_makers_manual(line: SerialModule) -> None:
 
 
 def test_sixteen_coils_come_lowest_address_in_the_lowest_bit(line: SerialModule) -> None:
-    """Modbus Application Protocol V1.1b3, 6.1, has this example. It is cut to 16 coils here: CD 6B."""
+    """The example comes from Modbus Application Protocol V1.1b3, 6.1. The test shortens it to 16 coils,
+    CD 6B."""
     said = {"010100000010" + crc(bytes.fromhex("010100000010")).hex(): rtu("010102cd6b")}
     line.on_wire = lambda frame: said[frame.hex()]
     high = [i for i, level in enumerate(coils(bus_to(line.port), 16)) if level]
@@ -128,9 +129,10 @@ def test_a_fault_says_which_other_unit_was_heard(line: SerialModule) -> None:
 
 
 def test_the_late_reply_to_one_question_never_answers_another(line: SerialModule) -> None:
-    """A unit is one reply behind. Each reply looks like an answer, but belongs to the question before.
+    """A unit is one reply behind. Each reply looks valid, but it answers the question before.
 
-    The unit sends its last reply when it is asked again, or otherwise a little later.
+    The unit sends its last reply after the next question. Without a next question it sends the reply a
+    little later.
     """
     owed: list[bytes] = []
 
@@ -223,7 +225,7 @@ def test_a_port_that_vanishes_is_found_again_by_its_path(line: SerialModule) -> 
     text = f"no serial port {line.port}: the port is not there; is the adapter plugged in?"
     assert fails(bus, IN0).startswith(text)
     line.plug()
-    assert fails(bus, "unit 2 coil 0").startswith(text)  # the pause holds for all units
+    assert fails(bus, "unit 2 coil 0").startswith(text)  # the pause applies to all units
     clock.now += 0.5
     assert lines.read() == {IN0: False}
 

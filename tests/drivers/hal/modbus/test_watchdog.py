@@ -1,7 +1,7 @@
-"""The module's own watchdog.
+"""The watchdog of a Modbus module.
 
-The bus arms the watchdog before any output is on, and refreshes it at each scan. The bus arms the
-watchdog again after a trip.
+The bus arms the watchdog before it switches any output on, and refreshes the watchdog at each scan.
+After a trip the bus arms the watchdog again.
 """
 
 import json
@@ -41,7 +41,7 @@ from tests.drivers.hal.modbus.module import Time
 from tests.waiting import wait_until
 
 SLOW = 600
-"""A watchdog time (x 100 ms) that is longer than any test."""
+"""A watchdog time (units of 100 ms) that is longer than any test."""
 
 
 def at(address: int) -> Point:
@@ -49,7 +49,7 @@ def at(address: int) -> Point:
 
 
 def habits(time: int) -> dict[str, Any]:
-    """Return the profile's watchdog, but with this time (x 100 ms)."""
+    """Return the profile's watchdog with this time (units of 100 ms)."""
     plain: dict[str, Any] = msgspec.to_builtins(PROFILE.load("wago-750"))
     plain["arm"][0]["value"] = time
     plain["armed"][0]["values"] = [time]
@@ -57,7 +57,7 @@ def habits(time: int) -> dict[str, Any]:
 
 
 class Site:
-    """A door at a module with a watchdog. `restart` makes the bus of a new daemon."""
+    """A door at a module with a watchdog. `restart` opens the bus as a new daemon does."""
 
     def __init__(self, time: int = SLOW, units: tuple[int, ...] = (1,)) -> None:
         self.settings = dry(("unit 1 discrete input 0", "unit 1 discrete input 1", "unit 1 coil 0"))
@@ -71,7 +71,7 @@ class Site:
         self.restart()
 
     def restart(self) -> None:
-        """Start a new daemon's bus and driver."""
+        """Make a new bus and driver, as a new daemon does."""
         plain = {"type": "modbus", "module_watchdog": self.dog, **self.server.replace}
         clock = Time()
         self.bus = modbus.ModbusBus(msgspec.convert(plain, modbus.ModbusSettings), clock)
@@ -83,7 +83,8 @@ class Site:
         return self.dead_men[0].get(at(address), 0.0)
 
     def scan(self) -> str:
-        """Read, write and end the scan, as the loop does. Return the text of the error, or ""."""
+        """Read, write and end the scan, as the daemon's loop does. Return the text of the error, or
+        ""."""
         self.bench.clock.now += 60.0
         try:
             self.bench.driver.read()
@@ -125,7 +126,7 @@ def test_a_scan_refreshes_it_with_a_value_that_differs_from_the_last(site: Site)
         assert site.scan() == ""
         triggers.append(site.register(TRIGGER))
     assert triggers == [1, 2, 1, 2]
-    site.bus.scanned()  # no time has passed
+    site.bus.scanned()  # no time has passed since the last scan
     assert site.register(TRIGGER) == 2
 
 
@@ -135,7 +136,7 @@ def test_without_scans_the_module_lets_go_by_itself() -> None:
         site.bench.driver.open()
         site.bench.driver.write(HOLD)
         wait_until(lambda: site.bench.relay() == [True, False], "the module drops its outputs")
-    except DriverError:  # the watchdog tripped before the read
+    except DriverError:  # the watchdog may trip before the test reads
         assert site.register(STATE) == TRIPPED
     finally:
         site.close()

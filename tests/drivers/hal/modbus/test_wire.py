@@ -1,4 +1,4 @@
-"""The connection to a module: its failures, its cost in memory, and its settings in a YAML file."""
+"""The connection to a module: its failures, its memory use, and its settings in a YAML file."""
 
 import errno
 import re
@@ -148,7 +148,7 @@ def test_the_defaults_bound_what_a_dead_module_can_cost() -> None:
 
 
 def loaded(code: str) -> set[str]:
-    """Return the modules of vendors' libraries that a new interpreter has loaded after this code."""
+    """Return the vendors' modules that a new interpreter has loaded after it has run this code."""
     show = "import sys; print(*[m for m in sys.modules if m.split('.')[0] in WATCHED])"
     watched = "WATCHED = {'pymodbus', 'aiohttp', 'gpiozero', 'requests', 'serial'}"
     done = subprocess.run(
@@ -158,7 +158,7 @@ def loaded(code: str) -> set[str]:
 
 
 def test_the_first_request_loads_nothing_more_of_the_vendors_library(either: Module) -> None:
-    """Loading a module would take longer than the time limit of one try."""
+    """To load a module would take longer than one try may take."""
     door(either)
     made = (
         "from tests.drivers.hal.modbus.module import bus_to;"

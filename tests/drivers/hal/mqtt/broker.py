@@ -1,4 +1,4 @@
-"""A broker, a bus, and the client of a device, for the tests of the `mqtt` bus."""
+"""Tools for tests of the `mqtt` bus: a broker, a bus, and a device's client."""
 
 import threading
 import time
@@ -26,7 +26,7 @@ RELAY = {
 
 
 def settings(port: int, points: dict[str, Any] | None = None, **more: Any) -> MqttSettings:
-    """Return the settings of a bus to this port."""
+    """Return the settings of a bus to a broker on this port."""
     plain = {"type": "mqtt", "host": "127.0.0.1", "port": port, "points": points or {}, **more}
     return msgspec.convert(plain, MqttSettings)
 
@@ -38,7 +38,7 @@ def bus_to(
     clock: Callable[[], float] = time.monotonic,
     **more: Any,
 ) -> Iterator[MqttBus]:
-    """Yield a bus to this port."""
+    """Yield a bus to a broker on this port."""
     bus = MqttBus(settings(port, points, **more), clock)
     try:
         yield bus
@@ -47,8 +47,8 @@ def bus_to(
 
 
 class FarDevice:
-    """A device's client at the broker. `taken` has (topic, payload, retained) of each received
-    message."""
+    """A device's client at the broker. `taken` has (topic, payload, retained) for each message that the
+    client received."""
 
     def __init__(self, port: int, *topics: str, **options: Any) -> None:
         self.taken: list[tuple[str, bytes, bool]] = []
@@ -75,7 +75,7 @@ class FarDevice:
 
 
 def reason(bus: MqttBus, topic: str, stale_after_s: float = 60.0) -> str:
-    """Return why the topic's last message does not count as a fact, or "" if it counts."""
+    """Return why the topic's last message does not count as a fact, or "" if the message counts."""
     try:
         bus.fresh(topic, stale_after_s)
     except HalError as error:

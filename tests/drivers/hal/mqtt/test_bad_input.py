@@ -1,4 +1,5 @@
-"""Bad input from broker and devices. Each sort of input has its own fault, and never becomes a fact."""
+"""Bad input from a broker or a device. Each sort of input has its own error, and never becomes a
+fact."""
 
 import socket
 import threading
@@ -31,7 +32,7 @@ def point(**keys: Any) -> MqttPoint:
 
 
 def fault(found: MqttPoint, payload: bytes) -> str:
-    """Return the fault in this payload, or "" if the point can decode the payload."""
+    """Return the error in this payload, or "" if the point can decode the payload."""
     try:
         found.asserted(payload)
     except HalError as error:
@@ -168,7 +169,7 @@ def test_ten_thousand_topics_that_nobody_asked_for_leave_nothing(broker: Mosquit
     device.close()
 
 
-# ---- a far side that is no broker
+# ---- a far side that is not a broker
 
 
 @settings(max_examples=examples(40), deadline=None)
@@ -190,7 +191,8 @@ def test_a_server_that_speaks_anything_is_an_error_by_its_name(noise: bytes) -> 
 
 
 def test_an_old_session_that_the_broker_has_kept_is_refused() -> None:
-    """A CONNACK with "session present" (MQTT 5.0, 3.2.2.1.1) is not a valid answer to a clean start."""
+    """The bus asks for a clean start. So a CONNACK with "session present" (MQTT 5.0, 3.2.2.1.1) is
+    invalid."""
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def talk() -> None:

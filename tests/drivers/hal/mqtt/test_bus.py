@@ -1,4 +1,4 @@
-"""The `mqtt` bus at a real broker, which the tests kill, freeze and restart."""
+"""The `mqtt` bus with a real broker, which the tests kill, freeze and restart."""
 
 import itertools
 import socket
@@ -132,7 +132,7 @@ def test_a_command_reaches_the_device_once_and_is_not_retained(
         wait_until(lambda: len(device.taken) == 2, "both commands")
     assert device.taken == [(SWITCH, b"ON", False), (SWITCH, b"OFF", False)]
     late = FarDevice(broker.port, SWITCH)
-    late.says("nothing", "a mark")  # a retained command would arrive before the mark
+    late.says("nothing", "a mark")  # a retained command would arrive before this mark
     wait_until(lambda: late.taken, "the mark")
     late.close()
     assert late.taken == [("nothing", b"a mark", False)]
@@ -144,8 +144,8 @@ def test_a_command_that_no_device_receives_is_an_error(broker: Mosquitto) -> Non
 
 
 RELAYS = 60
-"""The number of devices with kept sessions. Each can be asked only once, because a message is then
-gone."""
+"""The number of devices for which the broker keeps a session. The test asks each device only once,
+because the broker delivers a kept message only once."""
 
 
 def test_on_expires_for_a_device_that_returns_later_and_off_does_not(broker: Mosquitto) -> None:

@@ -33,7 +33,7 @@ POINTS: dict[str, Any] = {
 class Site:
     """A relay that obeys commands and publishes its state.
 
-    Without `obeys` the relay ignores commands.
+    With `obeys` false the relay ignores commands.
     """
 
     def __init__(self, broker: Mosquitto, bus: MqttBus) -> None:
@@ -77,7 +77,7 @@ class Site:
         return found[0]
 
     def hears(self, state: bytes) -> None:
-        """Wait until the relay has published this state and the bus has heard it."""
+        """Wait until the relay has published this state and the bus has received it."""
 
         def heard() -> bool:
             found = self.bus.heard(STATE)
@@ -86,7 +86,7 @@ class Site:
         wait_until(heard, "the relay's state")
 
     def until_it_fails(self, text: str) -> None:
-        """Read until the reading fails with this text."""
+        """Read until the reading fails. The error must contain this text."""
 
         def fails() -> bool:
             try:
@@ -110,7 +110,7 @@ def site() -> Iterator[Site]:
 
 
 def opened(site: Site) -> Site:
-    """Claim the relay while the contact is closed."""
+    """Claim the relay with the contact closed, and return the site."""
     bus = site.bus
     bus.up()
     site.contact(closed=True)
@@ -248,7 +248,8 @@ def test_a_device_that_is_asked_and_does_not_listen_is_named(site: Site) -> None
 
 
 def test_a_silent_device_delays_no_other(site: Site) -> None:
-    """The reading fails at once, because the last state is too old. The bus sends no request for it."""
+    """The reading fails at once, because the last state is too old. The bus does not ask the device
+    again."""
     opened(site).until_read()
     other = Points([Wire("closed", "in", "contact", "high")], site.bus)
     site.now = 100.0

@@ -14,7 +14,7 @@ from tests.waiting import wait_until
 
 
 class Authority:
-    """A certificate authority with its files in a folder."""
+    """A certificate authority. Its files are in a folder."""
 
     def __init__(self, folder: Path) -> None:
         folder.mkdir()
@@ -29,7 +29,8 @@ class Authority:
         return str(path)
 
     def issue(self, name: str) -> tuple[str, str]:
-        """Return the paths of the certificate and of the key for this host or user."""
+        """Issue a certificate for this host or user. Return the paths of the certificate and of its
+        key."""
         found = self._ca.issue_cert(name)
         chain = self.file(f"{name}.pem", *found.cert_chain_pems)
         return chain, self.file(f"{name}.key", found.private_key_pem)
@@ -40,7 +41,7 @@ Start = Callable[..., Mosquitto]
 
 @pytest.fixture
 def start() -> Iterator[Start]:
-    """Yield a function that starts brokers. The brokers end with the test."""
+    """Yield a function that starts a broker. All brokers end with the test."""
     brokers: list[Mosquitto] = []
 
     def started(*lines: str) -> Mosquitto:
@@ -71,7 +72,8 @@ def test_a_broker_with_a_certificate_of_our_authority_is_believed(
 
 
 PAHO_LEAVES_A_SOCKET = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-"""A filter for a warning: after a failed handshake paho leaves its socket to the garbage collector."""
+"""A filter for a warning of pytest. After a failed handshake paho leaves a socket to the garbage
+collector."""
 
 
 @PAHO_LEAVES_A_SOCKET
@@ -123,7 +125,7 @@ def test_a_missing_file_is_named(authority: Authority) -> None:
 
 @pytest.fixture
 def guarded(start: Start, tmp_path: Path) -> Mosquitto:
-    """Return a broker at which the user `door` has the password `sesame` and may only write."""
+    """Return a broker with the user `door`, whose password is `sesame`. The user may only write."""
     names, rights = tmp_path / "names", tmp_path / "rights"
     subprocess.run(["mosquitto_passwd", "-b", "-c", names, "door", "sesame"], check=True)
     rights.write_text("user door\ntopic write relay/#\n")

@@ -1,4 +1,4 @@
-"""The `mqtt` bus in a YAML file: refusals of `check` with their places, and warnings of `check`."""
+"""The `mqtt` bus in a YAML file: errors of `check` with their places, and warnings of `check`."""
 
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ STATE = {"topic": "a/state", "stale_after_s": 5}
 
 
 def problems(points: dict[str, Any], **more: Any) -> list[tuple[tuple[str, ...], str]]:
-    """Return the problems of a bus with these points."""
+    """Return the problems that `check` finds in a bus with these points."""
     return list(settings(1883, points, **more).problems())
 
 

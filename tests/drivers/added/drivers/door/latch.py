@@ -1,4 +1,5 @@
-"""A door driver in one file: an output releases the latch, and one contact sees the door shut."""
+"""A door driver in one file. An output releases the latch, and one contact shows that the door is
+shut."""
 
 from bridges.kinds.door.settings import DoorSettings
 from bridges.kinds.door.signals import DoorOutputs, DoorSample
@@ -7,7 +8,7 @@ from drivers.hal.points import Input, Output, Points, PointsBus, Wire
 
 
 class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The latch and its contact."""
+    """The points of the latch and its contact."""
 
     latch: Output
     shut: Input
@@ -23,14 +24,14 @@ def wires(settings: Settings) -> list[Wire]:
 
 
 class Door:
-    """One door (`drivers.Driver[DoorSample, DoorOutputs]`)."""
+    """A driver of one door (`drivers.Driver[DoorSample, DoorOutputs]`)."""
 
     def __init__(self, points: Points) -> None:
         self._points = points
         self.open, self.make_safe, self.close = points.open, points.make_safe, points.close
 
     def read(self) -> DoorSample:
-        """Read every input now."""
+        """Read every input."""
         return DoorSample(closed=self._points.read()["closed"])
 
     def write(self, outputs: DoorOutputs) -> None:
@@ -39,7 +40,7 @@ class Door:
 
 
 def create(name: str, settings: Settings, bus: PointsBus) -> Door:
-    """Return one door on its bus."""
+    """Return the driver of one door on this bus."""
     return Door(Points(wires(settings), bus))
 
 

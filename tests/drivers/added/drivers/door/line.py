@@ -1,4 +1,4 @@
-"""A driver for a door that takes questions and commands as lines of text."""
+"""A driver for a door whose controller takes questions and commands as lines of text."""
 
 from typing import Protocol
 
@@ -12,17 +12,17 @@ class Asks(Protocol):
     """A bus that sends a question as text and returns the answer."""
 
     def ask(self, question: str) -> str:
-        """Return the answer to a question. Raises HalError."""
+        """Return the answer to a question. Raise HalError if no answer comes."""
 
 
 class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The settings of a door. The door has a name on the line."""
+    """The settings of a door. The questions call the door by its name `called`."""
 
     called: Name
 
 
 class LineDoor:
-    """One door (`drivers.Driver[DoorSample, DoorOutputs]`)."""
+    """A driver of one door (`drivers.Driver[DoorSample, DoorOutputs]`)."""
 
     def __init__(self, settings: Settings, bus: Asks) -> None:
         self._name = settings.called

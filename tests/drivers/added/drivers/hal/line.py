@@ -24,7 +24,7 @@ class LineBus(Bus):
         self._address = (settings.host, settings.port)
 
     def ask(self, question: str) -> str:
-        """Send a line, and return the answering line."""
+        """Send a line, and return the line that the controller answers."""
         try:
             with socket.create_connection(self._address, 1.0) as wire:
                 wire.sendall(f"{question}\n".encode())

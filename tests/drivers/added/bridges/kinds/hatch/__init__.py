@@ -1,4 +1,4 @@
-"""Hatches, which are doors for RMF but have their own section in the YAML file."""
+"""Hatches. For RMF a hatch is a door, but the YAML file has a separate section for hatches."""
 
 from msgspec.structs import replace
 
