@@ -1,4 +1,5 @@
-"""Fixtures: an I/O module, the YAML file of a door on that module, and RMF's side of the graph."""
+"""Fixtures: an I/O module, the YAML file of a door on that module, and a node that stands in for
+RMF."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,7 +26,7 @@ def graph(module: Module) -> Iterator[Graph]:
 
 @pytest.fixture
 def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return a machine with services and users, on which systemd gives no directories to a daemon."""
+    """Return a machine with services and users. On it systemd gives a daemon no directories."""
     for name in ("RUNTIME_DIRECTORY", "STATE_DIRECTORY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(directories, "SERVICE_RUN", tmp_path / "run")

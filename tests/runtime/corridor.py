@@ -1,4 +1,4 @@
-"""Doors on one bus, scanned round by round in virtual time."""
+"""Doors on one bus in virtual time. The tests run each scan round."""
 
 from collections.abc import Callable, Sequence
 
@@ -18,7 +18,8 @@ SCAN_S = 0.25
 
 
 class Door:
-    """A door's driver. Each reading calls `during`, and a `lost` door cannot be switched off."""
+    """A stand-in for a door's driver. Each reading calls `during`. With `lost` the door cannot be
+    switched off."""
 
     def __init__(self, name: str, log: Callable[[str], None]) -> None:
         self.during: Callable[[], None] = lambda: None
@@ -49,7 +50,7 @@ class Door:
 
 
 class Wires(Bus):
-    """A bus that reports edges."""
+    """A bus that can report edges. The test calls `edge`."""
 
     def __init__(self, log: Callable[[str], None]) -> None:
         self._log = log
@@ -66,8 +67,8 @@ class Wires(Bus):
 
 
 class Corridor:
-    """A loop with two doors on one bus, or with the named doors. `story` has each event as (s,
-    event)."""
+    """A loop for the named doors on one bus, by default two doors. `story` has (time in s, event) for
+    each event."""
 
     def __init__(
         self, debounce: dict[str, float] | None = None, doors: Sequence[str] = ("ward", "lab")
@@ -94,14 +95,14 @@ class Corridor:
         self.story.append((self.now, what))
 
     def round(self, at: float) -> list[str]:
-        """Run a round at this time, and return the events of the round."""
+        """Run one round at this time (s), and return the round's events."""
         self.now = at
         before = len(self.story)
         self.loop.round()
         return [what for _, what in self.story[before:]]
 
     def falls_silent(self, door: str, timeout_s: float) -> None:
-        """Let each further reading of this door end with a timeout."""
+        """Let each later reading of this door end with a timeout."""
 
         def waits() -> None:
             self.now += timeout_s
@@ -111,5 +112,5 @@ class Corridor:
         self.doors[door].during = waits
 
     def asks(self, door: str) -> None:
-        """Let RMF request that this door opens."""
+        """Let RMF ask this door to open."""
         self.loop.inbox.put(door, OpenRequested("a"))

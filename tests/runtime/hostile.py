@@ -26,7 +26,7 @@ for path in sys.argv[1:]:
 print("waits", flush=True)
 sys.stdin.read()
 """
-"""A program that opens each given file that is readable, and waits for the lock of each file."""
+"""A program that opens each readable file among its arguments, and waits for the lock of each file."""
 
 
 @contextmanager
@@ -53,7 +53,7 @@ def unit(run: Path, invocation: str) -> dict[str, str]:
 
 
 def with_a_dead_bus_first(yaml: str, port: int, timeout_s: float = 1.5) -> str:
-    """Return a door's YAML with a second door before it. The second door's bus at `port` never
+    """Return a door's YAML, with a second door before it. The second door's bus at `port` never
     answers."""
     bus = f"{{type: modbus, tcp: {{host: 127.0.0.1, port: {port}}}, timeout_s: {timeout_s}}}"
     door = yaml.partition("doors:\n")[2]
@@ -65,6 +65,6 @@ def with_a_dead_bus_first(yaml: str, port: int, timeout_s: float = 1.5) -> str:
 
 
 def live_before_dead(log: str) -> bool:
-    """Was the live bus switched off before the wait for the dead bus ended?"""
+    """Return whether the log reports the live bus off before the wait for the dead bus ends."""
     before, _, live = log.partition("outputs_off bus=module verified=yes")
     return bool(live) and "outputs_off bus=dead" not in before

@@ -1,10 +1,10 @@
 """The command `rmf-bridge`, with a part that fails as soon as a file exists.
 
 `python -m tests.runtime.hurt PART FILE run …` takes one of these parts:
-- `reader` is the transport's reader, which raises again and again.
-- `bus` is Modbus, whose next reading never ends.
-- `loop` is the thread of the bus `dead`, which raises.
-- `watch` is the daemon's main thread, which raises.
+- `reader`: the transport's reader raises again and again.
+- `bus`: the next reading of the Modbus bus never ends.
+- `loop`: the thread of the bus `dead` raises.
+- `watch`: the daemon's main thread raises.
 """
 
 import sys
@@ -57,7 +57,7 @@ HURTS: dict[str, tuple[Callable[[], type], str, Callable[..., None]]] = {
 
 
 def main(argv: Sequence[str]) -> int:
-    """Run the command. The part fails once the file exists."""
+    """Run the command. The chosen part fails as soon as the file exists."""
     what, file, *command = argv
     owner, name, fail = HURTS[what]
     whole = getattr(owner(), name)

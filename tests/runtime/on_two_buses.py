@@ -1,7 +1,7 @@
-"""One device with inputs on another bus, on the daemon's own service in virtual time.
+"""One device with inputs on two buses. The daemon's own service runs in virtual time.
 
-The device's bus is `gateway`, its other bus `header`. A bus may be down (each call fails at once, as
-in a backoff) or hang (its thread waits for an answer and runs no round).
+The device is on the bus `gateway`, and its other inputs are on `header`. A bus that is down fails each
+call at once, as in a backoff. A hanging bus runs no round, because its thread waits for an answer.
 """
 
 from collections.abc import Callable, Mapping
@@ -47,8 +47,8 @@ doors:
 
 
 class FarBus(PointsFar, Bus):
-    """The far side of one bus. `read_at`: the time of the last successful reading (s). `shown`: the
-    levels of that reading."""
+    """The far side of one bus. `read_at` is the time of the last successful reading (s). `shown` has
+    the levels of that reading."""
 
     def __init__(self, clock: Any, plant: Any, wires: Any) -> None:
         super().__init__(clock, plant, wires)
@@ -67,10 +67,11 @@ class FarBus(PointsFar, Bus):
 
 
 class OnTwoBuses:
-    """The service of one device. `states`: (s, message). `after_round(bus)` is called after rounds."""
+    """The service of one device. `states` has (time in s, message). Each round ends with a call of
+    `after_round(bus)`."""
 
     def __init__(self, file: Path, ring: Path | None = None) -> None:
-        """`ring`: the folder of the ring that the service records; None for none."""
+        """Start the service. It records a ring in the folder `ring`, or no ring with None."""
         self.now = 0.0
         self.config = load(file)
         (self.device,) = self.config.devices
@@ -108,7 +109,7 @@ class OnTwoBuses:
         return RingWriter(partial(Ring, folder, head, 4_000_000), clock, lambda: NEWEST)
 
     def run(self, for_s: float) -> None:
-        """Run the rounds of both threads, in the order in which they are due."""
+        """Run the rounds of both threads for this time, in the order of their due times."""
         until = self.now + for_s
         while (due := self._due()) and due[0] <= until:
             self.now = max(self.now, due[0])

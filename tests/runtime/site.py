@@ -1,4 +1,4 @@
-"""A door on a real Modbus TCP connection between the real daemon and a fake module."""
+"""A door on a real Modbus TCP connection. A real daemon talks to a simulated module."""
 
 import json
 import os
@@ -20,14 +20,14 @@ from tests.waiting import PATIENCE_S, wait_until
 
 ROOT = Path(__file__).parents[2]
 SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
-"""The environment of a service. A service starts no guard process.
+"""The environment of a service. In a service the daemon starts no guard process.
 
-A guard would go on for minutes after the test's module has gone.
+A guard would run for minutes after the test's module has gone.
 """
 PATIENT = "stale_after_s: 30"
-"""A limit so long that the door does not become stale when a busy machine delays the scans.
+"""A limit so long that the door does not become stale, even if a busy machine delays the scans.
 
-For the same reason the module has 1.5 s to answer, instead of 0.3 s.
+For the same reason the module may take 1.5 s to answer, instead of 0.3 s.
 """
 YAML = """
 kind: door
@@ -47,7 +47,8 @@ doors:
 
 
 class Module:
-    """The I/O module and the door behind it, in this process. The module outlives every daemon."""
+    """The I/O module and the door behind it, in the test's process. The module outlives every
+    daemon."""
 
     text = YAML
 
@@ -72,7 +73,7 @@ class Module:
         self._partial = b""
 
     def relay(self) -> list[bool]:
-        """Return every edge of the hold relay so far."""
+        """Return every edge of the door's relay so far."""
         try:
             while chunk := self._follow.recv(65536):
                 self._partial += chunk
@@ -83,12 +84,12 @@ class Module:
         return [edge["value"] for edge in self.edges if edge["signal"] == "hold_open"]
 
     def tell(self, *words: str) -> None:
-        """Give the plant an order, such as `fail ward_door opened off`."""
+        """Give the simulated door an order, such as `fail ward_door opened off`."""
         with Caller(self.directory / "plant.sock") as control:
             control.order(" ".join(words))
 
     def hang(self) -> None:
-        """Let the module stop answering. Its relay does not change."""
+        """Let the module stop answering. Its relay keeps its state."""
         self.tell("fail", "ward_door", "server", "stuck")
 
     def go_on(self) -> None:
@@ -102,7 +103,7 @@ class Module:
 
 
 def shipped(name: str, directory: Path, transport: str) -> Path:
-    """Copy a shipped YAML file, set this transport, and remove `ros_setup`. Return the copy."""
+    """Copy a shipped YAML file, choose this transport, and remove `ros_setup`. Return the copy."""
     text = (ROOT / "config" / name).read_text()
     text = re.sub(r" *ros_setup: .*\n", "", text)
     file = directory / name
@@ -114,21 +115,21 @@ BRIDGE = ("bridges.cli",)
 
 
 def command(*arguments: str | Path, program: Sequence[str] = BRIDGE) -> list[str]:
-    """Return the command line of `rmf-bridge …`. `program` is a Python module with its first
+    """Return the command line of `rmf-bridge …`. `program` is another Python module with its first
     arguments."""
     return [sys.executable, "-m", *program, *map(str, arguments)]
 
 
 def environment(**more: str) -> dict[str, str]:
-    """Return this process's environment with the variables in `more`, and without a service's
-    variables."""
+    """Return this process's environment without a service's variables, but with the variables in
+    `more`."""
     units = ("RMF_", "NOTIFY", "WATCHDOG", "RUNTIME_DIR", "STATE_DIR", "SERVICE_RESULT")
     own = {name: value for name, value in os.environ.items() if not name.startswith(units)}
     return own | more
 
 
 class Daemon:
-    """A running `rmf-bridge run` with its log."""
+    """A running `rmf-bridge run`, and its log."""
 
     def __init__(
         self,
@@ -148,7 +149,7 @@ class Daemon:
             )
 
     def wait_for(self, text: str) -> None:
-        """Wait until this text is in the log. Fail at once if the daemon ends without it."""
+        """Wait until this text is in the log. Fail at once if the daemon ends first."""
 
         def said() -> bool:
             ended = self.process.poll() is not None
@@ -159,7 +160,7 @@ class Daemon:
         wait_until(said, f"{text!r} in {self.log}")
 
     def end(self, number: int) -> int:
-        """Send a signal to the daemon, and return its exit code."""
+        """Send a signal to the daemon. Wait for its end, and return its exit code."""
         self.process.send_signal(number)
         return self.process.wait(PATIENCE_S)
 
@@ -168,7 +169,7 @@ class Daemon:
 def daemon(
     file: Path, runtime_dir: Path, *options: str, program: Sequence[str] = BRIDGE, **env: str
 ) -> Iterator[Daemon]:
-    """Yield a running daemon, and end it with the test."""
+    """Yield a running daemon. It ends when the block ends."""
     started = Daemon(file, runtime_dir, *options, program=program, **env)
     try:
         yield started
@@ -182,7 +183,7 @@ def daemon(
 
 
 def hold_open(module: Module, graph: "Graph", running: Daemon) -> None:
-    """Request OPEN until the relay holds the door."""
+    """Request OPEN again and again, until the relay holds the door."""
     running.wait_for("ready")
 
     def held() -> bool:
@@ -193,7 +194,7 @@ def hold_open(module: Module, graph: "Graph", running: Daemon) -> None:
 
 
 class Graph:
-    """RMF's side of the graph, which requests the door and hears its states."""
+    """A node that stands in for RMF. It requests the door and hears the door's states."""
 
     def __init__(self, domain: int) -> None:
         self.states: list[DoorState] = []
@@ -202,7 +203,7 @@ class Graph:
         self.heard = self.transport.subscribe(DOOR_STATES, self.states.append)
 
     def ask(self, mode: DoorModeValue) -> None:
-        """Send a request as soon as the door's node is found."""
+        """Wait until the door's node listens, then send a request."""
         wait_until(self._requests.matched, "the node listens")
         self.request(mode)
 

@@ -1,4 +1,4 @@
-"""Two real daemons, of a panel and of a door, each with its own fake module.
+"""Two real daemons, one for a panel and one for a door. Each daemon has its own simulated module.
 
 A subscriber stands in for a fleet adapter.
 """
@@ -78,7 +78,7 @@ class Place:
         self._caller.order(f"press {self.device} fire {'on' if on else 'off'}")
 
     def state(self) -> str:
-        """Return the alarm's state in the status file, or "" if the file is missing."""
+        """Return the alarm's state from the status file, or "" if the file is missing."""
         try:
             status = (self._directory / f"run-{self._name}" / "status.json").read_bytes()
             found = msgspec.json.decode(status, type=dict[str, Any])
@@ -90,7 +90,8 @@ class Place:
         wait_until(lambda: self.state() == state, f"{self._name} is {state}: {self.file}")
 
     def reset(self) -> None:
-        """Reset as a person does, until the daemon accepts the reset. Its cause may end only now."""
+        """Type `rmf-bridge reset` until the alarm is reset. The alarm's cause may end only during the
+        first tries."""
 
         def is_reset() -> bool:
             run = self._directory / f"run-{self._name}"
@@ -113,7 +114,7 @@ def places(tmp_path: Path, domain: int) -> Iterator[tuple[Place, Place]]:
 
 
 def heard_late(domain: int) -> list[bool]:
-    """Start a fleet adapter's subscriber now, and return the values that it hears up to an alarm."""
+    """Start a late fleet adapter, and return the values that it hears until it hears an alarm."""
     found: list[Bool] = []
     late = join("late", domain)
     late.subscribe(FIRE_ALARM_TRIGGER, found.append)

@@ -1,4 +1,5 @@
-"""Daemons that are suspended, deaf or hung: the states that RMF gets and the messages to systemd."""
+"""Daemons that are suspended, deaf or hung. RMF gets the right states, and systemd the right
+messages."""
 
 import argparse
 import os
@@ -21,7 +22,7 @@ HURT = "tests.runtime.hurt"
 
 
 class Systemd:
-    """A socket that receives a daemon's messages to systemd."""
+    """A stand-in for systemd's socket. A daemon sends its messages to this socket."""
 
     def __init__(self, path: Path) -> None:
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -40,7 +41,7 @@ class Systemd:
 
 @contextmanager
 def systemd(directory: Path) -> Iterator[Systemd]:
-    """Yield a listener on the socket `notify`, which stands in for systemd's socket."""
+    """Yield a listener on the socket `notify`. It stands in for systemd."""
     listening = Systemd(directory / "notify")
     yield listening
     listening.socket.close()
@@ -60,9 +61,9 @@ def test_after_sigstop_no_earlier_state_is_shown_as_new(
         pid = running.process.pid
 
         def suspended() -> bool:
-            """Suspend the daemon, and let the door leave OPEN meanwhile.
+            """Suspend the daemon. During the suspension the door leaves OPEN.
 
-            Return False if the daemon was stopped in the middle of a scan.
+            Return False if SIGSTOP came in the middle of a scan.
             """
             module.tell("fail", "ward_door", "opened", "ok")
             wait_until(lambda: graph.last() is DoorModeValue.MODE_OPEN, "the door shows OPEN")
@@ -90,7 +91,7 @@ def test_after_sigstop_no_earlier_state_is_shown_as_new(
 
 
 def _since(graph: Graph, resumed: float) -> list[DoorModeValue]:
-    """Return the modes in states with a stamp after `resumed`."""
+    """Return the modes of the states with stamps from `resumed` on."""
     return [
         DoorModeValue(state.current_mode.value)
         for state in tuple(graph.states)
@@ -118,7 +119,7 @@ def test_a_transport_that_cannot_be_restarted_ends_the_daemon_with_the_relay_off
 
         def ended() -> bool:
             heard.extend(manager.heard())
-            graph.request(DoorModeValue.MODE_OPEN)  # the message wakes the reader
+            graph.request(DoorModeValue.MODE_OPEN)  # the request wakes the reader
             return running.process.poll() is not None
 
         wait_until(ended, "the daemon has ended")
@@ -152,7 +153,7 @@ def test_the_watchdog_is_not_fed_while_a_call_of_the_bus_hangs(
         _status_written(run, 5)
         assert manager.heard() == []
         assert module.relay() == [True]
-        assert running.end(signal.SIGABRT) == -signal.SIGABRT  # systemd would send this signal
+        assert running.end(signal.SIGABRT) == -signal.SIGABRT  # systemd would send SIGABRT
     off = command("outputs-off", module.file, "--runtime-dir", run)
     assert subprocess.run(off, env=environment()).returncode == 0
     wait_until(lambda: module.relay() == [True, False], "the relay is off")
@@ -161,7 +162,7 @@ def test_the_watchdog_is_not_fed_while_a_call_of_the_bus_hangs(
 def _status_written(run: Path, times: int) -> None:
     """Wait until the daemon's main thread has written the status `times` times.
 
-    The main thread also feeds the watchdog.
+    The main thread also sends the watchdog messages.
     """
     for _ in range(times):
         before = (run / "status.json").stat().st_ino
@@ -178,7 +179,8 @@ def _inode(run: Path) -> int | None:
 def test_a_reset_during_the_start_does_no_harm(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
-    """The test repeats `rmf-bridge reset` from before the daemon's start until the daemon serves."""
+    """The test repeats `rmf-bridge reset`. It begins before the daemon starts, and ends when the daemon
+    serves."""
     run = tmp_path / "run"
     asked = argparse.Namespace(file=module.file, runtime_dir=str(run))
     codes: list[tuple[bool, int]] = []

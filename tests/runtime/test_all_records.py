@@ -1,4 +1,4 @@
-"""The command `outputs-off --all-records` after a power cut: it runs before any daemon starts."""
+"""The command `outputs-off --all-records`. After a power cut it runs before any daemon starts."""
 
 import socket
 import subprocess
@@ -18,14 +18,13 @@ from tests.waiting import wait_until
 
 COIL_OFF = bytes.fromhex("0001 0000 0006 01 05 0000 0000")
 COIL_ON = bytes.fromhex("0001 0000 0006 01 05 0000 ff00")
-"""A Modbus TCP request: transaction 1, unit 1, write single coil 0 on."""
+"""A Modbus TCP request: transaction 1, unit 1, write single coil 0, on."""
 
 
 def died(state: Path, file: Path, later: bytes = b"") -> Path:
-    """Write the record that a daemon with this file had when the power failed. Return the record's
-    path.
+    """Write the record that a daemon leaves behind when the power fails. Return the record's path.
 
-    `later` is text that a later version added to the YAML file.
+    `later` is text that a later version has added to the YAML file.
     """
     left = record.of(load(file))
     if later:
@@ -43,7 +42,7 @@ def module(tmp_path: Path, domain: int) -> Iterator[Module]:
     made = Module(tmp_path, domain)
     with socket.create_connection(("127.0.0.1", port(made.file))) as wire:
 
-        def is_on() -> bool:  # repeated, because the first edge may come too early
+        def is_on() -> bool:  # sends again, because the test may miss the first edge
             for frame in (COIL_OFF, COIL_ON):
                 wire.sendall(frame)
                 assert wire.recv(64)
@@ -55,14 +54,14 @@ def module(tmp_path: Path, domain: int) -> Iterator[Module]:
 
 
 def port(file: Path) -> int:
-    """Return the TCP port of a file's module."""
+    """Return the TCP port of the module in a file."""
     found = int(load(file).buses["module"].tcp.port)
     texts.give({})
     return found
 
 
 def booted(state: Path) -> subprocess.CompletedProcess[str]:
-    """Run the command of the unit that runs at boot, with the state directories and YAMLs in this
+    """Run the command that a unit runs at boot. The state directories and YAMLs are in this
     folder."""
     code = (
         "import pathlib, sys; from bridges.runtime.all_records import switch_off_all;"

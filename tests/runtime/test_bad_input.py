@@ -1,4 +1,4 @@
-"""Impossible requests to a lift's daemon, which is a real process, on each wire."""
+"""Impossible requests to a lift's daemon on each wire. The daemon is a real process."""
 
 import json
 from collections.abc import Iterator
@@ -30,7 +30,7 @@ WRONG = {
 
 
 class Lift:
-    """The daemon of a simulated lift, and a node of RMF that can send any request."""
+    """The daemon of a simulated lift, and a node in place of RMF. The node can send any request."""
 
     def __init__(self, running: Daemon, status: Path, domain: int) -> None:
         self.running = running
@@ -97,7 +97,7 @@ def test_a_flood_ends_with_the_last_valid_request_and_states_go_on(lift: Lift) -
     edges = [
         line for line in lift.running.log.read_text().splitlines() if " outputs device" in line
     ]
-    # The test counts by the daemon's own time: the pace of the states, and the pace of the relays.
+    # The limits follow from the daemon's own time: the pace of states, and the pace of relays.
     read_at = [stamps.in_seconds(state.lift_time) for state in lift.states if state.lift_time.sec]
     took_s = read_at[-1] - read_at[0]
     assert len(read_at) <= 2 + (took_s + 1) / TELL_GAP_S
@@ -111,7 +111,7 @@ def test_samples_that_are_not_requests_are_dropped_and_good_ones_are_obeyed(
         wait_until(lambda: lift.status()["samples_dropped"], "hostile samples are counted")
     lift.send(replace(RIGHT, request_type=0))
 
-    def held() -> bool:  # repeated, because the flood may displace a request
+    def held() -> bool:  # sends again, because the flood may displace a request
         lift.send(RIGHT)
         return lift.states[-1].session_id == "fleet/robot"
 

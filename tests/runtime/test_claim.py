@@ -1,6 +1,6 @@
-"""A process that switches off uses the settings in the record.
+"""A process that switches off takes its settings from the record.
 
-If these settings cannot be decoded, the process uses the YAML text in the record.
+If it cannot decode the settings, it reads the YAML text in the record.
 """
 
 import subprocess
@@ -26,7 +26,7 @@ BUILD = "r1.gabcdef0"
 
 @pytest.fixture(autouse=True)
 def _built(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Set the build number of a package, because a checkout has no build number."""
+    """Pretend to be an installed package with a build number. A checkout has no build number."""
     monkeypatch.setattr(record, "BUILD", BUILD)
     texts.give({})
     yield
@@ -34,7 +34,7 @@ def _built(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def claimed(config: Config) -> tuple[object, ...]:
-    """Return the parts of a Config that matter for switching off."""
+    """Return the parts of a Config that the process needs to switch off."""
     return (
         config.text,
         config.kind,
@@ -59,7 +59,7 @@ def of_file(file: Path) -> tuple[Config, ClaimRecord, ClaimedSettings]:
 @pytest.mark.parametrize("file", DEVICES, ids=lambda file: file.stem)
 def test_the_settings_in_a_record_are_those_of_its_yaml(file: Path) -> None:
     config, written, _ = of_file(file)
-    # The second record has a spoiled YAML text, so only its decoded settings can give the result.
+    # The second record has a spoiled YAML text. So only its decoded settings can give the result.
     assert claimed(msgspec.structs.replace(written, yaml=config.text).config()) == claimed(config)
     spoiled = msgspec.structs.replace(written, yaml=b"kind: [").config()
     assert claimed(spoiled)[1:] == claimed(config)[1:]

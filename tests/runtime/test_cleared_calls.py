@@ -1,9 +1,9 @@
-"""A controller may take a call and clear the call's register or coil. Such a controller is no rival.
+"""A controller may take a call and then clear the call's register or coil. It is not a rival.
 
-A second master that writes the same register or coil is a rival. The daemon's log must name the rival.
+A second master that writes the same register or coil is a rival. The daemon's log must name it.
 
-Everything is real except the lift: the daemon's service with its clock, a Modbus line, and the rival's
-own connection. On RS-485 the rival uses the module's network port.
+Only the lift is simulated. The daemon's service with its clock, the Modbus line, and the rival's
+connection are real. On RS-485 the rival uses the module's network port.
 """
 
 import logging
@@ -46,7 +46,7 @@ TIMEOUT_S: Final = 2.0
 
 
 class Site:
-    """One lift with its daemon, and RMF. `another` is a second master's bus to the same units."""
+    """One lift with its daemon, and RMF. `another` is the bus of a second master to the same units."""
 
     def __init__(self, config: Config, clears_s: float | None, rtu: bool, held: ExitStack) -> None:
         self.states: list[LiftState] = []
@@ -93,7 +93,7 @@ class Site:
         self._requests.publish(asked)
 
     def rides(self, floor: str) -> None:
-        """Ride to a floor in AGV mode, and wait until the door is open at that floor."""
+        """Ride to a floor in AGV mode, until the door is open at that floor."""
 
         def there() -> bool:
             self.request(floor)
@@ -106,17 +106,17 @@ class Site:
         wait_until(there, f"the lift stands open at {floor}")
 
     def modes(self) -> list[int]:
-        """Return the modes in order, from the moment the lift was first in service."""
+        """Return the modes in order. The first is the mode when the lift came into service."""
         modes = [mode for mode, _ in groupby(state.current_mode for state in self.states)]
         return modes[modes.index(LiftMode.MODE_HUMAN) :]
 
     def called(self) -> bool:
-        """Ask for L3, and return whether the lift has been called to L3."""
+        """Ask for L3. Return whether the call relay for L3 has switched."""
         self.request("L3")
         return bool(self.relay("call_L3"))
 
     def relay(self, signal: str) -> list[object]:
-        """Return each change of one of the lift's relays."""
+        """Return the value of each change of this relay."""
         edges = list(self.plant.edges)
         return [e.value for e in edges if e.what == "relay" and e.signal == signal]
 
@@ -152,19 +152,20 @@ def spoken(caplog: pytest.LogCaptureFixture) -> list[str]:
 
 
 def is_told(point: Point, caplog: pytest.LogCaptureFixture) -> bool:
-    """Does a `device_lost` line in the log name another master that writes this point?"""
+    """Return whether a `device_lost` line in the log names another master that writes this point."""
     lost = [text for text in spoken(caplog) if text.startswith("device_lost")]
     return any("another master writes" in text and str(point) in text for text in lost)
 
 
 SPOILED: Final = re.compile(r"is not a frame|no reply within")
-"""In the log: a busy machine has torn a frame of the serial line, or has made a reply late."""
+"""Texts in the log after a busy machine has torn a frame of the line or delayed a reply."""
 
 
 def ridden(
     make: Callable[[], Site], held: ExitStack, caplog: pytest.LogCaptureFixture, *floors: str
 ) -> Site:
-    """Ride to these floors. Ride again with a new site if a busy machine has spoiled a frame."""
+    """Ride to these floors, and return the site. If a busy machine spoils a frame, ride again on a new
+    site."""
     for _ in range(10):
         site = make()
         for floor in floors:
@@ -254,8 +255,7 @@ def test_another_master_that_switches_our_command_off_is_told(
     held: ExitStack,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    """The second master writes 0 twice a second. The controller keeps its calls, or clears its
-    calls."""
+    """The second master writes 0 twice a second. The controller keeps its calls or clears them."""
     point = SERVED[what][example]
     site = Site(configured(example, tmp_path), clears_s, rtu, held)
     site.plant.fail("car", "slow")

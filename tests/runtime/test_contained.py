@@ -1,4 +1,4 @@
-"""A defect in a driver takes its device offline and off. The other devices stay in service."""
+"""A defect in a driver. It takes its device offline and off, and the other devices stay in service."""
 
 import pytest
 

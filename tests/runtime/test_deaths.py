@@ -1,6 +1,6 @@
-"""After every death of a daemon the outputs go off.
+"""The deaths of a daemon. After every death the outputs go off.
 
-The daemon of a door on a real Modbus module dies while its relay is on.
+The daemon serves a door on a real Modbus connection, and dies while its relay is on.
 """
 
 import os
@@ -43,7 +43,7 @@ from tests.waiting import PATIENCE_S, wait_until
 def wall(
     module_domain: int, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[tuple[Module, Graph]]:
-    """Yield one module and one RMF for all tests. Each test starts its own daemons."""
+    """Yield one module and one graph for all tests. Each test starts its own daemon."""
     standing = Module(tmp_path_factory.mktemp("wall"), module_domain)
     joined = Graph(standing.domain)
     yield standing, joined
@@ -58,7 +58,7 @@ def graph(wall: tuple[Module, Graph]) -> Graph:
 
 @pytest.fixture
 def module(wall: tuple[Module, Graph]) -> Module:
-    """Return the module in its first state: the relay is off, and the history is empty."""
+    """Return the module in its first state. The relay is off, and the list of edges is empty."""
     standing, joined = wall
     standing.go_on()
     standing.file.write_text(standing.yaml)
@@ -109,9 +109,9 @@ def test_the_rule_leaves_out_crashes_and_signals_that_end_nothing_by_default() -
 
 
 USUAL = [signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP, signal.SIGRTMAX]
-"""The signals in `make test`. test_process.py has SIGINT and SIGTERM."""
+"""The signals in `make test`. test_process.py tests SIGINT and SIGTERM."""
 EVERY = [n for n in ENDING if n < signal.SIGRTMIN or n in (signal.SIGRTMIN, signal.SIGRTMAX)]
-"""The signals in `make deep`. Of the realtime signals only the first and the last are included."""
+"""The signals in `make deep`. They include only the first and the last realtime signal."""
 
 
 @pytest.mark.parametrize(
@@ -406,7 +406,7 @@ def test_where_a_live_daemon_cannot_be_ruled_out_only_execstoppost_switches_off(
 
 
 def _runs_for_others() -> bool:
-    """May another user run this Python? No other user may, if this Python is below root's home."""
+    """Return whether another user may run this Python. Below root's home no other user may."""
     try:
         return subprocess.run([sys.executable, "-c", ""], user=65534).returncode == 0
     except PermissionError:
@@ -492,8 +492,8 @@ def test_missing_lgpio_or_permission_is_reported_in_one_line(tmp_path: Path) -> 
 def test_a_bus_that_cannot_be_opened_leaves_nothing_to_switch_off(
     domain: int, tmp_path: Path
 ) -> None:
-    """No output was claimed, so no record may stay. Nobody could clear a record without the
-    hardware."""
+    """The daemon claimed no output, so no record may remain. Without the hardware nobody could clear a
+    record."""
     file = shipped("lift_dry_contact.yaml", tmp_path, wire())
     text = file.read_text()
     text = text.replace("domain_id: 0", f"domain_id: {domain}\n  network: localhost")

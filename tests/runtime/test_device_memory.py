@@ -1,4 +1,4 @@
-"""One file with the memories of a daemon's devices, and an order by a person."""
+"""The file with the memories of a daemon's devices, and a person's order."""
 
 import os
 from pathlib import Path
@@ -17,7 +17,7 @@ QUEUED = WorkcellMemory(jobs=(Job("a"),))
 
 
 class Full:
-    """A disk that is full after this number of writes."""
+    """A disk that becomes full after this number of writes."""
 
     def __init__(self, writes: int) -> None:
         self.writes = writes

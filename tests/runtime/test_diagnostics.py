@@ -1,4 +1,4 @@
-"""The messages on `/diagnostics`, one each second, from a real daemon."""
+"""The messages on `/diagnostics` from a real daemon. One message comes each second."""
 
 from pathlib import Path
 

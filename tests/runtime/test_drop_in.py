@@ -1,4 +1,4 @@
-"""The permissions in a service's drop-in, for each way to reach devices and RMF's graph."""
+"""The permissions in a service's drop-in. Each way to reach devices and RMF's graph needs its own."""
 
 from pathlib import Path
 
@@ -37,7 +37,7 @@ SHIPPED = {
     "charger_mqtt": NET,
     "charger_register": SERIAL,
     "charger_relay": NET,
-    "charger_wiferion": SERIAL,  # by slcan
+    "charger_wiferion": SERIAL,  # on an slcan adapter
     "dispenser_contacts": GPIO,
     "dispenser_register": NET,
     "door_http": NET,
@@ -67,8 +67,7 @@ SHIPPED = {
 
 
 def permits(config: Config, groups: tuple[str, ...] = GROUPS) -> list[str]:
-    """Return the lines with permissions. Comments, section names and the needs' fingerprint are left
-    out."""
+    """Return only the lines with permissions, without comments, section names and the fingerprint."""
     lines = text(config, groups).splitlines()
     return [line for line in lines if line[:1] not in ("#", "[") and FITS not in line]
 
@@ -146,7 +145,7 @@ ROUTERS = "zenoh: {connect: [tcp/10.0.0.5:7447, 'tls/[fd00::5]:7447']}"
         ("transport: auto", None),
         ("transport: auto\n  network: localhost", LOCAL),
         ("transport: zenoh\n  network: localhost", LOCAL),
-        ("transport: zenoh", None),  # a zenoh peer can hear of peers at any address
+        ("transport: zenoh", None),  # a zenoh peer may hear of peers at any address
         (f"transport: zenoh\n  {ROUTERS}", f"{LOCAL} 10.0.0.5 fd00::5"),
         ("transport: zenoh\n  zenoh: {mode: client}", LOCAL),
         ("transport: zenoh\n  zenoh: {connect: [tcp/router.local:7447]}", None),
@@ -177,7 +176,7 @@ def test_the_watchdogs_time_follows_from_the_slowest_call(
     )
     assert watchdog_s(config) == expected_s
     assert too_slow(config, watchdog_s(config)) == ""
-    fed_every_s = watchdog_s(config) / 6 + 1 + timeout_s  # as in `_watch`: a scan and a call
+    fed_every_s = watchdog_s(config) / 6 + 1 + timeout_s  # as in `_watch`: one scan and one call
     assert fed_every_s < watchdog_s(config)
 
 

@@ -1,6 +1,7 @@
-"""Files of earlier versions stay readable. Files of later versions are read, or refused with a reason.
+"""Files of other versions. A daemon reads all earlier files. It reads a later file, or refuses it with
+a reason.
 
-`earlier/<date>` has files that the program of that day wrote. tests/blackbox/earlier has rings and
+`earlier/<date>` has files that the version of that day wrote. tests/blackbox/earlier has rings and
 recordings.
 """
 
@@ -33,7 +34,8 @@ def _forgotten() -> Iterator[None]:
 
 
 def left(folder: Path, **later: object) -> tuple[Path, Records, str]:
-    """Write a record that has a later version's fields. Return its path, the records and the YAML."""
+    """Write a record with fields of a later version. Return its path, the records, and the path of the
+    YAML."""
     (source,) = EARLIER[-1].glob(PATTERN)
     content = msgspec.json.decode(source.read_bytes()) | later
     path = folder / source.name

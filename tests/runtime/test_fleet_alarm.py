@@ -1,4 +1,4 @@
-"""The node of a daemon's alarm, on the memory transport: discs, late fleet adapters, releases."""
+"""The node of a daemon's alarm, on the memory transport: disks, late fleet adapters, releases."""
 
 import pytest
 
@@ -18,7 +18,7 @@ FIRE, CLEAR = AlarmInputs(frozenset({"fire"}), True), AlarmInputs(seen=True)
 
 
 class Disk:
-    """A file; `full`: it cannot be written."""
+    """A file in memory. With `full` a write fails."""
 
     def __init__(self) -> None:
         self.kept: bytes | None = None
@@ -38,7 +38,8 @@ def same(topic: AnyTopic) -> AnyTopic:
 
 
 class Site:
-    """Daemons' alarms on one graph, in virtual time. `heard`: the values that a fleet adapter hears."""
+    """The alarms of several daemons on one graph, in virtual time. `heard` has the values that a fleet
+    adapter hears."""
 
     def __init__(self, topic: AnyTopic = FIRE_ALARM_TRIGGER, release: Release = NEWEST) -> None:
         self.now = 0.0
@@ -79,7 +80,8 @@ class Site:
             node.round()
 
     def until(self, at: float) -> None:
-        """Let time pass in steps of 0.25 s, with a statement and a look each second."""
+        """Let time pass in steps of 0.25 s. Each second every node looks, and publishes its
+        diagnostics."""
         while self.now < at:
             self.now += 0.25
             if self.now % 1 == 0:
@@ -91,7 +93,7 @@ class Site:
             self.rounds()
 
     def late(self) -> list[bool]:
-        """Return the values that a fleet adapter hears that starts now."""
+        """Start a late fleet adapter, and return the values that it hears."""
         found: list[d.Bool] = []
         late = MemoryTransport(self.network, "late", self.release)
         late.subscribe(FIRE_ALARM_TRIGGER, found.append)

@@ -1,4 +1,4 @@
-"""The service of a kind without hardware: the node around the core, on real transports."""
+"""The service of a kind without hardware. It runs the node around the core, on real transports."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -27,7 +27,7 @@ WALL = 1_800_000_000.0
 
 
 class Site:
-    """Our node on a memory network. The tests play a fleet adapter and a lift's node."""
+    """Our node on a memory network. The test plays a fleet adapter and a lift's node."""
 
     def __init__(self, settings: LiftSupervisorSettings | None = None, **more: Any) -> None:
         self.now = 0.0
@@ -46,21 +46,21 @@ class Site:
         self.node.round()
 
     def until(self, at: float) -> None:
-        """Run the rounds that the service's thread would run up to this time."""
+        """Run all rounds that the service's thread would run until this time (s)."""
         while self.node.wake_at <= at:
             self.now = max(self.now, self.node.wake_at)
             self.node.round()
         self.now = at
 
     def asks(self, session: str = "fleet/a", lift: str = "Lift1") -> LiftRequest:
-        """Publish an adapter's request, and return the request."""
+        """Publish a request as a fleet adapter, and return the request."""
         request = LiftRequest(lift, stamp(WALL + self.now), session, 1, "L3", 2)
         self.adapter.publish(request)
         self.node.round()
         return request
 
     def ends(self, session: str = "fleet/a", lift: str = "Lift1") -> None:
-        """Publish an adapter's END of a session."""
+        """Publish END of a session as a fleet adapter."""
         self.adapter.publish(LiftRequest(lift, stamp(WALL + self.now), session, 0, "L3", 2))
         self.node.round()
 
@@ -361,7 +361,8 @@ def join(request: pytest.FixtureRequest) -> Iterator[Callable[[str], Transport]]
 def test_a_served_graph_kind_runs_in_its_thread_until_it_is_stopped(
     join: Callable[[str], Transport],
 ) -> None:
-    """A passive node publishes once its rival has gone. The other nodes then see one publisher."""
+    """A passive node publishes only after its rival has gone. Then the other nodes see one
+    publisher."""
     others, ours, rival = join("others"), join("supervisor"), join("rival")
     rival.publisher(LIFT_REQUESTS)
     heard: list[LiftRequest] = []

@@ -1,4 +1,5 @@
-"""A lift's daemon before a real HTTP gateway: it rides, it is killed, and all outputs go off."""
+"""A lift's daemon with a real HTTP gateway. The lift rides, the test kills the daemon, and all outputs
+go off."""
 
 import signal
 from collections.abc import Iterator
@@ -21,7 +22,7 @@ EXAMPLE = Path(__file__).parents[2] / "config" / "lift_http.yaml"
 
 
 class Gateway:
-    """A gateway with a lift. Its timers are longer than any test, so only the daemon can switch off."""
+    """A gateway with a lift. Its timers run longer than any test, so only the daemon can switch off."""
 
     def __init__(self, folder: Path, domain: int) -> None:
         text = EXAMPLE.read_text().replace("switches_off_after_s: 10", "switches_off_after_s: 900")

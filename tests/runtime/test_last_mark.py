@@ -1,6 +1,7 @@
-"""A mark of the daemon's last run says that its outputs are off, and spares `outputs-off` its work.
+"""The mark that a daemon's last run leaves. It says that all outputs are off, so that `outputs-off`
+need not switch.
 
-The mark counts only after the clean stop of the same run.
+The mark counts only if the same run stopped cleanly.
 """
 
 import signal

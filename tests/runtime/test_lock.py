@@ -1,6 +1,6 @@
-"""Processes that read the lock file or wait for the lock keep no relay on.
+"""Processes that read the lock file or wait for the lock. They keep no relay on.
 
-No run of a daemon switches another run's outputs off.
+No run of a daemon switches the outputs of another run off.
 """
 
 import fcntl
@@ -26,7 +26,7 @@ from tests.waiting import wait_until
 
 @pytest.fixture
 def public() -> Iterator[Path]:
-    """Yield a directory that other users can reach. Pytest's own directories are private."""
+    """Yield a directory that other users can reach. The directories of pytest are private."""
     with tempfile.TemporaryDirectory(dir="/tmp") as folder:
         yield Path(folder)
 

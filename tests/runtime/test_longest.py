@@ -1,4 +1,4 @@
-"""Ten megabytes in a string of a message are not kept, in any message that a kind hears."""
+"""Messages with a string of ten megabytes. No kind keeps such a string."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -20,7 +20,7 @@ from bridges.settings.load import load
 CONFIG = Path(__file__).parents[2] / "config"
 HUGE = "x" * 10_000_000
 KEPT_MOST = 20_000
-"""The limit of the characters that may be kept of one message."""
+"""The greatest number of characters that a kind may keep of one message."""
 
 ROBOT = d.RobotState(
     name="AMR01", task_id="t", mode=d.RobotMode(int(d.RobotModeValue.MODE_CHARGING))
@@ -63,9 +63,9 @@ HEARD: dict[str, dict[Topic[Any], Message]] = {
 
 
 def taker(name: str, topic: Topic[Any]) -> Callable[[Message], object]:
-    """Return a function that makes an event of a message on this topic.
+    """Return a function that turns a message on this topic into an event.
 
-    The function uses the settings of the shipped YAML file `name`.
+    The settings come from the shipped YAML file `name`.
     """
     config = load(CONFIG / f"{name}.yaml")
     kind = kind_called(config.kind)
@@ -77,7 +77,7 @@ def taker(name: str, topic: Topic[Any]) -> Callable[[Message], object]:
 
 
 def with_huge(value: Any) -> Iterator[Any]:
-    """Yield a copy of the value for each of its strings. In each copy that string is huge."""
+    """Yield one copy of the value for each of its strings. In each copy one string is huge."""
     if isinstance(value, str):
         yield HUGE
     elif isinstance(value, tuple):

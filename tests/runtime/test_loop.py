@@ -1,4 +1,4 @@
-"""A bus with its devices in virtual time: the order of scans in a round, and the loop's end."""
+"""The loop of a bus in virtual time: the order of the scans in a round, and the loop's end."""
 
 import pytest
 
@@ -60,8 +60,8 @@ def test_one_device_that_cannot_be_switched_off_keeps_no_other_on_and_is_reporte
 
 
 def test_after_a_suspension_nothing_is_shown_that_was_only_true_before_it() -> None:
-    """The suspension, by SIGSTOP or by a laptop's sleep, is shorter than a reading's greatest permitted
-    age."""
+    """The daemon is suspended by SIGSTOP or by a laptop's sleep. The suspension is shorter than a
+    reading may be old."""
     corridor = Corridor(debounce={"opened": 0.1, "closed": 0.1})
     for i in range(7):
         corridor.round(SCAN_S * i)
@@ -98,7 +98,7 @@ def test_a_slow_bus_does_not_count_as_a_suspension(caplog: pytest.LogCaptureFixt
 
 
 def test_each_device_that_is_scanned_and_each_call_of_the_bus_shows_that_the_loop_lives() -> None:
-    """Thirty silent units cause a round of thirty timeouts. Such a long round must not look like a
+    """With thirty silent units one round has thirty timeouts. Such a long round must not look like a
     hang."""
     corridor = Corridor()
     counts: list[int] = []

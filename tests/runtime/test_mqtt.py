@@ -13,7 +13,7 @@ from tests.waiting import wait_until
 
 
 class Shelly(Module):
-    """A broker, a relay with two inputs at the broker, and the door behind them."""
+    """A broker, a relay with two inputs, and the door behind the relay."""
 
     text = """
 kind: door

@@ -1,4 +1,4 @@
-"""Inputs on another bus than the device's, in virtual time: what is late or lost is unknown."""
+"""Inputs on a bus that is not the device's bus, in virtual time. A late or lost input is unknown."""
 
 import itertools
 import logging
@@ -23,9 +23,11 @@ from workbench.replay.replayed import Replay, ReplayedCores, of_head
 LIFT: Final = Path(__file__).parents[2] / "config" / "lift_two_buses.yaml"
 STALE_S: Final = 1.0
 LATEST_S: Final = STALE_S + 0.15 + 0.1
-"""stale_after_s; how long a reading of the header counts (0.05 + 0.1 s); a scan of the gateway."""
+"""The greatest age (s) of inputs in use: stale_after_s, plus the validity of a reading of the header
+(0.05 s + 0.1 s), plus a scan of the gateway."""
 SEEN_S: Final = 0.05 + 0.15 + 0.1 + 0.05
-"""The debounce of a fire contact, longer by the age of a reading; a scan of each bus."""
+"""The longest time (s) until an alarm is seen: the debounce of a fire contact, the age of a reading,
+and a scan of each bus."""
 
 
 @pytest.fixture
@@ -57,7 +59,7 @@ def ride(on: OnTwoBuses) -> None:
 
 
 def modes(on: OnTwoBuses) -> list[str]:
-    """Return the door's modes, each once in a row."""
+    """Return the door's modes in order, without repetitions."""
     names = (DoorModeValue(state.current_mode.value).name[5:] for _, state in on.states)
     return [name for name, _ in itertools.groupby(names)]
 
@@ -119,7 +121,7 @@ def test_an_alarm_that_begins_while_the_other_bus_is_dead_is_never_taken_for_non
 
 
 def test_one_reading_of_the_other_bus_is_no_debounced_change(door: OnTwoBuses) -> None:
-    """The gateway's thread looks at the same reading several times."""
+    """The gateway's thread takes one reading of the other bus several times."""
     door.run(1.0)
     hold(door)
     door.run(3.0)
@@ -178,7 +180,7 @@ def test_a_reading_counts_from_before_it_was_asked_for_and_not_longer_than_its_t
 
 
 def test_what_was_decided_on_two_buses_is_decided_again_from_its_recording(tmp_path: Path) -> None:
-    """The recorded sample has the values of both buses, and the debounce comes from the YAML."""
+    """The recorded sample has the values of both buses. The debounce times come from the YAML."""
     file = tmp_path / "door.yaml"
     file.write_text(DOOR)
     on = OnTwoBuses(file, ring=tmp_path)
@@ -201,7 +203,7 @@ def test_what_was_decided_on_two_buses_is_decided_again_from_its_recording(tmp_p
     assert replay.course.decisions > 20
 
 
-# ---- walks: every order of a few events
+# ---- walks through every order of some events
 
 
 Step = tuple[str, Callable[[OnTwoBuses], None]]
@@ -232,7 +234,8 @@ PART_S: Final = 0.3
 
 
 class Laws:
-    """What no order of events may break, looked at after each round of the device's own bus."""
+    """Laws that hold for every order of events. `look` checks them after each round of the device's
+    bus."""
 
     def __init__(self, on: OnTwoBuses, fire: str, says_fit: Callable[[OnTwoBuses], bool]) -> None:
         self._on = on

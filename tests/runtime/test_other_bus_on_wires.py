@@ -1,7 +1,7 @@
-"""Inputs on another bus, on real buses and threads: Modbus TCP beside Modbus TCP, and beside pins.
+"""Inputs on another bus, with real buses and threads. The buses are Modbus TCP and Modbus TCP or pins.
 
-The fire contact is in a panel of its own, so its module fails alone. A second door on the same gateway
-has nothing at the panel.
+The fire contact is in a separate panel, so the panel's module can fail alone. A second door on the same
+gateway has no input at the panel.
 """
 
 from collections.abc import Iterator
@@ -64,7 +64,8 @@ PANELS: Final = {
 
 
 class Site:
-    """Two doors, the fire panel, and RMF. `modes`: door -> its modes, each once in a row."""
+    """Two doors, the fire panel, and RMF. `modes` has the modes of each door in order, without
+    repetitions."""
 
     def __init__(self, folder: Path, panel: str, held: ExitStack) -> None:
         bus, fire = PANELS[panel]
@@ -132,11 +133,11 @@ class Site:
         self._requests.publish(asked)
 
     def relay(self, door: str) -> list[object]:
-        """Return each change of a door's relay."""
+        """Return the value of each change of a door's relay."""
         return [e.value for e in self.plants[door].edges if e.what == "relay"]
 
     def goes_on(self, bus: str) -> None:
-        """Wait until this bus's thread has done many scans and calls more."""
+        """Wait until this bus's thread has finished ten more scans or calls."""
         before = self.loops[bus].finished
         wait_until(lambda: self.loops[bus].finished >= before + 10, f"{bus} goes on")
 
@@ -206,7 +207,7 @@ def test_a_failed_own_bus_does_not_keep_the_other_bus_from_being_read(
 
 
 def test_outputs_off_needs_the_own_bus_alone(tmp_path: Path) -> None:
-    """Nobody listens at the panel's address; its bus is not even opened."""
+    """Nobody listens at the panel's address. The command does not even open the panel's bus."""
     bus, fire = PANELS["modbus"]
     file = tmp_path / "doors.yaml"
     file.write_text(YAML.replace("PANEL", bus).replace("FIRE", fire))

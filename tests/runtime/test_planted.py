@@ -1,4 +1,5 @@
-"""Directories that another user made or put in a daemon's way. They are neither read nor written."""
+"""Directories that another user makes or replaces in a daemon's place. A daemon neither reads nor
+writes in them."""
 
 import json
 import os
@@ -62,7 +63,7 @@ def a_directory(to: Path, place: Path) -> None:
 
 
 def a_link_within(to: Path, place: Path) -> None:
-    """Make another user's own directory that has a link to one of our directories inside."""
+    """Make a directory of another user. Inside is a link to one of our directories."""
     a_directory(to, place)
     (place / "rmf-bridge").unlink()
     (place / "rmf-bridge").mkdir()
@@ -74,8 +75,8 @@ PLANTED = [a_link, a_directory, a_link_within]
 
 @pytest.fixture
 def victim(machine: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the target of an attack: a directory of root, whose files are named like a daemon's
-    files."""
+    """Return the target of an attack. It is a directory of root, and its files have the names of a
+    daemon's files."""
     for name in ("XDG_RUNTIME_DIR", "XDG_STATE_HOME"):
         monkeypatch.delenv(name)
     monkeypatch.setenv("HOME", "none")
@@ -98,7 +99,7 @@ def files(folder: Path) -> dict[str, str]:
 def test_what_anybody_plants_below_tmp_is_neither_read_nor_written(
     victim: Path, machine: Path, plant: Callable[[Path, Path], None], where: str
 ) -> None:
-    """A daemon that root starts by hand has its runtime directory or its state directory at `where`."""
+    """If root starts a daemon by hand, its runtime directory or its state directory is at `where`."""
     before = files(victim)
     plant(victim.parents[1], machine / "tmp" / where)
     with pytest.raises(Distrusted):

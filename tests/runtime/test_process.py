@@ -111,7 +111,7 @@ def test_systemd_hears_ready_then_finished_scans_then_stopping(
             heard.append(systemd.recv(64))
     ready = heard.index(b"READY=1")
     assert heard.count(b"READY=1") == 1
-    assert set(heard[:ready]) <= {STARTING.encode()}  # a slow start sends these
+    assert set(heard[:ready]) <= {STARTING.encode()}  # only a slow start sends these messages
     assert set(heard[ready:]) == {b"READY=1", b"WATCHDOG=1", b"STOPPING=1"}
 
 

@@ -1,4 +1,5 @@
-"""A record has all data for switching off, even if files on the disk change later."""
+"""A record of claimed outputs. It has all data to switch off, even if files on the disk change
+later."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -59,7 +60,7 @@ def test_a_profile_that_is_gone_from_the_disk_is_found_in_the_record() -> None:
 
 
 class Silent:
-    """A device that answers only at the third try."""
+    """A device that answers from the third try on."""
 
     def __init__(self) -> None:
         self.called: list[str] = []

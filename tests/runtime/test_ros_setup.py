@@ -1,6 +1,6 @@
 """The key `ros_setup:` in the YAML file.
 
-The daemon sources ROS's setup file, and goes on as if it was started from a prepared shell.
+The daemon sources ROS's setup file. Then it runs as if a prepared shell had started it.
 """
 
 import logging

@@ -27,7 +27,7 @@ from tests.depth import depth
 FILE = Path("/etc/rmf-bridges/lift.yaml")
 OURS = ourselves(FILE, serves=True)
 DEAD = replace(OURS, started=1)
-"""The identity of a dead process. By now another process has its number."""
+"""The identity of a dead process. Another process has got the same number."""
 CLAIMED = ClaimRecord(str(FILE), b"kind: lift\n", {"make.yaml": b"for: door_register\n"})
 
 
@@ -81,7 +81,7 @@ def test_where_the_state_keeps_an_old_name_the_runtime_directory_says_who_it_is(
     serving = RuntimeDirectory(both, FILE, serves=False)
     named(
         tmp_path / "state", DEAD
-    )  # an earlier daemon wrote this, before the disk became read-only
+    )  # an earlier daemon wrote this file before the disk became read-only
     assert look(both) == replace(OURS, serves=False)
     with pytest.raises(AlreadyRunning, match=f"in use by process {os.getpid()}"):
         RuntimeDirectory(both, FILE, serves=True, wait_s=0.0)
@@ -365,13 +365,13 @@ def test_a_record_that_the_state_directory_cannot_take_goes_to_the_runtime_direc
     kept = MemoryFile(state, runtime)
     kept.write(b"one")
     state.unlink()
-    state.mkdir()  # a directory, which no file can replace
+    state.mkdir()  # no file can replace a directory
     kept.write(b"two")
     kept.write(b"three")
     assert (kept.read(), runtime.read_bytes()) == (b"three", b"three")
     assert [r.getMessage().split(" ")[0] for r in caplog.records] == ["not_written"]
     state.rmdir()
-    state.write_bytes(b"one")  # an old record, from before the disk failed
+    state.write_bytes(b"one")  # an old record from before the failure
     assert MemoryFile(state, runtime).read() == b"three"
     kept.write(b"four")
     assert (MemoryFile(state, runtime).read(), runtime.exists()) == (b"four", False)

@@ -1,4 +1,4 @@
-"""The thread of a service. The test provides the rounds that the thread runs."""
+"""The thread of a service. The test chooses what the thread's rounds do."""
 
 import threading
 import time
@@ -14,7 +14,8 @@ CLOCK = Clock(time.monotonic, time.time)
 
 
 class Rounds:
-    """Rounds that fail once `works` is False. `end` waits for `after`, and then returns `safe`."""
+    """Rounds for the thread. With `works` false a round fails. `end` waits for `after`, and returns
+    `safe`."""
 
     name = "rounds"
 

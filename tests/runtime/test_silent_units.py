@@ -1,4 +1,5 @@
-"""Silent devices delay live devices by at most one timeout, from the first round on."""
+"""Silent devices among live devices. From the first round on, they delay a live device by one timeout
+at most."""
 
 from collections.abc import Iterator
 from itertools import groupby, pairwise
@@ -21,7 +22,7 @@ SILENT = [f"silent{i}" for i in range(30)]
 
 
 def corridor(*names: str) -> Corridor:
-    """Return a corridor with these live doors between two halves of the silent doors."""
+    """Return a corridor. The live doors are in the middle of the silent doors."""
     made = Corridor(doors=[*SILENT[:15], *names, *SILENT[15:]])
     for name in SILENT:
         made.falls_silent(name, TIMEOUT_S)
@@ -29,7 +30,7 @@ def corridor(*names: str) -> Corridor:
 
 
 def served(corridor: Corridor, until: float) -> None:
-    """Run the rounds that the service's thread would run up to this time."""
+    """Run all rounds that the service's thread would run until this time (s)."""
     while corridor.now < until:
         corridor.round(max(corridor.now, corridor.loop.wake_at))
 
@@ -64,7 +65,7 @@ def test_a_request_to_a_silent_door_waits_for_its_turn_and_is_not_lost() -> None
 
 
 def test_doors_that_fall_silent_together_are_found_one_in_a_round() -> None:
-    """Between two readings of silent doors the door `ward` is read."""
+    """After each silent door the loop reads the door `ward`."""
     falling = Corridor(doors=["ward", *SILENT])
     served(falling, 1.0)
     for name in SILENT:
@@ -109,7 +110,7 @@ DOOR = """
     params=[(Module, depth(8, 30)), (SerialModule, depth(8, 16))], ids=["on tcp", "on rtu"]
 )
 def line(request: pytest.FixtureRequest) -> Iterator[tuple[Module, int]]:
-    """Yield a module with one live unit, and the number of silent units on the same bus."""
+    """Yield a module with one live unit, and the number of silent units on its bus."""
     make, silent = request.param
     module: Module = make()
     module.units.clear()

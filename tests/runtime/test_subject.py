@@ -1,4 +1,4 @@
-"""A subject's lines in the log, its status and its counts."""
+"""A subject's log lines, its status and its counts."""
 
 import logging
 
@@ -14,7 +14,7 @@ from bridges.runtime.subject import Subject, SubjectCore
 
 
 class Seen(msgspec.Struct, frozen=True):
-    """A report of a number. The report is news when the number changes between even and odd."""
+    """A report of a number. It is news after a change from even to odd or from odd to even."""
 
     number: int
     faults: tuple[Fault, ...] = ()

@@ -1,4 +1,4 @@
-"""A lift and its supervisor as two daemons on DDS, and commands by an operator."""
+"""A lift and its supervisor as two daemons on DDS. An operator types commands."""
 
 import subprocess
 from collections.abc import Iterator
@@ -14,14 +14,14 @@ CONFIG = Path(__file__).parents[2] / "config"
 
 @dataclass
 class Building:
-    """The daemons of a lift and its supervisor, in one domain."""
+    """The daemons of a lift and its supervisor, in one DDS domain."""
 
     domain: int
     supervisor: Daemon
     lift: Daemon
 
     def operator(self, *arguments: str) -> "subprocess.CompletedProcess[str]":
-        """Run one command of the operator."""
+        """Run one command that an operator types."""
         graph = ("--localhost", "--domain-id", str(self.domain), "--timeout", "30")
         return subprocess.run(
             command(*arguments, *graph), env=environment(), capture_output=True, text=True

@@ -1,4 +1,4 @@
-"""A new process switches off. Silent devices must not keep another device's relay on."""
+"""A new process that switches off. Silent devices must not keep another device's relay on."""
 
 import threading
 from collections.abc import Iterator
@@ -18,10 +18,10 @@ SILENT = 30
 
 @pytest.fixture
 def module() -> Iterator[Module]:
-    """Yield a module on which only the last of many units answers. The relay of that unit is on.
+    """Yield a module with many units. Only the last unit answers, and its relay is on.
 
-    At the time limit some threads wait for silent units. The threads end when the module is closed, and
-    the fixture waits for them.
+    At the time limit some threads still wait for silent units. They end when the module closes, and the
+    fixture waits for their end.
     """
     before = set(threading.enumerate())
     standing = Module()

@@ -1,4 +1,4 @@
-"""A dead bus is listed first in the YAML file. It must not keep a relay of another bus on.
+"""A dead bus that comes first in the YAML file. It must not keep a relay of another bus on.
 
 The daemon ends in several ways.
 """
@@ -26,12 +26,13 @@ from tests.waiting import wait_until
 HURT = "tests.runtime.hurt"
 SIGNALS = [signal.SIGTERM, *depth([], [signal.SIGINT, signal.SIGHUP, signal.SIGTSTP])]
 PARTS = ["loop", "reader", "watch"]
-"""The parts that fail (`hurt.py`): a bus's thread, the transport, and the thread that watches both."""
+"""The parts that fail (`hurt.py`): a bus's thread, the transport, and the thread that watches over
+them."""
 
 
 @pytest.fixture
 def two(module: Module) -> Iterator[Path]:
-    """Yield the door's YAML file with a second door before it. The second door's bus never answers."""
+    """Yield a YAML file with two doors. The bus of the first door never answers."""
     with socket.create_server(("127.0.0.1", 0)) as hole:
         module.file.write_text(with_a_dead_bus_first(module.yaml, hole.getsockname()[1]))
         yield module.file
@@ -59,7 +60,7 @@ def test_a_part_that_dies_switches_the_live_bus_off_while_the_dead_one_is_still_
         hurt.touch()
 
         def ended() -> bool:
-            graph.request(DoorModeValue.MODE_OPEN)  # the message wakes the reader
+            graph.request(DoorModeValue.MODE_OPEN)  # the request wakes the reader
             return running.process.poll() is not None
 
         wait_until(ended, "the daemon has ended")
@@ -88,8 +89,8 @@ def test_after_a_kill_the_live_bus_is_switched_off_while_the_dead_one_is_still_t
 def test_what_several_dead_daemons_left_on_shares_the_time_of_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """systemd kills ExecStopPost after TimeoutStopSec. Even the last record must have its turn before
-    that."""
+    """After TimeoutStopSec systemd kills ExecStopPost. By then even the last record must have had its
+    share of the time."""
     file, given = tmp_path / "lift.yaml", list[float]()
     claims = Records(Directories(tmp_path, tmp_path), file)
     for name in ("lift_dry_contact", "lift_relay_board", "lift_one_hot"):

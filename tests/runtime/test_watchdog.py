@@ -1,4 +1,4 @@
-"""A single call of a bus must be so short that systemd's watchdog does not take it for a hang."""
+"""The length of a single call of a bus. Systemd's watchdog must not take the call for a hang."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A dispenser's daemon as a process, which SIGKILL ends at each stage. Its PLC goes on."""
+"""A dispenser's daemon as a process. SIGKILL ends it at each stage, and its PLC continues."""
 
 import signal
 from collections.abc import Callable, Iterator
@@ -41,7 +41,7 @@ dispensers:
 
 
 class Site:
-    """The PLC in this process, and RMF's phase on the graph."""
+    """The PLC of the dispenser, and the phase of RMF's task that uses the dispenser."""
 
     def __init__(self, directory: Path, domain: int, stack: ExitStack) -> None:
         self.directory = directory
@@ -64,13 +64,13 @@ class Site:
         self._now = 0.0
 
     def ask(self, guid: str) -> None:
-        """Let RMF begin a phase, and forget the messages before it."""
+        """Let RMF begin a phase, and forget all earlier messages."""
         self.heard.clear()
         self._taken = 0
         self.phase = WorkcellPhase(_request(guid), self._now)
 
     def look(self) -> None:
-        """Let RMF take its messages and repeat its request."""
+        """Let RMF read its messages and repeat its request."""
         for message in self.heard[self._taken :]:
             self._taken += 1
             self.phase.hear(message, self._now)
@@ -80,7 +80,7 @@ class Site:
             self._requests.publish(message)
 
     def until(self, is_so: Callable[[], bool], what: str) -> None:
-        """Let RMF go on until the condition holds."""
+        """Let RMF read and repeat until the condition holds."""
 
         def looked() -> bool:
             self.look()
@@ -89,20 +89,20 @@ class Site:
         wait_until(looked, what)
 
     def outcome(self) -> str:
-        """Return the outcome of RMF's phase, or "" if the phase is still active."""
+        """Return the outcome of RMF's phase, or "" before its end."""
         return self.phase.outcome
 
     def is_offline(self) -> bool:
-        """Is the last state OFFLINE?"""
+        """Return whether the last state is OFFLINE."""
         states = [m for m in self.heard if isinstance(m, d.DispenserState)]
         return bool(states) and states[-1].mode == d.WorkcellMode.OFFLINE
 
     def mode(self, mode: d.WorkcellMode) -> bool:
-        """Has a state shown this mode?"""
+        """Return whether any state has shown this mode."""
         return any(isinstance(m, d.DispenserState) and m.mode == mode for m in self.heard)
 
     def says(self, status: d.WorkcellStatus) -> bool:
-        """Has a result had this status?"""
+        """Return whether any result has had this status."""
         return any(isinstance(m, d.DispenserResult) and m.status == status for m in self.heard)
 
 

@@ -1,7 +1,7 @@
 """RMF's graph in virtual time: its parties, the network between them, and our kinds without hardware.
 
 The network may lose, delay, repeat and reorder each message. A kind without hardware runs on the
-product's own runtime (`GraphNode`). Its rounds are called when they are due. No threads run.
+product's own runtime (`GraphNode`). No thread runs: `World.run` calls each round at its due time.
 """
 
 import heapq
@@ -21,47 +21,47 @@ from workbench.rmf_model import Party as RmfParty
 from workbench.rmf_model import Said
 
 EPOCH = 2.0**30
-"""The wall time (s) when the world's clock shows 0. It is a power of two, so sums of times are
+"""The wall time (s) at 0 s on the world's clock. It is a power of two, so that sums of times are
 exact."""
 NEVER = float("inf")
 
 Route = Callable[[str, str], Sequence[float]]
-"""A function from sender and receiver to the delays of a message (s). Each delay is one arriving
-copy."""
+"""A function that gets the sender and the receiver of a message. It returns the delays (s) of all
+arriving copies."""
 
 
 class Party(Protocol):
-    """A participant: a node, a robot, a fleet adapter."""
+    """A participant, such as a node, a robot or a fleet adapter."""
 
     name: str
 
     def hear(self, topic: Topic[Any], message: Any) -> None:
-        """Take a message that has arrived."""
+        """Receive a message."""
 
     def wake_at(self) -> float:
         """Return the time (s) of the next call of `wake`."""
 
     def wake(self) -> None:
-        """Act at the time that `wake_at` gave."""
+        """Act. The world calls this method at the time from `wake_at`."""
 
 
 def at_once(sender: str, receiver: str) -> Sequence[float]:
-    """Deliver in order, after a negligible delay and without loss."""
+    """Return one short delay. Messages arrive in order and without loss."""
     return (0.01,)
 
 
 def in_order(sender: str, receiver: str) -> Sequence[float]:
-    """Deliver in order and in no time."""
+    """Return one delay of 0 s. Messages arrive in order and without loss."""
     return (0.0,)
 
 
 class World:
     """All parties and the messages between them.
 
-    - `sent` has every message as (s, sender, topic, message).
-    - `watch` is called before each message goes out.
-    - `publishers` has, by topic, the parties that declared a publisher.
-    - `hears_others` has (topic, party) if the party does not hear its own messages on the topic.
+    - `sent` has every message as (time in s, sender, topic, message).
+    - `watch` gets each message before the message goes out.
+    - `publishers` has, for each topic, the parties with a publisher.
+    - `hears_others` has (topic, party) for each party that does not hear its own messages on the topic.
     """
 
     def __init__(self, route: Route = at_once) -> None:
@@ -78,13 +78,13 @@ class World:
         self._numbers = 0
 
     def add(self, party: Party, *topics: Topic[Any]) -> None:
-        """Let a party join that hears these topics. It replaces a party with the same name."""
+        """Let a party join and hear these topics. It replaces a party with the same name."""
         self.parties[party.name] = party
         for topic in topics:
             self.hearers[topic.name].add(party.name)
 
     def remove(self, name: str) -> None:
-        """Remove a party with its publishers."""
+        """Remove a party, its subscriptions and its publishers."""
         del self.parties[name]
         for names in (*self.hearers.values(), *self.publishers.values()):
             names.discard(name)
@@ -103,14 +103,14 @@ class World:
                 self._arrives_after(delay, receiver, topic, message)
 
     def replay(self, receiver: str) -> None:
-        """Deliver all retained messages to the receiver, as to a new subscriber."""
+        """Deliver all retained messages to the receiver, as if it had just subscribed."""
         for sender in sorted(self.retained):
             for topic, message in self.retained[sender]:
                 if receiver in self.hearers[topic.name]:
                     self._arrives_after(0.05, receiver, topic, message)
 
     def run(self, until: float, done: Callable[[], bool] = lambda: False) -> None:
-        """Run all events up to this time, or until `done` returns True."""
+        """Run all events until this time (s), or until `done` returns True."""
         wakes = {name: party.wake_at() for name, party in self.parties.items()}
         while not done():
             at = min(wakes.values(), default=NEVER)
@@ -128,14 +128,14 @@ class World:
                 break
             self.now = max(self.now, at)
             next(party for name, party in self.parties.items() if wakes[name] == at).wake()
-            # The woken party may restart, add or remove other parties.
+            # During its `wake` a party may restart, add or remove other parties.
             wakes = {name: party.wake_at() for name, party in self.parties.items()}
         else:
             return
         self.now = until
 
     def said_on(self, topic: Topic[Any]) -> list[tuple[float, str, Any]]:
-        """Return every message on this topic as (s, sender, message)."""
+        """Return every message on this topic as (time in s, sender, message)."""
         return [(at, who, message) for at, who, on, message in self.sent if on == topic]
 
     def _arrives_after(
@@ -146,7 +146,7 @@ class World:
 
 
 class WorldTransport:
-    """A node's place in the world (`bridges.transports.transport.Transport`)."""
+    """The transport of a node in the world (`bridges.transports.transport.Transport`)."""
 
     speaks = "memory"
     domain_id = 0
@@ -172,7 +172,7 @@ class WorldTransport:
         return _End(self, topic)
 
     def hear(self, topic: Topic[Any], message: Any) -> None:
-        """Take a message that has arrived."""
+        """Receive a message."""
         for received in self.received[topic.name]:
             received(message)
 
@@ -202,7 +202,7 @@ class _End:
         self._node.world.send(self._node.name, self._topic, message)
 
     def matched(self) -> int:
-        """Return the number of publishers that other nodes have on the topic."""
+        """Return how many other nodes publish on the topic."""
         return len(self.senders())
 
     def senders(self) -> list[str]:
@@ -216,9 +216,9 @@ class _End:
 
 @dataclass
 class Disk:
-    """The state directory, which outlives the daemon.
+    """The state directory. It outlives the daemon.
 
-    `written` counts the writes. If `full` is set, writes fail.
+    `written` counts the writes. With `full` a write fails.
     """
 
     kept: bytes | None = None
@@ -235,7 +235,7 @@ class Disk:
 
 
 class Served:
-    """A kind without hardware that runs as in its daemon."""
+    """A kind without hardware. It runs as in its daemon."""
 
     def __init__(
         self,
@@ -255,7 +255,7 @@ class Served:
         self.restart()
 
     def restart(self) -> None:
-        """Start a new daemon. It has only the memory on its disk, and hears all retained messages."""
+        """Start a new daemon. It reads the memory on its disk, and hears all retained messages."""
         self.transport.close()
         self.world.add(self)
         self.transport = WorldTransport(self.world, self.name)
@@ -291,8 +291,7 @@ class Served:
         return list(self.node.devices())
 
     def faults(self) -> dict[str, list[str]]:
-        """Return the faults in the status by lift or door. A lift or door without faults is left
-        out."""
+        """Return the faults in the status, for each lift or door that has a fault."""
         shown = {name: status["faults"] for name, status in self.node.devices().items()}
         return {
             name: [f"{fault['code']}: {fault['detail']}" for fault in faults]
@@ -323,7 +322,7 @@ class Ticking:
 
 
 class StandIn:
-    """A stand-in for one of RMF's parties, which follows RMF's rules. `new` makes the party."""
+    """A stand-in for one of RMF's parties. It follows RMF's rules. `new` makes the party."""
 
     def __init__(
         self, world: World, new: Callable[[], RmfParty], name: str, publishes: Topic[Any]
@@ -335,7 +334,7 @@ class StandIn:
         self.restart()
 
     def restart(self) -> None:
-        """Start a new party. It remembers nothing and hears all retained messages again."""
+        """Start a new party. It has no memory, and hears all retained messages again."""
         self.party = self._new()
         self.world.add(self, *self.party.subscribes)
         self.world.publishers[self._publishes.name].add(self.name)
@@ -356,6 +355,6 @@ class StandIn:
 
 
 def say(world: World, who: str, said: Iterable[Said]) -> None:
-    """Publish messages of one of RMF's parties."""
+    """Publish messages in the name of one of RMF's parties."""
     for topic, message in said:
         world.send(who, topic, message)

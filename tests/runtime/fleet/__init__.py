@@ -1,1 +1,2 @@
-"""The service of a fleet: RMF's adapter, or its stand-in, on one side, and robots on the other."""
+"""The service of a fleet. On one side is RMF's adapter or a stand-in, and on the other side are
+robots."""

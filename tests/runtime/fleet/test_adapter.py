@@ -1,5 +1,5 @@
-"""What the daemon asks of `rmf_adapter`: on its stand-in, and with ROS on RMF's own (`make
-test-ros`)."""
+"""The daemon's calls of `rmf_adapter`. The tests use a stand-in, and RMF's own adapter where ROS is
+installed (`make test-ros`)."""
 
 import itertools
 import shutil
@@ -30,7 +30,7 @@ FIT: dict[str, Any] = {"battery": 0.8, "fit": True}
 
 
 def place(waypoint: str) -> Pose:
-    """Return a waypoint of the graph on the robots' map."""
+    """Return the place of a waypoint, as a pose on the robots' map."""
     vertex = SITE.graph.called(waypoint)
     assert vertex
     return SITE.of("AMR01").on_robots_map(vertex.pose())
@@ -38,7 +38,7 @@ def place(waypoint: str) -> Pose:
 
 @dataclass
 class Joined:
-    """An adapter that has joined its RMF, and the orders that came back."""
+    """An adapter that has joined its RMF. `orders` has the orders that RMF has given."""
 
     adapter: FullControl
     orders: list[Order] = field(default_factory=list)
@@ -49,7 +49,7 @@ class Joined:
         self.threads.add(threading.current_thread())
 
     def says(self, at: str = "wait_1", robot: str = "AMR01", **levels: Any) -> None:
-        """Give RMF a robot's levels."""
+        """Give RMF a robot's position and levels."""
         self.adapter.update(robot, RobotReport(at=place(at), **{**FIT, **levels}))
 
 
@@ -64,7 +64,7 @@ def joined(rmf: Any) -> Joined:
 
 @pytest.fixture
 def schedule() -> Iterator[None]:
-    """RMF's own schedule node."""
+    """Run RMF's own schedule node."""
     ros2 = shutil.which("ros2")
     assert ros2, "source ROS's setup file first"
     node = subprocess.Popen([ros2, "run", "rmf_traffic_ros2", "rmf_traffic_schedule"])
@@ -109,7 +109,7 @@ class TestOnTheStandIn(AdapterContract):
         return stand_in.fleet.handles[robot]
 
     def sent(self, stand_in: StandIn, rmf: Joined, to: str = "pharmacy") -> Navigate:
-        """Send the robot to a waypoint; return the first order."""
+        """Let RMF send the robot to a waypoint. Return RMF's order."""
         assert stand_in.fleet
         rmf.says()
         assert stand_in.fleet.patrols.send(self.handle(stand_in).robot, to)

@@ -1,4 +1,5 @@
-"""A fleet's daemon as a process: robots patrol, fail and come back; a start that must fail says why."""
+"""A fleet's daemon as a process. Robots patrol, fail and recover, and a refused start names its
+reason."""
 
 import importlib.util
 import json
@@ -24,11 +25,12 @@ NO_ROS = importlib.util.find_spec("rmf_adapter") is None
 
 
 def site(name: str, directory: Path, **change: str) -> Path:
-    """Copy a shipped fleet with RMF's files; `change`: texts of the graph to replace."""
+    """Copy a shipped fleet with RMF's files. `change` has texts in the graph, and their
+    replacements."""
     file = shipped(name, directory, wire())
     file.write_text(
         file.read_text().replace("rmf:\n", "rmf:\n  release: kilted\n")
-    )  # as `join` has
+    )  # `join` uses this release too
     shutil.copy(CONFIG / "fleet_tiny.yaml", directory)
     graph = (CONFIG / "fleet_tiny_graph.yaml").read_text()
     for old, new in change.items():
@@ -39,7 +41,8 @@ def site(name: str, directory: Path, **change: str) -> Path:
 
 @dataclass
 class Fleet:
-    """A running simulation, seen from RMF's graph, from its status file and from its plants."""
+    """A running simulation. The test sees RMF's graph and the status file, and orders the simulated
+    robots."""
 
     running: Daemon
     runtime: Path
@@ -86,7 +89,7 @@ def test_robots_patrol_and_a_robot_with_a_fault_is_taken_out_until_it_is_over(
         lambda: fleet.states and len(fleet.states[-1].robots) == 3, "RMF's graph hears the fleet"
     )
     fleet.running.wait_for('device=AMR01 at="L1 between waypoints" doing="navigate')
-    if "vda5050" in fleet.running.log.read_text():  # the tutorial's manager tells no faults
+    if "vda5050" in fleet.running.log.read_text():  # the tutorial's manager reports no faults
         fleet.tells("press AMR01 fault on")
         fleet.until(lambda: fleet.faults() == ["ROBOT_FAULT"], "the fault is told")
         assert fleet.robot()["new_tasks"] == "no"
