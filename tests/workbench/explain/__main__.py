@@ -1,4 +1,4 @@
-"""Writes the expected texts anew: `python -m tests.workbench.explain [NAME …]`."""
+"""A program that writes the expected texts again: `python -m tests.workbench.explain [NAME …]`."""
 
 import logging
 import sys

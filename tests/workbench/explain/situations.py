@@ -1,4 +1,4 @@
-"""Situations that `explain` must describe correctly: real cores, drivers and plants in virtual time.
+"""Situations for `explain`. Real cores and drivers run with simulated devices in virtual time.
 
 Each function returns the messages on the graph, and the device that a person asks about.
 """
@@ -32,7 +32,8 @@ def held_by_another() -> Case:
 
 
 def holder_rides() -> Case:
-    """One robot waits for the lift. The robot that has the lift waits for the car to arrive."""
+    """A robot waits, because another robot has the lift. The second robot waits for the car to
+    arrive."""
     scene, red, _ = _two("Lift1")
     scene.until(red)
     red.asks("Lift1", "L4", inside=True)
@@ -41,7 +42,7 @@ def holder_rides() -> Case:
 
 
 def holder_is_dead() -> Case:
-    """The holder's fleet adapter died without END."""
+    """Two robots want the lift. The fleet adapter of the robot that has it has died without END."""
     scene, red, _ = _two("Lift1")
     scene.until(red)
     red.dies()
@@ -50,7 +51,8 @@ def holder_is_dead() -> Case:
 
 
 def holder_alone_is_dead() -> Case:
-    """The holder's fleet adapter died without END, and no other robot asks for the lift."""
+    """A robot has the lift, and its fleet adapter has died without END. No other robot asks for the
+    lift."""
     scene = Scene("Lift1")
     red = scene.robot("fleet/red")
     red.asks("Lift1", "L2")
@@ -92,7 +94,7 @@ def open_but_at_no_floor() -> Case:
 
 
 def floor_contact_lost() -> Case:
-    """The car stands at a floor, and the floor's contact does not show that floor."""
+    """The car stands at a floor, but the floor's contact shows nothing."""
     scene = Scene("Lift2")
     red = scene.robot("fleet/red")
     scene.fail("Lift2", "floor_L3", "off")
@@ -102,7 +104,8 @@ def floor_contact_lost() -> Case:
 
 
 def forgotten_by_rmf() -> Case:
-    """RMF's supervisor has restarted and asks for another robot. The holder's fleet adapter is dead."""
+    """RMF's supervisor has restarted, and asks for a second robot. The first robot still has the lift,
+    but its fleet adapter is dead."""
     scene = Scene("Lift1", rmf=True)
     red, blue = scene.robot("fleet/red"), scene.robot("fleet/blue")
     red.asks("Lift1", "L2")
@@ -118,7 +121,7 @@ def forgotten_by_rmf() -> Case:
 
 
 def unknown_floor() -> Case:
-    """A request to a floor that the lift does not serve."""
+    """A robot asks for a floor that the lift does not serve."""
     scene = Scene("Lift1")
     scene.robot("fleet/red").asks("Lift1", "B2")
     scene.run(30.0)
@@ -135,7 +138,7 @@ def foreign_node_refuses() -> Case:
 
 
 def no_supervisor() -> Case:
-    """No supervisor passes on the requests of the fleet adapters."""
+    """No supervisor runs, so nobody passes on the requests of the fleet adapters."""
     scene = Scene("Lift1")
     scene.supervisors["lift_supervisor"].kill()
     scene.run(1.0)
@@ -146,7 +149,7 @@ def no_supervisor() -> Case:
 
 
 def supervisor_is_passive() -> Case:
-    """A node has a publisher on `lift_requests` and publishes nothing. So our supervisor stays
+    """A foreign node has a publisher on `lift_requests`, but publishes nothing. So our supervisor stays
     silent."""
     scene = Scene("Lift1")
     Place(scene.air, "forgotten_pub", lambda: None).publisher(topics.LIFT_REQUESTS)
@@ -158,7 +161,7 @@ def supervisor_is_passive() -> Case:
 
 
 def reading_is_old() -> Case:
-    """The lift's bus does not answer any more."""
+    """The lift's bus has stopped answering, so the last reading grows old."""
     scene, red, _ = _two("Lift2")
     scene.devices["Lift2"].far.down = "the module does not answer"
     scene.run(30.0)
@@ -175,7 +178,7 @@ def nobody_publishes() -> Case:
 
 
 def daemon_is_gone() -> Case:
-    """The lift's daemon dies in the middle of a ride."""
+    """The lift's daemon has died in the middle of a ride."""
     scene, red, _ = _two("Lift1")
     scene.until(red)
     scene.daemons["Lift1"].kill()
@@ -200,7 +203,7 @@ def stamps_of_another_clock() -> Case:
 
 
 def two_nodes() -> Case:
-    """Two nodes publish states under one name."""
+    """Two nodes publish states of one lift."""
     scene = Scene(diagnoses=False)
     _Foreign(scene)
     scene.run(0.4)
@@ -211,7 +214,7 @@ def two_nodes() -> Case:
 
 
 def all_is_well() -> Case:
-    """A ride that has ended well."""
+    """A ride has ended well."""
     scene = Scene("Lift1")
     scene.rides(scene.robot("fleet/red"), "Lift1", "L2", "L3")
     scene.run(10.0)
@@ -219,7 +222,7 @@ def all_is_well() -> Case:
 
 
 def door_held_by_a_dead_robot() -> Case:
-    """A robot has died in the doorway."""
+    """A robot's adapter has died while the robot held the door open."""
     scene = Scene("ward")
     red = scene.robot("fleet/red")
     red.opens("ward")
@@ -230,7 +233,7 @@ def door_held_by_a_dead_robot() -> Case:
 
 
 def door_does_not_open() -> Case:
-    """The door gets the command to open, and stays shut."""
+    """The daemon holds the door open, but the door stays shut."""
     scene = Scene("ward")
     scene.fail("ward", "operator", "stuck")
     scene.robot("fleet/red").opens("ward")
@@ -239,7 +242,7 @@ def door_does_not_open() -> Case:
 
 
 def door_without_supervisor() -> Case:
-    """No supervisor takes the requests of the fleet adapters."""
+    """No supervisor runs, so nobody takes the requests of the fleet adapters."""
     scene = Scene("ward")
     scene.supervisors["door_supervisor"].kill()
     scene.run(1.0)
@@ -258,7 +261,7 @@ def door_held_open_by_a_person() -> Case:
 
 
 def charger_refuses() -> Case:
-    """A second robot asks for a charger that another robot has."""
+    """A second robot asks for a charger that is promised to another robot."""
     scene = Scene("bay1")
     scene.says(topics.CHARGER_REQUESTS, _charge("bay1", "red", "r1"))
     scene.run(3.0)
@@ -281,7 +284,7 @@ def wrong_station() -> Case:
 
 
 def coordinator_queues() -> Case:
-    """More robots than chargers: the coordinator keeps a queue, and gives reasons."""
+    """There are more robots than chargers. The coordinator keeps a queue, and gives reasons."""
     scene = Scene("bay1")
     scene.coordinate("red", "blue")
     scene.run(6.0)
@@ -325,7 +328,7 @@ SCENES: Final[Mapping[str, Callable[[], Case]]] = {
 
 
 def _two(lift: str) -> tuple[Scene, Guest, Guest]:
-    """Let red ask for L2, and blue for L1 2 s later."""
+    """Let red ask for L2, and let blue ask for L1 2 s later."""
     scene = Scene(lift)
     red, blue = scene.robot("fleet/red"), scene.robot("fleet/blue")
     red.asks(lift, "L2")
@@ -339,7 +342,7 @@ def _charge(charger: str, robot: str, request: str) -> d.ChargerRequest:
 
 
 class _Foreign:
-    """Another maker's lift node. It publishes the same state each second, whatever robots ask."""
+    """A lift node of another maker. Whatever robots ask, it publishes the same state each second."""
 
     def __init__(self, scene: Scene, stamp_s: float = 0.0, **fields: object) -> None:
         self._scene = scene

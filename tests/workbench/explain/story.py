@@ -1,7 +1,7 @@
-"""Short scenes in virtual time, with the devices of the soak test. Cores, drivers and plants are real;
-RMF is a model that follows RMF's rules.
+"""Short scenes in virtual time, with the devices of the soak test.
 
-Every message on the graph becomes a `Heard`, as in a recording.
+Cores and drivers are real, and the devices are simulated. A model of RMF follows RMF's rules. Every
+message on the graph becomes a `Heard`, as in a recording.
 """
 
 from abc import ABC, abstractmethod
@@ -40,7 +40,7 @@ SUPERVISORS: dict[str, AnyGraphKind] = {
 
 
 class Rider(ABC):
-    """A robot in the phases of its task. `robot` is the fleet adapter's knowledge of the robot."""
+    """A robot and the phases of its task. `robot` has all that the fleet adapter knows of it."""
 
     robot: RobotContext
 
@@ -66,7 +66,7 @@ class Rider(ABC):
 
 
 class Guest(Rider):
-    """A fleet adapter with one robot, on the simulated graph. Its clock is `behind_s` seconds slow."""
+    """A fleet adapter with one robot on the simulated graph. Its clock is `behind_s` seconds slow."""
 
     def __init__(self, timeline: Timeline, air: Air, name: str) -> None:
         self.robot = RobotContext(name)
@@ -85,7 +85,7 @@ class Guest(Rider):
         self._say(self.robot.begin(phase, self._now))
 
     def dies(self) -> None:
-        """Remove the robot's adapter from the graph, without a last message."""
+        """Remove the robot's adapter from the graph. It sends no last message."""
         self.place.close()
         self.robot.phase = None
 
@@ -108,7 +108,7 @@ class Guest(Rider):
 class Scene:
     """A site on a simulated graph.
 
-    The devices in `serves` have a running daemon. `rmf` puts RMF's own supervisors in place of ours.
+    A daemon runs for each device in `serves`. With `rmf`, RMF's own supervisors replace ours.
     """
 
     def __init__(self, *serves: str, rmf: bool = False, diagnoses: bool = True) -> None:
@@ -127,12 +127,12 @@ class Scene:
             daemon.start()
         self._supervise(rmf)
         self._second()
-        self.run(4.0)  # supervisors listen before they publish
+        self.run(4.0)  # at first the supervisors only listen
         self.heard.clear()
         self.run(2.0)
 
     def robot(self, name: str) -> Guest:
-        """Return a robot of this name (FLEET/ROBOT)."""
+        """Return a new robot with this name (FLEET/ROBOT)."""
         return Guest(self.timeline, self.air, name)
 
     def run(self, seconds: float) -> None:
@@ -158,7 +158,7 @@ class Scene:
         self.until(guest)
 
     def press(self, device: str, signal: str, on: bool) -> None:
-        """Let a person or the building switch a signal of the device."""
+        """Switch a signal of the device, as a person or the building would."""
         daemon = self.daemons[device]
         daemon.advance()
         self.devices[device].plant.press(signal, on, self.timeline.now)

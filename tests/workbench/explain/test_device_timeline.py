@@ -1,4 +1,4 @@
-"""The lanes of a timeline, made from messages."""
+"""The lanes of a timeline that is made from messages."""
 
 import json
 from collections.abc import Sequence
@@ -23,7 +23,8 @@ AGV = d.LiftRequest(lift_name="Lift1", session_id="fleet/red", request_type=1)
 
 
 def heard(at: float, message: d.Message, topic: str = "lift_states", wall: float = WALL) -> Heard:
-    """Return a message heard at this time. A state is stamped with the same time."""
+    """Return a message that was heard at this time. A state without a stamp gets this time as its
+    stamp."""
     if isinstance(message, d.LiftState) and message.lift_time == d.Time():
         message = replace(message, lift_time=stamp(wall + at))
     return Heard(at, wall + at, topic, message)
@@ -39,7 +40,7 @@ def told(spans: Sequence[LaneSpan]) -> list[tuple[float, float, str]]:
 
 
 def in_words(timeline: Timeline) -> list[str]:
-    """Return one line for each row, such as `door 6.1 closed 9.6 moving 12.0`."""
+    """Return one line for each lane, such as `door: 6.1-9.6 closed, 9.6-12.0 moving`."""
     lines = []
     for one in timeline.lanes:
         spans = [f"{span.from_s:.1f}-{span.to_s:.1f} {span.label}" for span in one.spans]

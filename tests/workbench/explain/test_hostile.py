@@ -1,5 +1,5 @@
-"""`explain` bounds and reports hostile messages: floods of names, strange values, control
-characters."""
+"""Hostile messages: floods of names, strange values, control characters. `explain` bounds and reports
+them."""
 
 import pytest
 from msgspec.structs import replace

@@ -1,4 +1,4 @@
-"""`explain` names a known defect of RMF only when the messages leave no doubt."""
+"""Known defects of RMF. `explain` names a defect only if the messages prove it."""
 
 from datetime import UTC
 
@@ -13,7 +13,8 @@ from workbench.explain.heard_devices import HeardDevices
 WALL, RED, BLUE = 1_800_000_000.0, "fleet/red", "fleet/blue"
 END, AGV = 0, 1
 Second = tuple[str, str, int, list[tuple[str, int, str]]]
-"""One second: the session, floor and door state that a lift shows, and the adapters' requests."""
+"""One second of a story: (session, floor, door state, requests). The first three come from the lift's
+state, and the adapters send the requests."""
 
 
 def notes(*seconds: Second) -> list[str]:

@@ -1,4 +1,4 @@
-"""A daemon's notes about its device, in our own incident files."""
+"""The notes about a device in our incident files. The device's daemon writes them."""
 
 import json
 from pathlib import Path

@@ -135,14 +135,14 @@ def _luminance(colour: str) -> float:
 
 
 def contrast(text: str, back: str) -> float:
-    """Return the contrast ratio as WCAG 2.2 defines it. Success criterion 1.4.3 asks 4.5 for text."""
+    """Return the contrast ratio (WCAG 2.2). Success criterion 1.4.3 demands 4.5 for text."""
     lighter, darker = sorted((_luminance(back), _luminance(text)), reverse=True)
     return (lighter + 0.05) / (darker + 0.05)
 
 
 @pytest.mark.parametrize("looks", [LIGHT, DARK], ids=["light", "dark"])
 def test_labels_can_be_read_on_every_tone(looks: dict[str, ToneStyle]) -> None:
-    """A label lies on the fill, and on the lines over the fill."""
+    """A label lies on the fill, and on the lines that cover the fill."""
     backs = {tone: filter(None, (looks[tone].fill, looks[tone].pattern)) for tone in TONES}
     found = {t: min(contrast(looks[t].text, back) for back in backs[t]) >= 4.5 for t in TONES}
     assert found == dict.fromkeys(TONES, True)

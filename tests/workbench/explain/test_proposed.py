@@ -1,4 +1,5 @@
-"""Each command that an explanation proposes can be copied, and names the graph of the messages."""
+"""The commands that an explanation proposes. A person can copy each command, and it names the graph
+from which the messages came."""
 
 import re
 import shlex
@@ -22,7 +23,7 @@ WHOLE = cli.whole_parser()
 
 
 def joins(command: str) -> bool:
-    """Return whether this subcommand joins a graph and has options that name the graph."""
+    """Return whether this subcommand joins a graph, and has options that name the graph."""
     (subparsers,) = (one for one in WHOLE._actions if one.dest == "command")
     assert isinstance(subparsers.choices, dict)
     return "--localhost" in subparsers.choices[command].format_help() or command == "send"

@@ -1,4 +1,4 @@
-"""`explain` explains a file at the moment for which our recorder kept the file, for every reason."""
+"""The reasons for which our recorder keeps a file. `explain` explains the moment of each reason."""
 
 import json
 from collections.abc import Iterator
@@ -38,8 +38,8 @@ def own(at: float, topic: str, /, **told: object) -> Own:
 
 
 def recorded(kind: Kind, code: str, text: str) -> Iterator[Heard | Own]:
-    """Yield the file of an idle device. The reason to keep the file lies in its middle; a fault ends
-    soon."""
+    """Yield the content of an idle device's file. The recorder kept the file for an event in its
+    middle. A fault ends 5 s after that event."""
     fault = {"code": text.partition(": ")[0], "detail": text.partition(": ")[2]}
     for second in range(int(LAST_S)):
         if second == KEPT_S:

@@ -1,4 +1,4 @@
-"""Senders on a device's own topic: the supervisor alone, or also a person with `send --direct`."""
+"""Senders on a device's own topic. Besides the supervisor, a person may send with `send --direct`."""
 
 from datetime import UTC
 
@@ -14,8 +14,8 @@ EITHER = "the supervisor, or a person with `send --direct`,"
 
 
 def lift(*said: tuple[str, d.LiftRequest]) -> str:
-    """Return the explanation of Lift1, which fleet/red has. The senders repeat these requests each
-    second."""
+    """Return the explanation of Lift1, whose session belongs to fleet/red. The senders repeat their
+    requests each second."""
     site = HeardDevices("Lift1")
     for n in range(20):
         state = d.LiftState(stamp(WALL + n), "Lift1", ("L1",), "L1", session_id="fleet/red")

@@ -1,6 +1,6 @@
 """The exact text of `explain` for each common situation, in `golden/*.txt`.
 
-`python -m tests.workbench.explain` writes the texts anew. Read the difference before you commit it.
+`python -m tests.workbench.explain` writes the texts again. Read the differences before you commit them.
 """
 
 from datetime import UTC
@@ -17,7 +17,7 @@ GOLDEN = Path(__file__).parent / "golden"
 
 
 def told(name: str) -> list[str]:
-    """Return the screen of `explain` for this situation."""
+    """Return the lines that `explain` prints for this situation."""
     heard, kind, device = SCENES[name]()
     site = HeardDevices(device)
     for one in heard:

@@ -1,4 +1,4 @@
-"""Tones of RMF's state numbers. A gap between two numbers must not shift the tones."""
+"""The tones for RMF's state numbers. An unused number must not shift the tones."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""`explain` explains a dispenser or ingestor from its requests and its own list of requests."""
+"""`explain` for a dispenser or ingestor. The workcell's requests and its own list give the reasons."""
 
 from typing import Any
 
