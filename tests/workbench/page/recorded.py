@@ -1,4 +1,4 @@
-"""A recording of a ride, as our recorder writes it."""
+"""A recording of a ride, in the form of our recorder's files."""
 
 from pathlib import Path
 
@@ -23,7 +23,8 @@ LIFT = d.LiftState(
 
 
 def write(path: Path, lift: str = "Lift1", seconds: int = 60) -> Path:
-    """Write a ride of a robot from L1 to L3: states once a second, and the requests behind them."""
+    """Write a robot's ride from L1 to L3. The file has a state each second, and the robot's
+    requests."""
     head = Head(
         "run", 1, __version__, "lift", "/etc/a.yaml", b"", {}, True, {}, RecordingSettings()
     )

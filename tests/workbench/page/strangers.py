@@ -1,4 +1,4 @@
-"""Hostile input for the page: half requests, strange frames, and long names on its graph."""
+"""Hostile input for the page: unfinished requests, strange frames, and long names on its graph."""
 
 import random
 import re
@@ -33,10 +33,10 @@ MB: Final = 1_000_000
 
 @contextmanager
 def half_requests(address: str, number: int, *, body: bool) -> Iterator[None]:
-    """Open this number of connections that each leave a request unfinished.
+    """Open `number` connections. On each of them a request remains unfinished.
 
-    With `body` each sends half a form. Otherwise each sends one whole request and half of the next
-    head.
+    With `body` each connection sends half a form. Otherwise it sends a complete request, and then half
+    of the next head.
     """
     place = urlsplit(address)
     there, host = (place.hostname or "", place.port or 0), f"Host: {place.netloc}\r\n"
@@ -57,7 +57,8 @@ def client_of(address: str) -> str:
 
 
 def strange_frames(address: str, rng: random.Random, number: int) -> int:
-    """Send frames that no browser would send, each on its own socket. Return the number sent."""
+    """Send frames that no browser would send, each on a new socket. Return the number of sent
+    frames."""
     client, sent = client_of(address), 0
     where = f"{address.replace('http', 'ws', 1)}{SOCKET}websocket"
     view = f"&client_id={client}&next_message_id=0&implicit_handshake=true&document_id=d&tab_id=t"
@@ -80,9 +81,9 @@ def strange_frames(address: str, rng: random.Random, number: int) -> int:
 def long_names(
     transport: Transport, times: int = 1, length: int = LONGEST_FLAT - 1000
 ) -> Iterator[None]:
-    """Publish 23 lifts with long names, and yield after each of the `times` rounds.
+    """Publish 23 lifts with long names in each of `times` rounds. Yield after each round.
 
-    The names have `length` characters. The default is about the longest that a transport takes.
+    The names have `length` characters. By default they are about as long as a transport permits.
     """
     publisher = transport.publisher(topics.LIFT_STATES)
     for n in range(times):

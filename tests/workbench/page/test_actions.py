@@ -1,4 +1,4 @@
-"""The commands behind the page's buttons. The command line's own parser parses each command."""
+"""The commands of the page's buttons. The parser of the command line accepts each command."""
 
 import pytest
 

@@ -1,4 +1,5 @@
-"""The page sends a browser one script for all changes of a turn, and none without a change."""
+"""The scripts that the page sends to a browser. One script has all changes of a turn. Without a change
+the page sends none."""
 
 import json
 
@@ -16,7 +17,7 @@ HOSTILE = "</script>\u2028\"'`${1}"
 
 
 class Wall:
-    """A wall that keeps the scripts for one browser."""
+    """A stand-in for a browser's view. It stores the scripts that the page sends."""
 
     def __init__(self) -> None:
         self.changes: list[list[str]] = []

@@ -1,4 +1,5 @@
-"""Requests without an answer: other host names, and sockets and forms of other origins."""
+"""Requests that the page does not answer: unknown host names, and sockets and forms of other
+origins."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Connections that have sent no request yet, and have waited too long."""
+"""Connections that have waited too long without a request."""
 
 from workbench.page.idle_connections import MOST_SILENT_S, Silent
 

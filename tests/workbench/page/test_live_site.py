@@ -1,4 +1,4 @@
-"""The page keeps the latest message of each device, in bounded memory, even with invented names."""
+"""The latest message of each device. The page stores it in bounded memory, even with invented names."""
 
 from collections import deque
 from collections.abc import Iterator, Sized
@@ -48,7 +48,7 @@ def charger(at: float, robot: str = "") -> Heard:
 
 def test_how_long_a_robot_has_had_a_charger_is_shown_as_far_as_it_was_seen() -> None:
     site, told = LiveSite(), []
-    for at in (0, 1, 2, 3, 4, 5, 6, 30, 31):  # no state from 6 s to 30 s
+    for at in (0, 1, 2, 3, 4, 5, 6, 30, 31):  # no state comes between 6 s and 30 s
         site.take(charger(float(at), "R1" if at < 3 else "" if at == 3 else "R2"))
         told.append(next(one.stands for one in site.changed(at, WALL + at)))
     assert told == [
@@ -129,7 +129,7 @@ def test_after_three_thousand_made_up_names_a_real_lift_is_explained_and_nothing
 
 
 def tables(root: object) -> Iterator[Sized]:
-    """Yield every collection that one of our objects holds, at any depth."""
+    """Yield every collection inside our objects, at any depth."""
     found, waiting = set[int](), [root]
     while waiting:
         one = waiting.pop()

@@ -1,4 +1,4 @@
-"""The list of recordings: device, reason and time, from the file's name."""
+"""The list of recordings. Device, reason and time come from the file's name."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The page in its own process, a graph that the test plays on loopback, and a real browser."""
+"""The page in a separate process, a real browser, and a graph on loopback that the test plays."""
 
 import os
 import subprocess
@@ -36,16 +36,16 @@ FLAGS = [
     "--disable-component-update",
 ]
 WITHIN_S = 120.0
-"""The longest wait (s) for a busy machine. No step normally takes this long."""
+"""The longest wait (s), enough for a busy machine. Normally no step takes this long."""
 USER, PASSWORD = "ann", "correct horse"
 SCHEMES: Final[tuple[Literal["light", "dark"], ...]] = ("light", "dark")
 SHOTS = Path("build/screenshots")
 VIOLATIONS = {"resultTypes": ["violations"]}
-"""Options for axe-core, so that its report has details of violations only."""
+"""Options for axe-core. With them its report has details of violations only."""
 
 
 class Graph:
-    """The daemons of a site, as the page hears them. Each call of `turn` publishes at most once a
+    """The nodes of a site, as the page hears them. `turn` publishes their states, at most once a
     second."""
 
     def __init__(self, domain: int, transport: Transport | None = None) -> None:
@@ -83,7 +83,7 @@ class Graph:
         if time.monotonic() - self._said_at < 1.0:
             return
         self._said_at = time.monotonic()
-        with suppress(TransportError):  # the transport may be gone for a time
+        with suppress(TransportError):  # the transport may fail for a time
             self.say()
 
     def say(self) -> None:
@@ -117,9 +117,9 @@ def graph(module_domain: int) -> Iterator[Graph]:
 def program(
     *words: str, ends: int = 0, state: Path | None = None, log: Path = Path("/dev/stderr")
 ) -> Iterator[subprocess.Popen[str]]:
-    """Run a process of ours. SIGTERM ends the process, which must exit with `ends`."""
+    """Run one of our commands as a process. SIGTERM ends it, and its exit code must be `ends`."""
     command = [sys.executable, "-m", "bridges.cli", *words]
-    # With PYTEST_CURRENT_TEST in its environment NiceGUI would believe that NiceGUI is under test.
+    # With PYTEST_CURRENT_TEST in its environment, NiceGUI would believe that the test tests NiceGUI.
     environment = {k: v for k, v in os.environ.items() if k != "PYTEST_CURRENT_TEST"}
     if state is not None:
         environment["STATE_DIRECTORY"] = str(state)
@@ -143,21 +143,21 @@ def page(
     state: Path | None = None,
     log: Path = Path("/dev/stderr"),
 ) -> Iterator[str]:
-    """Run a page at a free port, and yield its address. The page records who did what in `state`."""
+    """Run a page on a free port, and yield its address. In `state` the page records who did what."""
     with program("page", "--listen", listen, *words, state=state, log=log) as started:
         assert started.stdout is not None
         yield started.stdout.readline().split()[4]
 
 
 def on_graph(domain: int) -> tuple[str, ...]:
-    """Return the options of a page on this domain."""
+    """Return the options with which a page joins this domain."""
     return ("--localhost", "--domain-id", str(domain), "--transport", wire())
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder for passwords, recordings, and the runtime directories of this test's
-    daemons."""
+    """Return a folder for passwords, recordings, and the runtime directories of the daemons in the
+    tests."""
     made = tmp_path_factory.mktemp("page")
     access.add_user(made / "passwords", USER, PASSWORD)
     (made / "run").mkdir()
@@ -168,7 +168,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def address(module_domain: int, folder: Path) -> Iterator[str]:
-    """Yield the address of the page of a site where a user may log in."""
+    """Yield the address of a page on which a user may log in."""
     words = ["--passwords", str(folder / "passwords"), "--incidents", str(folder / "incidents")]
     words += ["--runtime-dirs", str(folder / "run")]
     with page(*on_graph(module_domain), *words) as found:
@@ -185,13 +185,14 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture
 def complaints() -> list[str]:
-    """Return the list of complaints from the browser's console and network."""
+    """Return a list that collects the complaints of the browser's console and network."""
     return []
 
 
 @pytest.fixture(scope="module")
 def profile(browser: Browser) -> Iterator[BrowserContext]:
-    """Yield one browser profile, so that all tests of a module fetch and compile the scripts once."""
+    """Yield one browser profile for all tests of a module. So the browser fetches and compiles the
+    scripts only once."""
     made = browser.new_context(viewport={"width": 1200, "height": 800})
     made.set_default_timeout(WITHIN_S * 1e3)
     yield made
@@ -200,7 +201,7 @@ def profile(browser: Browser) -> Iterator[BrowserContext]:
 
 @pytest.fixture
 def context(profile: BrowserContext) -> Iterator[BrowserContext]:
-    """Yield the browser without cookies and tabs."""
+    """Yield the browser profile, without cookies and tabs of earlier tests."""
     yield profile
     for tab in profile.pages:
         tab.close()
@@ -209,7 +210,7 @@ def context(profile: BrowserContext) -> Iterator[BrowserContext]:
 
 @pytest.fixture
 def tab(context: BrowserContext, address: str, complaints: list[str]) -> Iterator[Page]:
-    """Yield an empty tab. The test fails if the browser complains or asks another machine."""
+    """Yield an empty tab. If the browser complains or asks another machine, the test fails."""
     opened = context.new_page()
     opened.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
     opened.on("pageerror", lambda error: complaints.append(str(error)))
@@ -224,7 +225,7 @@ def _own(url: str, address: str) -> bool:
 
 
 def log_in(tab: Page, address: str, password: str, to: str = "/lift/Lift1") -> None:
-    """Fill in the login form, and send it."""
+    """Fill in the login form and send it."""
     tab.goto(f"{address}login?next={to}")
     tab.get_by_label("User").fill(USER)
     tab.get_by_label("Password").fill(password)
@@ -232,12 +233,12 @@ def log_in(tab: Page, address: str, password: str, to: str = "/lift/Lift1") -> N
 
 
 def settled(tab: Page) -> None:
-    """Wait until all fades have ended, because contrast cannot be judged on half-transparent text."""
+    """Wait until all fades have ended. The contrast of half-transparent text cannot be judged."""
     tab.wait_for_function("document.getAnimations().every(one => one.playState !== 'running')")
 
 
 def serious_faults(tab: Page) -> list[tuple[str, str, list[str]]]:
-    """Return axe-core's serious findings, by day and by night, with their places."""
+    """Return axe-core's serious findings with their places, in the light and in the dark colours."""
     found: list[tuple[str, str, list[str]]] = []
     for scheme in SCHEMES:
         tab.emulate_media(color_scheme=scheme)
@@ -254,7 +255,7 @@ Until = Callable[[Callable[[], bool], str], None]
 
 @pytest.fixture
 def until(graph: Graph, tab: Page) -> Until:
-    """Return a function that lets the site go on until a condition holds."""
+    """Return a function that lets the site publish until a condition holds."""
 
     def wait(ready: Callable[[], bool], what: str) -> None:
         deadline = time.monotonic() + WITHIN_S
@@ -268,8 +269,8 @@ def until(graph: Graph, tab: Page) -> Until:
 
 @pytest.fixture
 def shot(tab: Page) -> Shot:
-    """Return a function that keeps pictures of the tab: on a phone and on a wall, by day and by
-    night."""
+    """Return a function that saves screenshots of the tab. It takes a phone and a wall screen, in light
+    and in dark colours."""
 
     def take(name: str) -> None:
         SHOTS.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Actions in a real browser on a real daemon beside the page, and the users who may not act."""
+"""Actions in a real browser, with a real daemon beside the page. Some users may not act."""
 
 import json
 import re
@@ -26,8 +26,9 @@ from tests.workbench.page.browser.conftest import (
 pytestmark = pytest.mark.browser
 COLOURS = """selector => { const style = getComputedStyle(document.querySelector(selector));
   return [style.color, style.backgroundColor]; }"""
-"""Under a dialog axe-core takes the body's colour for every background. So the test compares a dialog's
-colours with the buttons and panels that axe-core accepted outside a dialog."""
+"""A script that returns the two colours of an element. Under a dialog axe-core takes the body's colour
+for every background. So the test compares a dialog's colours with those of buttons and panels.
+axe-core has accepted these outside a dialog."""
 BEYOND = """() => [...document.querySelectorAll('#main :is(p, td, th, li, button)')].filter(
   one => one.getBoundingClientRect().right > innerWidth).map(one => one.outerHTML)"""
 DOOR = Path("config/door_modbus.yaml").absolute()
@@ -36,7 +37,7 @@ LIFT = Path("config/lift_dry_contact.yaml").absolute()
 
 @pytest.fixture(scope="module", autouse=True)
 def daemons(folder: Path, module_domain: int) -> Iterator[None]:
-    """Run a simulated lift and a simulated door on this test's domain."""
+    """Run a simulated lift and a simulated door in this test's domain."""
     graph = on_graph(module_domain)[1:]
     lift = ("run", str(LIFT), "--simulate", "--runtime-dir", str(folder / "run/lift"), *graph)
     door = ("run", str(DOOR), "--simulate", "--runtime-dir", str(folder / "run/door"), *graph)
@@ -45,14 +46,14 @@ def daemons(folder: Path, module_domain: int) -> Iterator[None]:
 
 
 def confirm(tab: Page, button: str, until: Until) -> None:
-    """Press a button, and confirm in the dialog."""
+    """Press a button, and then confirm in the dialog."""
     until(lambda: tab.get_by_role("button", name=button, exact=True).count() == 1, button)
     tab.get_by_role("button", name=button, exact=True).click()
     tab.get_by_role("dialog").get_by_role("button").first.click()
 
 
 def now_of(tab: Page, signal: str) -> str:
-    """Return the present value of a contact in the wiring table."""
+    """Return the present value of a signal from the wiring table."""
     row = tab.locator("tr", has=tab.locator("td:first-child", has_text=re.compile(f"^{signal}$")))
     return row.first.locator("td").nth(1).inner_text() if row.count() else ""
 
@@ -62,7 +63,7 @@ def main(tab: Page) -> str:
 
 
 def colours(tab: Page, selector: str) -> list[str]:
-    """Return the text colour and the background colour."""
+    """Return the text colour and the background colour of an element."""
     found: list[str] = tab.evaluate(COLOURS, selector)
     return found
 
@@ -73,7 +74,7 @@ def logged(folder: Path) -> str:
 
 
 def deeds(folder: Path) -> list[tuple[str, int, str]]:
-    """Return the page's record of who did what."""
+    """Return (user, exit code, command) for each action that the page has recorded."""
     file = folder / "state/actions.jsonl"
     lines = file.read_text().splitlines() if file.exists() else []
     told = [json.loads(line) for line in lines]
@@ -128,7 +129,7 @@ def test_a_release_reaches_the_daemon(
     before = len(deeds(folder))
     asked = ("send", "lift", "Lift1", "L3", "--session", "me", "--direct", *graph.options)
     log_in(tab, address, PASSWORD, "/lift/Lift1")
-    with program(*asked, ends=130):  # a requester asks, and leaves without an END
+    with program(*asked, ends=130):  # a requester asks, and goes without an END
         until(lambda: "me" in tab.locator("article.card").inner_text().split(), "the session")
     confirm(tab, "Release the lift", until)
     until(lambda: len(deeds(folder)) > before, "the command's end")

@@ -1,4 +1,4 @@
-"""The page with a network that fails and returns, a browser that never reads, and idle sockets."""
+"""The page on bad days: the network fails and returns, a browser never reads, and sockets are idle."""
 
 import re
 import socket
@@ -23,7 +23,7 @@ from tests.workbench.page.browser.test_safety import ask
 pytestmark = pytest.mark.browser
 MOST_GROWTH_MB = 60
 LONG = 4000 * "x"
-"""The end of a session's name. Long names soon fill a socket's buffers."""
+"""A long ending for a session's name. With such names a socket's buffers fill soon."""
 RELOADED = "window.loadedOnce === undefined"
 
 
@@ -37,7 +37,7 @@ def router() -> Iterator[Router]:
 
 @pytest.fixture(scope="module")
 def graph(module_domain: int, router: Router) -> Iterator[Graph]:
-    """Yield a site that reaches the page through a router."""
+    """Yield a site whose messages reach the page through a router."""
     settings = Zenoh(connect=(router.endpoint,), mode="client")
     transport = ZenohTransport("site", module_domain, loopback=False, settings=settings)
     made = Graph(module_domain, transport)
@@ -98,8 +98,8 @@ def test_a_browser_that_never_reads_is_ended_and_others_see_all(
     turn = 0
 
     def ended() -> bool:
-        """Change all lifts, so that there is much to send. Return whether the page ended the deaf
-        socket."""
+        """Change all lifts, so that the page must send much. Return whether the page has ended the
+        socket that never reads."""
         nonlocal turn
         turn += 1
         for number in range(20):
@@ -141,7 +141,7 @@ def is_closed(opened: socket.socket) -> bool:
 
 @contextmanager
 def deaf(address: str) -> Iterator[None]:
-    """Open a view's socket as the library's script does, and never read from the socket."""
+    """Open a socket as a view's script does, and never read from it."""
     _, _, text = ask(address, "/")
     found = re.search(r"'client_id': '([0-9a-f-]+)'", text)
     assert found

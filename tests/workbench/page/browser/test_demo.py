@@ -1,4 +1,4 @@
-"""The page of `make demo-page` opens at the printed address, and accepts the printed password."""
+"""The page of `make demo-page`. It opens at the printed address, and accepts the printed password."""
 
 from pathlib import Path
 from urllib.parse import urlsplit

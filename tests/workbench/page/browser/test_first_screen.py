@@ -1,4 +1,5 @@
-"""The first screen says what is wrong and how to mend it. A tab receives only changes."""
+"""The first screen of the page. It says what is wrong and how to mend it. A tab receives only
+changes."""
 
 import json
 from collections.abc import Iterator
@@ -30,7 +31,7 @@ RIGHT = """() => Math.max(...[...document.querySelectorAll('article')].map(
 
 @pytest.fixture
 def overloaded(graph: Graph) -> Iterator[str]:
-    """Overload Lift1, leave Lift2 without a fault, and yield the remedy's text for OVERLOAD."""
+    """Overload Lift1, and leave Lift2 without a fault. Yield the remedy's text for OVERLOAD."""
     graph.lift("Lift1")
     graph.lift("Lift2")
     graph.faults["Lift1"] = {"OVERLOAD": "for 9 s"}
@@ -39,7 +40,7 @@ def overloaded(graph: Graph) -> Iterator[str]:
 
 
 def stands_at(tab: Page, floor: str) -> bool:
-    """Return whether the car is drawn at this floor."""
+    """Return whether the drawing shows the car at this floor."""
     return f"car at {floor}" in drawn(tab, "Lift1")
 
 
@@ -142,7 +143,7 @@ def test_a_tab_gets_what_has_changed(
 def test_a_phone_shows_the_wiring_when_it_is_asked_for(
     tab: Page, address: str, overloaded: str, until: Until
 ) -> None:
-    """The tables of a lift need more than six screens."""
+    """The tables of a lift need more than six phone screens."""
     for width, unfolded in ((390, False), (1200, True)):
         tab.set_viewport_size({"width": width, "height": 844})
         tab.goto(address)

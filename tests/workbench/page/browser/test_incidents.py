@@ -1,4 +1,5 @@
-"""Recordings on the page: the list, one recording with its timeline and explanation, and its file."""
+"""Recordings on the page. There is a list, a view of each recording with timeline and explanation, and
+the file."""
 
 import shutil
 from collections.abc import Iterator
@@ -42,8 +43,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def address(folder: Path) -> Iterator[str]:
-    """Yield the address of a page without a graph. The page has opened one recording, and knows a
-    folder."""
+    """Yield the address of a page without a graph. It shows one recording, and a folder of
+    recordings."""
     with page(str(folder / "ride.mcap"), "--incidents", str(folder)) as found:
         yield found
 
@@ -85,7 +86,8 @@ def test_an_incident_opens_with_its_sentences_and_its_timeline(
 def test_the_list_shows_device_reason_and_the_browsers_time_and_has_a_filter(
     browser: Browser, address: str
 ) -> None:
-    """The filter finds the shown day. In this time zone the file's name has another day."""
+    """The filter finds the day that the list shows. In this time zone the file's name has another
+    day."""
     zone = ZoneInfo("Pacific/Kiritimati")
     with browser.new_context(timezone_id=zone.key) as context:
         tab = context.new_page()

@@ -1,4 +1,5 @@
-"""The page never shows an old value as now: when the page freezes or dies, or the connection stalls."""
+"""Old values on the page. When the page freezes or dies, or when the connection stalls, no view shows
+them as present values."""
 
 import os
 import signal
@@ -19,12 +20,12 @@ from tests.workbench.page.browser.test_page import card
 pytestmark = pytest.mark.browser
 WITHIN_MS = 3000
 MORE = [f"door{number}" for number in range(20)]
-"""Enough doors to make the view longer than the screen."""
+"""So many doors that the view is longer than the screen."""
 LEFT = "window.loadedOnce = true"
 
 
 class Relay:
-    """A wire between the browser and the page. With `cut` it carries nothing more, and closes no
+    """A wire between the browser and the page. After `cut` it carries nothing, but it closes no
     socket."""
 
     def __init__(self, address: str) -> None:
@@ -67,7 +68,7 @@ def relay(module_domain: int) -> Iterator[Relay]:
 
 @pytest.fixture(scope="module")
 def address(relay: Relay) -> str:
-    """Return the address of the page behind the wire."""
+    """Return the page's address on the wire."""
     return relay.address
 
 
@@ -83,9 +84,9 @@ def all_is_old(tab: Page) -> bool:
 
 @contextmanager
 def seen_as_old(tab: Page, graph: Graph, until: Until, address: str) -> Iterator[None]:
-    """Let the block stop the page, and check that every card is old.
+    """Let the block stop the page. Then check that every card is marked old.
 
-    The cards turn old within WITHIN_MS of the browser's own clock.
+    By the browser's clock this takes at most WITHIN_MS.
     """
     graph.lift("Lift1", "L1", 2, "fleet/robot")
     graph.doors |= {name: d.DoorState(door_name=name) for name in ("ward", *MORE)}
@@ -142,4 +143,4 @@ def test_a_killed_page_is_old_within_three_seconds_on_a_devices_own_view_too(
             started.wait()
         other.clock.run_for(WITHIN_MS)
         assert "\nwas\n" in other.locator("article.card").inner_text()
-    complaints.clear()  # these complaints are about the dead page
+    complaints.clear()  # these complaints come from the death of the page

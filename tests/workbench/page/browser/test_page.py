@@ -1,4 +1,4 @@
-"""The page in a real browser, beside a graph that the test plays."""
+"""The page in a real browser, with a graph that the test plays."""
 
 import pytest
 from playwright.sync_api import BrowserContext, Page
@@ -28,7 +28,7 @@ def card(tab: Page, name: str) -> str:
 
 
 def drawn(tab: Page, name: str) -> str:
-    """Return the text that describes a device's drawing."""
+    """Return the text that describes the drawing of a device."""
     found = tab.locator("article.card", has=tab.locator("h3", has_text=name)).locator("svg")
     return (found.first.get_attribute("aria-label") or "") if found.count() else ""
 
@@ -98,7 +98,7 @@ def test_a_page_that_was_opened_too_early_shows_its_device_once_it_is_heard(
 
 
 def see_lift_held(tab: Page, address: str, graph: Graph, until: Until) -> None:
-    """Let fleet/robot have a lift, and wait until the page shows that."""
+    """Let fleet/robot have a lift, and wait until the page shows the session."""
     graph.lift("Lift1", "L1", 2, "fleet/robot")
     tab.goto(address)
     until(lambda: "fleet/robot" in card(tab, "Lift1"), "the lift")

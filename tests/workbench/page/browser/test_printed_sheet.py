@@ -1,4 +1,4 @@
-"""Every tick box of the printed commissioning sheet is on the paper, whatever the names and notes."""
+"""The printed commissioning sheet. Every tick box is on the paper, even with long names and notes."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from bridges.cli import main
 
 CONFIG = Path(__file__).parents[4] / "config"
 PAGE_PX = 726
-"""The width of A4 between margins of 9 mm, at 96 pixels an inch."""
+"""The width of A4 without two margins of 9 mm, at 96 pixels per inch."""
 LONG = "a_very_long_name_of_a_lift_that_somebody_chose_for_the_east_wing_of_building_17"
 BEYOND = """() => [...document.querySelectorAll("td.box, th, td")]
   .filter(cell => cell.getBoundingClientRect().right > window.innerWidth + 1)

@@ -1,4 +1,4 @@
-"""Requests of a program that the page's server refuses."""
+"""Requests that the page's server refuses. A program sends them."""
 
 import http.client
 import os
@@ -18,7 +18,7 @@ FORM = {"Content-Type": "application/x-www-form-urlencoded"}
 
 
 PROXY, GUESSER, FLOOD = "127.0.0.9", "127.0.0.8", "127.0.0.7"
-"""Addresses that ask the page. Each address has its own rate limit."""
+"""Addresses from which the test asks the page. The page limits the rate of each address."""
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def ask(
     method: str = "",
     came_from: str = "127.0.0.1",
 ) -> tuple[int, dict[str, str], str]:
-    """Return the status, the headers and the body of an answer."""
+    """Send a request, and return the answer's status, headers and body."""
     place, at = urlsplit(address), (came_from, 0)
     connection = http.client.HTTPConnection(
         place.hostname or "", place.port or 0, timeout=60, source_address=at

@@ -1,4 +1,4 @@
-"""A stranger's messages shut nobody out of the page, and fill neither its log nor its memory."""
+"""A stranger's messages. They shut nobody out of the page, and fill neither its log nor its memory."""
 
 import os
 import random
@@ -19,7 +19,7 @@ from tests.workbench.page.strangers import MB, half_requests, long_names, strang
 
 pytestmark = pytest.mark.browser
 MOST_MB = 200
-"""The most memory of the page (MB). The service's unit permits 256 MB."""
+"""The greatest permitted memory of the page (MB). The service's unit permits 256 MB."""
 
 
 @pytest.fixture(scope="module")
