@@ -1,1 +1,2 @@
-"""`judge` applies the same laws to our nodes, to correct nodes, and to nodes with known defects."""
+"""Tests of `judge`. It applies the same laws to our nodes, to correct nodes, and to nodes with known
+defects."""

@@ -1,4 +1,4 @@
-"""A party on the graph that publishes a test's written messages at their times."""
+"""A party on the graph. It publishes given messages at given times."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ from workbench.rmf_model import NEVER, Party, Said
 
 
 class Script(Party):
-    """A party that publishes `lines`, each a (time in s, topic, message), in order."""
+    """A party that publishes `lines` in order. Each line is (time in s, topic, message)."""
 
     subscribes: Sequence[AnyTopic] = ()
 
@@ -33,12 +33,12 @@ class Script(Party):
 
 
 def lift(session: str, floor: str, lift: str = "Lift1", kind: int = 1) -> d.LiftRequest:
-    """Return a LiftRequest for an open door. `kind` 0 is END."""
+    """Return a LiftRequest that asks for an open door. `kind` 0 means END."""
     return d.LiftRequest(lift, stamp(EPOCH), session, kind, floor, 2 if kind else 0)
 
 
 def asks(at: float, session: str, floor: str, times: int = 1) -> Script:
-    """Return a party that asks on lift_requests once a second."""
+    """Return a party that publishes this request on lift_requests once a second."""
     request = lift(session, floor)
     return Script(*((at + n, topics.LIFT_REQUESTS, request) for n in range(times)))
 
@@ -49,7 +49,7 @@ def door(mode: int, who: str = "door_supervisor", name: str = "ward") -> d.DoorR
 
 
 def to_door(*modes: tuple[float, int]) -> Script:
-    """Return a party that sends each (time in s, mode) on door_requests."""
+    """Return a party that sends each mode on door_requests. Each item is (time in s, mode)."""
     return Script(*((at, topics.DOOR_REQUESTS, door(mode)) for at, mode in modes))
 
 

@@ -1,4 +1,5 @@
-"""Each law of a fleet adapter applies on an occasion. Without one the verdict is "not seen"."""
+"""The laws for fleet adapters. Each law applies on an occasion, and without one the verdict is "not
+seen"."""
 
 from collections.abc import Callable
 
@@ -18,7 +19,7 @@ Lines = list[Line]
 
 
 def verdict(law: str, lines: Lines, name: str = "fleet") -> tuple[str, str]:
-    """Return the verdict on a law, and the first evidence."""
+    """Return the verdict on a law, and the text of the first evidence."""
     judge = Judge("adapter", name, only=[law])
     lines = sorted(lines, key=lambda line: line[0])
     for at, topic, message in lines:
@@ -63,7 +64,7 @@ def alive(until: float, **robot: str) -> Lines:
 def boards(open_at: float = 8.0, until: float = 12.0) -> Lines:
     """Return messages in which RED boards at L1.
 
-    RED asks from 5.5 s, has the lift from 6 s, and sees OPEN at L1 from `open_at`.
+    RED asks from 5.5 s on, has the lift from 6 s on, and sees OPEN at L1 from `open_at` on.
     """
     return [
         *many(0.0, 6.0, car),
@@ -74,7 +75,7 @@ def boards(open_at: float = 8.0, until: float = 12.0) -> Lines:
 
 
 def rides(*more: Line) -> Lines:
-    """Return messages in which RED boards, and asks for L3 from 12.5 s."""
+    """Return messages in which RED boards, and then asks for L3 from 12.5 s on."""
     return [*boards(), *many(12.5, 15.0, lambda s: asks(s, "L3")), held(13.0), held(14.0), *more]
 
 

@@ -1,4 +1,5 @@
-"""The judge acquits RMF's own fleet adapter, and convicts each wrong adapter under its law.
+"""The judge on fleet adapters. It acquits RMF's own adapter, and convicts each wrong adapter by the
+right law.
 
 `pytest -s` prints each planted defect, the law that convicts it, and false alarms.
 """
@@ -42,11 +43,11 @@ def judged(
     again: Again | None = None,
     begins_at: float = 0.0,
 ) -> Verdicts:
-    """Return the verdict after LONG_S.
+    """Return the verdict after LONG_S seconds.
 
-    `cut` gives the name of a party that loses the network, the time, and the duration (s). `again`
-    gives a type of party that dies, the time, and the seconds until it returns. The judge starts at
-    `begins_at`.
+    `cut` has the name of a party that loses the network, the time (s), and the duration (s). `again`
+    has a type of party that dies, the time (s), and the seconds until it returns. The judge starts at
+    `begins_at` (s).
     """
     world = World(Random(seed))
     world.air.weather = weather

@@ -1,4 +1,5 @@
-"""The law for a defect of a charger's node catches the defect, and no other law does."""
+"""The judge on chargers' nodes with a defect. The right law catches the defect, and no other law
+does."""
 
 import pytest
 

@@ -62,7 +62,7 @@ def test_the_recordings_of_our_own_daemons_in_trouble_accuse_none_of_them(
 
 
 def ride_that_outlives_its_end() -> Iterator[Heard]:
-    """Yield the messages of a lift whose session goes on after END."""
+    """Yield the messages of a lift that keeps the session after END."""
     for n in range(20):
         at = float(n)
         held = "fleet/red" if n > 4 else ""

@@ -1,4 +1,4 @@
-"""The laws, as `rmf-bridge judge KIND --laws` prints them and docs/reference/laws.md lists them."""
+"""The laws in the output of `rmf-bridge judge KIND --laws` and in docs/reference/laws.md."""
 
 import pytest
 

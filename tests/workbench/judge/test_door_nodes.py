@@ -1,4 +1,4 @@
-"""The law for a defect of a door's node catches the defect, and no other law does."""
+"""The judge on doors' nodes with a defect. The right law catches the defect, and no other law does."""
 
 import pytest
 
@@ -51,14 +51,15 @@ PUSHES = (5.0, 20.0, 35.0)
 def test_a_door_that_people_opened_is_closed_by_rmf_and_shut_by_nobody(
     node: type[RightDoor], broken: set[str]
 ) -> None:
-    """RMF's supervisor sends CLOSE at each state of an open door that no robot has requested."""
+    """If no robot has requested the door, RMF's supervisor answers each state of the open door with
+    CLOSE."""
     found = watched("door", "ward", node(PUSHES), DoorSupervisor())
     assert found["broken"] == broken
     assert ("D2.people" in found["kept"]) == (not broken)
 
 
 def test_one_robots_close_closes_the_door_on_another() -> None:
-    """Finding 11: the CLOSE bypasses the supervisor, which knows both robots."""
+    """Finding 11: the CLOSE bypasses the supervisor. Only the supervisor knows both robots."""
     adapters: Party = Script(
         (5.4, topics.ADAPTER_DOOR_REQUESTS, door(2, RED)),
         (8.4, topics.ADAPTER_DOOR_REQUESTS, door(2, BLUE)),

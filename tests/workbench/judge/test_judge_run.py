@@ -1,4 +1,4 @@
-"""The conditions under which the judge may play, its end, and its answer to nonsense."""
+"""A run of the judge: the conditions for a play, the end of a play, and nonsense from other nodes."""
 
 import pytest
 from msgspec.structs import replace
@@ -122,7 +122,7 @@ def test_an_interrupted_play_lets_the_device_go(
 
 
 def test_a_ride_that_another_robot_takes_ends_with_our_own_end_only() -> None:
-    """The lift goes to another robot, although the judge plays the supervisor."""
+    """The lift gives the session to another robot, although the judge plays the supervisor."""
     world = World()
     said = said_by_the_judge(world)
     node = RightLift()

@@ -1,4 +1,4 @@
-"""The law for a defect from the field catches the defect, and no other law does."""
+"""The judge on lifts' nodes with a defect. The right law catches the defect, and no other law does."""
 
 import pytest
 
@@ -100,7 +100,7 @@ def test_watching_finds_the_defect(node: type[RightLift], parties: list[Party], 
 
 
 def test_a_lift_whose_supervisor_has_died_owes_nobody_a_session() -> None:
-    """The robot repeats its request on adapter_lift_requests, from which a lift grants nothing."""
+    """The robot repeats its request on adapter_lift_requests only. A lift need not obey this topic."""
 
     class Taken(RightLift):
         def serves(self, request: d.LiftRequest) -> bool:
@@ -131,7 +131,7 @@ def test_the_volatile_publisher_of_jazzys_supervisor_is_not_the_lifts(
 
 
 def test_an_end_without_a_floor_that_is_refused_is_found_by_watching_three_rides() -> None:
-    """RMF's supervisor sends a second END with a floor, so a single ride proves nothing."""
+    """RMF's supervisor sends a second END with a floor. So a single ride proves nothing."""
     rides = [
         line
         for n in range(3)
@@ -147,7 +147,7 @@ def test_an_end_without_a_floor_that_is_refused_is_found_by_watching_three_rides
 
 
 def test_two_robots_stand_before_a_lift_that_refuses_an_end_without_a_floor() -> None:
-    """Finding 4: the supervisor now serves the second robot, and no node can release the first
+    """Finding 4: the supervisor already serves the second robot. So no node can release the first
     robot."""
     found, why = rides(EndNeedsAFloor(), robots=2)
     assert found["broken"] == {"L5.ends"}

@@ -1,4 +1,4 @@
-"""Every limit of a law. Values just inside and just outside the limit get different verdicts."""
+"""The limits of the laws. Values just inside and just outside a limit get different verdicts."""
 
 from collections.abc import Callable, Iterator
 
@@ -30,8 +30,8 @@ Story = Callable[[float], list[Line]]
 
 
 def is_broken(kind: JudgedKind, law: str, lines: list[Line]) -> bool:
-    """Return whether the judge finds the law broken, 2 s after these messages in the order of their
-    times."""
+    """Return whether the judge finds the law broken. It gets the messages in order of time, and judges
+    2 s after the last."""
     judge = Judge(kind, NAMES[kind])
     lines.sort(key=lambda line: line[0])
     for at, topic, message in lines:
@@ -54,7 +54,7 @@ def car(
     mode: int = AGV,
     read_at: float | None = None,
 ) -> Line:
-    """Return a LiftState stamped with `read_at`, by default with `at`."""
+    """Return a LiftState. Its stamp is `read_at`, or `at` by default."""
     read = stamp(1e3 + (at if read_at is None else read_at))
     state = d.LiftState(read, "Lift1", ("L1", "L3"), floor, to, door, 0, (AGV,), mode, session)
     return at, topics.LIFT_STATES, state
@@ -104,7 +104,7 @@ def cancel(at: float, request_id: str = "r1") -> Line:
 
 
 def seconds(begin: float, end: float, line: Callable[[float], Line]) -> Iterator[Line]:
-    """Yield one line each second, the first at `begin` and the last before `end`."""
+    """Yield one line each second. The first line is at `begin`, and the last is before `end`."""
     n = 0
     while begin + n < end:
         yield line(begin + n)
@@ -120,9 +120,10 @@ def held(at: float, **state: int | str | float) -> Line:
 
 
 def answered(times: int, early_s: float, after_s: float) -> list[Line]:
-    """Return a state each second, and then this number of requests.
+    """Return a state each second, and then `times` requests.
 
-    A state follows each request after `after_s`, and comes `early_s` before its second.
+    Each request gets a state `after_s` seconds later. This state comes `early_s` seconds before it is
+    due.
     """
     lines, at = list(seconds(0.0, 12.0, leaf)), 11.0
     for _ in range(times):
@@ -133,7 +134,7 @@ def answered(times: int, early_s: float, after_s: float) -> list[Line]:
 
 
 def back_and_forth(times: int, each_s: float, by_s: float) -> list[Line]:
-    """Return states whose stamps go back by `by_s` this number of times."""
+    """Return states whose stamps go back by `by_s` seconds, `times` times."""
     steps = [(n * each_s, n) for n in range(times + 1)]
     return [
         line
@@ -146,7 +147,7 @@ def back_and_forth(times: int, each_s: float, by_s: float) -> list[Line]:
 
 
 def frozen(line: Callable[..., Line], opened: int, for_s: float) -> list[Line]:
-    """Return open states with the old stamp 1 s, for `for_s`."""
+    """Return open states for `for_s` seconds. All have the old stamp 1 s."""
     open_ = {"mode" if line is leaf else "door": opened, "read_at": 1.0}
     shown = seconds(1.0, 1.0 + for_s, lambda s: line(s, **open_))
     return [line(0.0), *shown, line(1.0 + for_s, **open_)]
@@ -179,9 +180,9 @@ def test_a_shared_law_is_broken_just_beyond_its_limit_and_not_before(
 
 
 def asked_for_long(ends_at: float, last_ask_s: float = 0.5, gap_s: float = 1.0) -> list[Line]:
-    """Return messages in which RED asks each second from 1 s, and the lift never grants.
+    """Return messages in which RED asks each second from 1 s on. The lift never grants the session.
 
-    A gap follows the request at 16 s.
+    A gap of `gap_s` seconds follows the request at 16 s.
     """
     last_at = ends_at - last_ask_s
     return [
@@ -202,8 +203,8 @@ def asked_so_often(times: int) -> list[Line]:
 
 
 def asked_after_a_ride(free_s: float) -> list[Line]:
-    """Return messages in which BLUE asks each second for `free_s`, after RED's session, and gets
-    nothing."""
+    """Return messages in which BLUE asks each second after RED's session. The lift stays free for
+    `free_s` seconds, but BLUE gets nothing."""
     over_at = 4.0 + free_s
     return [
         *(car(0.0), asks(0.5, floor="L1"), held(1.0, to="L1", door=OPEN), ends(3.5)),
@@ -215,9 +216,9 @@ def asked_after_a_ride(free_s: float) -> list[Line]:
 
 
 def rides_with_bare_ends(times: int, waits_s: float = 0.5, goes_s: float = 0.2) -> list[Line]:
-    """Return this number of sessions that outlive an END without a floor.
+    """Return `times` sessions that continue after an END without a floor.
 
-    Each session ends `goes_s` after an END with a floor.
+    Each session ends `goes_s` seconds after an END with a floor.
     """
     lines = [car(0.0)]
     for n in range(times):
@@ -229,7 +230,8 @@ def rides_with_bare_ends(times: int, waits_s: float = 0.5, goes_s: float = 0.2) 
 
 
 def reopens(times: int, each_s: float, shut_s: float) -> list[Line]:
-    """Return messages in which the door held for RED shuts this number of times, for `shut_s` each."""
+    """Return messages in which the lift holds its door for RED. The door shuts `times` times, for
+    `shut_s` seconds each."""
     lines = [car(0.0), asks(0.5, floor="L1"), held(1.0, to="L1", door=OPEN)]
     for n in range(times):
         at = 2.0 + n * each_s
@@ -246,7 +248,7 @@ def false_alarms(times: int, each_s: float) -> list[Line]:
 
 
 LIFT: list[tuple[str, Story, float, float]] = [
-    # the request that explains a session may arrive up to this long after the session
+    # the request that explains a session may arrive up to this time after the session
     (
         "L1.other",
         lambda x: [
@@ -352,7 +354,7 @@ def test_a_lifts_law_is_broken_just_beyond_its_limit_and_not_before(
 
 
 def stays_shut(for_s: float, asked: int = 20) -> list[Line]:
-    """Return messages in which RMF asks for OPEN `asked` times, and the door stays closed."""
+    """Return messages in which RMF asks for OPEN `asked` times, but the door stays closed."""
     return [
         *seconds(0.0, 1.0 + for_s, leaf),
         *(to_door(1.0 + n * 29.0 / (asked - 1)) for n in range(asked)),
@@ -361,7 +363,7 @@ def stays_shut(for_s: float, asked: int = 20) -> list[Line]:
 
 
 def flaps(times: int, each_s: float, shut_s: float) -> list[Line]:
-    """Return messages in which the held door shuts this number of times, for `shut_s` each."""
+    """Return messages in which the held door shuts `times` times, for `shut_s` seconds each."""
     lines = [leaf(0.0), to_door(0.5), leaf(1.0, OPEN)]
     for n in range(times):
         at = 2.0 + n * each_s
@@ -371,7 +373,7 @@ def flaps(times: int, each_s: float, shut_s: float) -> list[Line]:
 
 
 def open_at_once(times: int, after_s: float) -> list[Line]:
-    """Return this number of openings. The door shows OPEN `after_s` after each request."""
+    """Return `times` openings. The door shows OPEN `after_s` seconds after each request."""
     lines = [leaf(0.0)]
     for n in range(times):
         at = 1.0 + 4.0 * n
@@ -382,10 +384,10 @@ def open_at_once(times: int, after_s: float) -> list[Line]:
 def pushed(
     times: int, closes_s: float = 2.0, shuts_s: float = 0.4, opens_s: float | None = 0.0
 ) -> list[Line]:
-    """Return messages in which people open the door this number of times.
+    """Return messages in which people open the door `times` times.
 
-    RMF sends CLOSE `closes_s` later. The door shows CLOSED `shuts_s` after CLOSE. `opens_s` is the time
-    to open; with None the door never reaches OPEN.
+    RMF sends CLOSE `closes_s` seconds later, and the door shows CLOSED `shuts_s` seconds after CLOSE.
+    The door takes `opens_s` seconds to open. With None it never shows OPEN.
     """
     lines = [leaf(0.0)]
     for n in range(times):
@@ -451,9 +453,9 @@ def test_a_doors_law_is_broken_just_beyond_its_limit_and_not_before(
 
 
 def promised(for_s: float, cancelled: bool = False, charging: bool = False) -> list[Line]:
-    """Return states in which the station is promised to r1, or charges r1, from 1 s on.
+    """Return states in which the station is promised to r1 from 1 s on, or charges r1.
 
-    A cancel may come at 2 s.
+    With `cancelled` a cancel comes at 2 s.
     """
     state = CHARGING if charging else ASSIGNED
     lines = [station(0.0, IDLE), charge(0.5), *([cancel(2.0)] if cancelled else [])]

@@ -1,4 +1,4 @@
-"""Each law applies on an occasion. Without the occasion the verdict is "not seen". With the occasion a
+"""The laws and their occasions. Without the occasion the verdict is "not seen". With the occasion a
 correct node keeps the law, and a wrong node breaks it."""
 
 from collections.abc import Callable
@@ -52,7 +52,7 @@ Lines = list[Line | Look]
 
 
 def senders(*names: str) -> Look:
-    """Return the publishers on the topic of the states."""
+    """Return a function that tells the judge which nodes publish the states."""
 
     def look(judge: Judge) -> None:
         judge.history.senders = names
@@ -61,7 +61,7 @@ def senders(*names: str) -> Look:
 
 
 def fire_publisher(retaining: int) -> Look:
-    """Return a publisher of the fire alarm that is found twice."""
+    """Return a function that shows the judge a publisher of the fire alarm twice."""
 
     def look(judge: Judge) -> None:
         for _ in range(2):
@@ -98,7 +98,7 @@ BOTH = (alarm(1.0, True, A), alarm(2.0, True, B))
 
 
 def twins(line: Callable[[float], Line]) -> Lines:
-    """Return the states of two nodes, 0.3 s apart."""
+    """Return the states of two nodes. The second node publishes 0.3 s after the first."""
     return [senders("/a", "/b"), *(line(n + by) for n in range(8) for by in (0.0, 0.3))]
 
 
@@ -115,18 +115,18 @@ def bay(until: float, state: int = IDLE, request_id: str = "", begin: float = 0.
 
 
 def rides(*more: Line, until: float = 6.0, **state: Any) -> Lines:
-    """Return messages in which RED asks at 0.5 s, and has the lift from 1 s."""
+    """Return messages in which RED asks at 0.5 s, and has the lift from 1 s on."""
     return [car(0.0), asks(0.5), *seconds(1.0, until, lambda s: held(s, **state)), *more]
 
 
 def opens(*more: Line, until: float = 8.0) -> Lines:
-    """Return messages in which RMF requests OPEN at 0.5 s, and the door shows OPEN from 3 s."""
+    """Return messages in which RMF requests OPEN at 0.5 s, and the door shows OPEN from 3 s on."""
     way = [leaf(0.0), to_door(0.5), leaf(1.0), leaf(2.0, 1)]
     return [*way, *seconds(3.0, until, lambda s: leaf(s, OPEN)), *more]
 
 
 def served(*more: Line, until: float = 6.0, state: int = ASSIGNED) -> Lines:
-    """Return messages in which RMF requests r1 at 0.5 s, and the charger serves r1 from 1 s."""
+    """Return messages in which RMF requests r1 at 0.5 s, and the charger serves r1 from 1 s on."""
     return [station(0.0, IDLE), charge(0.5), *bay(until, state, "r1", 1.0), *more]
 
 
@@ -338,7 +338,7 @@ def test_a_charge_may_be_taken_over_only_after_its_end() -> None:
 
 
 def test_a_listing_state_that_was_lost_or_comes_late_accuses_no_workcell() -> None:
-    """RMF compares the stamps, and ignores a state that is older than the acknowledgement."""
+    """RMF compares the stamps. It ignores a state that is older than the acknowledgement."""
     of = WorkcellLines("dispenser")
     story = [of.ask(0.1), of.result(0.3, 0), of.state(0.4, read_at=0.2), of.state(3.0, "a", mode=1)]
     assert verdict("dispenser", "W2.lists", [of.state(0.0), *story]) == "not seen"

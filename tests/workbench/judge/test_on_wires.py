@@ -1,4 +1,4 @@
-"""`rmf-bridge judge` as a process on DDS and on zenoh, for our own daemons and for other nodes."""
+"""`rmf-bridge judge` as a process on DDS and on zenoh. It judges our own daemons and other nodes."""
 
 import json
 import signal
@@ -30,14 +30,14 @@ CONFIG = Path(__file__).parents[3] / "config"
 
 @pytest.fixture(params=sorted({runs_here(), "zenoh"}))
 def speaks(request: pytest.FixtureRequest) -> Wire:
-    """Return the transport of the node and of the judge."""
+    """Return the transport that the node and the judge use."""
     speaks: Wire = request.param
     return speaks
 
 
 @contextmanager
 def bridge(*words: str, speaks: Wire, domain: int) -> Iterator[subprocess.Popen[str]]:
-    """Run an `rmf-bridge` process until the end of the block."""
+    """Run an `rmf-bridge` process until the `with` block ends."""
     line = [sys.executable, "-m", "bridges.cli", *words, "--domain-id", str(domain)]
     process = subprocess.Popen(
         [*line, "--transport", speaks],
@@ -55,7 +55,7 @@ def bridge(*words: str, speaks: Wire, domain: int) -> Iterator[subprocess.Popen[
 
 @contextmanager
 def served(party: Party, speaks: Wire, domain: int) -> Iterator[list[d.Message]]:
-    """Run a node in real time, and yield the list of requests that the node received."""
+    """Run a node in real time. Yield the list of requests that the node has received."""
     node = open_transport(Rmf(transport=speaks, domain_id=domain), "node", localhost=True)
     publishers: dict[AnyTopic, Publisher[d.Message]] = {}
     asked: list[d.Message] = []
@@ -153,7 +153,7 @@ def test_a_judge_that_is_told_to_end_ends_its_session_first(speaks: Wire, domain
 
 @pytest.mark.long(20)
 def test_a_node_that_answers_each_request_floods_nobody(speaks: Wire, domain: int) -> None:
-    """The node and RMF would answer each other without end. The judge stops that by silence."""
+    """The node and RMF would answer each other without end. So the judge falls silent."""
     ride = ["judge", "lift", "Lift1", "--active", "--ride", "L1", "L3", "--json", "--localhost"]
     with (
         served(LiftAnswers(), speaks, domain) as asked,

@@ -1,4 +1,4 @@
-"""The judge rides each of our daemons, with its driver and plant, and accuses none."""
+"""The judge on our own daemons, each with its driver and a simulated device. It accuses no daemon."""
 
 import pytest
 

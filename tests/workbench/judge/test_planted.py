@@ -1,8 +1,8 @@
-"""Wrong nodes planted among correct nodes. The judge plays with each node, and convicts each wrong node
-under its law. It convicts no correct node under load, without a network, or when a party restarts.
+"""Wrong nodes among correct nodes. The judge plays with each node, and convicts each wrong node by the
+right law. It convicts no correct node, even under load, without a network, or after a restart.
 
-`pytest -s` prints each planted defect, the law that convicts it, and false alarms. The defects are
-breaches of the contract in RMF's messages, supervisors and fleet adapters.
+`pytest -s` prints each planted defect, the law that convicts it, and false alarms. The defects break
+the contract in the messages, supervisors and fleet adapters of RMF.
 """
 
 from collections.abc import Callable, Sequence
@@ -36,7 +36,7 @@ Make = Callable[[], Party]
 
 
 class NextLift(RightLift):
-    """A second lift. Its states tell a silent network from a silent node."""
+    """A second lift. If its states stop too, the network is silent, and not the node."""
 
     name = "Lift9"
 
@@ -57,10 +57,9 @@ def convicted(
     cut: tuple[float, float] | None = None,
     restarts: float | None = None,
 ) -> set[str]:
-    """Return the laws that these nodes break in a play. The nodes share one name and publish 0.3 s
-    apart.
+    """Return the laws that these nodes break in a play. They publish under one name, 0.3 s apart.
 
-    `cut` gives the time at which the judge loses the network, and the duration (s). At `restarts` (s)
+    `cut` has the time (s) at which the judge loses the network, and the duration (s). At `restarts` (s)
     the node and RMF restart.
     """
     world = World(Random(seed))
@@ -142,14 +141,14 @@ def test_a_planted_defect_is_convicted_by_its_law_alone(
 
 
 ACQUITTED = {"D OPEN is shown before the door is open"}
-"""A busy network may hide the 0.3 s that reveal this defect."""
+"""The defect that a busy network may hide. Only 0.3 s reveal it."""
 
 
 @pytest.mark.parametrize(("defect", "nodes", "laws"), PLANTED, ids=[one[0] for one in PLANTED])
 def test_under_load_a_planted_defect_is_convicted_by_no_other_law(
     defect: str, nodes: Sequence[Make], laws: set[str]
 ) -> None:
-    """Messages come up to 0.8 s late, and then all at once."""
+    """Messages are up to 0.8 s late, and then arrive together."""
     found = [convicted(*nodes, weather=LOADED, seed=seed) for seed in range(4)]
     assert set().union(*found) <= laws
     assert sum(map(bool, found)) >= (0 if defect in ACQUITTED else 3)
@@ -165,7 +164,7 @@ NAMES = [make().__class__.__name__ for make in RIGHT]
 
 @pytest.mark.parametrize("make", RIGHT, ids=NAMES)
 def test_no_right_node_is_convicted_under_load(make: Make) -> None:
-    """Messages come up to 0.8 s late, and then all at once."""
+    """Messages are up to 0.8 s late, and then arrive together."""
     assert [convicted(make, weather=LOADED, seed=seed) for seed in range(5)] == [set()] * 5
 
 
@@ -174,7 +173,7 @@ def test_no_right_node_is_convicted_under_load(make: Make) -> None:
 def test_no_right_node_is_convicted_for_the_silence_of_the_network(
     make: Make, for_s: float
 ) -> None:
-    """A short outage delivers all messages at its end; a longer outage loses them."""
+    """After a short outage all messages arrive. After a longer outage the messages are lost."""
     found = [convicted(make, cut=(at, for_s)) for at in (5.0, 12.0, 19.0, 26.0, 33.0)]
     assert found == [set()] * 5
 
@@ -190,7 +189,8 @@ def test_no_right_node_is_convicted_for_a_restart(make: Make, at: float) -> None
 def test_no_right_node_is_convicted_by_a_judge_that_is_killed_and_started_again(
     make: Make, at: float
 ) -> None:
-    """The first judge leaves its session or its hold behind. The second judge listens, then plays."""
+    """The killed judge leaves its session or its hold behind. The second judge first listens, then
+    plays."""
     world = World()
     seats = world.add(NextLift(), make())
     kind, name, scenario = play_for(seats[1].party, False)
@@ -202,7 +202,7 @@ def test_no_right_node_is_convicted_by_a_judge_that_is_killed_and_started_again(
 
 @pytest.mark.parametrize("jitter_s", [0.1, 0.2, 0.4])
 def test_jitter_is_no_answer_to_requests_that_arrive_together_with_states(jitter_s: float) -> None:
-    """A busy machine delivers RMF's request just before a state that comes early or late."""
+    """On a busy machine RMF's request may arrive just before a state that is early or late."""
     for seed in range(30):
         random = Random(seed)
         lines: list[Line] = []

@@ -1,4 +1,4 @@
-"""The judge does not accuse a correct node, however much the node differs from ours."""
+"""The judge on correct nodes. It does not accuse them, however much they differ from ours."""
 
 import pytest
 

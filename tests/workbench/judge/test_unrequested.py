@@ -1,6 +1,8 @@
-"""A charge without a request has an id that no request has, `unrequested/…`. The id changes when the
-robot's request comes. The station's next charge without a request has the `unrequested/…` id again.
-No law takes either change for a fault."""
+"""A charge that nobody requested. Its id is `unrequested/…`, which no request has.
+
+The id changes when the robot's request comes. The next charge without a request has the id
+`unrequested/…` again. No law counts either change as a fault.
+"""
 
 import pytest
 from msgspec.structs import replace
@@ -35,7 +37,7 @@ def cancels(request_id: str) -> d.ChargerCancel:
 
 
 def broken(*said: d.ChargerState | d.ChargerRequest | d.ChargerCancel) -> set[str]:
-    """Return the laws that these messages break, sent one each second."""
+    """Return the laws that these messages break. One message comes each second."""
     judge, at = Judge("charger", "bay1"), 100.0
     for message in said:
         at += 1.0

@@ -1,5 +1,5 @@
-"""Three stories for each law of workcells: the law is kept, the law is broken, and the law has no
-occasion."""
+"""Three stories for each law of workcells. In the first the law has no occasion, in the second the
+workcell keeps the law, and in the third it breaks the law."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ NAMES = {"dispenser": "store", "ingestor": "intake"}
 
 
 class WorkcellLines:
-    """Messages of one kind of workcell, each with its time and topic."""
+    """A maker of messages for one kind of workcell. Each message comes with its time and topic."""
 
     def __init__(self, kind: str) -> None:
         self.name = NAMES[kind]

@@ -1,4 +1,4 @@
-"""The judge in virtual time on the memory transport, with nodes and RMF's parties."""
+"""The judge in virtual time on a simulated graph, with nodes and RMF's parties."""
 
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -35,7 +35,7 @@ Verdicts = dict[str, set[str]]
 
 
 class Seat:
-    """A party's place on the graph. The party's clock differs from the wall clock by `skew_s`."""
+    """A party's place on the graph. The party's clock is `skew_s` seconds ahead of the wall clock."""
 
     def __init__(self, world: "World", party: Party, skew_s: float = 0.0) -> None:
         self.party = party
@@ -76,7 +76,7 @@ class Seat:
 
 
 class World:
-    """A graph without loss, and every party on the graph."""
+    """A graph without loss, and all parties on the graph."""
 
     def __init__(self, random: Random | None = None) -> None:
         self.timeline = Timeline()
@@ -95,7 +95,8 @@ class World:
         most_s: float = 600.0,
         also: Callable[[JudgeRun], None] = lambda judging: None,
     ) -> JudgeRun:
-        """Let the judge listen, or play and leave, for at most `most_s`."""
+        """Let the judge listen for `for_s` seconds, or play the scenario. In both cases end after
+        `most_s` seconds."""
         judging = JudgeRun(Judge(kind, name), scenario, for_s)
         place = Place(self.air, "judge", lambda: None)
         publishers: dict[AnyTopic, Publisher[Message]] = {}
@@ -151,8 +152,7 @@ def told(judging: JudgeRun, now: float) -> Verdicts:
 def rides(
     *nodes: Party, robots: int = 1, restarts: bool = False, name: str = "Lift1"
 ) -> tuple[Verdicts, str]:
-    """Return the verdict on a lift that robots ride from L1 to L3, and the reason if they did not
-    ride."""
+    """Return the verdict on a lift that robots ride from L1 to L3, and the judge's note."""
     world = World()
     world.add(*nodes)
     ride = RideScenario(name, ("L1", "L3"), robots, 60.0, restarts=restarts)
@@ -177,7 +177,7 @@ def charges(*nodes: Party) -> tuple[Verdicts, str]:
 
 
 def watched(kind: JudgedKind, name: str, *parties: Party, for_s: float = 60.0) -> Verdicts:
-    """Return the verdict on a device to which the judge only listens."""
+    """Return the verdict on a device after the judge has only listened."""
     world = World()
     world.add(*parties)
     judging = world.judge(kind, name, for_s=for_s, most_s=for_s + 1.0)

@@ -1,4 +1,4 @@
-"""Fleet adapters that keep RMF's rules, and fleet adapters with one defect each."""
+"""Fleet adapters. Some keep RMF's rules, and the others have one defect each."""
 
 from collections.abc import Iterator, Sequence
 
@@ -83,7 +83,8 @@ class RightAdapter(Party):
         return [(topic, out) for topic, one in said for out in self.says(one, now)]
 
     def says(self, message: d.Message, now: float) -> list[d.Message]:
-        """Return the messages to send in place of this message. Wrong adapters override this method."""
+        """Return the messages that replace this message. Adapters with a defect override this
+        method."""
         return [message]
 
 
@@ -113,7 +114,7 @@ class LateToEnd(RightLift):
         return super().tick(now)
 
 
-# ---- wrong ones
+# ---- adapters with a defect
 
 
 def is_end(message: d.Message) -> bool:
@@ -145,7 +146,7 @@ class EndsForEver(RightAdapter):
 
 
 class ChangesItsMind(RightAdapter):
-    """During a ride the adapter asks once for the floor on the way, and then for its own floor
+    """During a ride the adapter asks once for a floor on the way. Then it asks for the robot's floor
     again."""
 
     other = "L2"
@@ -161,7 +162,7 @@ class ChangesItsMind(RightAdapter):
 
 
 class CallsItBack(ChangesItsMind):
-    """During a ride the adapter asks once for the floor where the ride began, as RMF's adapter does
+    """During a ride the adapter asks once for the floor where the ride began. RMF's adapter does so
     (rmf_ros2#555)."""
 
     other = "L1"
@@ -202,7 +203,8 @@ class StampsGoBack(RightAdapter):
 
 
 class EntersEarly(RightAdapter):
-    """The robot drives in when the lift shows the robot's session, wherever the car is."""
+    """The robot drives in as soon as the lift shows the robot's session. The car may be at any
+    floor."""
 
     def way(self, robot: RobotContext) -> Iterator[Step]:
         for step in journey(robot):
@@ -240,7 +242,7 @@ class DoorAskedOnce(RightAdapter):
 
 
 class StateNumbers(RightAdapter):
-    """The adapter sends 2, the state's number of AGV, as the request type."""
+    """The adapter sends the request type 2. In a state 2 means AGV, but in a request AGV is 1."""
 
     def says(self, message: d.Message, now: float) -> list[d.Message]:
         if isinstance(message, d.LiftRequest) and message.request_type:

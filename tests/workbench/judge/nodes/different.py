@@ -1,4 +1,4 @@
-"""Correct nodes that differ from ours as far as the contract permits. The judge must accuse none."""
+"""Correct nodes that differ from ours as far as the contract permits. The judge must accuse no node."""
 
 from msgspec.structs import replace
 
@@ -11,8 +11,8 @@ from workbench.rmf_model import Said
 
 
 class SimulatedLift(RightLift):
-    """The lift of RMF's simulation: always AGV, no modes, the nearest floor, and the last target
-    kept."""
+    """The lift behaves as in RMF's simulation. It is always in AGV mode, lists no modes, shows the
+    nearest floor, and keeps its last target."""
 
     modes = ()
 
@@ -26,7 +26,7 @@ class SimulatedLift(RightLift):
 
 
 class SlowLift(RightLift):
-    """The lift publishes every 2 s, as at a field site, and obeys an END up to 1 s later."""
+    """The lift publishes every 2 s, as at a field site. It obeys an END up to 1 s later."""
 
     period_s = 2.0
     modes = (0, 1, 2, 3, 4, 5)
@@ -43,7 +43,7 @@ class SlowLift(RightLift):
 
 
 class EagerLift(RightLift):
-    """The lift publishes ten times a second, whether its state changes or not."""
+    """The lift publishes ten times a second, even without a change."""
 
     beats_at = 0.0
 
@@ -58,8 +58,8 @@ class EagerLift(RightLift):
 
 
 class LiftWithoutModes(RightLift):
-    """A destination dispatch without an AGV mode. Mode and motion are UNKNOWN, and no floors are
-    listed."""
+    """The lift has a destination dispatch without an AGV mode. Mode and motion are UNKNOWN, and the
+    list of floors is empty."""
 
     def state(self, now: float) -> d.LiftState:
         state = super().state(now)
@@ -67,7 +67,7 @@ class LiftWithoutModes(RightLift):
 
 
 class LiftInFire(RightLift):
-    """A fire begins with the robot in the car. The lift keeps the session, and opens at the recall
+    """A fire begins while the robot is in the car. The lift keeps the session, and opens at the recall
     floor."""
 
     fire = False
@@ -96,7 +96,7 @@ class DoorOnChange(RightDoor):
 
 
 class LeasedDoor(RightDoor):
-    """The door shows UNKNOWN when its own controller ends the hold. RMF sees that the hold is over."""
+    """The door shows UNKNOWN when its controller ends the hold. So RMF sees the end of the hold."""
 
     def mode(self) -> int:
         return (

@@ -1,5 +1,5 @@
-"""A charger's node that keeps the contract in its own way. An idle charger accepts each request at
-once."""
+"""A charger's node that keeps the contract, but differs from ours. An idle charger accepts each request
+at once."""
 
 from collections.abc import Sequence
 
@@ -15,8 +15,7 @@ IDLE, ASSIGNED, CHARGING, RELEASED, ERROR = 1, 2, 3, 4, 200
 
 
 class RightCharger(Party):
-    """A correct charger. The robot's current flows `comes_s` seconds after the promise, or never for
-    None."""
+    """A correct charger. The current flows `comes_s` seconds after the promise, or never with None."""
 
     subscribes: Sequence[topics.AnyTopic] = (topics.CHARGER_REQUESTS, topics.CHARGER_CANCELS)
     name = "bay1"
@@ -47,7 +46,7 @@ class RightCharger(Party):
             self.shows(RELEASED, now)
 
     def shows(self, state: int, now: float, text: str = "") -> None:
-        """Set the state. The names and the id of the request appear in every state but IDLE."""
+        """Set the state. Every state except IDLE has the request's id and the robot's name."""
         self.since = now
         asked = self.request if state != IDLE else d.ChargerRequest()
         self.shown = replace(

@@ -1,4 +1,4 @@
-"""A door's node that keeps the contract in its own way. It has no grace time."""
+"""A door's node that keeps the contract, but differs from ours. It has no grace time."""
 
 from collections.abc import Sequence
 
@@ -13,9 +13,9 @@ DWELL_S = 3.0
 
 
 class RightDoor(Party):
-    """A correct door. `leaf` is 0 shut and 1 open.
+    """A correct door. `leaf` is 0 when the door is shut, and 1 when it is open.
 
-    People open the door at each time of `pushed_at` (s after its start). It then stays open for
+    People open the door at each time in `pushed_at` (s after its start). Then it stays open for
     DWELL_S.
     """
 

@@ -1,4 +1,4 @@
-"""A lift's node that keeps the contract in its own way, in a loop of 0.25 s."""
+"""A lift's node that keeps the contract, but differs from ours. Its loop takes 0.25 s."""
 
 from collections.abc import Sequence
 
@@ -14,9 +14,9 @@ DOOR_S = 1.0
 
 
 class RightLift(Party):
-    """A correct lift. It publishes every `period_s` and on change.
+    """A correct lift. It publishes every `period_s`, and at each change.
 
-    `car` counts the floors from the bottom; `door` is 0 shut and 1 open.
+    `car` is the car's floor, counted from 0 at the bottom. `door` is 0 when shut, and 1 when open.
     """
 
     subscribes: Sequence[topics.AnyTopic] = (topics.LIFT_REQUESTS,)

@@ -1,4 +1,4 @@
-"""Charger nodes, each with one defect that is known from the field. Its docstring names the defect."""
+"""Charger nodes, each with one defect that occurred in the field. Each docstring names the defect."""
 
 from msgspec.structs import replace
 
@@ -9,14 +9,14 @@ from workbench.rmf_model import Said
 
 
 class AnyCancelCancels(RightCharger):
-    """The charger does not compare the id of a cancel."""
+    """The charger does not compare the id of a cancel, so any cancel stops the charge."""
 
     def cancelled(self, request_id: str, now: float) -> None:
         super().cancelled(self.shown.request_id, now)
 
 
 class ChargerAnswers(RightCharger):
-    """The charger publishes a state for each request, whether its state has changed or not."""
+    """The charger publishes a state for each request, even without a change."""
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
         super().hear(message, now)
@@ -24,7 +24,7 @@ class ChargerAnswers(RightCharger):
 
 
 class ChargerFallsSilent(RightCharger):
-    """The callback calls HTTP without a timeout, so no state comes when the station is slow."""
+    """The node's callback calls HTTP without a timeout. So no state comes while the station is slow."""
 
     def tick(self, now: float) -> list[Said]:
         said = super().tick(now)
@@ -32,7 +32,7 @@ class ChargerFallsSilent(RightCharger):
 
 
 class ChargerIdleFromMemory(RightCharger):
-    """The station is unreachable, and the charger publishes IDLE for ever."""
+    """The station is unreachable, but the charger publishes IDLE for ever."""
 
     read_at = 0.0
 
@@ -60,7 +60,7 @@ class ChargerIsTakenOver(RightCharger):
 
 
 class ChargerNamesAnotherRobot(RightCharger):
-    """The charger names the robot that stood on the pad before."""
+    """The charger names a robot that stood on the pad earlier."""
 
     def state(self, now: float) -> d.ChargerState:
         state = super().state(now)
@@ -68,14 +68,14 @@ class ChargerNamesAnotherRobot(RightCharger):
 
 
 class ChargerTalksAlways(RightCharger):
-    """In every state error_message holds the station's status line."""
+    """The charger puts the station's status line into error_message in every state."""
 
     def state(self, now: float) -> d.ChargerState:
         return replace(super().state(now), error_message="48.1 V 0.0 A")
 
 
 class ChargerVendorCodes(RightCharger):
-    """The charger publishes the station's own code as RMF's state: 5 is charging, 238 is an error."""
+    """The charger publishes 238 in place of RELEASED. 238 is the station's own code."""
 
     def state(self, now: float) -> d.ChargerState:
         state = super().state(now)

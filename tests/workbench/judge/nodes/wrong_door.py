@@ -1,4 +1,4 @@
-"""Door nodes, each with one defect that is known from the field. Its docstring names the defect."""
+"""Door nodes, each with one defect that occurred in the field. Each docstring names the defect."""
 
 from msgspec.structs import replace
 
@@ -9,7 +9,7 @@ from workbench.rmf_model import Said
 
 
 class CloseDrivesShut(RightDoor):
-    """CLOSE starts the motor, and the door shuts on people who have opened it."""
+    """CLOSE starts the motor, so the door shuts on people who have opened it."""
 
     shut = False
 
@@ -33,7 +33,7 @@ class DoorAnswers(RightDoor):
 
 
 class DoorFallsSilent(RightDoor):
-    """When its module does not answer, no state comes."""
+    """The door publishes no state while its module does not answer."""
 
     def tick(self, now: float) -> list[Said]:
         said = super().tick(now)
@@ -48,20 +48,21 @@ class DoorFlaps(RightDoor):
 
 
 class DoorHearsAdapters(RightDoor):
-    """The door obeys adapter_door_requests, so CLOSE of one robot shuts the door on another robot."""
+    """The door obeys adapter_door_requests. So the CLOSE of one robot shuts the door on another
+    robot."""
 
     subscribes = (topics.ADAPTER_DOOR_REQUESTS,)
 
 
 class DoorNumbersMixed(RightDoor):
-    """The door publishes 1 for OPEN, but 1 is MOVING."""
+    """The door takes the request mode 1 for OPEN, and ignores RMF's OPEN, which is 2."""
 
     def asked(self, mode: int) -> None:
         super().asked({1: 2, 0: 0}.get(mode, -1))
 
 
 class DoorStaleOpen(RightDoor):
-    """The module is lost when the door is open, and the door publishes the last reading for ever."""
+    """The module fails while the door is open, and the door publishes its last reading for ever."""
 
     frozen: d.DoorState | None = None
 
@@ -72,7 +73,7 @@ class DoorStaleOpen(RightDoor):
 
 
 class DoorVendorCodes(RightDoor):
-    """The door publishes the operator's own status word: 5 is locked."""
+    """The door publishes 5 (locked) in place of CLOSED. 5 is the door operator's own code."""
 
     def mode(self) -> int:
         return 5 if self.leaf == 0.0 else super().mode()
@@ -86,7 +87,7 @@ class DoorWithoutStamps(RightDoor):
 
 
 class OpenAsAsked(RightDoor):
-    """The door shows OPEN because a robot asked for it, without a sensor."""
+    """The door shows OPEN as soon as a robot asks for OPEN. It has no sensor."""
 
     def mode(self) -> int:
         return 2 if self.held else 0
@@ -122,7 +123,7 @@ class DoorOnlyOnChange(RightDoor):
 
 
 class DoorPulses(RightDoor):
-    """OPEN is one pulse, and the operator's own timer shuts the door on the robot."""
+    """OPEN is a single pulse. The door operator's timer then shuts the door on the robot."""
 
     pulsed_at = 0.0
 

@@ -1,4 +1,4 @@
-"""Lift nodes, each with one defect that is known from the field. Its docstring names the defect."""
+"""Lift nodes, each with one defect that occurred in the field. Each docstring names the defect."""
 
 from msgspec.structs import replace
 
@@ -9,15 +9,15 @@ from workbench.rmf_model import Said
 
 
 class AnyEndEnds(RightLift):
-    """END_SESSION of any requester releases the lift (low_level_lift)."""
+    """The lift accepts END_SESSION from any requester, and releases the session (low_level_lift)."""
 
     def ended(self, end: d.LiftRequest) -> None:
         self.free()
 
 
 class EndNeedsAFloor(RightLift):
-    """The lift refuses an END_SESSION for a floor it does not serve, and so refuses the empty floor ""
-    (lift_adapter_template)."""
+    """The lift refuses an END_SESSION for a floor that it does not serve. The empty floor "" is such a
+    floor (lift_adapter_template)."""
 
     def ended(self, end: d.LiftRequest) -> None:
         if end.destination_floor in self.floors:
@@ -35,7 +35,7 @@ class FireBoards(RightLift):
 
 
 class FireFrees(RightLift):
-    """The lift clears the session during a fire, but only END frees the supervisor's slot."""
+    """The lift clears the session during a fire. But only END makes the supervisor forget the robot."""
 
     def moves(self, age_s: float) -> None:
         if self.mode == 2 and self.door == 1.0:
@@ -45,7 +45,7 @@ class FireFrees(RightLift):
 
 
 class FireGrants(RightLift):
-    """Requests are obeyed during a fire (low_level_lift)."""
+    """The lift obeys requests during a fire (low_level_lift)."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -59,8 +59,8 @@ ALARM = replace(topics.FIRE_ALARM_TRIGGER, publish=topics.VOLATILE)
 
 
 class FireIsVolatile(RightLift):
-    """The lift publishes the fire alarm once and as a volatile sample, so no fleet adapter gets the
-    alarm (low_level_lift)."""
+    """The lift publishes the fire alarm once, as a volatile sample. So no fleet adapter gets the alarm
+    (low_level_lift)."""
 
     told = False
 
@@ -73,8 +73,7 @@ class FireIsVolatile(RightLift):
 
 
 class FireSaysFalse(RightLift):
-    """The lift publishes `false` on the fire alarm each second when there is no fire
-    (low_level_lift)."""
+    """Without a fire the lift publishes `false` on the fire alarm each second (low_level_lift)."""
 
     def tick(self, now: float) -> list[Said]:
         said = super().tick(now)
@@ -82,7 +81,7 @@ class FireSaysFalse(RightLift):
 
 
 class FloorByLastCharacter(RightLift):
-    """The lift takes the last character of a floor's name for its number, so L10 lies below L1."""
+    """The lift takes the last character of a floor's name as the floor's number. So L10 is below L1."""
 
     floors = ("L9", "L10", "L11")
 
@@ -92,7 +91,7 @@ class FloorByLastCharacter(RightLift):
 
 
 class FloorFlickers(RightLift):
-    """The lift does not filter the floor's code, so the code shows another floor for a moment."""
+    """The lift does not filter the floor code. So another floor appears for a moment."""
 
     def state(self, now: float) -> d.LiftState:
         state = super().state(now)
@@ -102,7 +101,7 @@ class FloorFlickers(RightLift):
 
 
 class GoesToTheDefaultFloor(RightLift):
-    """The lift drives to its first floor if a request names a floor it does not serve."""
+    """The lift drives to its first floor if it does not serve the requested floor."""
 
     def requested(self, request: d.LiftRequest) -> None:
         known = request.destination_floor in self.floors
@@ -111,13 +110,13 @@ class GoesToTheDefaultFloor(RightLift):
 
 
 class HearsAdapters(RightLift):
-    """The lift obeys adapter_lift_requests, which bypass the supervisor."""
+    """The lift obeys adapter_lift_requests. These requests bypass the supervisor."""
 
     subscribes = (topics.ADAPTER_LIFT_REQUESTS,)
 
 
 class LastOneWins(RightLift):
-    """The latest request gets the lift, even with another robot in the car."""
+    """The latest request gets the lift, even if another robot is in the car."""
 
     def requested(self, request: d.LiftRequest) -> None:
         self.free()
@@ -125,7 +124,7 @@ class LastOneWins(RightLift):
 
 
 class LiftAnswers(RightLift):
-    """The lift publishes a state for each request, as callbacks of most templates do."""
+    """The lift publishes a state for each request, as the callbacks of most templates do."""
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
         super().hear(message, now)
@@ -134,7 +133,7 @@ class LiftAnswers(RightLift):
 
 
 class LiftBlocks(RightLift):
-    """The callback waits for the car, so no state comes for up to 60 s (low_level_lift)."""
+    """The node's callback waits for the car. So no state comes for up to 60 s (low_level_lift)."""
 
     floor_s = 4.0
 
@@ -145,7 +144,7 @@ class LiftBlocks(RightLift):
 
 
 class LiftFlaps(RightLift):
-    """The door's contact is not debounced, so OPEN flickers when the robot drives in."""
+    """The door's contact is not debounced. So OPEN flickers while the robot drives in."""
 
     def state(self, now: float) -> d.LiftState:
         state = super().state(now)
@@ -154,7 +153,7 @@ class LiftFlaps(RightLift):
 
 
 class LiftModeMixed(RightLift):
-    """The state's mode uses the request's numbers, where AGV is 1. In a state 1 means HUMAN."""
+    """The state shows the mode by the request's numbers, where AGV is 1. In a state 1 means HUMAN."""
 
     def state(self, now: float) -> d.LiftState:
         state = super().state(now)
@@ -162,7 +161,7 @@ class LiftModeMixed(RightLift):
 
 
 class LiftNumbersMixed(RightLift):
-    """The maker typed the request numbers anew: END 1, AGV 2, HUMAN 3 (QuikSync). So AGV ends a
+    """The maker gave the request types new numbers: END 1, AGV 2, HUMAN 3 (QuikSync). So AGV ends a
     session, and END does nothing."""
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
@@ -175,8 +174,7 @@ class LiftNumbersMixed(RightLift):
 
 
 class LiftStaleOpen(RightLift):
-    """The controller is lost when the door is open, and the lift publishes the last reading for
-    ever."""
+    """The controller fails while the door is open, and the lift publishes its last reading for ever."""
 
     read: d.LiftState | None = None
 
@@ -189,7 +187,7 @@ class LiftStaleOpen(RightLift):
 
 
 class LiftVendorCodes(RightLift):
-    """The lift publishes the vendor's own status word of the door: 3 is locked."""
+    """The lift publishes 3 (locked) in place of a closed door. 3 is the vendor's own code."""
 
     def state(self, now: float) -> d.LiftState:
         state = super().state(now)
@@ -204,7 +202,7 @@ class LiftWithoutStamps(RightLift):
 
 
 class OpenNowhere(RightLift):
-    """The lift shows OPEN and no floor, because it has not read the floor's code yet."""
+    """The lift shows OPEN without a floor, because it reads the floor code later than the door."""
 
     def state(self, now: float) -> d.LiftState:
         state = super().state(now)
@@ -213,7 +211,7 @@ class OpenNowhere(RightLift):
 
 
 class OpenWhileMoving(RightLift):
-    """A contact that the car passes on its way makes the lift show OPEN."""
+    """The lift shows OPEN while the car moves, because the car passes a contact on its way."""
 
     def state(self, now: float) -> d.LiftState:
         state = super().state(now)
@@ -221,7 +219,8 @@ class OpenWhileMoving(RightLift):
 
 
 class OtherLiftsRequest(RightLift):
-    """The lift compares the lift's name too late (sharp-rmf/low_level_lift)."""
+    """The lift compares the lift's name too late, so it obeys requests for other lifts
+    (sharp-rmf/low_level_lift)."""
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
         if isinstance(message, d.LiftRequest):
@@ -230,7 +229,7 @@ class OtherLiftsRequest(RightLift):
 
 
 class OwnSessionName(RightLift):
-    """session_id holds the vendor's booking number instead of the requester's id."""
+    """The lift puts the vendor's booking number into session_id, in place of the requester's id."""
 
     def state(self, now: float) -> d.LiftState:
         state = super().state(now)
@@ -238,7 +237,7 @@ class OwnSessionName(RightLift):
 
 
 class SessionTimesOut(RightLift):
-    """A watchdog frees the lift after 5 s with an open door. No END has come."""
+    """A watchdog frees the lift after 2 s with an open door, although no END has come."""
 
     opened = 0
 
@@ -250,7 +249,8 @@ class SessionTimesOut(RightLift):
 
 
 class ShowsWhatItWasAsked(RightLift):
-    """destination_floor repeats the requested floor, even if the lift does not serve that floor."""
+    """The lift repeats the requested floor in destination_floor, even if it does not serve that
+    floor."""
 
     asked = ""
 
@@ -270,7 +270,7 @@ class LiftOnlyOnChange(RightLift):
 
 
 class LeavesWithoutSession(RightLift):
-    """The node ends the session when the car leaves for the robot's floor."""
+    """The lift ends the session when the car leaves for the robot's floor."""
 
     def moves(self, age_s: float) -> None:
         super().moves(age_s)
@@ -279,8 +279,8 @@ class LeavesWithoutSession(RightLift):
 
 
 class LiftReadsDoorOnce(RightLift):
-    """The door's module is lost when the door is open. The lift still reads its floor, and stamps each
-    state with the time of publishing."""
+    """The door's module fails while the door is open. The lift goes on reading its floor, and gives
+    each state the time of publishing as its stamp."""
 
     read = 0
 
@@ -291,7 +291,8 @@ class LiftReadsDoorOnce(RightLift):
 
 
 class LiftListsOtherFloors(RightLift):
-    """available_floors holds the controller's numbers, but current_floor holds the map's names."""
+    """The lift lists the controller's numbers in available_floors. But current_floor has the map's
+    names."""
 
     def serves(self, request: d.LiftRequest) -> bool:
         return True
@@ -301,6 +302,7 @@ class LiftListsOtherFloors(RightLift):
 
 
 class HearsBothTopics(RightLift):
-    """The lift obeys both the supervisor and the fleet adapters, which bypass the supervisor."""
+    """The lift obeys the supervisor and also the fleet adapters, whose requests bypass the
+    supervisor."""
 
     subscribes = (topics.LIFT_REQUESTS, topics.ADAPTER_LIFT_REQUESTS)
