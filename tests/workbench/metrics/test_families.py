@@ -1,4 +1,4 @@
-"""Metrics of the graph and of this machine in the form that Prometheus reads."""
+"""Metrics of the graph and of this machine, in the form that Prometheus reads."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -20,7 +20,7 @@ from workbench.metrics.machine import of_machine, of_recordings
 
 
 class Once(Collector):
-    """A collector of given metric families."""
+    """A collector that returns the given metric families."""
 
     def __init__(self, families: Iterable[Metric]) -> None:
         self._families = [*families]
@@ -30,7 +30,7 @@ class Once(Collector):
 
 
 def samples(families: Iterable[Metric]) -> dict[str, float]:
-    """Return the value of each sample by its name in a scrape, `name{label="value",…}`."""
+    """Return the value of each sample in a scrape, by its name `name{label="value",…}`."""
     registry = CollectorRegistry()
     registry.register(Once(families))
     text = generate_latest(registry).decode()
