@@ -1,4 +1,4 @@
-"""A fixture for the server that receives notices."""
+"""A fixture: the server that receives notices."""
 
 import threading
 from collections.abc import Iterator

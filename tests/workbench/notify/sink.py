@@ -4,7 +4,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 
 class Sink(ThreadingHTTPServer):
-    """An HTTP server that keeps each request, and answers with `status`."""
+    """An HTTP server that stores each request, and answers with `status`."""
 
     daemon_threads = True
 
@@ -30,4 +30,4 @@ class Taking(BaseHTTPRequestHandler):
         self.end_headers()
 
     def log_message(self, *_: object) -> None:
-        """Stay silent."""
+        """Log nothing."""

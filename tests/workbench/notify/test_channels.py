@@ -1,4 +1,4 @@
-"""The channels to people, over real HTTP and a real mail server."""
+"""The ways to send notices to people, over real HTTP and with a real mail server."""
 
 import json
 import ssl
@@ -76,7 +76,7 @@ def test_a_server_that_is_not_there_and_a_token_that_others_can_read_are_errors(
 
 
 class Mailbox:
-    """A mail server's store."""
+    """The mails that a mail server has received."""
 
     def __init__(self) -> None:
         self.mails: list[EmailMessage] = []

@@ -1,4 +1,5 @@
-"""`rmf-bridge notify` beside a real daemon. People get notices when the daemon dies and returns."""
+"""`rmf-bridge notify` beside a real daemon. People get a notice when the daemon dies and when it
+returns."""
 
 import json
 import os
@@ -37,7 +38,7 @@ def notify(file: Path, state: Path, domain: int) -> Iterator[subprocess.Popen[by
 
 
 def states_are_heard(status: Path) -> None:
-    """Wait until another node hears the daemon's states, and the daemon has published two more."""
+    """Wait until another node hears the daemon's states, and two more states have come."""
 
     def heard() -> bool:
         return bool(json.loads(status.read_text())["heard_by"]["door_states"])

@@ -25,7 +25,7 @@ ALL = {("lift", "Lift1"), ("door", "ward")}
 
 @dataclass
 class Desk:
-    """A desk with a turn every 10 s. `told` holds a line for each notice."""
+    """A run of `notify` that looks every 10 s. `told` has one line for each notice."""
 
     notices: Notices = field(default_factory=lambda: Notices(SETTINGS))
     now: float = 0.0
@@ -35,7 +35,7 @@ class Desk:
     def passes(
         self, seconds: float, *present: Trouble, heard: set[tuple[str, str]] = ALL
     ) -> "Desk":
-        """Let time pass with these troubles present."""
+        """Let time pass. During this time these troubles are present."""
         for _ in range(round(seconds / 10)):
             self.now += 10
             for one in self.notices.turn(present, heard, self.now, self.clock):
