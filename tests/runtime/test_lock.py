@@ -46,7 +46,7 @@ def test_a_member_of_the_group_who_waits_for_every_lock_keeps_no_relay_on(
     run.mkdir()
     os.chown(run, 0, NOBODY)
     run.chmod(0o2750)
-    (run / "lock").write_text('{"pid":1,"file":"x","serves":true}')  # from an older version
+    (run / "lock").write_text('{"pid":1,"file":"x","serves":true}')  # an older version's file
     (run / "lock").chmod(0o640)
     with daemon(module.file, run, **unit(run, "a")) as running:
         hold_open(module, graph, running)

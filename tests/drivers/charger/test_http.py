@@ -91,7 +91,7 @@ def test_every_code_of_a_byte_has_a_state_in_rmf_and_none_is_passed_on_raw() -> 
             sample.activity is Activity.UNKNOWN
         )
     assert states == {
-        State.CHARGER_IDLE: {0, 1, 2, 3, 4, 9, 10},  # a handshake without a request is idle
+        State.CHARGER_IDLE: {0, 1, 2, 3, 4, 9, 10},  # a handshake without a request counts as idle
         State.CHARGER_ASSIGNED: set(),
         State.CHARGER_CHARGING: {5, 6, 11},
         State.CHARGER_RELEASED: {7},

@@ -32,7 +32,7 @@ def test_every_code_of_a_byte_has_a_state_in_rmf() -> None:
         unknown = "unknown vendor state" in shown.error_message
         assert unknown == (made.activity is Activity.UNKNOWN) == (code not in xnergy.CODES)
     assert states == {
-        State.CHARGER_IDLE: {0, 1, 2, 3, 4, 9, 10},  # a handshake without a request is idle
+        State.CHARGER_IDLE: {0, 1, 2, 3, 4, 9, 10},  # a handshake without a request counts as idle
         State.CHARGER_ASSIGNED: set(),
         State.CHARGER_CHARGING: {5, 6, 11},
         State.CHARGER_RELEASED: {7},

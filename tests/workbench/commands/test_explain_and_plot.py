@@ -1,4 +1,4 @@
-"""`rmf-bridge explain` and `plot` as typed commands, on recordings of every kind."""
+"""`rmf-bridge explain` and `plot` as a person types them, on recordings of every kind."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`rmf-bridge init`: every draft passes `check`, and nothing is overwritten."""
+"""`rmf-bridge init`. Every draft passes `check`, and the command overwrites no file."""
 
 import json
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ lifts:
 
 @pytest.fixture(autouse=True)
 def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the user's data directory, in which the schema lies."""
+    """Return the user's data directory. It contains the schema."""
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
     return tmp_path / "data"
 
@@ -91,7 +91,7 @@ def test_a_gateway_is_drafted_from_its_register_table(tmp_path: Path) -> None:
     assert found["fire_alarm"] == {"at": "discrete input 4", "active": "high"}
     assert found["agv_mode"] == {"at": "input register 3", "bit": 0, "active": "high"}
     assert found["commands"]["agv_mode_request"]["at"] == "coil 2"
-    assert found["commands"]["call"]["none"] == 1  # 0 is also a floor
+    assert found["commands"]["call"]["none"] == 1  # the floor 0 exists too
     assert "motion" not in found
 
 
@@ -175,7 +175,7 @@ def test_on_a_terminal_it_asks_one_thing_after_the_other(tmp_path: Path) -> None
     file = tmp_path / "device.yaml"
     terminal = Terminal("init", str(file), "--domain-id", "5")
     terminal.wait_for("What is it?")
-    terminal.type("\x1b[B\r")  # down arrow: select the door
+    terminal.type("\x1b[B\r")  # the down arrow selects the door
     terminal.wait_for("The device's name on RMF's map?")
     terminal.type("ward\r")
     terminal.wait_for("How is it wired?")

@@ -1,4 +1,5 @@
-"""`mqtt-out` as a process between RMF's graph and a real broker. The broker is killed and restarted."""
+"""`mqtt-out` as a process between RMF's graph and a real broker. The tests kill and restart the
+broker."""
 
 import argparse
 import json
@@ -32,7 +33,7 @@ CONFIG = "homeassistant/device/rmf_door_ward/config"
 
 
 class Reader:
-    """A client that joins the broker anew and reads the retained messages."""
+    """A new client that reads the retained messages of the broker."""
 
     def __init__(self, broker: Mosquitto, user: str = "", password: str = "") -> None:
         self.retained: dict[str, str] = {}
@@ -62,7 +63,7 @@ def reader(broker: Mosquitto, user: str = "", password: str = "") -> Iterator[Re
 
 
 def holds(broker: Mosquitto, **wanted: str) -> None:
-    """Wait until every client that joins now gets these payloads from the broker."""
+    """Wait until the broker retains these payloads for every new client."""
     with reader(broker) as found:
         wait_until(
             lambda: all(found.retained.get(topic) == said for topic, said in wanted.items()),
@@ -72,7 +73,7 @@ def holds(broker: Mosquitto, **wanted: str) -> None:
 
 @contextmanager
 def mqtt_out(broker: Mosquitto, domain: int, *options: str) -> Iterator[subprocess.Popen[str]]:
-    """Run the command until the end of the block."""
+    """Run the command until the `with` block ends."""
     words = [sys.executable, "-m", "bridges.cli", "mqtt-out", f"127.0.0.1:{broker.port}", *options]
     words += ["--domain-id", str(domain), "--localhost", "--transport", runs_here()]
     process = subprocess.Popen(
@@ -95,7 +96,7 @@ def door(domain: int) -> Iterator["Door"]:
 
 
 class Door:
-    """A door's node on the graph, without diagnostics."""
+    """A door's node on the graph. It publishes no diagnostics."""
 
     def __init__(self, domain: int) -> None:
         self.node = open_transport(
@@ -104,13 +105,13 @@ class Door:
         self._states = self.node.publisher(topics.DOOR_STATES)
 
     def says(self, mode: int) -> None:
-        """Publish a state that was read at this moment."""
+        """Publish a state with the present time as its stamp."""
         wall = self.node.wall()
         stamp = d.Time(int(wall), int(wall % 1 * 1e9))
         self._states.publish(d.DoorState(stamp, "ward", d.DoorMode(mode)))
 
     def is_shown(self, broker: Mosquitto, mode: int, word: str) -> None:
-        """Publish this state until the broker holds it."""
+        """Publish this state again and again, until the broker retains it."""
         with reader(broker) as found:
 
             def shown() -> bool:

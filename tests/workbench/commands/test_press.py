@@ -1,4 +1,4 @@
-"""`rmf-bridge press` and `fail` act on the plants of a simulated lift."""
+"""`rmf-bridge press` and `fail` on the simulated devices of a lift."""
 
 import logging
 from collections.abc import Iterator

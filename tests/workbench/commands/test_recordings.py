@@ -1,4 +1,4 @@
-"""For an unreadable recording every command gives the same exit code and prints a sentence."""
+"""Unreadable recordings. Every command gives the same exit code and prints a sentence."""
 
 import os
 from pathlib import Path
@@ -22,7 +22,7 @@ CONTENTS = {
     "sqlite": b"SQLite format 3\0",
 }
 CUT = b"\x89MCAP0\r\n"
-"""The beginning of a recording whose end is missing."""
+"""The first bytes of a recording that was cut off."""
 
 
 def unreadable(sort: str, folder: Path) -> Path:
@@ -56,7 +56,8 @@ def test_what_is_no_recording_is_exit_66_and_a_sentence(
 def test_a_recording_that_was_cut_is_read_as_far_as_it_goes(
     command: tuple[str, ...], code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Every command reads the beginning; `replay` refuses the file, because its head is missing."""
+    """Every command reads the remaining part. Only `replay` refuses the file, because its head is
+    missing."""
     file = tmp_path / "x.mcap"
     file.write_bytes(CUT)
     assert cli.main([str(file) if word == "FILE" else word for word in command]) == code

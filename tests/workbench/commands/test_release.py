@@ -1,4 +1,4 @@
-"""`release` asks first the supervisor, then the lift's daemon. If a robot may be inside, `release`
+"""`release` asks first the supervisor, then the lift's daemon. If a robot may be inside, the command
 refuses."""
 
 import dataclasses
@@ -31,9 +31,9 @@ LOOK = (
 def told(
     request: LiftEnd, states: Iterable[d.LiftState], boarded: str, listeners: int = 1
 ) -> tuple[list[tuple[int, str]], list[str], Fulfilled | Failed]:
-    """Deliver one state each second.
+    """Deliver one state each second to a `release`.
 
-    Return (time, way) of each request, the hints, and the end.
+    Return (time in s, way) of each request, the hints, and the outcome.
     """
     seen = RequestProgress(0.0, 10.0, listeners, boarded=boarded)
     sent, hints = list[tuple[int, str]](), list[str]()

@@ -1,4 +1,4 @@
-"""`send` and `watch` as whole commands: on the memory transport, and as processes on DDS."""
+"""`send` and `watch` as whole commands, on the memory transport and as processes on DDS."""
 
 import argparse
 import io
@@ -43,7 +43,8 @@ LIFT = d.LiftState(
 
 
 class Command(MemoryTransport):
-    """A node that gets a device's state when it subscribes, and after each of its requests."""
+    """The command's node. It gets the device's state when it subscribes, and after each of its
+    requests."""
 
     def __init__(self, device: "Device") -> None:
         super().__init__(device.network, "command")
@@ -52,14 +53,14 @@ class Command(MemoryTransport):
     def subscribe(
         self, topic: Topic[M], received: Callable[[M], None], *, others_only: bool = False
     ) -> Any:
-        """Subscribe, and deliver a state at once. A real device publishes at 1 Hz."""
+        """Subscribe, and deliver one state at once. A real device would publish within 1 s."""
         subscription = super().subscribe(topic, received, others_only=others_only)
         self._device.tell()
         return subscription
 
 
 class Device:
-    """A lift, door or charger on the memory transport that obeys at once."""
+    """A lift, door or charger on the memory transport. It obeys each request at once."""
 
     def __init__(self, states: Topic[Any], requests: Topic[Any], state: Any) -> None:
         self.network = MemoryNetwork()
@@ -187,7 +188,7 @@ def test_what_comes_from_the_network_cannot_move_the_cursor(
 
 
 class Interrupted(io.StringIO):
-    """A stream that raises Ctrl-C when the command prints this text."""
+    """A stream that raises KeyboardInterrupt when the command prints this text."""
 
     def __init__(self, at: str) -> None:
         super().__init__()
@@ -305,7 +306,7 @@ def test_a_request_id_is_new_each_time_and_begins_with_our_name() -> None:
 
 @pytest.fixture(params=sorted({runs_here(), "zenoh"}))
 def speaks(request: pytest.FixtureRequest) -> Wire:
-    """Return the transport of the daemon and of the command."""
+    """Return the transport that the daemon and the command use."""
     speaks: Wire = request.param
     return speaks
 
@@ -340,7 +341,7 @@ def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic(
         states = node.publisher(topics.LIFT_STATES)
         requests: list[d.LiftRequest] = []
         node.subscribe(topics.ADAPTER_LIFT_REQUESTS, requests.append)
-        node.publisher(topics.LIFT_REQUESTS)  # a supervisor publishes there too
+        node.publisher(topics.LIFT_REQUESTS)  # a supervisor also publishes on lift_requests
         with command("send lift Lift1 L3 --session fleet/robot", speaks, domain) as process:
             wait_until(lambda: states.matched() > 0, "send listens to lift_states")
             states.publish(LIFT)
@@ -387,8 +388,8 @@ def test_an_interrupted_send_exits_130_and_leaves_no_ghost_that_asks_for_the_doo
 
 
 def test_a_command_reaches_a_site_as_a_device_yaml_does(tmp_path: Path) -> None:
-    """`--config` gives the command the router, domain and keys of the site. An option beside `--config`
-    overrides the file."""
+    """With `--config` the command takes the router, domain and keys from the site's file. Other options
+    override the file."""
     router = Router()
     file = tmp_path / "lift.yaml"
     shipped = (Path(__file__).parents[3] / "config" / "lift_supervisor.yaml").read_text()

@@ -140,8 +140,8 @@ def test_faults_have_a_column_when_there_are_any_and_are_a_change() -> None:
 
 
 def test_a_device_is_shown_once_it_is_known_whether_it_is_simulated() -> None:
-    """A real device's daemon may never publish diagnostics, so `watch` waits for diagnostics only
-    briefly."""
+    """`watch` waits briefly for diagnostics, which say whether a device is simulated. The node of a
+    real device may never publish diagnostics."""
     young = board(LIFT)
     assert watch.settled(young, 100.0, WALL) == []
     assert [row.simulated for row in watch.settled(young, 101.5, WALL)] == [False]
@@ -279,7 +279,7 @@ def test_robots_are_shown_with_the_place_that_they_are_assigned_to_charge_or_to_
 
 
 def daemon(node: str, kind: str, **status: object) -> d.DiagnosticArray:
-    """Return the diagnostics of a daemon and of Lift1."""
+    """Return the diagnostics of a daemon, with its status and with Lift1."""
     lift = {"faults": [{"code": "OVERLOAD", "detail": "since 3 s"}], "input_age_s": 0.1}
     return diagnosis(node, kind, status, {"Lift1": lift}, d.Time())
 

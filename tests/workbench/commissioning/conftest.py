@@ -1,4 +1,4 @@
-"""The Modbus module of the daemon tests, for commands that act on real wires."""
+"""Fixtures of the daemon tests: a Modbus module for commands on real wires."""
 
 from tests.runtime.conftest import module
 

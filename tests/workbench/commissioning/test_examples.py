@@ -1,4 +1,5 @@
-"""Each key of the reference has a valid example, and each heading appears once."""
+"""The examples and headings of the reference. Each key has a valid example, and each heading is
+unique."""
 
 from collections import Counter
 from pathlib import Path
@@ -18,7 +19,7 @@ from workbench.commissioning.examples import example
 
 
 def structs() -> list[type]:
-    """Return every struct of the reference, and the structs inside them."""
+    """Return every struct in the reference. The list includes the structs inside other structs."""
     tops: list[type] = [Rmf, *(named.bus_called(name).settings for name in named.bus_types())]
     tops += [shape.type.settings for shape in json_schema.shapes()]
     tops += [kind.settings for kind in json_schema.graph_kinds()]
@@ -36,7 +37,7 @@ def fields(struct: type) -> tuple[mi.Field, ...]:
 
 
 def judged(struct: type, field: mi.Field) -> list[str]:
-    """Return the problems that the loader finds in an example."""
+    """Return the problems that the loader finds in the example for this key."""
     page = YamlFile("example")
     root = yaml.compose(f"wanted: {{{example(struct, field)}}}")
     assert root is not None

@@ -1,4 +1,4 @@
-"""A command finds its device in a file. The file may be wrong, or hold several devices."""
+"""The device that a command finds in a file. The file may be wrong or may list several devices."""
 
 import os
 from pathlib import Path

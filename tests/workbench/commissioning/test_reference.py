@@ -28,7 +28,7 @@ def validator(schema: json_schema.Schema) -> Draft202012Validator:
 
 
 def properties(part: object) -> Iterator[tuple[str, json_schema.Schema]]:
-    """Yield every property of a schema, at any depth. An editor shows the property's text beside its
+    """Yield every property of a schema, at any depth. An editor shows the text of a property beside its
     key."""
     if isinstance(part, dict):
         yield from part.get("properties", {}).items()
@@ -58,7 +58,7 @@ def test_every_shipped_file_is_right_by_the_schema(
 ) -> None:
     as_json = json.loads(
         json.dumps(yaml.safe_load(file.read_text()))
-    )  # every key in JSON is a string
+    )  # in JSON every key is a string
     assert [e.message for e in validator.iter_errors(as_json)] == []
 
 

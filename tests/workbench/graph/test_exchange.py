@@ -1,4 +1,4 @@
-"""`send` in virtual time: the requests and their times, the end, and the texts for failures."""
+"""`send` in virtual time: the requests and their times, the outcome, and the texts for failures."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -36,7 +36,8 @@ CHARGER = d.ChargerState(state=1, charger_name="a")
 
 @dataclass
 class Ran:
-    """One run of `send`: each request with its time, the hints, and the outcome with its time."""
+    """One run of `send`. It has each request with its time, the hints, and the outcome with its time
+    (s)."""
 
     sent: list[tuple[float, words.Requested]]
     hints: list[str]
@@ -53,7 +54,7 @@ def tell(
     timeout_s: float = 10.0,
     graph: str = "",
 ) -> Ran:
-    """Run `send` every 0.1 s from 0 s on, and deliver each message of the story at its time."""
+    """Run `send` in steps of 0.1 s from 0 s on. Deliver each message of the story at its time."""
     left = sorted(story, key=lambda entry: entry[0])
     seen, ran = RequestProgress(0.0, timeout_s, graph=graph), Ran([], [], Fulfilled(""), 0.0)
     for tick in range(10_000):

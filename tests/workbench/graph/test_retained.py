@@ -1,4 +1,4 @@
-"""The messages of `mqtt-out` for given states, in virtual time."""
+"""The messages that `mqtt-out` publishes for given states, in virtual time."""
 
 import json
 import re
@@ -22,7 +22,7 @@ DOOR = d.DoorState(stamp(WALL), "ward", d.DoorMode(0))
 
 
 class Site:
-    """A graph that one retainer shows. At `now` = 0 s the wall clock reads WALL."""
+    """A graph whose states one retainer publishes. The wall clock reads WALL at the time 0 s."""
 
     def __init__(self, discovery: str | None = None) -> None:
         self.graph = PlainGraph(most=2)

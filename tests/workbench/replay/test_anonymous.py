@@ -1,4 +1,4 @@
-"""An incident without names keeps no name of the site, and gives the same decisions."""
+"""Incidents without names. Such a file has no name of the site, and gives the same decisions."""
 
 import re
 import sys
@@ -25,7 +25,7 @@ NAMES = (b"Lift1", b"Lift2", b"red", b"green", b"white", b"black", b"bay1", b"ba
 
 
 def whole(file: Path) -> Incident:
-    """Return the content of a file, with its messages."""
+    """Return the content of a file, including its messages."""
     head, entries = opened(file, Notes())
     return Incident(head, list(entries), tuple(notes_in(file)))
 
@@ -77,7 +77,8 @@ def test_a_name_is_the_same_in_messages_and_decisions_and_comments_and_addresses
 def test_a_kind_whose_words_cannot_be_read_makes_nothing_anonymous(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Without this rule words of the kind would count as names of the site, and replay would fail."""
+    """Without the words of a kind, `anonymous` would replace them as names of the site. Then replay
+    would fail."""
     monkeypatch.setitem(sys.modules, lift.__name__ + ".report", None)
     our_words.cache_clear()
 

@@ -1,4 +1,4 @@
-"""Recordings of rosbag2, in each release and storage format, give the same values."""
+"""Recordings of rosbag2. Each release and storage format gives the same values."""
 
 import shutil
 from pathlib import Path
@@ -30,7 +30,7 @@ FLEET = FleetState("mir", (RobotState(name="r1", mode=RobotMode(mode=2)),))
 
 
 def heard(*messages: tuple[str, object]) -> list[Heard]:
-    """Return the messages as heard, one each second."""
+    """Return these messages as if one was heard each second."""
     return [
         Heard(WALL + second, WALL + second, topic, message)  # type: ignore[arg-type]
         for second, (topic, message) in enumerate(messages)

@@ -1,4 +1,4 @@
-"""Damaged and hostile recordings. The reader gives the readable parts in bounded memory, and reports
+"""Damaged and hostile recordings. The reader returns the readable parts in bounded memory, and reports
 the damage."""
 
 import io
@@ -27,7 +27,7 @@ NAME = "rmf_lift_msgs/msg/LiftState"
 
 
 def states(number: int, *, compression: CompressionType = CompressionType.NONE) -> bytes:
-    """Return an MCAP file with this number of lift states, in small chunks."""
+    """Return an MCAP file with `number` lift states, in small chunks."""
     out = io.BytesIO()
     writer = Writer(out, chunk_size=1000, compression=compression)
     writer.start("ros2")
@@ -42,18 +42,18 @@ def states(number: int, *, compression: CompressionType = CompressionType.NONE) 
 
 
 def record(opcode: int, body: bytes, length: int | None = None) -> bytes:
-    """Return a record whose head states `length`, by default the true length."""
+    """Return a record. Its head states `length`, or by default the true length."""
     return struct.pack("<BQ", opcode, len(body) if length is None else length) + body
 
 
 def chunk(compression: bytes, data: bytes, unpacked: int) -> bytes:
-    """Return a chunk that claims to unpack to this number of bytes."""
+    """Return a chunk that claims to have `unpacked` bytes after decompression."""
     head = struct.pack("<QQQII", 0, 0, unpacked, 0, len(compression)) + compression
     return record(Opcode.CHUNK, head + struct.pack("<Q", len(data)) + data)
 
 
 def read(path: Path, content: bytes) -> tuple[list[str], str]:
-    """Return the names of the lifts, and the report of the damage without the path."""
+    """Return the names of the lifts, and the report of the damage without the file's path."""
     path.write_bytes(content)
     notes = Notes()
     found = [one.message.lift_name for one in heard_in(path, notes)]  # type: ignore[union-attr]

@@ -1,4 +1,4 @@
-"""Replay decides recordings of the soak test again, with the same decisions and memories."""
+"""Replays of the soak test's recordings. They give the same decisions and memories again."""
 
 import os
 from pathlib import Path
@@ -59,7 +59,8 @@ def test_a_ring_that_has_turned_many_times_begins_where_all_is_known(tmp_path: P
 
 @pytest.mark.parametrize("file", CORPUS, ids=lambda file: file.stem)
 def test_each_incident_of_the_soak_is_decided_as_it_was_recorded(file: Path) -> None:
-    """After a deliberate change, renew the incidents: `python -m tests.workbench.replay.corpus`."""
+    """After a deliberate change, write the incidents again: `python -m
+    tests.workbench.replay.corpus`."""
     notes = Notes()
     head, entries = opened(file, notes)
     replay = Replay(entries, ReplayedCores(of_head(head)))
@@ -70,7 +71,7 @@ def test_each_incident_of_the_soak_is_decided_as_it_was_recorded(file: Path) -> 
 
 
 def test_a_change_of_a_core_is_seen_with_what_led_to_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The changed lift reports no faults. The difference shows the events before the missing fault."""
+    """The changed core reports no faults. The difference shows the events before the missing fault."""
     monkeypatch.setattr(lift_core, "_faults", lambda memory, view, now, limits: ())
     head, entries = opened(HERE / "Lift1_1.mcap", Notes())
 
@@ -140,7 +141,7 @@ def test_the_yaml_of_another_device_is_refused_with_both_names(
 
 
 def test_what_cannot_be_replayed_is_counted(tmp_path: Path) -> None:
-    """The `Known` entries are missing, as in a recording whose beginning is damaged."""
+    """The recording has no `Known` entries, as when its beginning is damaged."""
     head, entries = opened(HERE / "bay1_1.mcap", Notes())
     replay = Replay(
         [one for one in entries if not isinstance(one, Known)], ReplayedCores(of_head(head))
@@ -159,5 +160,5 @@ def recorded_faults() -> tuple[Fault, ...]:
 
 
 def summary(found: Difference) -> str:
-    """Return a difference in one line, for a failed test."""
+    """Return a difference in one line, for the report of a failed test."""
     return f"{found.subject} {found.what}: {found.recorded} -> {found.today} after {found.before}"

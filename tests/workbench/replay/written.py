@@ -1,5 +1,4 @@
-"""Recordings as rosbag2 writes them. The `rosbags` library writes them with its own definition
-texts."""
+"""Recordings in the form of rosbag2. The library `rosbags` writes them with our definition texts."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,7 +17,7 @@ MCAP, SQLITE = StoragePlugin.MCAP, StoragePlugin.SQLITE3
 
 
 def store(release: Release) -> Typestore:
-    """Return the types of a release. `rosbags` gets the types from our definition texts."""
+    """Return the types of a release. They come from our definition texts."""
     types = get_typestore(Stores.EMPTY)
     for message_type in release.messages():
         own = text(message_type, release).partition("=" * 80)[0]
@@ -29,7 +28,7 @@ def store(release: Release) -> Typestore:
 def write(
     bag: Path, heard: Iterable[Heard], release: Release, storage: StoragePlugin = MCAP
 ) -> Path:
-    """Write a bag with these messages, and with one topic that does not belong to RMF."""
+    """Write a bag with these messages, and with one topic that RMF does not have."""
     types = store(release)
     with Writer(bag, version=9, storage_plugin=storage) as writer:
         other = writer.add_connection("/scan", "std_msgs/msg/Bool", typestore=types)

@@ -1,4 +1,5 @@
-"""Edges of RMF's rules: the older rules of Jazzy, and rules that mutation testing found untested."""
+"""Rare cases of RMF's rules: the older rules of Jazzy, and rules that mutation testing found
+untested."""
 
 from msgspec.structs import replace
 

@@ -1,5 +1,4 @@
-"""The model of RMF keeps the rules of RMF's supervisors and fleet adapters. Each test checks one
-rule."""
+"""The rules of RMF's supervisors and fleet adapters in our model. Each test checks one rule."""
 
 from collections.abc import Iterable
 
@@ -49,12 +48,12 @@ def listing(*requesters: str, at: float = 0.0) -> d.SupervisorHeartbeat:
 
 
 def heard(party: Party, *messages: d.Message, now: float = 0.0) -> list[Said]:
-    """Return the messages that a party sends in answer to each of these messages."""
+    """Return the messages that a party sends in answer to these messages."""
     return [said for message in messages for said in party.hear(message, now)]
 
 
 def circulate(parties: Iterable[Party], said: list[Said], now: float) -> list[Said]:
-    """Deliver messages until all parties are quiet; return all messages in order."""
+    """Deliver messages until no party answers any more. Return all messages in order."""
     parties, record, left = list(parties), list[Said](), list(said)
     while left:
         topic, message = left.pop(0)
@@ -99,7 +98,7 @@ def test_another_session_is_dropped_silently_whatever_it_wants() -> None:
 @pytest.mark.parametrize(
     ("state", "repeats"),
     [
-        (BOUND, True),  # the door is not open yet
+        (BOUND, True),  # the door is not open
         (replace(BOUND, door_state=2), False),
         (ARRIVED, False),
         (replace(ARRIVED, session_id=""), True),
@@ -323,8 +322,8 @@ def test_a_waiting_robot_costs_two_requests_for_each_state_and_one_after_arrival
 
 
 def test_a_node_that_refuses_the_floorless_end_locks_two_robots_out_for_ever() -> None:
-    """RMF behaves like this. The supervisor forgets A at A's END, adopts B, and then drops A's repeated
-    ENDs."""
+    """RMF behaves like this. At A's END the supervisor forgets A and serves B. Then it drops A's
+    repeated ENDs."""
     supervisor, a, b = LiftSupervisor(), RobotContext(A), RobotContext(B)
     parties: list[Party] = [supervisor, a, b]
     circulate(parties, a.begin(RequestLift("Lift1", "L3", inside=True), 0.0), 0.0)

@@ -1,6 +1,6 @@
 """Twelve troubles on a whole site. `explain` explains each trouble live, and from our recorder's file.
 
-expected.toml   the verdicts, written before the code by somebody who had not seen the code
+expected.toml   the verdicts; their author wrote them before the code, and had not seen it
 verdicts.py     reads the verdicts, and compares a screen with a verdict
 site.py         the site: daemons with their rings, RMF's supervisors, one fleet, the recorder
 fleet.py        the fleet's adapter

@@ -1,7 +1,7 @@
 """`python -m tests.workbench.troubles [NAME …]`: the twelve troubles with real processes on loopback.
 
-A table at the end shows each trouble's verdict, live and from its file. The exit code is 1 if any
-verdict is wrong.
+A table at the end shows the result for each trouble, live and from its file. The exit code is 1 if any
+screen is wrong.
 """
 
 import argparse
@@ -23,11 +23,11 @@ Stage = Callable[[Any], Any]
 
 @dataclass(frozen=True)
 class Real:
-    """One trouble.
+    """One trouble with real processes.
 
-    The trouble needs the daemons in `serves`. `daemon` owns the file. The step `then` runs after the
+    `stage` needs the daemons in `serves`. The file comes from `daemon`. The step `then` runs after the
     live question, and before the recorder writes the file. With `dead` the question waits until DDS has
-    noticed a killed node. `slow` names a part of the device that is slow all the time.
+    noticed that a node was killed. `slow` names a part of the device that is always slow.
     """
 
     stage: Stage
@@ -59,7 +59,7 @@ TROUBLES: Final = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Play the named troubles, or all without a name."""
+    """Play the named troubles, or all troubles without a name."""
     parser = argparse.ArgumentParser(prog="python -m tests.workbench.troubles", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", choices=[*TROUBLES, []])
     parser.add_argument("--screens", action="store_true", help="print each screen that is wrong")

@@ -1,4 +1,4 @@
-"""`rmf-bridge` as a person types it at the site. The site's time goes on when a command waits."""
+"""`rmf-bridge` as a person types it at the site. While a command waits, the site's time passes."""
 
 import io
 from collections import deque
@@ -21,15 +21,14 @@ LISTENS_S: Final = 10.0
 
 
 def live_screen(site: Site, device: str) -> str:
-    """Return the screen of `explain --live` for a listener that joins now."""
+    """Return the screen of `explain --live`. The command joins the graph now."""
     return _typed(site, "explain", "--live", device, "--for", f"{LISTENS_S:g}")
 
 
 def file_screen(site: Site, device: str, daemon: str = "", note: str = "") -> str:
     """Return the screen of `explain FILE`.
 
-    The file is the recorder's. If the recorder writes none, a person asks for it with `incident
-    --note`.
+    The recorder writes the file. If it writes none, a person asks for a file with `incident --note`.
     """
     path = site.file(daemon or device)
     if path is None:
@@ -42,7 +41,7 @@ def file_screen(site: Site, device: str, daemon: str = "", note: str = "") -> st
 
 
 def release_screen(site: Site, device: str) -> str:
-    """Return the screen of `release`. The person knows that the car is empty."""
+    """Return the screen of `release`. The person confirms that the car is empty."""
     return _typed(site, "release", device)
 
 
@@ -66,7 +65,7 @@ def _typed(site: Site, *words: str) -> str:
 
 
 class _Time:
-    """A replacement of the module `time` for a command at the site."""
+    """A stand-in for the module `time`, with the site's time."""
 
     def __init__(self, timeline: Timeline) -> None:
         self._timeline = timeline
@@ -82,7 +81,7 @@ class _Time:
 
 
 class _Queue:
-    """A replacement of SimpleQueue. The site's time goes on when a command waits for the queue."""
+    """A stand-in for SimpleQueue. While a command waits for the queue, the site's time passes."""
 
     def __init__(self, timeline: Timeline) -> None:
         self._timeline = timeline

@@ -1,10 +1,10 @@
-"""Troubles at the charging station charger_a, under our coordinator."""
+"""Troubles at the charging station charger_a. Our coordinator serves it."""
 
 from tests.workbench.troubles.site import CHARGER, Site
 
 
 def daemon_killed(site: Site) -> None:
-    """Kill the station's daemon when a robot charges."""
+    """Kill the station's daemon while a robot charges."""
     site.coordinates()
     site.fleet.robots.charge("red", site.fleet.wall())
     site.run(40.0)
@@ -25,7 +25,8 @@ def robot_never_comes(site: Site) -> None:
 
 
 def robot_never_comes_in_time(site: Site) -> None:
-    """Grant the station to a robot that does not drive, and wait until start_timeout is near."""
+    """Let the coordinator grant the station to a robot that does not drive, until start_timeout is
+    near."""
     robot_never_comes(site)
     site.run(200.0)
     site.trouble_begins()

@@ -1,4 +1,4 @@
-"""Troubles at ward_door, under RMF's own supervisor."""
+"""Troubles at ward_door. RMF's own supervisor serves it."""
 
 from typing import Final
 
@@ -30,7 +30,7 @@ def closed_contact_cut(site: Site) -> None:
 
 
 def slow_modbus_unit(site: Site) -> None:
-    """Let the door's Modbus unit answer only sometimes."""
+    """Make the door's Modbus unit slow, so that it answers in time only sometimes."""
     site.passes(site.red, DOOR)
     site.trouble_begins()
     site.slow(DOOR)
@@ -40,7 +40,7 @@ def slow_modbus_unit(site: Site) -> None:
 
 
 def daemon_killed(site: Site) -> None:
-    """Kill the door's daemon when the door opens for a robot."""
+    """Kill the door's daemon while the door opens for a robot."""
     site.passes(site.red, DOOR)
     site.trouble_begins()
     site.red.opens(DOOR)
@@ -50,7 +50,7 @@ def daemon_killed(site: Site) -> None:
 
 
 def door_merely_closes(site: Site) -> None:
-    """Let a robot pass. Its hold has ended a moment ago."""
+    """Let a robot pass, and stop just after the robot has closed the door."""
     site.red.opens(DOOR)
     site.until(site.red)
     site.run(6.0)
@@ -60,7 +60,7 @@ def door_merely_closes(site: Site) -> None:
 
 
 def robot_in_doorway(site: Site) -> None:
-    """Let a robot's DoorOpen end when the robot stands in the doorway."""
+    """Let a robot stop in the doorway after its DoorOpen has ended."""
     site.red.opens(DOOR)
     site.until(site.red)
     site.trouble_begins()
@@ -68,14 +68,14 @@ def robot_in_doorway(site: Site) -> None:
 
 
 def supervisor_dead_doorway(site: Site) -> None:
-    """Let a robot stand in the doorway after its DoorOpen, and kill the door supervisor."""
+    """Let a robot stop in the doorway after its DoorOpen. Then kill the door supervisor."""
     robot_in_doorway(site)
     site.supervisors[SUPERVISOR].kill()
     site.run(30.0)
 
 
 def supervisor_dead(site: Site) -> None:
-    """Kill the door supervisor, and let a robot ask for OPEN."""
+    """Kill the door supervisor. Then let a robot ask for OPEN."""
     _three_passages(site)
     site.supervisors[SUPERVISOR].kill()
     site.trouble_begins()
@@ -84,7 +84,7 @@ def supervisor_dead(site: Site) -> None:
 
 
 def operator_dead(site: Site) -> None:
-    """Let the door operator not move the leaf."""
+    """Let the door operator fail, so that the door does not move. Then let a robot ask for OPEN."""
     _three_passages(site)
     site.fail(DOOR, "operator", "off")
     site.trouble_begins()

@@ -1,4 +1,4 @@
-"""A fleet adapter's node with its robots, by RMF's rules."""
+"""A fleet adapter's node and its robots. They follow RMF's rules."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Final
@@ -23,11 +23,12 @@ SAYS: Final[tuple[Topic[Any], ...]] = (
 
 
 Join = Callable[[str], Transport]
-"""A function that joins the graph as a node of this name."""
+"""A function that joins the graph. The argument is the node's name."""
 
 
 class PartyNode:
-    """One of RMF's nodes, played by its rules. `wall` returns the node's clock (s since the epoch)."""
+    """A node in place of one of RMF's nodes. It follows RMF's rules. `wall` returns the node's clock (s
+    since the epoch)."""
 
     def __init__(
         self,
@@ -59,7 +60,7 @@ class PartyNode:
         self._parties.clear()
 
     def say(self, said: Any) -> None:
-        """Publish a party's messages, and set the alarm for the next tick."""
+        """Publish messages of a party, and set the alarm for the next tick."""
         for topic, message in said:
             self._mouths[topic.name].publish(message)
         left_s = min(party.wake_at() for party in self._parties) - self.wall()
@@ -76,7 +77,7 @@ class PartyNode:
 
 
 class Fleet(PartyNode):
-    """One adapter for all robots of one fleet. Its clock is `behind_s` seconds slow."""
+    """One adapter for all robots of a fleet. Its clock is `behind_s` seconds slow."""
 
     def __init__(
         self,
@@ -98,11 +99,11 @@ class Fleet(PartyNode):
         )
 
     def add(self, robot: RobotContext) -> None:
-        """Let the adapter publish for this robot from now on."""
+        """Let the adapter publish requests for this robot from now on."""
         self._parties.append(robot)
 
     def drop(self, robot: RobotContext) -> None:
-        """Let the adapter stop publishing for this robot."""
+        """Let the adapter stop publishing requests for this robot."""
         self._parties.remove(robot)
 
 
@@ -126,5 +127,5 @@ class Robot(Rider):
         super().ends(lift)
 
     def is_dropped(self) -> None:
-        """Let the adapter stop publishing for this robot."""
+        """Let the adapter stop publishing requests for this robot."""
         self._fleet.drop(self.robot)

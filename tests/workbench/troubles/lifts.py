@@ -1,4 +1,4 @@
-"""Troubles at Lift1. RMF's own supervisor runs unless a docstring names another."""
+"""Troubles at Lift1. RMF's own supervisor serves it, unless the docstring names another supervisor."""
 
 from typing import Final
 
@@ -23,7 +23,8 @@ FLICKERS_S: Final = 1.6
 
 
 def robot_dies_in_car(site: Site) -> None:
-    """Let the adapter fall silent for the robot in the car. It goes on for another robot."""
+    """Let the adapter fall silent for the robot in the car. The adapter still asks for another
+    robot."""
     site.boards(site.red, "L1", "L3")
     site.run(4.0)
     site.blue.asks(LIFT, "L1")
@@ -45,21 +46,21 @@ def robot_dies_in_car_b(site: Site) -> None:
 
 
 def fire_mid_ride(site: Site) -> None:
-    """Let a fire begin in a ride. The car goes down to the recall floor, and the adapter asks for
-    it."""
+    """Let a fire begin during a ride. The car goes down to the recall floor, and the adapter asks for
+    that floor."""
     _fire_between_floors(site)
     site.red.asks(LIFT, "L1", inside=True)
     site.run(5.0)
 
 
 def fire_mid_ride_to_its_end(site: Site) -> None:
-    """Let a fire begin in a ride. The robot leaves at the recall floor."""
+    """Let a fire begin during a ride. The robot leaves the car at the recall floor."""
     fire_mid_ride(site)
     robot_leaves(site)
 
 
 def robot_leaves(site: Site) -> None:
-    """Let the robot in the car see its floor, and drive out."""
+    """Let the robot in the car reach its floor, and drive out."""
     site.until(site.red)
     site.run(2.0)
     site.red.ends(LIFT)
@@ -67,8 +68,8 @@ def robot_leaves(site: Site) -> None:
 
 
 def fire_mid_ride_b(site: Site) -> None:
-    """Let a fire begin. The car stands open at the recall floor, and the adapter goes on asking for
-    L3."""
+    """Let a fire begin during a ride. The car stands open at the recall floor, but the adapter still
+    asks for L3."""
     _fire_between_floors(site)
     site.run(80.0)
 
@@ -83,7 +84,7 @@ def lift_door_contact_cut(site: Site) -> None:
 
 
 def supervisor_killed(site: Site) -> None:
-    """Kill RMF's supervisor before two robots ask for the free lift."""
+    """Kill RMF's supervisor. Then two robots ask for the free lift."""
     site.rides(site.red, LIFT, "L1", "L2")
     site.run(5.0)
     site.supervisors[RMFS].kill()
@@ -95,7 +96,7 @@ def supervisor_killed(site: Site) -> None:
 
 
 def supervisor_killed_b(site: Site) -> None:
-    """Kill RMF's supervisor during a ride. The robot leaves the car and its adapter sends END."""
+    """Kill RMF's supervisor during a ride. The robot leaves the car, and its adapter sends END."""
     site.boards(site.red, "L1", "L3")
     site.run(5.0)
     site.trouble_begins()
@@ -120,7 +121,7 @@ def rmf_silent_robot_asks(site: Site) -> None:
 
 
 def slow_modbus_unit(site: Site) -> None:
-    """Let the lift's Modbus unit answer only sometimes."""
+    """Make the lift's Modbus unit slow, so that it answers in time only sometimes."""
     site.run(5.0)
     site.trouble_begins()
     site.slow(LIFT)
@@ -130,7 +131,7 @@ def slow_modbus_unit(site: Site) -> None:
 
 
 def two_daemons_one_name(site: Site) -> dict[str, str]:
-    """Start a second daemon of ours with the same name, for another lift."""
+    """Start a second daemon of ours for another lift. By mistake it publishes the first lift's name."""
     site.rides(site.red, LIFT, "L2", "L1")
     site.run(60.0)
     site.trouble_begins()
@@ -157,10 +158,9 @@ def two_foreign_nodes(site: Site) -> dict[str, str]:
 
 
 def robot_clock_hour_off(site: Site) -> None:
-    """Set the adapter's clock an hour back, under a supervisor that drops old requests.
+    """Set the adapter's clock back by an hour. A supervisor of another maker drops old requests.
 
-    The supervisor is another maker's, because ours believes a requester that repeats its request
-    (FRESHNESS-5).
+    Our supervisor would believe a requester that repeats its request (FRESHNESS-5).
     """
     site.supervisors[RMFS].kill()
     PartyNode(
@@ -178,7 +178,7 @@ def robot_clock_hour_off(site: Site) -> None:
 
 
 def robot_clock_hour_off_b(site: Site) -> None:
-    """Set the adapter's clock an hour ahead during a ride, under RMF's supervisor."""
+    """Set the adapter's clock an hour ahead, and let a robot ride. RMF's supervisor serves the lift."""
     site.fleet.behind_s = -HOUR_S
     site.trouble_begins()
     site.boards(site.red, "L1", "L3")
@@ -196,7 +196,7 @@ def daemon_killed(site: Site) -> None:
 
 
 def fleet_adapter_killed(site: Site) -> None:
-    """Kill the adapter of the robot in the car. Another robot of this adapter waits."""
+    """Kill the fleet adapter while one of its robots is in the car. Another of its robots waits."""
     site.boards(site.red, "L1", "L3")
     site.blue.asks(LIFT, "L2")
     site.until(site.red)
@@ -207,7 +207,7 @@ def fleet_adapter_killed(site: Site) -> None:
 
 
 def human_mode_with_fault(site: Site) -> None:
-    """Let the relay that asks for AGV mode read back off."""
+    """Let the relay for AGV mode fail. Whatever the daemon writes, the relay reads back off."""
     far = site.devices[LIFT].far
     assert isinstance(far, ModuleFar)
     far.dead = frozenset({parse("unit 1 coil 0")})
@@ -217,7 +217,7 @@ def human_mode_with_fault(site: Site) -> None:
 
 
 def human_mode_relays_off(site: Site) -> None:
-    """Let an unsteady input switch the relays off again and again, until the relays must rest."""
+    """Let an unsteady input switch the relays off again and again. In the end the relays must rest."""
     site.red.asks(LIFT, "L1")
     while not site.daemons[LIFT].faults() or "RELAY_RESTS" not in site.daemons[LIFT].faults():
         site.trouble_begins()
@@ -252,8 +252,8 @@ class StrictSupervisor(LiftSupervisor):
 
 
 class Foreign:
-    """Another maker's lift node. It publishes the same state each second. Its clock is `behind_s` s
-    slow."""
+    """A lift node of another maker. It publishes the same state each second. Its clock is `behind_s`
+    seconds slow."""
 
     def __init__(self, site: Site, node: str, behind_s: float = 0.0) -> None:
         self._site = site

@@ -1,4 +1,4 @@
-"""A Modbus module in virtual time, under the HAL's own read-back, contradiction and pause rules.
+"""A Modbus module in virtual time, under the HAL's own rules for read-back, contradictions and pauses.
 
 Only the wire is missing, with its timeouts and its backoff (`drivers/hal/modbus/bus.py`).
 """
@@ -27,7 +27,7 @@ class ModuleFar(PointsFar):
         return ModbusLines(units, *found, dict(outputs), *of_modbus)  # type: ignore[arg-type]
 
     def silent(self, why: str) -> None:
-        """Stop answering for this reason, or answer again with ""."""
+        """Stop answering, and give this reason. With "" answer again."""
         self.down = self.units.down = why
 
 

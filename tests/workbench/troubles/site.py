@@ -1,7 +1,7 @@
-"""A whole site in virtual time: our daemons with their rings, RMF's supervisors, one fleet, and the
-machine's recorder.
+"""A whole site in virtual time: our daemons with their rings, RMF's supervisors, one fleet, and a
+recorder.
 
-The site equals the soak test's site (`tests/site`), with the names of `expected.toml`.
+The site is the soak test's site (`tests/site`) with the names of `expected.toml`.
 """
 
 import dataclasses
@@ -68,10 +68,10 @@ PLACES: Final = {
 
 
 class Site(Scene):
-    """A site with its recorder.
+    """A site and its recorder.
 
-    Rings and recordings lie in `folder`. `mortal` names a daemon that a story will kill. `latest_s` is
-    the latest reply of a slow unit (s); `slow_s` is the unit's pace (s).
+    Rings and recordings are in `folder`. `mortal` names the daemon that a story kills. A slow unit
+    replies after at most `latest_s` (s), and the daemon asks it every `slow_s` (s).
     """
 
     def __init__(self, folder: Path, mortal: str = "") -> None:
@@ -97,7 +97,7 @@ class Site(Scene):
         self.run(10.0)
 
     def join(self, name: str) -> Transport:
-        """Take part in the graph as a node of this name."""
+        """Join the graph as a node with this name."""
         return Place(self.air, name, lambda: None)
 
     def wall(self) -> float:
@@ -113,7 +113,7 @@ class Site(Scene):
         daemon.start()
 
     def takes_over(self, settings: LiftSupervisorSettings) -> None:
-        """Put our lift supervisor in the place of RMF's."""
+        """Replace RMF's lift supervisor with ours."""
         self.supervisors.pop("rmf_lift_supervisor").kill()
         self._ours("lift_supervisor", LIFT_SUPERVISOR, settings)
 
@@ -122,7 +122,7 @@ class Site(Scene):
         self._ours("charger_coordinator", COORDINATOR, coordinator_settings(START_TIMEOUT_S))
 
     def trouble_begins(self) -> None:
-        """Count only files that the recorder writes from now on."""
+        """Let `file` return only files that the recorder writes from now on."""
         self._before = {path.name for path in self.recordings.folder.glob("*")}
 
     def kills(self, name: str) -> None:
@@ -133,14 +133,14 @@ class Site(Scene):
         self.daemons[name].kill()
 
     def retires(self, name: str) -> None:
-        """Shut the daemon down in good order, without a restart."""
+        """Stop the daemon cleanly. It does not start again."""
         daemon = self.daemons.pop(name)
         daemon.kill()
         daemon.writer.ended(safe=True)
 
     def slow(self, name: str) -> None:
-        """Let the device's unit answer after 0.1 s to `latest_s` from now on, so that most replies are
-        too late."""
+        """Make the device's unit slow from now on. It answers after 0.1 s to `latest_s`, and most
+        replies are too late."""
         far = self.devices[name].far
         assert isinstance(far, ModuleFar)
         far.silent(TOO_LATE if self.random.uniform(0.1, self.latest_s) > TIMEOUT_S else "")
@@ -148,13 +148,13 @@ class Site(Scene):
         self.timeline.after(self.slow_s, lambda: self.slow(name))
 
     def close(self) -> None:
-        """End all processes."""
+        """End the process of the mortal daemon."""
         if self.process:
             self.process.kill()
             self.process.wait()
 
     def boards(self, robot: Robot, start: str, end: str) -> None:
-        """Let the robot board Lift1 at `start`, and ask for `end`."""
+        """Let the robot board Lift1 at `start`. Then the robot asks for `end`."""
         robot.asks(LIFT, start)
         self.until(robot)
         self.run(6.0)
@@ -170,7 +170,7 @@ class Site(Scene):
         self.run(10.0)
 
     def file(self, name: str, within_s: float = 260.0) -> Path | None:
-        """Return the first file that the recorder writes of this daemon after the trouble began."""
+        """Return the first file of this daemon that the recorder writes after the trouble began."""
         until = self.timeline.now + within_s
         while not (found := self._written(name)) and self.timeline.now < until:
             self.run(1.0)
@@ -191,8 +191,8 @@ class Site(Scene):
         self.run(6.0)
 
     def _each_second(self) -> None:
-        """Publish each daemon's diagnostics (as `_tell` in `bridges/runtime/daemon.py` does), and let
-        the recorder look at the rings."""
+        """Publish each daemon's diagnostics, as `_tell` in `bridges/runtime/daemon.py` does. Then let
+        the recorder read the rings."""
         for daemon in self.daemons.values():
             if daemon.alive:
                 told = {daemon.name: daemon.status()}
@@ -226,8 +226,8 @@ class Site(Scene):
 
 
 def devices(timeline: Timeline) -> dict[str, Device]:
-    """Return two devices of each kind. Lift1, with two door contacts, and both doors are at Modbus
-    modules."""
+    """Return two devices of each kind. Lift1 and both doors are at Modbus modules. Lift1 has two door
+    contacts."""
     content = {**building._lift2(), "fire_reset": "auto", "alarm": "fire_alarm_trigger"}
     settings = building._convert(lift_dry_contact, content)
     other = building._shipped("lift_dry_contact", LIFT)

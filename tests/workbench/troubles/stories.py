@@ -1,4 +1,4 @@
-"""Each trouble of `expected.toml`, staged at the site up to the moment when somebody asks."""
+"""The stories of the troubles in `expected.toml`. Each story ends when somebody asks."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -9,16 +9,17 @@ from tests.workbench.troubles.site import DOOR, Site
 from tests.workbench.troubles.site import LIFT as LIFT1
 
 Stage = Callable[[Site], Mapping[str, str] | None]
-"""A function that stages a trouble. It returns the node names for the verdict's places in braces."""
+"""A function that stages a trouble. It may return node names. They fill the places in braces in the
+verdict's texts."""
 
 
 @dataclass(frozen=True)
 class Trouble:
     """One trouble.
 
-    `daemon` owns the file; "" means the device's daemon. With `note` a person asks for a file that the
-    recorder does not write. `mortal` names the daemon that the story kills. With `release` the person
-    types `rmf-bridge release`.
+    The file comes from `daemon`, or from the device's daemon with "". With `note` a person asks for the
+    file, because the recorder writes none. `mortal` names the daemon that the story kills. With
+    `release` the person types `rmf-bridge release`.
     """
 
     stage: Stage

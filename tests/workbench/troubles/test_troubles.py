@@ -1,4 +1,4 @@
-"""`explain` explains each of the twelve troubles as `expected.toml` says, live and from its file."""
+"""`explain` on the twelve troubles, live and from the file. It must say what `expected.toml` says."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -21,13 +21,14 @@ OTHERWISE: Mapping[str, str] = {
     "slow_modbus_unit": "a lift is OFFLINE 1 s after its last reading, so it flips faster",
     "two_foreign_nodes": "the file is our lift supervisor's",
 }
-"""Stories whose stage differs from the text of `expected.toml`, each with the reason."""
+"""Troubles whose story differs from the text of `expected.toml`, each with the reason."""
 
 
 def told(
     trouble: Trouble, verdict: Verdict, folder: Path, change: Callable[[Site], None] | None = None
 ) -> tuple[str, Mapping[str, str]]:
-    """Return the screen, and the names of the nodes. `change` alters the site before the trouble."""
+    """Return the screen, and the names of the nodes. `change` changes the site before the trouble
+    begins."""
     site = Site(folder, trouble.mortal)
     try:
         if change is not None:
@@ -58,8 +59,8 @@ SLOW = next(verdict for verdict in VERDICTS if verdict.key == ("slow_modbus_unit
 def test_a_unit_that_is_slow_at_another_pace_is_explained_as_expected(
     seed: int, tmp_path: Path
 ) -> None:
-    """On a busy machine the lift is OFFLINE for seconds, so a listener of 10 s may hear one recovery
-    only. Seed 7 is left out, because there the only outage has already ended."""
+    """On a busy machine the lift is OFFLINE for seconds. A command that listens for 10 s may then hear
+    only one recovery. Seed 7 is not tested, because its only outage ends too early."""
 
     def slower(site: Site) -> None:
         site.latest_s, site.slow_s, site.random = 1.7, 0.7, Random(seed)
@@ -80,7 +81,7 @@ def test_a_unit_that_is_slow_at_another_pace_is_explained_as_expected(
 def test_a_doors_own_file_names_the_robot_and_claims_nothing_of_a_heartbeat(
     stage: Callable[[Site], None], says: str, acts: str, tmp_path: Path
 ) -> None:
-    """A door's daemon records the robots' requests, and not the supervisor's heartbeat."""
+    """A door's daemon records the robots' requests, but not the supervisor's heartbeat."""
     site = Site(tmp_path)
     try:
         stage(site)

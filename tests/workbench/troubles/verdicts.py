@@ -1,4 +1,4 @@
-"""The expected verdicts (`expected.toml`), and their comparison with a screen."""
+"""The expected verdicts (`expected.toml`), and a function that compares a screen with a verdict."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -9,22 +9,23 @@ import msgspec
 
 FILE: Final = Path(__file__).parent / "expected.toml"
 STEP: Final = re.compile(r"^Next, (?:.|\n  )*", re.MULTILINE)
-"""One next step on a screen, with its wrapped lines."""
+"""A pattern for one next step on a screen, with its wrapped lines."""
 Alternatives = list[str]
 
 
 class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A rule for each next step: a step with a phrase of `when_next` also has a phrase of `needs`."""
+    """A rule for each next step. If a step has a phrase of `when_next`, it also has a phrase of
+    `needs`."""
 
     when_next: Alternatives
     needs: Alternatives
 
 
 class Verdict(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One entry of the file.
+    """One trouble of the file.
 
-    The screen needs one phrase of each list in `says`. Its next steps need one phrase of each list in
-    `next_says`. No phrase of `never` or `next_never` may occur.
+    The screen needs one phrase from each list in `says`. Its next steps need one phrase from each list
+    in `next_says`. The phrases in `never` and `next_never` must not occur.
     """
 
     name: str
@@ -42,7 +43,7 @@ class Verdict(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """The entry's own name."""
+        """The name of the entry: (trouble, view, device)."""
         return self.name, self.view, self.device
 
 
@@ -57,7 +58,7 @@ RULES: Final = _READ.rule
 
 
 def wrong(verdict: Verdict, screen: str, names: Mapping[str, str]) -> list[str]:
-    """Return the differences between a screen and the verdict. `names` fill the places in braces."""
+    """Return the differences between a screen and the verdict. `names` fills the places in braces."""
     steps = STEP.findall(screen)
     return list(_wrong(verdict, _plain(screen), [_plain(step) for step in steps], names))
 
@@ -68,7 +69,7 @@ def _wrong(
     def named(phrases: Alternatives) -> Alternatives:
         return [_plain(phrase.format_map(names)) for phrase in phrases]
 
-    following = " ".join(steps) or told  # the screen of `release` has no line for a next step
+    following = " ".join(steps) or told  # the screen of `release` has no next step
     if steps and not steps[0].startswith(f"next, {verdict.acts}:"):
         yield f"acts: {verdict.acts}, not {steps[0].partition(':')[0]!r}"
     for what, text, wanted in (

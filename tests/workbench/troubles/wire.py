@@ -1,7 +1,7 @@
-"""The same site with real processes on loopback. Our daemons are `rmf-bridge run --simulate`, a person
-types `rmf-bridge explain`, and this process plays RMF's nodes on the same wire.
+"""The same site with real processes on loopback. Our daemons are `rmf-bridge run --simulate`, and a
+person types `rmf-bridge explain`. This process plays RMF's nodes on the same wire.
 
-Each wait of a stage is cut to at most PASSES_S.
+Each wait in a story lasts at most PASSES_S.
 """
 
 import json
@@ -43,12 +43,12 @@ PASSES_S: Final = 4.0
 WITHIN_S: Final = 90.0
 RECORDED_S: Final = 100.0
 LEASE_S: Final = 25.0
-"""DDS notices a killed node within this time (s)."""
+"""The time (s) within which DDS notices a killed node."""
 START_TIMEOUT_S: Final = 40.0
 
 
 class WireSite:
-    """The part of `site.Site` that the stages use."""
+    """The part of `site.Site` that the stories use."""
 
     def __init__(self, folder: Path, domain: int, serves: tuple[str, ...]) -> None:
         self.timeline = RealTime()
@@ -141,14 +141,14 @@ class WireSite:
         self._starts("charger_coordinator", kept.of_graph("", COORDINATOR, settings).yaml)
 
     def close(self) -> None:
-        """Stop all processes and leave the graph."""
+        """Stop all processes, and leave the graph."""
         stop_all(self.daemons.values())
         for node in (*self.supervisors.values(), self.fleet):
             node.kill()
         self._observer.close()
 
     def waits(self, seconds: float) -> None:
-        """Let this many seconds pass, at most PASSES_S."""
+        """Let this many seconds pass, but at most PASSES_S."""
         until = time.monotonic() + seconds
         self.timeline.until(lambda: time.monotonic() >= until, lambda: None)
 
@@ -161,8 +161,8 @@ class WireSite:
         )
 
     def file(self, device: str, daemon: str) -> str:
-        """Return the screen of `explain FILE`, for the recorder's file or else a person's
-        `incident`."""
+        """Return the screen of `explain FILE`. If the recorder writes no file, a person asks for one
+        with `incident`."""
         name = daemon or device
         self._until(lambda: bool(self._written(name)), RECORDED_S, must=False)
         if not (found := self._written(name)):
@@ -193,7 +193,7 @@ class WireSite:
         self._rings.append(self.daemons[name].runtime_dir)
 
     def _starts(self, name: str, content: bytes) -> None:
-        """Start a node without hardware, and wait until it speaks."""
+        """Start a node without hardware, and wait until it publishes."""
         self._start(name, content)
         self._until(lambda: _status(self.daemons[name]).get("passive") is False, WITHIN_S)
 

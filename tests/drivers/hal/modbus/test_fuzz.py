@@ -238,7 +238,7 @@ def test_a_pulse_is_requested_once_and_only_its_echo_proves_it(
                 bus.flash(Point(1, "coil", 0x200), 0.7)
                 assert pdu.hex() == "0502000007"
             except HalError as error:
-                if "no Modbus TCP connection" in str(error):  # the machine is too busy
+                if "no Modbus TCP connection" in str(error):  # on a busy machine
                     return False
             wait_until(lambda: module.asked, "the module has received the request")
             asked.extend(module.asked)

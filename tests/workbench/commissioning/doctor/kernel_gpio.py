@@ -14,19 +14,19 @@ READ, WRITE = 2, 1
 
 
 class GpiochipInfo(ctypes.Structure):
-    """struct gpiochip_info."""
+    """The kernel's `struct gpiochip_info`."""
 
     _fields_ = [("name", NAME), ("label", NAME), ("lines", ctypes.c_uint32)]
 
 
 class LineAttribute(ctypes.Structure):
-    """struct gpio_v2_line_attribute; the union is represented by its widest member."""
+    """The kernel's `struct gpio_v2_line_attribute`. The widest member represents the union."""
 
     _fields_ = [("id", ctypes.c_uint32), ("padding", ctypes.c_uint32), ("value", ctypes.c_uint64)]
 
 
 class LineInfo(ctypes.Structure):
-    """struct gpio_v2_line_info."""
+    """The kernel's `struct gpio_v2_line_info`."""
 
     _fields_ = [
         ("name", NAME),
@@ -40,11 +40,11 @@ class LineInfo(ctypes.Structure):
 
 
 def _request(way: int, number: int, argument: type[ctypes.Structure]) -> int:
-    """Return the request number of _IOR or _IOWR for the ioctl type 0xB4."""
+    """Return the number of an ioctl request of type 0xB4. `way` distinguishes _IOR from _IOWR."""
     return way << 30 | ctypes.sizeof(argument) << 16 | 0xB4 << 8 | number
 
 
 GET_CHIPINFO: Final = _request(READ, 1, GpiochipInfo)
 GET_LINEINFO: Final = _request(READ | WRITE, 5, LineInfo)
 USED, ACTIVE_LOW, INPUT, OUTPUT = 1 << 0, 1 << 1, 1 << 2, 1 << 3
-"""GPIO_V2_LINE_FLAG_*."""
+"""Flags of a line, named GPIO_V2_LINE_FLAG_* in the kernel."""

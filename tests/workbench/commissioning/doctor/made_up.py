@@ -1,4 +1,4 @@
-"""A made-up machine: a directory tree, scripts for its commands, and answers of its GPIO chips."""
+"""A made-up machine. It has a directory tree, scripts in place of commands, and made-up GPIO chips."""
 
 import errno
 import os
@@ -18,12 +18,12 @@ from workbench.commissioning.doctor.machine import Machine
 from workbench.commissioning.doctor.users import User
 
 OURS = os.getegid()
-"""The group of every file of the made-up machine. Users in this group may use the files."""
+"""The group of every file on the made-up machine. Users in this group may use the files."""
 OTHERS = OURS + 4321
 
 
 class MadeUp:
-    """A machine whose files lie below `root`. The doctor reads this machine through `machine`."""
+    """A machine whose files are inside `root`. The doctor examines it through `machine`."""
 
     def __init__(
         self, root: Path, gids: Collection[int] = (OURS,), installed: Collection[str] = ("lgpio",)
@@ -31,7 +31,7 @@ class MadeUp:
         self.root = root
         self._chips: dict[str, tuple[str, Mapping[int, str], Collection[int]]] = {}
         self.hidden: set[str] = set()
-        """Chips that the doctor's own process may not open."""
+        """The chips that the doctor's process may not open."""
         self.synchronised: bool | None = True
         self.machine = Machine(
             root,
@@ -47,7 +47,7 @@ class MadeUp:
         self.write("/etc/passwd", f"pi:x:{self.machine.uid}:1000::/home/pi:/bin/bash\n")
 
     def write(self, path: str, text: str = "", mode: int = 0o660) -> None:
-        """Write a file. A file also stands for a device."""
+        """Write a file. A device is also only a file."""
         place = self.root / path.lstrip("/")
         place.parent.mkdir(parents=True, exist_ok=True)
         place.write_text(text)
@@ -73,8 +73,8 @@ class MadeUp:
         outputs: Collection[int] = (),
         mode: int = 0o660,
     ) -> None:
-        """Make a GPIO chip. `held` gives the consumer of each used line; `outputs` are the driven
-        lines."""
+        """Make a GPIO chip. `held` has the consumer of each used line. The lines in `outputs` are
+        driven."""
         self.write(f"/dev/gpiochip{number}", mode=mode)
         self._chips[f"gpiochip{number}"] = (label, held or {}, outputs)
 

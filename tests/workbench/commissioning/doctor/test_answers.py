@@ -1,4 +1,5 @@
-"""The doctor reads a device without opening its driver. Every driver offers such a reading."""
+"""A device's answer to the doctor. The doctor reads the device, and does not open the driver. Every
+driver permits such a reading."""
 
 import re
 from contextlib import closing
@@ -27,7 +28,7 @@ def test_the_devices_of_each_example_answer_an_unopened_driver(name: str, tmp_pa
     config = load(CONFIG / name)
     for bus_name, settings in config.buses.items():
         if config.bus_types[bus_name] == "gpio":
-            continue  # its lines are read from the kernel, without a driver
+            continue  # the doctor reads these lines from the kernel, without a driver
         with served(CONFIG / name, bus_name, tmp_path / "plant.sock") as replace:
             plain = {**msgspec.to_builtins(unarmed(settings)), **replace, "timeout_s": 1.5}
             there = msgspec.convert(plain, type(settings))

@@ -34,9 +34,9 @@ from tests.waiting import PATIENCE_S, wait_until
 from workbench.commissioning.doctor.served import served
 
 READS = {1, 2, 3, 4}
-LISTEN_S = "15"
-"""The doctor listens for this time (s), because nodes find each other late on a busy machine."""
 """Modbus functions that only read."""
+LISTEN_S = "15"
+"""The time (s) for which the doctor listens. On a busy machine nodes find each other late."""
 
 
 def doctor(file: Path, tmp_path: Path, *options: str) -> tuple[int, dict[str, list[Any]]]:
@@ -51,7 +51,7 @@ def doctor(file: Path, tmp_path: Path, *options: str) -> tuple[int, dict[str, li
 
 
 class Tapped:
-    """A wire to the module. The wire records each requested function and counts the connections."""
+    """A wire to the module. It records each requested function and counts the connections."""
 
     def __init__(self, module: Module) -> None:
         self.functions: set[int] = set()
@@ -112,7 +112,7 @@ def test_a_module_is_read_and_its_units_are_found_and_nothing_is_written(
     assert found["daemon"] == [("ok", "no daemon serves this file, so its buses are read here")]
     assert tapped.functions <= READS
     assert module.relay() == []
-    assert code in (0, 1)  # the machine that runs this test may have no watchdog
+    assert code in (0, 1)  # the machine that runs this test may lack a watchdog
 
 
 def test_a_device_that_does_not_answer_is_wrong(module: Module, tmp_path: Path) -> None:
@@ -284,7 +284,7 @@ def test_for_people_each_finding_has_a_line_below_its_subject(
 
 @contextmanager
 def far_side(yaml: str, bus: str, folder: Path) -> Iterator[Any]:
-    """Run the fake of a bus, and yield the settings for that bus."""
+    """Run the simulated far side of a bus. Yield the settings for that bus."""
     (folder / "far.yaml").write_text(yaml)
     with served_by(folder / "far.yaml", bus, folder / "plant.sock") as there:
         yield there

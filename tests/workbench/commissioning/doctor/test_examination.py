@@ -1,4 +1,5 @@
-"""The doctor examines every subject of a lift's file, on a good and on a bad made-up Raspberry Pi."""
+"""The doctor on a lift's file. It examines every subject on a good and on a bad made-up Raspberry
+Pi."""
 
 from pathlib import Path
 
@@ -14,7 +15,7 @@ PERSIST = "/sys/module/pinctrl_bcm2835/parameters/persist_gpio_outputs"
 
 
 def pi(root: Path) -> MadeUp:
-    """Return a Pi 4 that is set up well."""
+    """Return a Raspberry Pi 4 on which the doctor finds no fault."""
     root.mkdir()
     made = MadeUp(root)
     made.chip(0, "pinctrl-bcm2711")

@@ -1,5 +1,5 @@
-"""The form for real hardware holds the machine's answers. Fields that need a person's eyes are
-empty."""
+"""The form for real hardware. It has the machine's answers, and empty fields for a person's
+observations."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The doctor's findings about the GPIO header of made-up Raspberry Pis."""
+"""The doctor's findings about the GPIO headers of made-up Raspberry Pis."""
 
 import ctypes
 from pathlib import Path

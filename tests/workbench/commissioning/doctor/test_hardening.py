@@ -1,5 +1,5 @@
-"""`doctor --hardening` judges each point of docs/how-to/harden.md. It names the points it cannot
-judge."""
+"""`doctor --hardening`. It judges each point of docs/how-to/harden.md, or says that it cannot judge the
+point."""
 
 import re
 from pathlib import Path
@@ -40,14 +40,14 @@ def made(tmp_path: Path) -> MadeUp:
 
 
 def config(rmf: str = "{transport: dds}", text: str = LIFT) -> Config:
-    """Return an example's config with these `rmf` settings, as installed on the machine."""
+    """Return the config of an example with these `rmf` settings. Its file is in /etc/rmf-bridges."""
     body = re.sub(r"^rmf:\n(  .*\n|\n)*", "", text, flags=re.M)
     file = Path("/etc/rmf-bridges/lift.yaml")
     return understood(file, f"rmf: {rmf}\n{body}".encode())
 
 
 def found(made: MadeUp, subject: str, of: Config | None = None) -> list[tuple[str, str]]:
-    """Return (severity, fact) of each finding of a subject."""
+    """Return (level, fact) for each finding about a subject."""
     return [
         (one.level, one.found)
         for one in hardening(of or config(), made.machine)
@@ -67,7 +67,7 @@ def test_each_point_is_a_heading_of_the_page() -> None:
 def test_a_machine_that_shows_nothing_is_unknown_and_never_well(made: MadeUp) -> None:
     of = config(TLS)
     assert {one.level for one in hardening(of, made.machine) if one.subject != points.WIRES} == {
-        "ok",  # the YAML itself names certificates, and the machine runs no sshd
+        "ok",  # the YAML names certificates, and the machine runs no sshd
         "unknown",
     }
     for subject in (points.FIREWALL, points.ROOT, points.FILES, points.UPDATES):

@@ -34,7 +34,7 @@ STEPS = [
 
 
 class Walk:
-    """A walk that reads its inputs every 0.1 s until the inputs are lost."""
+    """A walk that reads its inputs every 0.1 s. Without a sample the inputs are lost."""
 
     def __init__(self) -> None:
         self.now = 0.0

@@ -1,4 +1,4 @@
-"""The screen of a walk shows every name whole, and no line scrolls away, also on a phone."""
+"""The screen of a walk. Even on a phone it shows every name in full, and no line scrolls away."""
 
 from dataclasses import replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""`rmf-bridge walk` on a real terminal with a real Modbus module. The process is also killed."""
+"""`rmf-bridge walk` on a real terminal with a real Modbus module. The tests also kill the process."""
 
 import json
 import os

@@ -1,2 +1,4 @@
-"""Incidents of the soak test, as the recorder writes them. `python -m tests.workbench.replay.corpus`
-renews them."""
+"""Incidents of the soak test, in the form of the recorder's files.
+
+`python -m tests.workbench.replay.corpus` writes them again.
+"""

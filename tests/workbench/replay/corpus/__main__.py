@@ -1,7 +1,7 @@
-"""`python -m tests.workbench.replay.corpus` keeps the first incident of each daemon of the soak test.
+"""A program that records incidents of the soak test: `python -m tests.workbench.replay.corpus`.
 
-Run this module after a deliberate change of a core's decisions. `git diff --stat` then shows the
-incidents with changed decisions.
+It records the first incident of each chosen daemon. Run it after a deliberate change of a core's
+decisions. Then `git diff --stat` shows the incidents whose decisions have changed.
 """
 
 import sys
@@ -20,14 +20,14 @@ CHOSEN = {
     1: ("Lift1", "Lift2", "store", "bay1", "bay2", "coordinator"),
     3: ("ward", "lift_supervisor"),
 }
-"""The daemons whose incidents are kept, by the seed of a simulated day. More daemons would repeat
-these."""
+"""The daemons whose incidents the program records, by the seed of a simulated day. The incidents of
+more daemons would only repeat these."""
 HOURS = 0.3
 BEFORE_S, AFTER_S = 5.0, 12.0
 
 
 def incident(ring: Path) -> Incident | None:
-    """Return the first fault of a daemon, else the first refusal, else None."""
+    """Return a daemon's first fault. Without a fault return the first refusal, or None."""
     read = RingContent(ring)
     entries = list(read.entries())
     triggers = Triggers(60.0)
@@ -40,7 +40,7 @@ def incident(ring: Path) -> Incident | None:
 
 
 def main() -> int:
-    """Write every incident file anew."""
+    """Write every incident file again."""
     for seed, names in CHOSEN.items():
         with tempfile.TemporaryDirectory(dir="/dev/shm") as scratch:
             site = Site(seed)
