@@ -32,7 +32,7 @@ def held_by_another() -> Case:
 
 
 def holder_rides() -> Case:
-    """A robot waits, because another robot has the lift. The second robot waits for the car to
+    """A robot waits, because another robot has the lift. The robot with the lift waits for the car to
     arrive."""
     scene, red, _ = _two("Lift1")
     scene.until(red)
@@ -42,7 +42,8 @@ def holder_rides() -> Case:
 
 
 def holder_is_dead() -> Case:
-    """Two robots want the lift. The fleet adapter of the robot that has it has died without END."""
+    """Two robots want the lift. The first robot has the lift, but its fleet adapter has died without
+    END."""
     scene, red, _ = _two("Lift1")
     scene.until(red)
     red.dies()
@@ -342,7 +343,8 @@ def _charge(charger: str, robot: str, request: str) -> d.ChargerRequest:
 
 
 class _Foreign:
-    """A lift node of another maker. Whatever robots ask, it publishes the same state each second."""
+    """A lift node of another maker. The node publishes the same state each second, whatever robots
+    ask."""
 
     def __init__(self, scene: Scene, stamp_s: float = 0.0, **fields: object) -> None:
         self._scene = scene

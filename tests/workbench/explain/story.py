@@ -40,7 +40,7 @@ SUPERVISORS: dict[str, AnyGraphKind] = {
 
 
 class Rider(ABC):
-    """A robot and the phases of its task. `robot` has all that the fleet adapter knows of it."""
+    """A robot and the phases of its task. `robot` has all that the fleet adapter knows of the robot."""
 
     robot: RobotContext
 
@@ -66,7 +66,8 @@ class Rider(ABC):
 
 
 class Guest(Rider):
-    """A fleet adapter with one robot on the simulated graph. Its clock is `behind_s` seconds slow."""
+    """A fleet adapter with one robot on the simulated graph. The adapter's clock is `behind_s` seconds
+    slow."""
 
     def __init__(self, timeline: Timeline, air: Air, name: str) -> None:
         self.robot = RobotContext(name)
@@ -85,7 +86,7 @@ class Guest(Rider):
         self._say(self.robot.begin(phase, self._now))
 
     def dies(self) -> None:
-        """Remove the robot's adapter from the graph. It sends no last message."""
+        """Remove the robot's adapter from the graph. The adapter sends no last message."""
         self.place.close()
         self.robot.phase = None
 

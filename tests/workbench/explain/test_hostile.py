@@ -1,5 +1,5 @@
-"""Hostile messages: floods of names, strange values, control characters. `explain` bounds and reports
-them."""
+"""Hostile messages: floods of names, strange values, control characters. `explain` limits the harm and
+reports such messages."""
 
 import pytest
 from msgspec.structs import replace

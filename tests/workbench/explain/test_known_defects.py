@@ -13,8 +13,8 @@ from workbench.explain.heard_devices import HeardDevices
 WALL, RED, BLUE = 1_800_000_000.0, "fleet/red", "fleet/blue"
 END, AGV = 0, 1
 Second = tuple[str, str, int, list[tuple[str, int, str]]]
-"""One second of a story: (session, floor, door state, requests). The first three come from the lift's
-state, and the adapters send the requests."""
+"""One second of a story: (session, floor, door state, requests). The lift shows the first three values,
+and the adapters send the requests."""
 
 
 def notes(*seconds: Second) -> list[str]:

@@ -1,4 +1,4 @@
-"""The notes about a device in our incident files. The device's daemon writes them."""
+"""The notes about a device in our incident files. A note comes from the device's daemon."""
 
 import json
 from pathlib import Path

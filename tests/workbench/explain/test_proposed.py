@@ -1,5 +1,5 @@
-"""The commands that an explanation proposes. A person can copy each command, and it names the graph
-from which the messages came."""
+"""The commands that an explanation proposes. A person can copy each command. Each command names the
+graph from which the messages came."""
 
 import re
 import shlex

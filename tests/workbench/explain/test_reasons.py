@@ -38,8 +38,8 @@ def own(at: float, topic: str, /, **told: object) -> Own:
 
 
 def recorded(kind: Kind, code: str, text: str) -> Iterator[Heard | Own]:
-    """Yield the content of an idle device's file. The recorder kept the file for an event in its
-    middle. A fault ends 5 s after that event."""
+    """Yield the content of an idle device's file. In the middle is the event for which the recorder
+    kept the file. A fault ends 5 s after this event."""
     fault = {"code": text.partition(": ")[0], "detail": text.partition(": ")[2]}
     for second in range(int(LAST_S)):
         if second == KEPT_S:
