@@ -33,10 +33,10 @@ MB: Final = 1_000_000
 
 @contextmanager
 def half_requests(address: str, number: int, *, body: bool) -> Iterator[None]:
-    """Open `number` connections. On each of them a request remains unfinished.
+    """Open `number` connections, and leave a request unfinished on each connection.
 
-    With `body` each connection sends half a form. Otherwise it sends a complete request, and then half
-    of the next head.
+    With `body` each connection sends half a form. Otherwise each connection sends a complete request,
+    and then half of the next head.
     """
     place = urlsplit(address)
     there, host = (place.hostname or "", place.port or 0), f"Host: {place.netloc}\r\n"
@@ -83,7 +83,7 @@ def long_names(
 ) -> Iterator[None]:
     """Publish 23 lifts with long names in each of `times` rounds. Yield after each round.
 
-    The names have `length` characters. By default they are about as long as a transport permits.
+    The names have `length` characters. The default is about the longest name that a transport permits.
     """
     publisher = transport.publisher(topics.LIFT_STATES)
     for n in range(times):

@@ -1,4 +1,4 @@
-"""Passwords, sessions and login attempts in virtual time. They decide who may act on the page."""
+"""The access to the page in virtual time. Passwords, sessions and login attempts decide who may act."""
 
 from pathlib import Path
 

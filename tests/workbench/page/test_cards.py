@@ -1,5 +1,5 @@
 """The scripts that the page sends to a browser. One script has all changes of a turn. Without a change
-the page sends none."""
+the page sends no script."""
 
 import json
 
@@ -17,7 +17,7 @@ HOSTILE = "</script>\u2028\"'`${1}"
 
 
 class Wall:
-    """A stand-in for a browser's view. It stores the scripts that the page sends."""
+    """A stand-in for a browser's view that stores the scripts from the page."""
 
     def __init__(self) -> None:
         self.changes: list[list[str]] = []

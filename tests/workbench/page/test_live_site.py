@@ -1,4 +1,5 @@
-"""The latest message of each device. The page stores it in bounded memory, even with invented names."""
+"""The latest message of each device, as the page stores it. The memory stays bounded, even with
+invented names."""
 
 from collections import deque
 from collections.abc import Iterator, Sized

@@ -1,4 +1,4 @@
-"""A browser tab. It receives only changed pieces, and its times are in an existing time zone."""
+"""A browser tab. The tab receives only changed pieces. Its times are in an existing time zone."""
 
 from datetime import UTC
 from random import Random

@@ -41,7 +41,7 @@ USER, PASSWORD = "ann", "correct horse"
 SCHEMES: Final[tuple[Literal["light", "dark"], ...]] = ("light", "dark")
 SHOTS = Path("build/screenshots")
 VIOLATIONS = {"resultTypes": ["violations"]}
-"""Options for axe-core. With them its report has details of violations only."""
+"""Options for axe-core, so that its report has details of violations only."""
 
 
 class Graph:
@@ -117,7 +117,8 @@ def graph(module_domain: int) -> Iterator[Graph]:
 def program(
     *words: str, ends: int = 0, state: Path | None = None, log: Path = Path("/dev/stderr")
 ) -> Iterator[subprocess.Popen[str]]:
-    """Run one of our commands as a process. SIGTERM ends it, and its exit code must be `ends`."""
+    """Run one of our commands as a process. SIGTERM ends the process, whose exit code must be
+    `ends`."""
     command = [sys.executable, "-m", "bridges.cli", *words]
     # With PYTEST_CURRENT_TEST in its environment, NiceGUI would believe that the test tests NiceGUI.
     environment = {k: v for k, v in os.environ.items() if k != "PYTEST_CURRENT_TEST"}
@@ -238,7 +239,7 @@ def settled(tab: Page) -> None:
 
 
 def serious_faults(tab: Page) -> list[tuple[str, str, list[str]]]:
-    """Return axe-core's serious findings with their places, in the light and in the dark colours."""
+    """Return axe-core's serious findings in light and in dark colours, with their places."""
     found: list[tuple[str, str, list[str]]] = []
     for scheme in SCHEMES:
         tab.emulate_media(color_scheme=scheme)
@@ -269,7 +270,7 @@ def until(graph: Graph, tab: Page) -> Until:
 
 @pytest.fixture
 def shot(tab: Page) -> Shot:
-    """Return a function that saves screenshots of the tab. It takes a phone and a wall screen, in light
+    """Return a function that saves screenshots of the tab, on a phone and on a wall screen, in light
     and in dark colours."""
 
     def take(name: str) -> None:

@@ -27,8 +27,8 @@ pytestmark = pytest.mark.browser
 COLOURS = """selector => { const style = getComputedStyle(document.querySelector(selector));
   return [style.color, style.backgroundColor]; }"""
 """A script that returns the two colours of an element. Under a dialog axe-core takes the body's colour
-for every background. So the test compares a dialog's colours with those of buttons and panels.
-axe-core has accepted these outside a dialog."""
+for every background. Outside a dialog axe-core judges buttons and panels correctly. So the test
+compares a dialog's colours with those of buttons and panels."""
 BEYOND = """() => [...document.querySelectorAll('#main :is(p, td, th, li, button)')].filter(
   one => one.getBoundingClientRect().right > innerWidth).map(one => one.outerHTML)"""
 DOOR = Path("config/door_modbus.yaml").absolute()

@@ -141,7 +141,7 @@ def is_closed(opened: socket.socket) -> bool:
 
 @contextmanager
 def deaf(address: str) -> Iterator[None]:
-    """Open a socket as a view's script does, and never read from it."""
+    """Open a socket as a view's script does. Nobody ever reads from this socket."""
     _, _, text = ask(address, "/")
     found = re.search(r"'client_id': '([0-9a-f-]+)'", text)
     assert found

@@ -1,4 +1,5 @@
-"""The page of `make demo-page`. It opens at the printed address, and accepts the printed password."""
+"""The page of `make demo-page`. The page opens at the printed address, and accepts the printed
+password."""
 
 from pathlib import Path
 from urllib.parse import urlsplit

@@ -1,4 +1,4 @@
-"""The first screen of the page. It says what is wrong and how to mend it. A tab receives only
+"""The first screen of the page. The screen says what is wrong and how to mend it. A tab receives only
 changes."""
 
 import json

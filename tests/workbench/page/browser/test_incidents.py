@@ -1,5 +1,5 @@
-"""Recordings on the page. There is a list, a view of each recording with timeline and explanation, and
-the file."""
+"""Recordings on the page: the list, the view of a recording with timeline and explanation, and the
+file."""
 
 import shutil
 from collections.abc import Iterator
@@ -43,7 +43,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def address(folder: Path) -> Iterator[str]:
-    """Yield the address of a page without a graph. It shows one recording, and a folder of
+    """Yield the address of a page without a graph. The page shows one recording, and a folder of
     recordings."""
     with page(str(folder / "ride.mcap"), "--incidents", str(folder)) as found:
         yield found

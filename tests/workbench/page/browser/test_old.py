@@ -1,5 +1,5 @@
-"""Old values on the page. When the page freezes or dies, or when the connection stalls, no view shows
-them as present values."""
+"""Old values on the page. No view shows an old value as a present value, even if the page freezes or
+dies, or if the connection stalls."""
 
 import os
 import signal
@@ -25,7 +25,7 @@ LEFT = "window.loadedOnce = true"
 
 
 class Relay:
-    """A wire between the browser and the page. After `cut` it carries nothing, but it closes no
+    """A wire between the browser and the page. After `cut` the wire carries nothing, but closes no
     socket."""
 
     def __init__(self, address: str) -> None:
@@ -86,7 +86,7 @@ def all_is_old(tab: Page) -> bool:
 def seen_as_old(tab: Page, graph: Graph, until: Until, address: str) -> Iterator[None]:
     """Let the block stop the page. Then check that every card is marked old.
 
-    By the browser's clock this takes at most WITHIN_MS.
+    By the browser's clock a card is marked within WITHIN_MS.
     """
     graph.lift("Lift1", "L1", 2, "fleet/robot")
     graph.doors |= {name: d.DoorState(door_name=name) for name in ("ward", *MORE)}

@@ -1,4 +1,4 @@
-"""Requests that the page's server refuses. A program sends them."""
+"""Requests that the page's server refuses. A program sends these requests, and no browser."""
 
 import http.client
 import os

@@ -1,4 +1,5 @@
-"""A stranger's messages. They shut nobody out of the page, and fill neither its log nor its memory."""
+"""A stranger's messages. The messages shut nobody out of the page, and fill neither its log nor its
+memory."""
 
 import os
 import random
