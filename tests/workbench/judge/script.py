@@ -1,4 +1,4 @@
-"""A party on the graph. It publishes given messages at given times."""
+"""A party on the graph that publishes given messages at given times."""
 
 from collections.abc import Sequence
 

@@ -1,5 +1,5 @@
-"""The laws for fleet adapters. Each law applies on an occasion, and without one the verdict is "not
-seen"."""
+"""The laws for fleet adapters. Each law applies on an occasion. Without the occasion the verdict is
+"not seen"."""
 
 from collections.abc import Callable
 

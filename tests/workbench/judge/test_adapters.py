@@ -1,7 +1,7 @@
-"""The judge on fleet adapters. It acquits RMF's own adapter, and convicts each wrong adapter by the
-right law.
+"""The judge on fleet adapters. The judge acquits RMF's own adapter, and convicts each wrong adapter by
+the right law.
 
-`pytest -s` prints each planted defect, the law that convicts it, and false alarms.
+`pytest -s` prints each planted defect, the law that convicts the defect, and false alarms.
 """
 
 from collections.abc import Callable

@@ -30,8 +30,8 @@ Story = Callable[[float], list[Line]]
 
 
 def is_broken(kind: JudgedKind, law: str, lines: list[Line]) -> bool:
-    """Return whether the judge finds the law broken. It gets the messages in order of time, and judges
-    2 s after the last."""
+    """Return whether the judge finds the law broken. The judge gets the messages in order of time, and
+    gives its verdict 2 s after the last message."""
     judge = Judge(kind, NAMES[kind])
     lines.sort(key=lambda line: line[0])
     for at, topic, message in lines:
@@ -147,7 +147,7 @@ def back_and_forth(times: int, each_s: float, by_s: float) -> list[Line]:
 
 
 def frozen(line: Callable[..., Line], opened: int, for_s: float) -> list[Line]:
-    """Return open states for `for_s` seconds. All have the old stamp 1 s."""
+    """Return open states for `for_s` seconds. All these states have the old stamp 1 s."""
     open_ = {"mode" if line is leaf else "door": opened, "read_at": 1.0}
     shown = seconds(1.0, 1.0 + for_s, lambda s: line(s, **open_))
     return [line(0.0), *shown, line(1.0 + for_s, **open_)]
@@ -248,7 +248,7 @@ def false_alarms(times: int, each_s: float) -> list[Line]:
 
 
 LIFT: list[tuple[str, Story, float, float]] = [
-    # the request that explains a session may arrive up to this time after the session
+    # a session may appear up to this time (s) before the request that explains the session
     (
         "L1.other",
         lambda x: [
@@ -387,7 +387,7 @@ def pushed(
     """Return messages in which people open the door `times` times.
 
     RMF sends CLOSE `closes_s` seconds later, and the door shows CLOSED `shuts_s` seconds after CLOSE.
-    The door takes `opens_s` seconds to open. With None it never shows OPEN.
+    The door takes `opens_s` seconds to open. With None the door never shows OPEN.
     """
     lines = [leaf(0.0)]
     for n in range(times):

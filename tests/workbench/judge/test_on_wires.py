@@ -1,4 +1,5 @@
-"""`rmf-bridge judge` as a process on DDS and on zenoh. It judges our own daemons and other nodes."""
+"""`rmf-bridge judge` as a process on DDS and on zenoh. The process judges our own daemons and other
+nodes."""
 
 import json
 import signal

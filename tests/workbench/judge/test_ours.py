@@ -1,4 +1,5 @@
-"""The judge on our own daemons, each with its driver and a simulated device. It accuses no daemon."""
+"""The judge on our own daemons, each with its driver and a simulated device. The judge accuses no
+daemon."""
 
 import pytest
 

@@ -1,8 +1,9 @@
 """Wrong nodes among correct nodes. The judge plays with each node, and convicts each wrong node by the
-right law. It convicts no correct node, even under load, without a network, or after a restart.
+right law. The judge convicts no correct node, even under load, without a network, or after a
+restart.
 
-`pytest -s` prints each planted defect, the law that convicts it, and false alarms. The defects break
-the contract in the messages, supervisors and fleet adapters of RMF.
+`pytest -s` prints each planted defect, the law that convicts the defect, and false alarms. The defects
+break the contract in the messages, supervisors and fleet adapters of RMF.
 """
 
 from collections.abc import Callable, Sequence
@@ -36,7 +37,8 @@ Make = Callable[[], Party]
 
 
 class NextLift(RightLift):
-    """A second lift. If its states stop too, the network is silent, and not the node."""
+    """A second lift. If the states of this lift stop too, the network is silent, and not the judged
+    node."""
 
     name = "Lift9"
 
@@ -57,7 +59,7 @@ def convicted(
     cut: tuple[float, float] | None = None,
     restarts: float | None = None,
 ) -> set[str]:
-    """Return the laws that these nodes break in a play. They publish under one name, 0.3 s apart.
+    """Return the laws that these nodes break in a play. The nodes publish under one name, 0.3 s apart.
 
     `cut` has the time (s) at which the judge loses the network, and the duration (s). At `restarts` (s)
     the node and RMF restart.
@@ -141,7 +143,7 @@ def test_a_planted_defect_is_convicted_by_its_law_alone(
 
 
 ACQUITTED = {"D OPEN is shown before the door is open"}
-"""The defect that a busy network may hide. Only 0.3 s reveal it."""
+"""The defect that a busy network may hide. Only a gap of 0.3 s reveals this defect."""
 
 
 @pytest.mark.parametrize(("defect", "nodes", "laws"), PLANTED, ids=[one[0] for one in PLANTED])

@@ -1,4 +1,5 @@
-"""The judge on correct nodes. It does not accuse them, however much they differ from ours."""
+"""The judge on correct nodes. The judge accuses no such node, however much the node differs from
+ours."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A charge that nobody requested. Its id is `unrequested/…`, which no request has.
+"""A charge that nobody requested. The charge has the id `unrequested/…`, which no request has.
 
 The id changes when the robot's request comes. The next charge without a request has the id
 `unrequested/…` again. No law counts either change as a fault.

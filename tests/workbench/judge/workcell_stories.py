@@ -1,5 +1,5 @@
-"""Three stories for each law of workcells. In the first the law has no occasion, in the second the
-workcell keeps the law, and in the third it breaks the law."""
+"""Three stories for each law of workcells. In the first the law has no occasion. In the second the
+workcell keeps the law, and in the third the workcell breaks the law."""
 
 from typing import Any
 

@@ -11,8 +11,8 @@ from workbench.rmf_model import Said
 
 
 class SimulatedLift(RightLift):
-    """The lift behaves as in RMF's simulation. It is always in AGV mode, lists no modes, shows the
-    nearest floor, and keeps its last target."""
+    """The lift of RMF's simulation. The lift is always in AGV mode, lists no modes, shows the nearest
+    floor, and keeps its last target."""
 
     modes = ()
 
@@ -26,7 +26,8 @@ class SimulatedLift(RightLift):
 
 
 class SlowLift(RightLift):
-    """The lift publishes every 2 s, as at a field site. It obeys an END up to 1 s later."""
+    """The lift publishes every 2 s, as a lift at a field site does. The lift obeys an END up to 1 s
+    later."""
 
     period_s = 2.0
     modes = (0, 1, 2, 3, 4, 5)
@@ -82,8 +83,8 @@ class LiftInFire(RightLift):
 
 
 class DoorOnChange(RightDoor):
-    """The door publishes on change and every 2 s. It never shows MOVING, and travels for half a
-    second."""
+    """The door publishes on change and every 2 s. The door takes half a second to open, and never shows
+    MOVING."""
 
     period_s = 2.0
 

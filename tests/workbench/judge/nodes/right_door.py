@@ -1,4 +1,4 @@
-"""A door's node that keeps the contract, but differs from ours. It has no grace time."""
+"""A door's node that keeps the contract, but differs from ours. The door has no grace time."""
 
 from collections.abc import Sequence
 
@@ -13,10 +13,10 @@ DWELL_S = 3.0
 
 
 class RightDoor(Party):
-    """A correct door. `leaf` is 0 when the door is shut, and 1 when it is open.
+    """A correct door. `leaf` is 0 when the door is shut, and 1 when the door is open.
 
-    People open the door at each time in `pushed_at` (s after its start). Then it stays open for
-    DWELL_S.
+    People open the door at each time in `pushed_at` (s after the door's start). Then the door stays
+    open for DWELL_S.
     """
 
     subscribes: Sequence[topics.AnyTopic] = (topics.DOOR_REQUESTS,)

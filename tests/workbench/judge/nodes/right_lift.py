@@ -1,4 +1,4 @@
-"""A lift's node that keeps the contract, but differs from ours. Its loop takes 0.25 s."""
+"""A lift's node that keeps the contract, but differs from ours. The node's loop takes 0.25 s."""
 
 from collections.abc import Sequence
 

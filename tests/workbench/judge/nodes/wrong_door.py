@@ -87,7 +87,7 @@ class DoorWithoutStamps(RightDoor):
 
 
 class OpenAsAsked(RightDoor):
-    """The door shows OPEN as soon as a robot asks for OPEN. It has no sensor."""
+    """The door has no sensor, and shows OPEN as soon as a robot asks for OPEN."""
 
     def mode(self) -> int:
         return 2 if self.held else 0

@@ -101,7 +101,7 @@ class FloorFlickers(RightLift):
 
 
 class GoesToTheDefaultFloor(RightLift):
-    """The lift drives to its first floor if it does not serve the requested floor."""
+    """The lift drives to its first floor, if the lift does not serve the requested floor."""
 
     def requested(self, request: d.LiftRequest) -> None:
         known = request.destination_floor in self.floors
@@ -219,7 +219,7 @@ class OpenWhileMoving(RightLift):
 
 
 class OtherLiftsRequest(RightLift):
-    """The lift compares the lift's name too late, so it obeys requests for other lifts
+    """The lift compares the name in a request too late. So the lift obeys requests for other lifts
     (sharp-rmf/low_level_lift)."""
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
@@ -249,8 +249,8 @@ class SessionTimesOut(RightLift):
 
 
 class ShowsWhatItWasAsked(RightLift):
-    """The lift repeats the requested floor in destination_floor, even if it does not serve that
-    floor."""
+    """The lift repeats the requested floor in destination_floor, even a floor that the lift does not
+    serve."""
 
     asked = ""
 
