@@ -28,9 +28,9 @@ A killed daemon's guard may have started another process in the meantime. So the
 def end_with_us() -> None:
     """Let all later children and grandchildren of this process end when this process ends.
 
-    The children also end when this process dies from SIGKILL. PR_SET_PDEATHSIG would not suffice: its
-    signal already comes when the thread ends that started the child, and grandchildren do not inherit
-    it.
+    The children also end when this process dies from SIGKILL. PR_SET_PDEATHSIG would not suffice, for
+    two reasons. Its signal comes when the thread ends that started the child, and grandchildren do not
+    inherit the setting.
     """
     if RUN in os.environ:
         return  # the run that started this worker ends the worker's processes

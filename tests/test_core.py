@@ -1,4 +1,4 @@
-"""The core's imports. It imports no extra, and only its own libraries (decision 0123)."""
+"""The core's imports. The core imports no extra, and no library except its own (decision 0123)."""
 
 import sys
 import tomllib
@@ -42,14 +42,14 @@ LIBRARIES = {
 }  # fmt: skip
 """The PyPI name of the library that contains each module. The core needs these libraries."""
 FLEET = ("bridges.runtime.fleet", "bridges.settings.fleet_site", "bridges.settings.nav_graph")
-"""Modules for a fleet's rooms. They are extras, although they lie in the core's folders."""
+"""Modules for a fleet's rooms. These modules are extras, although they lie in the core's folders."""
 ON_REQUEST = {
     ("drivers.hal.http", "drivers.hal.http_push"),
     ("bridges.runtime.service", "bridges.runtime.fleet.service"),
     ("bridges.commands.run", "bridges.settings.fleet_site"),
     ("bridges.commands.check", "bridges.settings.fleet_site"),
 }
-"""Imports of extras in the core. They happen only if a YAML asks for the extra."""
+"""Imports of extras in the core. The core imports an extra only if a YAML asks for it."""
 OF_ROS = {"rclpy", "launch", "launch_ros", "_typeshed"}
 
 

@@ -41,7 +41,7 @@ def at_last(step: Callable[[], T], what: str, between: Callable[[], object] = la
     """Return the result of a step on a wire. Repeat the step after a late answer, as from a busy
     machine.
 
-    `between` runs before each repetition. Any DriverError that means no late answer is raised.
+    `between` runs before each repetition. Any other DriverError is raised at once.
     """
     done: list[T] = []
 

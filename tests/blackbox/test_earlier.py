@@ -1,4 +1,5 @@
-"""Recordings of earlier versions, which stay readable. Each recordable type has a fixed name."""
+"""Recordings of earlier versions. Every later version can read them, because each recordable type has a
+fixed name."""
 
 import gzip
 import subprocess

@@ -1,4 +1,4 @@
-"""The recorder. It has reasons to write a file, and limits the number of files."""
+"""The recorder: its reasons to write a file, the content of the file, and the number of kept files."""
 
 import os
 import re

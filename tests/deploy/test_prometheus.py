@@ -134,7 +134,7 @@ def test_a_killed_door_daemon_is_an_alert_in_a_real_prometheus(
 
 
 def named(text: str) -> set[str]:
-    """Return the metrics that a text names. The names of a histogram's series lose their endings."""
+    """Return the metrics that a text names. The names have no endings such as `_bucket` or `_total`."""
     found = re.findall(r"rmf_bridge_[a-z_]+", text)
     return {re.sub(r"_(bucket|count|sum|total)$", "", one) for one in found}
 

@@ -1,8 +1,8 @@
 """The far side of every bus in virtual time, in place of `drivers/hal/`.
 
 If `down` has a text, the bus raises HalError with this text, as the HAL does after its timeout. After
-WATCHDOG_S the module behind that bus drops its outputs, like a module with a watchdog. Only a bus can
-be lost. The GPIO header is no bus, so it cannot be lost.
+WATCHDOG_S the module behind that bus drops its outputs, like a module with a watchdog. The GPIO header
+is never down, because it is not a bus.
 """
 
 import json

@@ -1,5 +1,5 @@
-"""Drivers, kinds and bus types in new files. `check` and `run` find them by name, so no other file
-changes."""
+"""Drivers, kinds and bus types in new files. `check` and `run` find the new files by name, so that no
+other file changes."""
 
 import json
 import shutil

@@ -1,7 +1,7 @@
-"""Failing registers, units and replies. They keep no output on, because off is always written.
+"""Failing registers, units and replies. No output stays on, because the driver always writes off.
 
-In each story one output is on. Something cannot be read: a part of the same device, or a neighbour on
-the bus. The failure happens once or lasts for ever.
+In each story one output is on, and one read fails, once or for ever. The read concerns a part of the
+same device, or a neighbour on the bus.
 """
 
 import struct

@@ -1,5 +1,5 @@
-"""Drivers on contacts whose inputs are on another bus. The sample is the same, and without the inputs
-there is no sample."""
+"""Drivers whose inputs are contacts on another bus. The driver gives the same sample as with one bus.
+Without the other bus it gives no sample."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,8 @@
-"""A stand-in for rclpy in a separate folder. With it a daemon starts and then refuses.
+"""A stand-in for rclpy in a separate folder. On the stand-in a daemon can start, and then refuse to
+run.
 
 When the interpreter ends, the stand-in prints whether its executor's thread still runs. In that case
-the real rclpy aborts the process (SIGABRT): the thread still uses C++ objects that are already gone.
+the real rclpy aborts the process (SIGABRT), because the thread still uses deleted C++ objects.
 """
 
 from pathlib import Path

@@ -1,5 +1,5 @@
-"""The files for colcon and `ros2 launch`. They agree with the project, and setup.py includes them
-all."""
+"""The files for colcon and `ros2 launch`. The files agree with the project, and setup.py includes all
+of them."""
 
 import ast
 import subprocess

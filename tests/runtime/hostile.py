@@ -53,8 +53,8 @@ def unit(run: Path, invocation: str) -> dict[str, str]:
 
 
 def with_a_dead_bus_first(yaml: str, port: int, timeout_s: float = 1.5) -> str:
-    """Return a door's YAML, with a second door before it. The second door's bus at `port` never
-    answers."""
+    """Return a door's YAML, with another door in front. The bus of the other door is at `port` and
+    never answers."""
     bus = f"{{type: modbus, tcp: {{host: 127.0.0.1, port: {port}}}, timeout_s: {timeout_s}}}"
     door = yaml.partition("doors:\n")[2]
     far = door.replace("ward_door:", "far_door:\n    bus: dead")

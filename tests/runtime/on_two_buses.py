@@ -67,11 +67,12 @@ class FarBus(PointsFar, Bus):
 
 
 class OnTwoBuses:
-    """The service of one device. `states` has (time in s, message). Each round ends with a call of
-    `after_round(bus)`."""
+    """The service of one device. `states` has (time in s, message). After each round of a bus the
+    service calls `after_round(bus)`."""
 
     def __init__(self, file: Path, ring: Path | None = None) -> None:
-        """Start the service. It records a ring in the folder `ring`, or no ring with None."""
+        """Start the service. The service records a ring in the folder `ring`. With None it records
+        nothing."""
         self.now = 0.0
         self.config = load(file)
         (self.device,) = self.config.devices

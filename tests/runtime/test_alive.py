@@ -22,7 +22,7 @@ HURT = "tests.runtime.hurt"
 
 
 class Systemd:
-    """A stand-in for systemd's socket. A daemon sends its messages to this socket."""
+    """A stand-in for systemd's socket, to which a daemon sends its messages."""
 
     def __init__(self, path: Path) -> None:
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -41,7 +41,7 @@ class Systemd:
 
 @contextmanager
 def systemd(directory: Path) -> Iterator[Systemd]:
-    """Yield a listener on the socket `notify`. It stands in for systemd."""
+    """Yield a listener on the socket `notify`, in place of systemd."""
     listening = Systemd(directory / "notify")
     yield listening
     listening.socket.close()
@@ -179,8 +179,7 @@ def _inode(run: Path) -> int | None:
 def test_a_reset_during_the_start_does_no_harm(
     module: Module, graph: Graph, tmp_path: Path
 ) -> None:
-    """The test repeats `rmf-bridge reset`. It begins before the daemon starts, and ends when the daemon
-    serves."""
+    """The test repeats `rmf-bridge reset`, from before the daemon's start until the daemon serves."""
     run = tmp_path / "run"
     asked = argparse.Namespace(file=module.file, runtime_dir=str(run))
     codes: list[tuple[bool, int]] = []

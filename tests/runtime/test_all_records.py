@@ -1,4 +1,4 @@
-"""The command `outputs-off --all-records`. After a power cut it runs before any daemon starts."""
+"""The command `outputs-off --all-records`. After a power cut the command runs before any daemon."""
 
 import socket
 import subprocess

@@ -1,6 +1,6 @@
 """A process that switches off takes its settings from the record.
 
-If it cannot decode the settings, it reads the YAML text in the record.
+If the process cannot decode these settings, the process reads the YAML text in the record.
 """
 
 import subprocess

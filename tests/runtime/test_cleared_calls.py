@@ -1,6 +1,8 @@
-"""A controller may take a call and then clear the call's register or coil. It is not a rival.
+"""A controller may take a call and then clear the call's register or coil. Such a controller is no
+rival.
 
-A second master that writes the same register or coil is a rival. The daemon's log must name it.
+A second master that writes the same register or coil is a rival. The daemon's log must name the second
+master.
 
 Only the lift is simulated. The daemon's service with its clock, the Modbus line, and the rival's
 connection are real. On RS-485 the rival uses the module's network port.
@@ -46,7 +48,7 @@ TIMEOUT_S: Final = 2.0
 
 
 class Site:
-    """One lift with its daemon, and RMF. `another` is the bus of a second master to the same units."""
+    """One lift with its daemon, and RMF. `another` is a second master's bus to the lift's units."""
 
     def __init__(self, config: Config, clears_s: float | None, rtu: bool, held: ExitStack) -> None:
         self.states: list[LiftState] = []

@@ -1,4 +1,5 @@
-"""A defect in a driver. It takes its device offline and off, and the other devices stay in service."""
+"""A defect in a driver. The defect takes only one device offline and off. The other devices stay in
+service."""
 
 import pytest
 

@@ -1,4 +1,5 @@
-"""The permissions in a service's drop-in. Each way to reach devices and RMF's graph needs its own."""
+"""The permissions in a service's drop-in. The permissions depend on the way to the devices and to RMF's
+graph."""
 
 from pathlib import Path
 

@@ -1,5 +1,5 @@
-"""Files of other versions. A daemon reads all earlier files. It reads a later file, or refuses it with
-a reason.
+"""Files of other versions. A daemon reads all earlier files. The daemon reads a later file too, or
+refuses the file with a reason.
 
 `earlier/<date>` has files that the version of that day wrote. tests/blackbox/earlier has rings and
 recordings.

@@ -1,4 +1,4 @@
-"""The service of a kind without hardware. It runs the node around the core, on real transports."""
+"""The service of a kind without hardware: the node around the core, on real transports."""
 
 import time
 from collections.abc import Callable, Iterator

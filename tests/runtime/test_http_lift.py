@@ -22,7 +22,8 @@ EXAMPLE = Path(__file__).parents[2] / "config" / "lift_http.yaml"
 
 
 class Gateway:
-    """A gateway with a lift. Its timers run longer than any test, so only the daemon can switch off."""
+    """A gateway with a lift. The gateway's timers run longer than any test, so only the daemon can
+    switch off."""
 
     def __init__(self, folder: Path, domain: int) -> None:
         text = EXAMPLE.read_text().replace("switches_off_after_s: 10", "switches_off_after_s: 900")

@@ -1,5 +1,5 @@
-"""The mark that a daemon's last run leaves. It says that all outputs are off, so that `outputs-off`
-need not switch.
+"""The mark that a daemon's last run leaves. The mark says that all outputs are off. So `outputs-off`
+need not switch any output.
 
 The mark counts only if the same run stopped cleanly.
 """

@@ -1,4 +1,4 @@
-"""Processes that read the lock file or wait for the lock. They keep no relay on.
+"""Processes that read the lock file or wait for the lock. Such processes keep no relay on.
 
 No run of a daemon switches the outputs of another run off.
 """

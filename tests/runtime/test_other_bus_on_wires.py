@@ -1,4 +1,5 @@
-"""Inputs on another bus, with real buses and threads. The buses are Modbus TCP and Modbus TCP or pins.
+"""Inputs on another bus, with real buses and threads. The device's bus is Modbus TCP. The other bus is
+Modbus TCP too, or a header's pins.
 
 The fire contact is in a separate panel, so the panel's module can fail alone. A second door on the same
 gateway has no input at the panel.

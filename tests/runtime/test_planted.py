@@ -1,5 +1,5 @@
-"""Directories that another user makes or replaces in a daemon's place. A daemon neither reads nor
-writes in them."""
+"""Directories that another user makes or replaces where a daemon expects its own. A daemon neither
+reads nor writes in such a directory."""
 
 import json
 import os

@@ -1,5 +1,5 @@
-"""A record of claimed outputs. It has all data to switch off, even if files on the disk change
-later."""
+"""A record of claimed outputs. The record has all data that a process needs to switch off, even if
+files on the disk change later."""
 
 from collections.abc import Iterator
 from pathlib import Path

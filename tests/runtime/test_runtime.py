@@ -27,7 +27,7 @@ from tests.depth import depth
 FILE = Path("/etc/rmf-bridges/lift.yaml")
 OURS = ourselves(FILE, serves=True)
 DEAD = replace(OURS, started=1)
-"""The identity of a dead process. Another process has got the same number."""
+"""The identity of a dead process. A new process has got the dead process's number."""
 CLAIMED = ClaimRecord(str(FILE), b"kind: lift\n", {"make.yaml": b"for: door_register\n"})
 
 

@@ -1,5 +1,5 @@
-"""Silent devices among live devices. From the first round on, they delay a live device by one timeout
-at most."""
+"""Silent devices among live devices. From the first round on, silent devices delay a live device by one
+timeout at most."""
 
 from collections.abc import Iterator
 from itertools import groupby, pairwise

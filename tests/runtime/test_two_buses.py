@@ -1,4 +1,4 @@
-"""A dead bus that comes first in the YAML file. It must not keep a relay of another bus on.
+"""A dead bus that comes first in the YAML file. The dead bus must not keep a relay of another bus on.
 
 The daemon ends in several ways.
 """
@@ -26,8 +26,8 @@ from tests.waiting import wait_until
 HURT = "tests.runtime.hurt"
 SIGNALS = [signal.SIGTERM, *depth([], [signal.SIGINT, signal.SIGHUP, signal.SIGTSTP])]
 PARTS = ["loop", "reader", "watch"]
-"""The parts that fail (`hurt.py`): a bus's thread, the transport, and the thread that watches over
-them."""
+"""The parts that fail (`hurt.py`): a bus's thread, the transport, and the daemon's main thread, which
+watches over both."""
 
 
 @pytest.fixture
@@ -89,8 +89,8 @@ def test_after_a_kill_the_live_bus_is_switched_off_while_the_dead_one_is_still_t
 def test_what_several_dead_daemons_left_on_shares_the_time_of_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """After TimeoutStopSec systemd kills ExecStopPost. By then even the last record must have had its
-    share of the time."""
+    """After TimeoutStopSec systemd kills ExecStopPost. Before that time even the last record must get
+    its turn."""
     file, given = tmp_path / "lift.yaml", list[float]()
     claims = Records(Directories(tmp_path, tmp_path), file)
     for name in ("lift_dry_contact", "lift_relay_board", "lift_one_hot"):

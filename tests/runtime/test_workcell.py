@@ -1,4 +1,4 @@
-"""A dispenser's daemon as a process. SIGKILL ends it at each stage, and its PLC continues."""
+"""A dispenser's daemon as a process. SIGKILL ends the daemon at each stage, and the PLC continues."""
 
 import signal
 from collections.abc import Callable, Iterator

@@ -21,13 +21,12 @@ from workbench.rmf_model import Party as RmfParty
 from workbench.rmf_model import Said
 
 EPOCH = 2.0**30
-"""The wall time (s) at 0 s on the world's clock. It is a power of two, so that sums of times are
-exact."""
+"""The wall time (s) at 0 s on the world's clock. A power of two keeps sums of times exact."""
 NEVER = float("inf")
 
 Route = Callable[[str, str], Sequence[float]]
-"""A function that gets the sender and the receiver of a message. It returns the delays (s) of all
-arriving copies."""
+"""A function that gets the sender and the receiver of a message. It returns one delay (s) for each copy
+of the message that arrives."""
 
 
 class Party(Protocol):

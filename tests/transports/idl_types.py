@@ -1,8 +1,8 @@
 """RMF's messages as cyclonedds types, written by hand without `bridges/transports/dds/idl.py`.
 
 The fields come from the .msg files of rmf_internal_msgs 3d4df02, std_msgs and builtin_interfaces. So
-these types look like those of another node on the wire. This file has no `from __future__ import
-annotations`, because cyclonedds cannot read such annotations.
+these types look like those of another node on the wire. cyclonedds cannot read postponed annotations.
+So this file does not import `annotations` from `__future__`.
 """
 
 from dataclasses import dataclass

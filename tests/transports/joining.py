@@ -11,7 +11,8 @@ from bridges.transports.transport import Transport
 from bridges.transports.zenoh.transport import ZenohTransport
 
 RELEASE = NEWEST if missing_of_ros() else installed()
-"""The release of RMF whose messages the tests send. An installed ROS decides the release."""
+"""The release of RMF whose messages the tests send. It is the release of the installed ROS, or without
+ROS the newest release."""
 
 Join = Callable[[str], Transport]
 """A function that opens a node on one graph. The argument is the node's name."""

@@ -52,7 +52,7 @@ def echo(domain: int, transport: str) -> None:
 def sent(publisher: Publisher[Any], message: Any) -> bool:
     """Publish the message, and return False.
 
-    In the condition of `wait_until` this function repeats the message until the condition holds.
+    In a condition of `wait_until`, this call sends the message again at each check.
     """
     publisher.publish(message)
     return False

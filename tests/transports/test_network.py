@@ -73,7 +73,7 @@ def test_on_loopback_a_node_has_the_same_settings() -> None:
 
 
 class Machine:
-    """The machine's network addresses. The test sets them."""
+    """The network addresses of a machine, as the test sets them."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self._monkeypatch = monkeypatch

@@ -21,8 +21,8 @@ BY_HAND = 8
 - Two have 10 MB each.
 - One is a deletion.
 
-Two more samples follow. The node does not hear the first, because a wrong hash makes another key. It
-counts the second, which has a wildcard in its key.
+Two more samples follow. The first has a wrong hash in its key, so the node does not hear it. The second
+has a wildcard in its key, and the node counts it.
 """
 
 

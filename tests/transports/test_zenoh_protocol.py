@@ -150,7 +150,7 @@ def heard_from(
 ) -> list[Any]:
     """Return the messages that our subscription hears from another program.
 
-    The other program publishes `message` under `key`. `token` describes its publisher.
+    The other program publishes `message` under `key`. `token` describes the program's publisher.
     """
     received: list[Any] = []
     subscription = node.subscribe(topic, received.append)

@@ -156,7 +156,7 @@ def test_with_two_routers_each_message_comes_once_and_one_of_them_is_enough(site
 
 
 class Machine:
-    """The machine's network addresses. The test sets them."""
+    """The network addresses of a machine, as the test sets them."""
 
     def __init__(self) -> None:
         self.addresses: addresses.Addresses = frozenset({(2, "10.0.0.7")})

@@ -22,8 +22,8 @@ from tests.waiting import wait_until
 
 
 class Stranger:
-    """A session of another program. It declares tokens for publishers and subscriptions that do not
-    exist."""
+    """A session of another program. The session declares tokens for publishers and subscriptions that
+    do not exist."""
 
     def __init__(self, domain: int) -> None:
         config = zenoh.Config()
@@ -38,7 +38,8 @@ class Stranger:
     def claims(
         self, kind: str, topic: str, type_text: str, numbers: range, qos: str = "::"
     ) -> None:
-        """Declare a token for each number, as if the session had an end of this topic."""
+        """Declare one token for each number. Each token claims a publisher or subscription of the
+        topic."""
         for number in numbers:
             ids = f"@ros2_lv/{self._domain}/{self.session.zid()}/0/{number}/{kind}"
             token = f"{ids}/%/%/stranger/%{topic}/{type_text}/{qos},10:,:,:,,"

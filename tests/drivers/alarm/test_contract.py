@@ -58,8 +58,8 @@ class PanelContract(Contract[Bench]):
 
 
 class LinkedPanelContract(PanelContract):
-    """Duties of a driver whose link can fail. `parts` names the parts on the far side that may be
-    off."""
+    """Duties of a driver whose link can fail. `parts` names the parts on the far side that a test
+    switches off."""
 
     parts: ClassVar[tuple[str, ...]] = ("unit", "server")
 

@@ -26,8 +26,8 @@ from tests.waiting import wait_until
 
 ON, OFF, AS_IT_IS = ChargerOutputs(True), ChargerOutputs(False), ChargerOutputs(None)
 PACE = 20.0
-"""The factor by which a simulated charger runs faster. With this factor no test waits for the
-charger."""
+"""The speed of a simulated charger, as a multiple of the real speed. At this speed no test waits for
+the charger."""
 
 ChargerDriver = Driver[ChargerSample, ChargerOutputs]
 OnDeath = Literal["stop", "keep"]
@@ -87,7 +87,8 @@ def behind(driver: Any, settings: Any, canonical: Callable[[str], str] = str) ->
 
 
 def news(driver: Any, settings: Any, bus: Bus) -> Callable[[OnDeath], ChargerDriver]:
-    """Return a function that makes drivers with these settings. Its argument is `on_death`."""
+    """Return a function that makes drivers with these settings. The function's argument is
+    `on_death`."""
 
     def new(on_death: OnDeath) -> ChargerDriver:
         changed = msgspec.structs.replace(settings, on_death=on_death)

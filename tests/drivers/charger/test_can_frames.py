@@ -1,6 +1,6 @@
-"""The driver of makers' frames: its bytes, its sending pace, and wrong maps.
+"""The driver for makers' frames: its bytes, its sending pace, and wrong maps.
 
-The makers have published the bytes.
+The tests compare the bytes with frames that the makers have published.
 """
 
 import itertools

@@ -1,6 +1,6 @@
-"""A charger on CAN without a state number.
+"""A charger on CAN that sends no state number.
 
-Rules find its state from an error number and a byte of flags.
+Rules find the charger's state from an error number and a byte of flags.
 """
 
 from collections.abc import Iterator
@@ -138,8 +138,8 @@ def test_a_map_must_say_in_some_way_what_the_state_is() -> None:
 
 
 class TestTheFakeShowsIt(Frames):
-    """The contract with a simulated charger that has this map. The driver must read the charger's true
-    state."""
+    """The contract with a simulated charger that uses the same map as the driver. The driver must read
+    the charger's true state."""
 
     foreign_object = "foreign object"
     settings: ClassVar = {"map": MAP}

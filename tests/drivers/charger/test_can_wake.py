@@ -26,7 +26,7 @@ START, STOP, CHARGE = (0x000, "010a"), (0x200, "00"), (0x200, "01")
 
 
 class Sleeper:
-    """A charger in virtual time. It broadcasts its status only while the test sets `awake`.
+    """A charger in virtual time. While the test sets `awake`, the charger broadcasts its status.
 
     `got` has (time in s, (id, payload)) for each frame from the driver.
     """

@@ -91,7 +91,7 @@ class ContactBench(Bench):
 
 
 class TestContactsAtAModule(ChargerContract):
-    """A charger whose relay is at a module. The module drops the relay when the daemon has died."""
+    """A charger whose relay is at a module. When the daemon has died, the module drops the relay."""
 
     link: ClassVar = "unit"
     measures: ClassVar = False

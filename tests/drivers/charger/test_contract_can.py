@@ -1,4 +1,4 @@
-"""Chargers on CAN. They obey the contract of every charger, and more rules for a robot on the pad."""
+"""Chargers on CAN: the contract of every charger, and more rules for a robot on the pad."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -228,8 +228,8 @@ class TestACanOpenReceiverBehindAnAdapter(CanOpen, OnAnAdapter):
 
 
 class Frames(CanContract):
-    """The contract with Wiferion's charger. It reports no foreign object, and checks the range by
-    itself."""
+    """The contract with Wiferion's charger. This charger reports no foreign object, and checks the
+    range without a command."""
 
     link = "node"
     foreign_object = "the station is too hot"

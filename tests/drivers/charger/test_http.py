@@ -1,6 +1,6 @@
-"""The driver of the HTTP charger.
+"""The driver of the HTTP charger. It reads JSON.
 
-The driver reads JSON, and sends each command that clears an error only once.
+To clear an error, the driver sends its command only once.
 """
 
 import json

@@ -1,4 +1,5 @@
-"""The JSON of another make, described only by a map in YAML: fields, words, commands, bad answers."""
+"""The JSON of another make: fields, words, commands, and bad answers. A map in YAML describes
+everything."""
 
 from pathlib import Path
 from typing import Any

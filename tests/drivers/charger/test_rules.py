@@ -1,5 +1,5 @@
-"""Rules for chargers on any protocol. They find the charger's state, and name errors by numbers and
-bits."""
+"""Rules that find the state of a charger, on any protocol. Numbers and bits name the charger's
+errors."""
 
 from pathlib import Path
 from typing import Any

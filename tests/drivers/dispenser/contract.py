@@ -13,7 +13,7 @@ REST = WorkcellOutputs()
 
 
 class Bench(benches.Bench[WorkcellSample, WorkcellOutputs]):
-    """A bench with a workcell. Its cycle is so short that no test waits for it."""
+    """A bench with a workcell. The workcell's cycle is so short that no test waits for its end."""
 
     def moved(self) -> int:
         """Return the number of items that left the workcell."""

@@ -28,7 +28,7 @@ class Pace(TypedDict):
 
 
 QUICK: Pace = {"open_s": 0.05, "close_s": 0.05, "auto_close_s": 0.05}
-"""The times of a simulated door (s). They are so short that no test waits for the door."""
+"""The times of a simulated door (s). With such short times no test waits for the door."""
 
 
 Ends = tuple[bool | None, bool | None]

@@ -1,4 +1,5 @@
-"""Robots behind an HTTP interface. One is the tutorial's manager, and others have other forms."""
+"""Robots behind HTTP interfaces: the interface of the tutorial's manager, and interfaces of other
+forms."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -55,8 +56,8 @@ START = Pose("L1", 1.0, 2.0, 0.5)
 
 @dataclass
 class Bench:
-    """The robots of one manager on one bus, each with its driver. `clock` ends the pauses of the
-    bus."""
+    """The robots of one manager on one bus, each with its driver. The bus measures its pauses with
+    `clock`."""
 
     plants: dict[str, RobotPlant]
     drivers: dict[str, HttpRobot]

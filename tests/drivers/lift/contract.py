@@ -21,7 +21,7 @@ from tests.drivers.benches import Contract
 from tests.waiting import wait_until
 
 QUICK = LiftPace(floor_s=0.2, door_s=0.05, agv_s=0.02, dwell_s=0.1)
-"""The times of a simulated lift (s). They are so short that no test waits for the lift."""
+"""The times of a simulated lift (s). With such short times no test waits for the lift."""
 
 IDLE = LiftSample("B1", DoorReading.CLOSED, motion=Motion.STOPPED, agv=False)
 OFF, AGV = LiftOutputs(), LiftOutputs(agv_request=True)

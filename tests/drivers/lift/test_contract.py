@@ -47,7 +47,7 @@ class MqttBench(Bench):
 
 
 class TestWordsOnMqtt(WiredLiftContract):
-    """A gateway that publishes words in one JSON object. Each command to the gateway is a word too."""
+    """A gateway that publishes words in one JSON object. The commands to the gateway are also words."""
 
     @contextmanager
     def benches(self) -> Iterator[Bench]:

@@ -1,2 +1,2 @@
-"""The service of a fleet. On one side is RMF's adapter or a stand-in, and on the other side are
-robots."""
+"""The service of a fleet. The service connects robots with RMF's adapter, or with a stand-in for the
+adapter."""

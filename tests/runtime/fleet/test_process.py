@@ -1,5 +1,5 @@
-"""A fleet's daemon as a process. Robots patrol, fail and recover, and a refused start names its
-reason."""
+"""A fleet's daemon as a process. Robots patrol, fail and recover. A daemon that must not start says
+why."""
 
 import importlib.util
 import json
@@ -25,8 +25,8 @@ NO_ROS = importlib.util.find_spec("rmf_adapter") is None
 
 
 def site(name: str, directory: Path, **change: str) -> Path:
-    """Copy a shipped fleet with RMF's files. `change` has texts in the graph, and their
-    replacements."""
+    """Copy a shipped fleet with RMF's files. `change` has old texts in the graph, each with its new
+    text."""
     file = shipped(name, directory, wire())
     file.write_text(
         file.read_text().replace("rmf:\n", "rmf:\n  release: kilted\n")

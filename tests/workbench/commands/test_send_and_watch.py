@@ -43,7 +43,7 @@ LIFT = d.LiftState(
 
 
 class Command(MemoryTransport):
-    """The command's node. It gets the device's state when it subscribes, and after each of its
+    """The command's node. The node gets the device's state when it subscribes, and after each of its
     requests."""
 
     def __init__(self, device: "Device") -> None:
@@ -388,8 +388,8 @@ def test_an_interrupted_send_exits_130_and_leaves_no_ghost_that_asks_for_the_doo
 
 
 def test_a_command_reaches_a_site_as_a_device_yaml_does(tmp_path: Path) -> None:
-    """With `--config` the command takes the router, domain and keys from the site's file. Other options
-    override the file."""
+    """With `--config` the command takes the router, domain and keys from the site's file. Options
+    beside `--config` override the file."""
     router = Router()
     file = tmp_path / "lift.yaml"
     shipped = (Path(__file__).parents[3] / "config" / "lift_supervisor.yaml").read_text()

@@ -279,7 +279,7 @@ def test_robots_are_shown_with_the_place_that_they_are_assigned_to_charge_or_to_
 
 
 def daemon(node: str, kind: str, **status: object) -> d.DiagnosticArray:
-    """Return the diagnostics of a daemon, with its status and with Lift1."""
+    """Return the diagnostics of a daemon. They contain the daemon's status and the device Lift1."""
     lift = {"faults": [{"code": "OVERLOAD", "detail": "since 3 s"}], "input_age_s": 0.1}
     return diagnosis(node, kind, status, {"Lift1": lift}, d.Time())
 

@@ -1,4 +1,4 @@
-"""Fixtures of the daemon tests: a Modbus module for commands on real wires."""
+"""A fixture of the daemon tests: the Modbus module, for commands that act on real wires."""
 
 from tests.runtime.conftest import module
 

@@ -36,7 +36,7 @@ CHARGER = d.ChargerState(state=1, charger_name="a")
 
 @dataclass
 class Ran:
-    """One run of `send`. It has each request with its time, the hints, and the outcome with its time
+    """One run of `send`: each request with its time (s), the hints, and the outcome with its time
     (s)."""
 
     sent: list[tuple[float, words.Requested]]

@@ -1,4 +1,4 @@
-"""Incidents without names. Such a file has no name of the site, and gives the same decisions."""
+"""Incidents without names. Such a file contains no name of the site, and gives the same decisions."""
 
 import re
 import sys
@@ -77,8 +77,8 @@ def test_a_name_is_the_same_in_messages_and_decisions_and_comments_and_addresses
 def test_a_kind_whose_words_cannot_be_read_makes_nothing_anonymous(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Without the words of a kind, `anonymous` would replace them as names of the site. Then replay
-    would fail."""
+    """`anonymous` must know the words of a kind. Otherwise it would replace them like names of the
+    site, and replay would fail."""
     monkeypatch.setitem(sys.modules, lift.__name__ + ".report", None)
     our_words.cache_clear()
 

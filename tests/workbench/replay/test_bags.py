@@ -30,7 +30,7 @@ FLEET = FleetState("mir", (RobotState(name="r1", mode=RobotMode(mode=2)),))
 
 
 def heard(*messages: tuple[str, object]) -> list[Heard]:
-    """Return these messages as if one was heard each second."""
+    """Return these messages with times of hearing. One message comes each second."""
     return [
         Heard(WALL + second, WALL + second, topic, message)  # type: ignore[arg-type]
         for second, (topic, message) in enumerate(messages)

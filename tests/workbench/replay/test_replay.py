@@ -1,4 +1,4 @@
-"""Replays of the soak test's recordings. They give the same decisions and memories again."""
+"""Replays of the soak test's recordings. Each replay gives the same decisions and memories again."""
 
 import os
 from pathlib import Path
@@ -59,8 +59,8 @@ def test_a_ring_that_has_turned_many_times_begins_where_all_is_known(tmp_path: P
 
 @pytest.mark.parametrize("file", CORPUS, ids=lambda file: file.stem)
 def test_each_incident_of_the_soak_is_decided_as_it_was_recorded(file: Path) -> None:
-    """After a deliberate change, write the incidents again: `python -m
-    tests.workbench.replay.corpus`."""
+    """After a deliberate change of a core, write the incidents again with
+    `python -m tests.workbench.replay.corpus`."""
     notes = Notes()
     head, entries = opened(file, notes)
     replay = Replay(entries, ReplayedCores(of_head(head)))
@@ -141,7 +141,8 @@ def test_the_yaml_of_another_device_is_refused_with_both_names(
 
 
 def test_what_cannot_be_replayed_is_counted(tmp_path: Path) -> None:
-    """The recording has no `Known` entries, as when its beginning is damaged."""
+    """The recording has no `Known` entries. The same happens if the beginning of a recording is
+    damaged."""
     head, entries = opened(HERE / "bay1_1.mcap", Notes())
     replay = Replay(
         [one for one in entries if not isinstance(one, Known)], ReplayedCores(of_head(head))

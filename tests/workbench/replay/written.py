@@ -17,7 +17,7 @@ MCAP, SQLITE = StoragePlugin.MCAP, StoragePlugin.SQLITE3
 
 
 def store(release: Release) -> Typestore:
-    """Return the types of a release. They come from our definition texts."""
+    """Return the types of a release. The types come from our definition texts."""
     types = get_typestore(Stores.EMPTY)
     for message_type in release.messages():
         own = text(message_type, release).partition("=" * 80)[0]

@@ -28,7 +28,7 @@ def live_screen(site: Site, device: str) -> str:
 def file_screen(site: Site, device: str, daemon: str = "", note: str = "") -> str:
     """Return the screen of `explain FILE`.
 
-    The recorder writes the file. If it writes none, a person asks for a file with `incident --note`.
+    The recorder writes the file. If the recorder writes none, a person types `incident --note`.
     """
     path = site.file(daemon or device)
     if path is None:

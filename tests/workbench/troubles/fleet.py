@@ -1,4 +1,4 @@
-"""A fleet adapter's node and its robots. They follow RMF's rules."""
+"""A fleet adapter's node and its robots, which follow RMF's rules."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Final
@@ -27,8 +27,8 @@ Join = Callable[[str], Transport]
 
 
 class PartyNode:
-    """A node in place of one of RMF's nodes. It follows RMF's rules. `wall` returns the node's clock (s
-    since the epoch)."""
+    """A stand-in for one of RMF's nodes. The stand-in follows RMF's rules. `wall` returns the node's
+    clock (s since the epoch)."""
 
     def __init__(
         self,
@@ -77,7 +77,7 @@ class PartyNode:
 
 
 class Fleet(PartyNode):
-    """One adapter for all robots of a fleet. Its clock is `behind_s` seconds slow."""
+    """One adapter for all robots of a fleet. The adapter's clock is `behind_s` seconds slow."""
 
     def __init__(
         self,

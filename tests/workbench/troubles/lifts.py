@@ -36,7 +36,7 @@ def robot_dies_in_car(site: Site) -> None:
 
 
 def robot_dies_in_car_b(site: Site) -> None:
-    """Let the robot die in the car. Its adapter does not notice."""
+    """Let the robot die in the car. The robot's adapter does not notice."""
     site.boards(site.red, "L1", "L3")
     site.run(4.0)
     site.trouble_begins()
@@ -131,7 +131,8 @@ def slow_modbus_unit(site: Site) -> None:
 
 
 def two_daemons_one_name(site: Site) -> dict[str, str]:
-    """Start a second daemon of ours for another lift. By mistake it publishes the first lift's name."""
+    """Start a second daemon of ours for another lift. The second daemon publishes under the first
+    lift's name."""
     site.rides(site.red, LIFT, "L2", "L1")
     site.run(60.0)
     site.trouble_begins()
@@ -252,8 +253,8 @@ class StrictSupervisor(LiftSupervisor):
 
 
 class Foreign:
-    """A lift node of another maker. It publishes the same state each second. Its clock is `behind_s`
-    seconds slow."""
+    """A lift node of another maker. The node publishes the same state each second. The node's clock is
+    `behind_s` seconds slow."""
 
     def __init__(self, site: Site, node: str, behind_s: float = 0.0) -> None:
         self._site = site

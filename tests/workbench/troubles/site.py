@@ -71,7 +71,7 @@ class Site(Scene):
     """A site and its recorder.
 
     Rings and recordings are in `folder`. `mortal` names the daemon that a story kills. A slow unit
-    replies after at most `latest_s` (s), and the daemon asks it every `slow_s` (s).
+    replies after at most `latest_s` (s). The daemon asks a slow unit every `slow_s` (s).
     """
 
     def __init__(self, folder: Path, mortal: str = "") -> None:
@@ -133,14 +133,14 @@ class Site(Scene):
         self.daemons[name].kill()
 
     def retires(self, name: str) -> None:
-        """Stop the daemon cleanly. It does not start again."""
+        """Stop the daemon cleanly, and do not start it again."""
         daemon = self.daemons.pop(name)
         daemon.kill()
         daemon.writer.ended(safe=True)
 
     def slow(self, name: str) -> None:
-        """Make the device's unit slow from now on. It answers after 0.1 s to `latest_s`, and most
-        replies are too late."""
+        """Make the device's unit slow from now on. The unit answers after 0.1 s to `latest_s`, so that
+        most replies are too late."""
         far = self.devices[name].far
         assert isinstance(far, ModuleFar)
         far.silent(TOO_LATE if self.random.uniform(0.1, self.latest_s) > TIMEOUT_S else "")

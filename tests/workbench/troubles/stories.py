@@ -9,8 +9,8 @@ from tests.workbench.troubles.site import DOOR, Site
 from tests.workbench.troubles.site import LIFT as LIFT1
 
 Stage = Callable[[Site], Mapping[str, str] | None]
-"""A function that stages a trouble. It may return node names. They fill the places in braces in the
-verdict's texts."""
+"""A function that stages a trouble. The function may return node names, which fill the places in braces
+in the verdict's texts."""
 
 
 @dataclass(frozen=True)

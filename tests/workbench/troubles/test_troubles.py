@@ -1,4 +1,5 @@
-"""`explain` on the twelve troubles, live and from the file. It must say what `expected.toml` says."""
+"""`explain` on the twelve troubles, live and from the file. `expected.toml` has the expected
+verdicts."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path

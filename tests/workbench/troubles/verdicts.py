@@ -14,7 +14,7 @@ Alternatives = list[str]
 
 
 class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A rule for each next step. If a step has a phrase of `when_next`, it also has a phrase of
+    """A rule for each next step. A step with a phrase of `when_next` must also have a phrase of
     `needs`."""
 
     when_next: Alternatives

@@ -34,7 +34,7 @@ def data_frame(frame_id: int, payload: str, extended: bool = False) -> can.Messa
 
 
 class FarEnd:
-    """The far end of the bus. It can send any frame, and hears our frames."""
+    """The far end of the bus. The test sends any frame from here, and reads our frames here."""
 
     def __init__(self, channel: str) -> None:
         self._bus = can.Bus(channel, interface="virtual")
@@ -67,7 +67,7 @@ class FarEnd:
 def bus_on(
     channel: str, clock: Callable[[], float] | None = None, *, timeout_s: float = 0.1
 ) -> CanBus:
-    """Return our bus. It measures its pauses with `clock`, and adds no jitter."""
+    """Return our bus. `clock` measures the bus's pauses, which have no jitter."""
     settings = CanSettings(socketcan="can0", timeout_s=timeout_s, scan_s=0.05)
     vendor = lambda: can.Bus(channel, interface="virtual")  # noqa: E731
     return CanBus(settings, clock or time.monotonic, lambda: 0.0, vendor)
@@ -90,7 +90,8 @@ def two_ends(clock: Time | None = None) -> Iterator[tuple[CanBus, FarEnd, Time]]
 
 
 class Reactive(can.BusABC):
-    """A bus in virtual time. Its stations answer at once. A wait takes no real time, but adds to `now`.
+    """A bus in virtual time. The stations on the bus answer at once. A wait takes no real time, but
+    adds to `now`.
 
     The frames in `later` arrive only during a wait.
     """

@@ -198,7 +198,7 @@ def test_minor_faults_of_the_controller_are_named_where_a_station_is_silent(
 
 
 class Broken(can.BusABC):
-    """An open interface whose call `where` fails."""
+    """An interface on which one call fails. `where` names the call."""
 
     def __init__(self, error: Exception, where: str) -> None:
         super().__init__("broken")

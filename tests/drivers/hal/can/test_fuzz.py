@@ -125,7 +125,7 @@ STATE_5 = bytes.fromhex("02200a0500")
 
 
 def good(request: can.Message) -> can.Message:
-    """Return the answer of a healthy and idle RCU. It answers 0 to every question."""
+    """Return the answer of a healthy and idle RCU, which answers 0 to every question."""
     asked = bytes(request.data)
     command = 0x4B if asked[0] == 0x40 else 0x60
     return frame(0x58A, bytes((command,)) + asked[1:4] + bytes(4))

@@ -14,7 +14,8 @@ HOUR_S = 3600.0
 
 
 class Interface(can.BusABC):
-    """A bus with a file descriptor. Each byte in the file is one frame, and is the frame's id.
+    """A bus with a file descriptor. Each byte in the file stands for one frame. The byte is the frame's
+    id.
 
     `waits` has the time limit (s) of each call of `recv`.
     """

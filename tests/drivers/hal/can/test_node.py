@@ -17,7 +17,7 @@ Answer = Callable[[bytes], list[str]]
 
 
 def value(request: bytes, number: int, command: int = 0x4B) -> str:
-    """Return the reply to a read. It carries a number of two octets (expedited transfer)."""
+    """Return the reply to a read of a number with two octets (expedited transfer)."""
     return (bytes((command,)) + request[1:4] + struct.pack("<I", number)).hex()
 
 
@@ -150,7 +150,7 @@ def test_a_node_that_owes_an_answer_is_asked_nothing(side: Side) -> None:
     ours, node, far, _ = side
     node.answer = lambda request: []
     assert failure(lambda: ours.read(*STATE))
-    ours._sdo_pause.mended()  # the bus would send no request during the pause, so the test ends it
+    ours._sdo_pause.mended()  # end the pause, because the bus would send no request during the pause
     assert failure(lambda: ours.read(*STATE)) == (f"{NAME}, read 0x2002:0A: no reply within 0.05 s")
     assert len(node.asked) == 1
     far.now += 0.2
@@ -196,7 +196,7 @@ def test_a_heartbeat_that_stays_away_is_a_loss_and_its_return_ends_it(side: Side
 
 
 def test_a_node_that_was_lost_counts_as_restarted(side: Side) -> None:
-    """A lost node may have restarted, and the bus may have missed its boot-up frame.
+    """While a node is lost, the node may restart. The bus may then miss the boot-up frame.
 
     So a node that returns must get all orders again.
     """

@@ -1,4 +1,4 @@
-"""An slcan adapter on a pseudo-terminal. It carries CAN frames on a serial port, which can fail."""
+"""An slcan adapter on a pseudo-terminal: CAN frames on a serial port, and failures of the port."""
 
 import os
 import threading

@@ -1,4 +1,4 @@
-"""A stand-in for lgpio. With it the tests run the pin factory for real hardware."""
+"""A stand-in for lgpio. The tests use it to run the pin factory for real hardware."""
 
 import sys
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from tests.drivers.hal.gpio.lgpio_stand_in import StandIn
 
 @pytest.fixture
 def lgpio(monkeypatch: pytest.MonkeyPatch) -> Iterator[StandIn]:
-    """Yield a stand-in. The pin factory for real hardware imports it in place of lgpio."""
+    """Yield a stand-in for lgpio. The pin factory for real hardware imports the stand-in."""
     stand_in = StandIn()
     monkeypatch.setitem(sys.modules, "lgpio", stand_in)
     forget()

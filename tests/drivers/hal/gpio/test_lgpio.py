@@ -1,4 +1,4 @@
-"""The pin factory for real hardware. A stand-in records each of its lgpio calls."""
+"""The pin factory for real hardware. A stand-in records each lgpio call of the factory."""
 
 import os
 import sys

@@ -43,7 +43,7 @@ class Caller:
 class FarEnd:
     """A server that takes the next conversation for each new connection.
 
-    After the last conversation the server repeats it. `requests` has the heads of all requests, and
+    Further connections repeat the last conversation. `requests` has the heads of all requests, and
     `connections` is the number of connections.
     """
 

@@ -391,7 +391,7 @@ def test_a_refused_connection_says_so() -> None:
 
 @contextlib.contextmanager
 def full_server() -> Iterator[Any]:
-    """Yield the address of a server with a full queue. It neither accepts nor refuses more
+    """Yield the address of a server whose queue is full. The server neither accepts nor refuses more
     connections."""
     with contextlib.ExitStack() as opened:
         full = opened.enter_context(socket.create_server(("127.0.0.1", 0), backlog=0))

@@ -1,4 +1,5 @@
-"""The simulated HTTP charger is a real server. The real driver reads it in each of its failures."""
+"""The simulated HTTP charger, which is a real server. The real driver reads from this server in each of
+the server's failures."""
 
 import contextlib
 import json

@@ -82,7 +82,7 @@ def test_a_message_wakes_the_daemon_and_the_state_is_read_by_a_request() -> None
     plant = world.plants["lift"]
     server = HttpServer([FakeHttpLift(plant, settings)], "", 0.5, "/ws")
     with listening(server.replace["api_base"].rpartition(":")[2]) as (bus, wakes):  # type: ignore[attr-defined]
-        wakes.more_than(1)  # the connection wakes once, and the state wakes once
+        wakes.more_than(1)  # the connection and the state wake once each
         lift = create("lift", settings, bus)
         assert not lift.read().hazards
         before = wakes.count

@@ -1,5 +1,5 @@
-"""The simulated HTTP charger of `--simulate`. It is a child process, and the test sends commands
-through its control socket."""
+"""The HTTP charger of `--simulate`. The charger is a child process, and the test sends commands to its
+control socket."""
 
 from pathlib import Path
 

@@ -33,7 +33,8 @@ class Answers(BaseHTTPRequestHandler):
 
 
 class Site:
-    """A server with a certificate for 127.0.0.1. `ca_file` is the file of its authority."""
+    """A server with a certificate for 127.0.0.1. `ca_file` is the certificate of the server's
+    authority."""
 
     def __init__(self, tmp_path: Path) -> None:
         authority = trustme.CA()

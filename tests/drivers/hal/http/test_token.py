@@ -1,7 +1,7 @@
 """A bearer token from a file.
 
-The bus reads the file for each call. It refuses a file that other users can read or write, and never
-shows the token.
+The bus reads the file for each call. If other users can read or write the file, the bus refuses it. The
+bus never shows the token.
 """
 
 import os

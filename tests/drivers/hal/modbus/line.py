@@ -34,8 +34,8 @@ class SerialModule(Module):
     """A module on a line.
 
     `reply` gets and returns frames with a TCP header, as in the base class. If a test sets `on_wire`,
-    `on_wire` answers instead. It gets the bytes of a request, and returns the bytes that follow on the
-    wire. `frames` has each request as it was on the wire.
+    `on_wire` answers instead. `on_wire` gets the bytes of a request, and returns the bytes that follow
+    on the wire. `frames` has each request as it was on the wire.
     """
 
     def __init__(self, reply: Reply | None = None) -> None:
@@ -58,7 +58,7 @@ class SerialModule(Module):
             os.close(descriptor)
 
     def plug(self) -> None:
-        """Plug the adapter in again. It becomes another device under the same path."""
+        """Plug the adapter in again. The adapter becomes another device under the same path."""
         self._pty = pty.openpty()
         self._stop = os.pipe()
         tty.setraw(self._pty[1])

@@ -121,7 +121,7 @@ class Module:
 
 
 def frame(request: bytes, pdu: bytes) -> bytes:
-    """Return a reply to this request. It has this PDU and an MBAP header with the right length."""
+    """Return a reply to this request, with this PDU and a correct MBAP header."""
     return request[:4] + struct.pack(">H", len(pdu) + 1) + request[6:7] + pdu
 
 
@@ -187,7 +187,7 @@ def bus_to(
     ignore_echo: bool = False,
     module_watchdog: dict[str, Any] | None = None,
 ) -> ModbusBus:
-    """Return a bus to a port of this machine. It measures its pauses with `clock`, and adds no
+    """Return a bus to a port of this machine. `clock` measures the bus's pauses, which have no
     jitter."""
     settings = ModbusSettings(
         tcp=Tcp(host="127.0.0.1", port=port) if isinstance(port, int) else None,

@@ -40,8 +40,8 @@ def door_at(unit: int) -> DryContactDoorSettings:
 
 
 class Site:
-    """Two doors on one bus. They are units 1 and 2 of one gateway or line, and `clock` drives the
-    bus."""
+    """Two doors on one bus, as units 1 and 2 of one gateway or line. The bus measures its pauses with
+    `clock`."""
 
     def __init__(self, serial: modbus.Serial | None) -> None:
         self.settings = {"front": door_at(1), "ward": door_at(2)}

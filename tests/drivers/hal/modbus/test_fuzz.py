@@ -1,5 +1,5 @@
-"""Arbitrary replies on TCP and on a line. They cause only HalErrors, and never a false open door or a
-false pulse."""
+"""Arbitrary replies on TCP and on a line. Such replies cause only HalErrors, and never a false open
+door or a false pulse."""
 
 import itertools
 from collections.abc import Callable, Iterator
@@ -33,7 +33,7 @@ DOOR = msgspec.convert(
 )
 
 Spoil = Callable[[bytes, bytes], bytes | None]
-"""A function that gets a request and its good reply. It returns the bytes that are sent instead."""
+"""A function that gets a request and the correct reply. It returns the bytes that the module sends."""
 
 
 def _flipped(good: bytes, at: int, mask: int) -> bytes:

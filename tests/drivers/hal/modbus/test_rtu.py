@@ -24,7 +24,7 @@ def coils(bus: ModbusBus, count: int) -> list[int]:
 
 
 def test_the_frames_are_those_of_the_makers_manual(line: SerialModule) -> None:
-    """The frames come from the manual of the Waveshare Modbus RTU Relay. They switch relay 0 on and
+    """The manual of the Waveshare Modbus RTU Relay has these frames. The frames switch relay 0 on and
     off, and read all states."""
     said = {
         "01050000ff008c3a": "01050000ff008c3a",

@@ -1,4 +1,4 @@
-"""Bad input from a broker or a device. Each sort of input has its own error, and never becomes a
+"""Bad input from a broker or a device. Each sort of input has its own error. No bad input becomes a
 fact."""
 
 import socket

@@ -144,7 +144,7 @@ def test_a_command_that_no_device_receives_is_an_error(broker: Mosquitto) -> Non
 
 
 RELAYS = 60
-"""The number of devices for which the broker keeps a session. The test asks each device only once,
+"""The number of devices for which the broker keeps a session. Each device serves for one question only,
 because the broker delivers a kept message only once."""
 
 

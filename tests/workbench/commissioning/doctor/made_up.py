@@ -1,4 +1,5 @@
-"""A made-up machine. It has a directory tree, scripts in place of commands, and made-up GPIO chips."""
+"""A made-up machine: a directory tree, scripts in place of commands, and answers in place of GPIO
+chips."""
 
 import errno
 import os
@@ -23,7 +24,7 @@ OTHERS = OURS + 4321
 
 
 class MadeUp:
-    """A machine whose files are inside `root`. The doctor examines it through `machine`."""
+    """A machine whose files are inside `root`. The doctor examines the machine through `machine`."""
 
     def __init__(
         self, root: Path, gids: Collection[int] = (OURS,), installed: Collection[str] = ("lgpio",)

@@ -1,4 +1,4 @@
-"""A device's answer to the doctor. The doctor reads the device, and does not open the driver. Every
+"""The answer of a device to the doctor. The doctor reads the device without opening the driver. Every
 driver permits such a reading."""
 
 import re

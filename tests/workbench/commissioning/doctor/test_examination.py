@@ -1,5 +1,5 @@
-"""The doctor on a lift's file. It examines every subject on a good and on a bad made-up Raspberry
-Pi."""
+"""The doctor's examination of a lift's file. The doctor examines every subject, on a good and on a bad
+made-up Raspberry Pi."""
 
 from pathlib import Path
 

@@ -1,5 +1,5 @@
-"""The form for real hardware. It has the machine's answers, and empty fields for a person's
-observations."""
+"""The form for real hardware. The machine's answers fill some fields, and a person's observations fill
+the empty fields."""
 
 from pathlib import Path
 

@@ -1,5 +1,5 @@
-"""`doctor --hardening`. It judges each point of docs/how-to/harden.md, or says that it cannot judge the
-point."""
+"""`doctor --hardening`, which judges each point of docs/how-to/harden.md. The doctor names the points
+that it cannot judge."""
 
 import re
 from pathlib import Path
@@ -40,7 +40,8 @@ def made(tmp_path: Path) -> MadeUp:
 
 
 def config(rmf: str = "{transport: dds}", text: str = LIFT) -> Config:
-    """Return the config of an example with these `rmf` settings. Its file is in /etc/rmf-bridges."""
+    """Return the config of an example with these `rmf` settings, as if its file were in
+    /etc/rmf-bridges."""
     body = re.sub(r"^rmf:\n(  .*\n|\n)*", "", text, flags=re.M)
     file = Path("/etc/rmf-bridges/lift.yaml")
     return understood(file, f"rmf: {rmf}\n{body}".encode())

@@ -1,4 +1,5 @@
-"""The screen of a walk. Even on a phone it shows every name in full, and no line scrolls away."""
+"""The screen of a walk. Even on a phone the screen shows every name in full, and no line scrolls
+away."""
 
 from dataclasses import replace
 from typing import Any

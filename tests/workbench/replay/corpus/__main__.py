@@ -1,7 +1,7 @@
 """A program that records incidents of the soak test: `python -m tests.workbench.replay.corpus`.
 
-It records the first incident of each chosen daemon. Run it after a deliberate change of a core's
-decisions. Then `git diff --stat` shows the incidents whose decisions have changed.
+The program records the first incident of each chosen daemon. Run the program after a deliberate change
+of a core's decisions. Then `git diff --stat` shows the incidents whose decisions have changed.
 """
 
 import sys
@@ -21,7 +21,7 @@ CHOSEN = {
     3: ("ward", "lift_supervisor"),
 }
 """The daemons whose incidents the program records, by the seed of a simulated day. The incidents of
-more daemons would only repeat these."""
+more daemons would be repetitions."""
 HOURS = 0.3
 BEFORE_S, AFTER_S = 5.0, 12.0
 

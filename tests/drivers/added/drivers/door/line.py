@@ -16,7 +16,7 @@ class Asks(Protocol):
 
 
 class Settings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The settings of a door. The questions call the door by its name `called`."""
+    """The settings of a door. `called` is the door's name in the questions."""
 
     called: Name
 
