@@ -41,7 +41,8 @@ class Cells(Protocol):
 
 
 class PointsFar:
-    """Contacts and relays on a header or at a module, in place of a `drivers.hal.points.PointsBus`."""
+    """Contacts and relays on a header or at a module. The class replaces a
+    `drivers.hal.points.PointsBus`."""
 
     def __init__(self, clock: Clocked, plant: Plant, wires: Iterable[Wire]) -> None:
         self.down = ""
@@ -106,8 +107,8 @@ class _Lines:
 
 
 class RegisterFar:
-    """A controller's registers, in place of a `drivers.hal.modbus.ModbusBus`. Drivers need no other
-    part."""
+    """A controller's registers. The class replaces the part of `drivers.hal.modbus.ModbusBus` that
+    drivers use."""
 
     def __init__(self, clock: Clocked, cells: Cells) -> None:
         self.down = ""
@@ -146,7 +147,7 @@ class RegisterFar:
 
 
 class HttpFar:
-    """A charging station that answers HTTP, in place of `drivers.charger.http.Calls`."""
+    """A charging station that answers HTTP. The class replaces `drivers.charger.http.Calls`."""
 
     def __init__(self, clock: Clocked, plant: ChargerPlant, settings: Any) -> None:
         self.down = ""

@@ -177,7 +177,7 @@ def test_the_watchdogs_time_follows_from_the_slowest_call(
     )
     assert watchdog_s(config) == expected_s
     assert too_slow(config, watchdog_s(config)) == ""
-    fed_every_s = watchdog_s(config) / 6 + 1 + timeout_s  # as in `_watch`: one scan and one call
+    fed_every_s = watchdog_s(config) / 6 + 1 + timeout_s  # period of `_watch`, a scan, a call
     assert fed_every_s < watchdog_s(config)
 
 

@@ -75,8 +75,8 @@ PLANTED = [a_link, a_directory, a_link_within]
 
 @pytest.fixture
 def victim(machine: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the target of an attack. It is a directory of root, and its files have the names of a
-    daemon's files."""
+    """Return the target of an attack: a directory of root, with files that are named like a daemon's
+    files."""
     for name in ("XDG_RUNTIME_DIR", "XDG_STATE_HOME"):
         monkeypatch.delenv(name)
     monkeypatch.setenv("HOME", "none")

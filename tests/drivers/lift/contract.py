@@ -43,7 +43,7 @@ class Bench(benches.Bench[LiftSample, LiftOutputs]):
         return seen
 
     def rides(self) -> list[LiftSample]:
-        """Ride to landing 1 in AGV mode. Then hold the door open.
+        """Call the lift to landing 1 in AGV mode. Then hold the door open.
 
         Return all readings since the call.
         """

@@ -41,8 +41,8 @@ def site(name: str, directory: Path, **change: str) -> Path:
 
 @dataclass
 class Fleet:
-    """A running simulation. The test sees RMF's graph and the status file, and orders the simulated
-    robots."""
+    """A running simulation. The test sees RMF's graph and the status file, and gives orders to the
+    simulated robots."""
 
     running: Daemon
     runtime: Path

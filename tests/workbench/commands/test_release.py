@@ -33,7 +33,8 @@ def told(
 ) -> tuple[list[tuple[int, str]], list[str], Fulfilled | Failed]:
     """Deliver one state each second to a `release`.
 
-    Return (time in s, way) of each request, the hints, and the outcome.
+    Return (time in s, way) of each request, the hints, and the outcome. The way is "supervisor" or
+    "direct".
     """
     seen = RequestProgress(0.0, 10.0, listeners, boarded=boarded)
     sent, hints = list[tuple[int, str]](), list[str]()

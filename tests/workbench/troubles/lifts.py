@@ -244,7 +244,7 @@ def _fire_between_floors(site: Site) -> None:
 
 
 class StrictSupervisor(LiftSupervisor):
-    """A supervisor that drops requests older than OLD_S."""
+    """A supervisor that drops requests older than OLD_S seconds."""
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
         if isinstance(message, d.LiftRequest) and now - in_seconds(message.request_time) > OLD_S:

@@ -126,7 +126,7 @@ class Site(Scene):
         self._before = {path.name for path in self.recordings.folder.glob("*")}
 
     def kills(self, name: str) -> None:
-        """Kill the daemon's process. Its service switches the outputs off."""
+        """Kill the daemon's process. Then the daemon's service switches the outputs off."""
         if name == self._mortal and self.process:
             self.process.kill()
             self.process.wait()

@@ -164,7 +164,7 @@ def proven(
 ) -> ModbusBus:
     """Return a bus whose unit 1 has answered once. The bus retries only requests to such a unit.
 
-    `asked` is empty again.
+    Afterwards the module's `asked` is empty.
     """
     door(module)
     bus = bus_to(module.port, clock, timeout_s=timeout_s, retries=retries)

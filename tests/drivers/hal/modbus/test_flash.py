@@ -51,7 +51,7 @@ def pulsed(on_s: float = 0.7, every_s: float = 3.0) -> DryContactDoorSettings:
 
 
 def claimed(module: Module, **settings: Any) -> DryContactDoor:
-    """Return an open driver. The module's `asked` is empty again."""
+    """Return an open driver. Afterwards the module's `asked` is empty."""
     door(module)
     driver = create("door", pulsed(), bus_to(module.port, **settings))
     driver.open()

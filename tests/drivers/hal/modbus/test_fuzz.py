@@ -66,8 +66,8 @@ def one_module() -> Iterator[Module]:
 
 
 class Spoiled:
-    """The answers of a closed door on TCP. Each spoil changes one answer. After the last spoil the
-    module hangs up."""
+    """The answers of a closed door on TCP. Each function in `spoils` changes one answer. After the last
+    function the module hangs up."""
 
     def __init__(self, module: Module, spoils: list[Spoil]) -> None:
         module.inputs.update({(1, 0): False, (1, 1): True})
@@ -144,8 +144,8 @@ def one_line() -> Iterator[SerialModule]:
 
 
 class SpoiledLine:
-    """The answers of a closed door on a line. The spoils change the answers in turn, again and
-    again."""
+    """The answers of a closed door on a line. The functions in `spoils` change the answers in turn,
+    again and again."""
 
     def __init__(self, line: SerialModule, spoils: list[Spoil]) -> None:
         line.inputs.update({(1, 0): False, (1, 1): True})
