@@ -10,8 +10,8 @@ T = TypeVar("T")
 
 
 def depth(default: T, deep: T) -> T:
-    """Return `default` in `make test` and `deep` in `make deep`, as the depth of a walk or the fewest
-    states that it must reach."""
+    """Return `default` in `make test` and `deep` in `make deep`. The number is the depth of a walk, or
+    the fewest states of a walk."""
     return deep if DEEP else default
 
 

@@ -1,5 +1,4 @@
-"""Fixtures: an I/O module, the YAML file of a door on that module, and a node that stands in for
-RMF."""
+"""Fixtures: an I/O module, the YAML file of a door on that module, and RMF's node."""
 
 from collections.abc import Iterator
 from pathlib import Path

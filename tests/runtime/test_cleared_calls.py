@@ -118,7 +118,7 @@ class Site:
         return bool(self.relay("call_L3"))
 
     def relay(self, signal: str) -> list[object]:
-        """Return the value of each change of this relay."""
+        """Return each value to which this relay has switched."""
         edges = list(self.plant.edges)
         return [e.value for e in edges if e.what == "relay" and e.signal == signal]
 

@@ -23,11 +23,11 @@ from workbench.replay.replayed import Replay, ReplayedCores, of_head
 LIFT: Final = Path(__file__).parents[2] / "config" / "lift_two_buses.yaml"
 STALE_S: Final = 1.0
 LATEST_S: Final = STALE_S + 0.15 + 0.1
-"""The greatest age (s) of the inputs that a device uses. It is the sum of stale_after_s, the validity
-of a header's reading (0.05 s + 0.1 s), and a scan of the gateway."""
+"""The greatest age (s) of the inputs that a device uses. Three times add up: stale_after_s, the
+validity of a header's reading (0.05 s + 0.1 s), and a scan of the gateway."""
 SEEN_S: Final = 0.05 + 0.15 + 0.1 + 0.05
-"""The longest time (s) until the device sees an alarm. It is the sum of the debounce of a fire contact,
-the age of a reading, and a scan of each bus."""
+"""The longest time (s) until the device sees an alarm. Three times add up: the debounce of a fire
+contact, the age of a reading, and a scan of each bus."""
 
 
 @pytest.fixture

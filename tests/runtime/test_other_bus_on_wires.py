@@ -134,7 +134,7 @@ class Site:
         self._requests.publish(asked)
 
     def relay(self, door: str) -> list[object]:
-        """Return the value of each change of a door's relay."""
+        """Return each value to which a door's relay has switched."""
         return [e.value for e in self.plants[door].edges if e.what == "relay"]
 
     def goes_on(self, bus: str) -> None:

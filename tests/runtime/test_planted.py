@@ -75,7 +75,7 @@ PLANTED = [a_link, a_directory, a_link_within]
 
 @pytest.fixture
 def victim(machine: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the target of an attack: a directory of root, with files that are named like a daemon's
+    """Return the target of an attack: a directory of root. Its files have the same names as a daemon's
     files."""
     for name in ("XDG_RUNTIME_DIR", "XDG_STATE_HOME"):
         monkeypatch.delenv(name)

@@ -1,4 +1,4 @@
-"""The length of a single call of a bus. Systemd's watchdog must not take the call for a hang."""
+"""The longest duration of a bus call. Systemd's watchdog must not take the call for a hang."""
 
 import re
 from pathlib import Path

@@ -1,7 +1,7 @@
 """Duties of every transport with a wire, in one process.
 
-The tests check threads, publishers and subscriptions that do not fit, and that closing leaves nothing
-behind.
+The tests check threads, and publishers and subscriptions that do not fit. After closing, nothing may
+remain.
 """
 
 import os

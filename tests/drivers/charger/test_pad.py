@@ -1,4 +1,4 @@
-"""Stations that move their pads, on every bus that carries height, range and temperatures."""
+"""Stations with a moving pad. The tests use every bus that carries height, range and temperatures."""
 
 import contextlib
 from pathlib import Path

@@ -1,5 +1,5 @@
-"""A code on lines. With one line cut or shorted, the code must never read as a state that is safer than
-the true state."""
+"""A code on lines, of which one is cut or shorted. The code must never read as a safer state than the
+true state."""
 
 from typing import Any
 

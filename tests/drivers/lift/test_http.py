@@ -287,7 +287,7 @@ def test_held_commands_with_a_timer_are_renewed_in_each_scan_and_a_call_is_sent_
         lift.write(outputs)
         gateway.answer["out"] = {"agv": outputs.agv_request}
     assert gateway.sent == [
-        *("/call/none", "/door/off"),  # sent by the claim; AGV mode is already off
+        *("/call/none", "/door/off"),  # sent by the claim, with AGV mode already off
         *("/agv/on", '/call{"to": 1}'),
         "/agv/on",
         *("/call/none", "/agv/on", "/door/on"),

@@ -64,7 +64,7 @@ def alive(until: float, **robot: str) -> Lines:
 def boards(open_at: float = 8.0, until: float = 12.0) -> Lines:
     """Return messages in which RED boards at L1.
 
-    RED asks from 5.5 s on, has the lift from 6 s on, and sees OPEN at L1 from `open_at` on.
+    RED asks from 5.5 s on and has the lift from 6 s on. OPEN at L1 begins at `open_at`.
     """
     return [
         *many(0.0, 6.0, car),

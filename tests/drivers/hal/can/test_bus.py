@@ -32,7 +32,7 @@ def ends() -> Iterator[Ends]:
 
 
 def heard_by(bus: CanBus, *wanted: FrameFilter) -> list[Frame]:
-    """Return a list that grows with each arriving frame that matches a filter."""
+    """Return a list of frames. The list grows with each arriving frame that a filter accepts."""
     heard: list[Frame] = []
     bus.listen(wanted, lambda frame, at: heard.append(frame))
     return heard

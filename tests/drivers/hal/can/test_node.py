@@ -1,4 +1,4 @@
-"""A CANopen node: valid answers, and frames that show that the node is alive."""
+"""A CANopen node: valid answers, and the frames by which the bus knows that the node is alive."""
 
 import struct
 from collections.abc import Callable

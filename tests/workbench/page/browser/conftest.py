@@ -270,8 +270,8 @@ def until(graph: Graph, tab: Page) -> Until:
 
 @pytest.fixture
 def shot(tab: Page) -> Shot:
-    """Return a function that saves screenshots of the tab, on a phone and on a wall screen, in light
-    and in dark colours."""
+    """Return a function that saves screenshots of the tab. It saves four: phone and wall screen, light
+    and dark."""
 
     def take(name: str) -> None:
         SHOTS.mkdir(parents=True, exist_ok=True)

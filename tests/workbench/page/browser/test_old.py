@@ -1,5 +1,5 @@
-"""Old values on the page. No view shows an old value as a present value, even if the page freezes or
-dies, or if the connection stalls."""
+"""Old values on the page. The page may freeze or die, or its connection may stall. No view then shows
+an old value as a present value."""
 
 import os
 import signal
