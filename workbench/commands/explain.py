@@ -1,7 +1,6 @@
-"""`rmf-bridge explain`: say why a robot waits for a lift, a door or a charger, in one screen of
-sentences.
+"""`rmf-bridge explain`: say on one screen why a robot waits for a lift, a door or a charger.
 
-The messages come from a recording, or live from the graph. `workbench/explain/` makes the sentences.
+The messages come from a recording or from the live graph. `workbench/explain/` makes the sentences.
 """
 
 import argparse
@@ -72,8 +71,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0; 1 if the device or RMF was not heard, or the graph cannot be joined; 66 if FILE is no
-    readable recording."""
+    """Return the exit code.
+
+    - 0: the explanation was printed.
+    - 1: no message of the device or of RMF was heard, or the program could not join the graph.
+    - 66: FILE is no readable recording.
+    """
     if (args.file is None) == (args.live is None):
         complain("explain", "name either a FILE or --live DEVICE")
         return 2
@@ -122,7 +125,7 @@ def _all(site: HeardDevices, devices: list[tuple[Kind, str]], *, as_json: bool) 
 
 
 def _one(site: HeardDevices, args: argparse.Namespace) -> int:
-    """Print the explanation of the named device, or of the only device."""
+    """Print the explanation of the named device. Without a name, explain the only device."""
     name = args.device or args.live or site.devices()[0][1]
     kinds = [args.kind] if args.kind else site.kinds(name) or ["lift"]
     if len(kinds) > 1:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 TURN_S: Final = 0.5
 KEEPALIVE_S: Final = 10
 WAITING: Final = 5000
-"""Maximum number of messages that wait for a slow broker. The next turn tries the rest again."""
+"""Maximum number of messages that wait for a slow broker. The next turn publishes the rest."""
 LEAVES_S: Final = 2.0
 PORTS: Final = {False: 1883, True: 8883}
 
@@ -79,7 +79,12 @@ def _prefix(text: str) -> str:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 after Ctrl-C or SIGTERM; 1 if the graph is lost; else 64, 69 or 78."""
+    """Return the exit code.
+
+    - 0: Ctrl-C or SIGTERM ended the program.
+    - 1: the graph is lost.
+    - 64, 69 or 78: the program could not start, and has printed the reason.
+    """
     retainer = Retainer(args.prefix, args.home_assistant)
     if why := _unsafe(args):
         complain("mqtt-out", why)
@@ -110,7 +115,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _unsafe(args: argparse.Namespace) -> str:
-    """Return why the program refuses these options; "" for safe options."""
+    """Return the reason to refuse these options. Return "" for safe options."""
     if bool(args.user) != bool(args.password_file):
         return "--user and --password-file need each other"
     if args.ca_file and not args.tls:
@@ -125,7 +130,7 @@ def _unsafe(args: argparse.Namespace) -> str:
 
 
 def publish(transport: Transport, broker: "Broker", retainer: Retainer) -> None:
-    """Publish until interrupted. Raises TransportError when the graph is lost."""
+    """Publish until a signal interrupts the program. Raises TransportError when the graph is lost."""
     ear, graph = listen_on(transport), PlainGraph()
     board = Board(graph)
     while transport.lives:
@@ -150,11 +155,14 @@ def publish(transport: Transport, broker: "Broker", retainer: Retainer) -> None:
 
 
 class Broker:
-    """A connection to a broker. paho-mqtt connects again after each loss."""
+    """A connection to a broker. After each loss, paho-mqtt connects again."""
 
     def __init__(self, args: argparse.Namespace, status: str) -> None:
-        """Begin to connect. Raises ImportError without paho-mqtt, SecretError for an unusable password
-        file, and OSError for an unreadable `ca_file`."""
+        """Begin to connect.
+
+        Raises ImportError without paho-mqtt, SecretError for an unusable password file, and OSError for
+        an unreadable `ca_file`.
+        """
         from paho.mqtt.client import Client, MQTTv5
         from paho.mqtt.enums import CallbackAPIVersion
 
@@ -179,13 +187,13 @@ class Broker:
         self._client.loop_start()
 
     def is_new(self) -> bool:
-        """Has paho-mqtt connected after the last call?"""
+        """Return whether paho-mqtt has made a new connection after the last call."""
         new = self._new.is_set()
         self._new.clear()
         return new
 
     def gives(self, message: Retained) -> bool:
-        """Give a message to the broker. Return False without a connection, or if too many messages
+        """Give a message to the broker. Return False if there is no connection, or if too many messages
         wait."""
         from paho.mqtt.packettypes import PacketTypes
         from paho.mqtt.properties import Properties
@@ -198,9 +206,9 @@ class Broker:
         return info.rc == 0
 
     def close(self) -> None:
-        """Publish that `mqtt-out` has stopped, and disconnect. Does not raise."""
+        """Publish the message that `mqtt-out` has stopped, and disconnect. Never raises."""
         if self._client.is_connected():
-            with suppress(RuntimeError, ValueError):  # the broker publishes the will
+            with suppress(RuntimeError, ValueError):  # else the will does it
                 self._client.publish(self._status, "offline", 1, True).wait_for_publish(LEAVES_S)
         self._client.disconnect()
         self._client.loop_stop()
@@ -219,7 +227,7 @@ class Broker:
             self._tell(f"is gone: {reason}")
 
     def _tell(self, trouble: str) -> None:
-        """Print a trouble, unless it was the last trouble printed. A connection clears the last
+        """Print a trouble, but not twice in a row. A new connection makes `Broker` forget the last
         trouble."""
         if trouble != self._trouble:
             self._trouble = trouble

@@ -1,10 +1,12 @@
 """`rmf-bridge release LIFT`: an operator ends a lift's present session.
 
-`release` does the same as `send lift LIFT --end`: it sends the holder's END_SESSION to the lift
-supervisor until the lift shows the session's end. If the supervisor is missing or does not obey within
-seconds, `release` sends the request directly to the lift's own daemon. If a robot may be in the car,
-the direct request needs `--car-empty`. After the end, `release` watches for 5 s. It then prints who has
-the lift and whether the car moves. A robot that keeps requesting the lift goes to the end of the queue.
+`release` does the same as `send lift LIFT --end`. It sends the session holder's END_SESSION to the lift
+supervisor, until the lift shows the session's end. The supervisor may be missing, or may not obey
+within seconds. Then `release` sends the request directly to the lift's own daemon. If a robot may be in
+the car, the direct request needs `--car-empty`.
+
+After the end, `release` watches the lift for 5 s. Then `release` prints which robot has the lift, and
+whether the car moves. A robot that keeps requesting the lift goes to the end of the queue.
 """
 
 import argparse
@@ -29,6 +31,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the lift showed the session's end. Otherwise print the reason and return the exit
+    """Return 0 if the lift showed the session's end. Otherwise print the reason, and return the exit
     code of `send`."""
     return send.run(args)

@@ -1,8 +1,9 @@
-"""Explain why a robot waits at a door or a door stays open, in sentences from its messages.
+"""Explain, in sentences from a door's messages, why a robot waits at the door or why the door stays
+open.
 
-RMF's DoorOpen waits for two conditions: the door's state is OPEN, and a heartbeat of the door
-supervisor lists the robot for this door. DoorClose waits until no heartbeat lists the robot (rmf_ros2,
-DoorOpen.cpp and DoorClose.cpp). The robot sends no request while it drives through.
+RMF's DoorOpen waits for two conditions. The door's state must be OPEN, and a heartbeat of the door
+supervisor must list the robot for this door. RMF's DoorClose waits until no heartbeat lists the robot
+(rmf_ros2, DoorOpen.cpp and DoorClose.cpp). The robot sends no request while the robot drives through.
 """
 
 from shlex import quote
@@ -22,15 +23,15 @@ SETTLES_S: Final = 2.0
 LONG_S: Final = 60.0
 """Maximum normal time (s) of a robot's drive through a doorway."""
 OPENS_S, MOVES_S = 5.0, 15.0
-"""Normal times (s) until a door that nobody holds begins to close, and until the door is closed."""
+"""Normal times (s) of a door that nobody holds: OPENS_S in state OPEN, and MOVES_S in motion."""
 AWAY: Final = ("offline", "unknown")
 
 
 def answer(
     door: DoorFacts, clock: TimePhrases, around: common.OthersHeard, focus: str = ""
 ) -> Answer:
-    """Explain the door at the last message. `focus`: the requester to explain; "" for the requester who
-    waits."""
+    """Explain the door at the last message. `focus` is the requester to explain. With "", explain the
+    requester who waits."""
     if door.last_state is None:
         return _with_askers(common.unheard(door, around), door, clock)
     stopped = common.stopped(door, around, clock)
@@ -95,8 +96,8 @@ def _with_askers(found: Answer, door: DoorFacts, clock: TimePhrases) -> Answer:
 def _fields(
     door: DoorFacts, claim: DeviceRequester, clock: TimePhrases
 ) -> tuple[CheckedField, ...]:
-    """Return the fields that DoorOpen or DoorClose checks, as the fleet adapter of this requester sees
-    them."""
+    """Return the fields that DoorOpen or DoorClose checks, as this requester's fleet adapter sees the
+    fields."""
     told = {
         "door": door.mode.since,
         "heartbeat": door.holders.get(claim.who) or claim.since,
@@ -215,10 +216,10 @@ def _nobody_asks(
 def _nobody_tells(
     found: Answer, door: DoorFacts, clock: TimePhrases, around: common.OthersHeard
 ) -> None:
-    """Explain an open door that nobody is known to hold.
+    """Explain an open door that no requester is known to hold.
 
-    RMF's supervisor sends a heartbeat only after requests. It sends CLOSE at each state of an open door
-    that nobody holds (door_supervisor/Node.cpp).
+    RMF's supervisor sends a heartbeat only after requests. If nobody holds an open door, the supervisor
+    sends CLOSE at each state of the door (door_supervisor/Node.cpp).
     """
     if clock.now.at - door.began.at < REQUESTER_SILENT_S:
         found.say("Whether a robot holds it is not known yet.", "nobody", "listen for longer")
@@ -251,8 +252,8 @@ def _nobody_tells(
 
 
 def _asked_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
-    """Explain requests heard only on the daemon's own topic. The supervisor sends such requests, or a
-    person does with `send --direct`."""
+    """Explain requests heard only on the daemon's own topic. The sender is the supervisor, or a person
+    with `send --direct`."""
     assert door.asked is not None
     found.say(
         f"On door_requests {door.asked_by} has asked for OPEN {clock.since(door.asked.since)}."
@@ -263,8 +264,8 @@ def _asked_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
 
 
 def _held_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
-    """Name the holders, and the last request of each. Silence is normal, because a robot in a doorway
-    sends nothing."""
+    """Name the holders, and tell when the last request came. Silence is normal, because a robot in a
+    doorway sends nothing."""
     who, since = min(door.holders.items(), key=lambda one: one[1].at)
     claim = door.requesters.get(who)
     last: Moment | None = claim.last if claim else None

@@ -1,8 +1,9 @@
-"""Metric families of RMF's graph, from the memory of its devices. Pure: `now` is an argument.
+"""Metric families about RMF's graph, made from the memory of its devices. All functions are pure,
+because `now` is an argument.
 
 Names and labels follow Prometheus' conventions: base units, `_total` for counters, `_info` for facts.
-Every label from the network is printable and of bounded length, and the devices are those that an
-`ObservedGraph` keeps, so invented names cannot make series without end.
+Every label from the network is printable and at most LONGEST characters long. `ObservedGraph` limits
+the number of devices, so invented names cannot create an unlimited number of series.
 """
 
 from collections.abc import Iterable, Iterator
@@ -31,7 +32,7 @@ from bridges.observe.workcell import ObservedWorkcell
 PREFIX: Final = "rmf_bridge_"
 DEVICE: Final = ("kind", "device")
 LONGEST: Final = 128
-"""The longest label from the network (characters)."""
+"""Maximum length (characters) of a label from the network."""
 MODES: Final[dict[str, type[IntEnum]]] = {
     "lift": d.LiftMode,
     "door": d.DoorModeValue,
@@ -188,7 +189,7 @@ def _names(device: AnyDevice) -> tuple[str, str]:
 
 
 def _mode(device: AnyDevice) -> int:
-    """Return the number of the present mode or state, as RMF's message has it."""
+    """Return the number of the present mode or state from the device's RMF message."""
     state = device.state
     match state:
         case d.LiftState():
@@ -216,7 +217,8 @@ def _held(device: AnyDevice) -> bool:
 
 
 def _simulated(graph: ObservedGraph[Any], reporter: str) -> bool:
-    """Does the daemon of the report `<node>: <device>` move no hardware?"""
+    """Return whether the report's daemon is simulated, so that it moves no hardware. A report's name is
+    `<node>: <device>`."""
     daemon = graph.nodes.get(f"{reporter.partition(': ')[0]}: daemon")
     return daemon is not None and SIMULATED in daemon.message
 

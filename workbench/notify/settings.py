@@ -49,7 +49,7 @@ class QuietHours(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     )
 
     def contains(self, at: time) -> bool:
-        """Is it quiet at this time of day?"""
+        """Return whether this time of day is in the quiet hours."""
         begins, ends = time.fromisoformat(self.begins), time.fromisoformat(self.ends)
         if begins <= ends:
             return begins <= at < ends
@@ -57,7 +57,7 @@ class QuietHours(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 
 
 class Recipient(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One way to people: exactly one of `ntfy`, `webhook` and `mail`."""
+    """One recipient, with exactly one of `ntfy`, `webhook` and `mail`."""
 
     ntfy: Annotated[Url | None, tells("the address of an ntfy topic.")] = None
     webhook: Annotated[Url | None, tells("an address that takes a JSON object by POST.")] = None
@@ -85,7 +85,8 @@ class Recipient(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         return f"{way} at {(url or '').split('/')[2]}"
 
     def problems(self) -> Remarks:
-        """Yield a recipient without a way, with several ways, or with half of a mail's settings."""
+        """Yield a problem if the recipient has no way, several ways, or incomplete settings for
+        mail."""
         ways = [bool(self.ntfy), bool(self.webhook), bool(self.mail)]
         if sum(ways) != 1:
             yield (), "write exactly one of ntfy, webhook and mail; another way is another entry"
@@ -101,7 +102,7 @@ class Recipient(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class NotifySettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The recipients of notices, and the times at which they receive them."""
+    """The recipients of notices, and the rules for when a notice is sent."""
 
     to: Annotated[list[Recipient], Meta(min_length=1, max_length=20), tells("the recipients.")]
     page: Annotated[Url | None, tells("the page of `rmf-bridge page`, for links.")] = None
@@ -122,10 +123,10 @@ class NotifySettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 
 
 def load(file: Path) -> NotifySettings:
-    """Read the file. Raises SettingsError with every problem found."""
+    """Read the file. Raises SettingsError, which lists every problem found."""
     page = YamlFile(str(file))
     root = compose(page, read(str(file), SORT), SORT)
     found = Values(page).make(NotifySettings, Spot(root, root, "the file"))
     page.check()
-    assert found is not BROKEN  # otherwise `check` raises
+    assert found is not BROKEN  # after any problem, `check` raises
     return found

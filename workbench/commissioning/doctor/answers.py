@@ -1,8 +1,11 @@
-"""Find devices on a file's buses: read each device of the file once, then scan a limited range for
-other devices.
+"""Find devices on a file's buses.
 
-Nothing is written. Drivers are read but never opened, because opening claims outputs and may switch
-them off. The doctor removes the modules' watchdogs from the settings, so no driver arms a watchdog.
+The doctor first reads each device of the file once. Then the doctor scans a limited range of addresses
+for other devices.
+
+The doctor writes nothing. The doctor reads through drivers but never opens a driver, because opening
+claims outputs and may switch the outputs off. The doctor removes the modules' watchdogs from the
+settings, so no driver arms a watchdog.
 """
 
 import re
@@ -36,14 +39,16 @@ LOOK_AT: Final = {
 }
 TEXTS: Final = "docs/how-to/troubleshoot.md"
 NO_PATH: Final = (10, 11)
-"""Exception codes of a gateway whose unit is silent (Modbus Application Protocol V1.1b3, section 7)."""
+"""Exception codes of a gateway when the unit behind the gateway is silent (Modbus Application Protocol
+V1.1b3, section 7)."""
 DEVICE_TYPE: Final = (0x1000, 0, 4)
-"""Index, subindex and size (bytes) of the device type, which every CANopen node has (CiA 301,
-7.5.2.1)."""
+"""Index, subindex and size (bytes) of the object "device type". Every CANopen node has this object (CiA
+301, 7.5.2.1)."""
 
 
 def answers(config: Config, bus_name: str, whole: bool) -> Iterator[Finding]:
-    """Examine a bus, but not GPIO. `whole`: scan every unit or node, not only 1 to 16."""
+    """Examine any bus except GPIO. With `whole`, scan every unit or node. Otherwise scan only 1 to
+    16."""
     subject, kind = f"bus {bus_name}", config.bus_types[bus_name]
     try:
         bus = _opened(config, bus_name)
@@ -88,7 +93,8 @@ def readings(config: Config, bus_name: str, bus: Any, subject: str) -> Iterator[
 
 
 def _reading(config: Config, bus_name: str, name: str, bus: Any) -> Callable[[], Any]:
-    """Return how to read a device: by its driver; by this bus's contacts alone if it has two buses."""
+    """Return a function that reads a device. The function reads through the device's driver. If the
+    device has two buses, the function reads only this bus's contacts."""
     if config.other_buses(name):
         return Points(config.wires_on(bus_name, name), bus).read
     read: Callable[[], Any] = config.driver_type(name).create(name, config.devices[name], bus).read
@@ -96,7 +102,8 @@ def _reading(config: Config, bus_name: str, name: str, bus: Any) -> Callable[[],
 
 
 def _read(read: Callable[[], Any], bus: Bus) -> Any:
-    """Read. Try several times, because a sleeping line answers late. Raises DriverError."""
+    """Read the device. Try several times, because a device on a sleeping line answers late. Raises
+    DriverError."""
     for _ in range(TRIES - 1):
         bus.insist()
         try:
@@ -108,7 +115,8 @@ def _read(read: Callable[[], Any], bus: Bus) -> Any:
 
 
 def _listened(bus: Any, listen_s: float = HEARD_S) -> None:
-    """Receive for `listen_s` (s) on CAN and MQTT. The readings show faults of the bus."""
+    """Receive for `listen_s` (s) on CAN and MQTT. Ignore faults of the bus, because the readings show
+    the same faults."""
     if not hasattr(bus, "wait"):
         return
     try:
@@ -165,8 +173,8 @@ def _can(config: Config, bus_name: str, bus: Any, whole: bool) -> Iterator[Findi
 
 
 def _mqtt(config: Config, bus_name: str, bus: Any, whole: bool) -> Iterator[Finding]:
-    """List the topics of the broker, only with `--scan`, because our user may not be allowed to read
-    them."""
+    """List the broker's topics, but only with `--scan`, because our user may not be allowed to read the
+    topics."""
     if not whole:
         return
     subject, ours = f"bus {bus_name}", set(bus.topics())

@@ -1,4 +1,5 @@
-"""Draft a commented YAML for `rmf-bridge init`. All functions are pure: answers in, text out.
+"""Draft a commented YAML for `rmf-bridge init`. All functions are pure. They take answers and return
+text.
 
 `points.py` gives each signal a pin or an address.
 """
@@ -18,7 +19,7 @@ from workbench.commissioning.init.points import FreePoints, points_for
 from workbench.commissioning.reference import meaning
 
 DRIVERS: Final = {"http": "http", "can": "canopen", "gateway": "register"}
-"""Wiring -> driver. A wiring that is not listed uses `dry_contact`."""
+"""Wiring -> driver. Any other wiring uses the driver `dry_contact`."""
 WIRINGS: Final = {
     "lift": ("gpio", "modbus", "rs485", "gateway"),
     "door": ("modbus", "rs485", "gpio", "http", "gateway"),
@@ -98,15 +99,15 @@ def draft(answers: DraftAnswers) -> str:
 
 
 def _bus(wiring: str, address: str) -> str:
-    """Return the bus as a key of BUSES. A gateway whose address is a device file is on a serial
-    line."""
+    """Return the bus as a key of BUSES. If a gateway's address is a device file, the gateway is on a
+    serial line."""
     if wiring != "gateway":
         return wiring
     return "rs485" if address.startswith("/") else "modbus"
 
 
 def _lift(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
-    """Yield the lines below the name of a lift, on contacts or on a gateway."""
+    """Yield the lines below the name of a lift. The lift is on contacts or on a gateway."""
     floors = [quoted(floor) for floor in answers.floors]
     if len(floors) < 2 or len(set(floors)) < len(floors):
         raise Impossible(f"a lift has at least two floors, each name once, not {', '.join(floors)}")
@@ -115,7 +116,7 @@ def _lift(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
         return
     calls = [
         f"      {floor}: {{{points.relay()}}}" for floor in floors
-    ]  # floors first, because they need most pins
+    ]  # floors come first, because they need the most pins
     request, hold = points.relay(), points.relay()
     yield f"    floors: [{', '.join(floors)}]        # RMF's names, from below"
     yield "    inputs:"
@@ -159,7 +160,7 @@ def _floor_code(answers: DraftAnswers, floors: list[str], points: FreePoints) ->
 
 
 def _door(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
-    """Yield the lines below the name of a door, on contacts, an HTTP relay or registers."""
+    """Yield the lines below the name of a door. The door is on contacts, an HTTP relay or registers."""
     if answers.wiring == "http":
         yield from SHELLY.splitlines()
         return
@@ -174,7 +175,7 @@ def _door(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
 
 
 def _charger(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
-    """Yield the lines below the name of a charger, on HTTP, CANopen or contacts."""
+    """Yield the lines below the name of a charger. The charger is on HTTP, CANopen or contacts."""
     if answers.wiring in ("http", "can"):
         yield from (CHARGER_HTTP if answers.wiring == "http" else CHARGER_CANOPEN).splitlines()
         return
@@ -192,7 +193,7 @@ def _said(struct: type, key: str) -> str:
 
 
 def quoted(text: str) -> str:
-    """Quote a text so that YAML reads it as text even if it looks like a number or boolean."""
+    """Quote a text, so that YAML never reads the text as a number or boolean."""
     plain = text[:1].isalpha() and text.replace("_", "a").replace("-", "a").isalnum()
     if plain and text.lower() not in BOOLEANS:
         return text

@@ -9,7 +9,8 @@ from workbench.commissioning.init.answers import DraftAnswers, Impossible, Level
 
 REST_LOW: Final = (11, 13, 15, 16, 18, 22, 32, 33, 35, 36, 37, 38, 40, 12)
 REST_HIGH: Final = (7, 29, 31, 26, 24)
-"""Positions on J8 that the Pi pulls high, or low, from power-on until the daemon starts.
+"""Positions on J8 that the Pi pulls high from power-on until the daemon starts, and positions that the
+Pi pulls low.
 
 A relay belongs on a pin whose level keeps the relay off. Source: BCM2835 ARM Peripherals, table 6-31
 (BCM0 to 8 high).
@@ -17,17 +18,18 @@ A relay belongs on a pin whose level keeps the relay off. Source: BCM2835 ARM Pe
 
 
 class FreePoints(Protocol):
-    """The next free points. Each method returns the text inside a YAML mapping."""
+    """A source of free points. Each method returns the text inside a YAML mapping."""
 
     def contact(self) -> str:
-        """Take a point for a contact that is closed while its signal is on. A cut wire reads off."""
+        """Take a point for a contact that is closed while its signal is on. With a cut wire, the signal
+        reads off."""
 
     def loop(self) -> str:
-        """Take a point for a contact that is open while its signal is on (an alarm loop). A cut wire
-        reads on."""
+        """Take a point for a contact that is open while its signal is on, such as an alarm loop. With a
+        cut wire, the signal reads on."""
 
     def relay(self) -> str:
-        """Take a point for a relay that acts while energised."""
+        """Take a point for a relay whose energised state is on."""
 
 
 class PinHeader:
@@ -41,7 +43,7 @@ class PinHeader:
         self._inputs = list(REST_HIGH if high else REST_LOW)
 
     def contact(self) -> str:
-        """Take the next input pin, pulled to the level of an open contact."""
+        """Take the next input pin. The pin's pull resistor sets the level of an open contact."""
         return f'point: "J8:{self._input()}", active: {self._closed}, pull: {self._pull}'
 
     def loop(self) -> str:
@@ -67,7 +69,7 @@ def _first(pins: list[int]) -> int:
 
 
 class Module:
-    """A Modbus I/O module: contacts are discrete inputs, relays are coils."""
+    """A Modbus I/O module. Its contacts are discrete inputs, and its relays are coils."""
 
     def __init__(self, unit: int) -> None:
         self._unit = unit
@@ -75,7 +77,7 @@ class Module:
         self._coils: Iterator[int] = count()
 
     def contact(self) -> str:
-        """Take the next discrete input; an open contact reads 0."""
+        """Take the next discrete input. An open contact reads 0."""
         return f'point: "unit {self._unit} discrete input {next(self._inputs)}", active: high'
 
     def loop(self) -> str:
@@ -88,7 +90,7 @@ class Module:
 
 
 def points_for(answers: DraftAnswers) -> FreePoints:
-    """Return the points of this wiring, all free."""
+    """Return the points of this wiring. All points are free."""
     if answers.wiring == "gpio":
         return PinHeader(answers.contacts, answers.relays)
     return Module(answers.unit)
