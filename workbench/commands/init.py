@@ -200,9 +200,7 @@ def run(args: argparse.Namespace) -> int:
     - 66: the map cannot be read.
     - 73: the file exists.
     """
-    if os.path.lexists(
-        args.file
-    ):  # check before the first question, so that nobody answers in vain
+    if os.path.lexists(args.file):  # checked first, so that nobody answers in vain
         return _there_already(args.file)
     if why := no_folder(args.file):
         return not_written(args.file, why)

@@ -50,9 +50,7 @@ def driver_on(config: Config, device: str, buses: Mapping[str, Any]) -> Driver[A
         device, config.devices[device], buses[own]
     )
     if others:
-        assert isinstance(
-            driver, TakesInputs
-        )  # only devices with contacts can have `bus` in the YAML
+        assert isinstance(driver, TakesInputs)  # only contacts may name another bus
         driver.take_inputs(
             _OtherInputs([Points(config.wires_on(name, device), buses[name]) for name in others])
         )

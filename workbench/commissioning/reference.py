@@ -101,11 +101,7 @@ def _headings(tops: Headings) -> Headings:
     everywhere = [struct for top in tops for struct, _ in _inside(top, ())]
     heirs = Counter(base for struct in {*tops, *everywhere} for base in _bases(struct))
     shared = (base for base, many in heirs.items() if many > 1 and len(_fields(base)) > 1)
-    printed = {
-        *tops,
-        *everywhere,
-        *shared,
-    }  # each heir prints the key of a base that has only one key
+    printed = {*tops, *everywhere, *shared}  # heirs print the key of a base with one key
     inside = {top: list(_inside(top, printed)) for top in tops}
     tops_of = Counter(struct for found in inside.values() for struct in {s for s, _ in found})
     ordered: Headings = {}

@@ -41,9 +41,7 @@ def on_graph(text: str, options: Sequence[str]) -> str:
     def joined(found: re.Match[str]) -> str:
         command, name = found.groups()
         words = [*options]
-        if (
-            name == "doctor" and "--config" in words
-        ):  # the file of `--config` already names the graph
+        if name == "doctor" and "--config" in words:  # doctor's FILE names the graph
             at = words.index("--config")
             del words[at : at + 2]
         return f"`{command} {shlex.join(words)}`" if words else found[0]

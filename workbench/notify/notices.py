@@ -8,8 +8,8 @@ NOTIFY-2. The end of a trouble gets one notice, after the trouble has been gone 
    nothing is known about the device.
 NOTIFY-3. In the quiet hours, only critical troubles get a notice. A warning that still lasts gets its
    notice after the quiet hours. If a trouble ends before its first notice, the end gets no notice.
-NOTIFY-4. A critical trouble gets a notice again every `again_s`, until a person acknowledges the trouble
-   or the trouble ends.
+NOTIFY-4. A critical trouble gets a notice again every `again_s`. The repeats stop when a person
+   acknowledges the trouble, or when the trouble ends.
 NOTIFY-5. After a restart, no notice is sent twice. The program keeps reported troubles on disk, and
    counts them as reported at the start.
 """
