@@ -157,9 +157,7 @@ def _foreign_cancel(history: ChargerHistory) -> Finding:
     if state is None or before is None or before.state != ASSIGNED or not before.request_id:
         return None
     if unrequested(before.request_id):
-        return (
-            None  # an unrequested charge ends when its robot leaves, and no message tells of that
-        )
+        return None  # an unrequested charge ends when its robot leaves, without a message
     if history.now - history.foreign_at > FOREIGN_S:
         return None
     if state.state not in (IDLE, RELEASED):
