@@ -34,7 +34,7 @@ def main() -> int:
     libraries = [one for one in found if canonicalize_name(one.name) != OURS]
     unlicensed = [one.name for one in libraries if not _has_text(one)]
     if unlicensed:
-        print(f"no licence text: {', '.join(unlicensed)} (deb/licences/)", file=sys.stderr)
+        print(f"no licence text in deb/licences/ for {', '.join(unlicensed)}", file=sys.stderr)
         return 1
     args.out.write_text(_bom(args, libraries) + "\n")
     return 0

@@ -66,7 +66,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--lock",
         type=Path,
-        help="versions and hashes (`make lock`); without it, the newest fitting",
+        help="versions and hashes (`make lock`); without a lock, the newest version that fits",
     )
     parser.add_argument("--built", type=Path, help="a directory of wheels that were built here")
     parser.add_argument("--arch", choices=MACHINES, required=True)

@@ -1,7 +1,7 @@
 """A fleet adapter and its robots, for charging only.
 
-The rules come from rmf_ros2 9dedd0f (TaskManager.cpp, tasks/ChargeBattery.cpp, phases/WaitForCharge.cpp,
-FleetUpdateHandle.cpp), and from tests with Jazzy's adapter:
+The rules come from rmf_ros2 9dedd0f (TaskManager.cpp, tasks/ChargeBattery.cpp,
+phases/WaitForCharge.cpp, FleetUpdateHandle.cpp), and from tests with Jazzy's adapter:
 1. ChargeBattery goes to the robot's dedicated waypoint and waits there for its battery. An assignment
    with a new waypoint or mode restarts a running ChargeBattery, and moves no other robot. A waypoint
    missing in the graph crashes the adapter.
@@ -11,12 +11,13 @@ FleetUpdateHandle.cpp), and from tests with Jazzy's adapter:
    With `finishing_request: charge` the fleet's robots run ChargeBattery after their tasks. This
    ChargeBattery is no task, and lasts until the next task, even with a full battery. With `nothing`
    a robot stays. With `park` a robot drives to a parking spot. Jazzy's adapter (branch jazzy,
-   7eef65a) knows no parking spots: the robot goes to its dedicated waypoint, and again at each
-   assignment.
+   7eef65a) knows no parking spots. There the robot goes to its dedicated waypoint, and goes there
+   again at each assignment.
 3. A robot without a task shows the mode IDLE and no task id, even while it charges. Only
-   WaitForCharge sets CHARGING, and nothing resets CHARGING: every later task shows CHARGING too.
-4. An EasyFullControl adapter forgets the assignments in a restart. It takes the retained assignment,
-   and a moment later replaces the assignment by the charger of its file.
+   WaitForCharge sets CHARGING, and nothing resets CHARGING. Therefore every later task shows CHARGING
+   too.
+4. An EasyFullControl adapter forgets the assignments in a restart. First the adapter takes the
+   retained assignment. A moment later, the adapter replaces the assignment by the charger in its file.
 """
 
 from collections.abc import Mapping, Sequence
