@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=seconds(0, 60),
         default=LISTEN_S,
         metavar="SECONDS",
-        help="how long to hear RMF's graph (default 3; 0: do not join it)",
+        help="time (s) to hear RMF's graph (default 3; with 0, doctor does not join the graph)",
     )
     parser.add_argument(
         "--localhost", action="store_true", help="join the graph on the loopback interface only"
@@ -81,7 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     completed_by(device, device_names)
     kill.add_argument("--output", metavar="NAME", help="the output, by its name in walk")
-    kill.add_argument("--yes", action="store_true", help="do not ask again")
+    kill.add_argument("--yes", action="store_true", help="do not ask for confirmation")
     parser.add_argument("--runtime-dir", metavar="DIR", help="the daemon's runtime directory")
 
 

@@ -56,15 +56,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=seconds(0.1, 86400),
         default=LISTENS_S,
         metavar="SECONDS",
-        help=f"with --live: how long to listen (default {LISTENS_S:.0f})",
+        help=f"with --live: time (s) to listen (default {LISTENS_S:.0f})",
     )
     parser.add_argument(
         "--follow",
         action="store_true",
-        help="with --live: keep listening, and print each change; Ctrl-C ends",
+        help="with --live: print each change until Ctrl-C",
     )
-    parser.add_argument("--kind", choices=KINDS, help="where a lift and a door have the same name")
-    parser.add_argument("--session", default="", metavar="ID", help="the session in question")
+    parser.add_argument(
+        "--kind", choices=KINDS, help="the kind, if a lift and a door have the same name"
+    )
+    parser.add_argument("--session", default="", metavar="ID", help="the session to explain")
     parser.add_argument("--json", action="store_true", help="the explanation as JSON")
     add_span_arguments(parser)
     add_graph_arguments(parser)

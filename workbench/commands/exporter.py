@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=address_and_port,
         default=("127.0.0.1", PORT),
         metavar="ADDRESS:PORT",
-        help=f"default: 127.0.0.1:{PORT}; with port 0 a free port",
+        help=f"default: 127.0.0.1:{PORT}; with port 0, any free port",
     )
     parser.add_argument(
         "--no-graph",

@@ -159,7 +159,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the file, and an option for each question."""
     parser.add_argument("file", type=Path, metavar="FILE", help="the YAML to write")
     parser.add_argument("--kind", choices=get_args(Kind))
-    parser.add_argument("--name", help="as on RMF's map")
+    parser.add_argument("--name", help="the device's name, as on RMF's map")
     parser.add_argument(
         "--wiring",
         choices=get_args(Wiring),
@@ -167,7 +167,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--address", help="host, serial port or CAN interface")
     parser.add_argument("--unit", help="unit id of a Modbus module")
-    parser.add_argument("--floors", help="such as L1,L2,L3, from below")
+    parser.add_argument("--floors", help="the floors, from the lowest up, such as L1,L2,L3")
     parser.add_argument("--signals", help=f"some of: {', '.join(LIFT_INPUTS)}")
     parser.add_argument(
         "--encoding", choices=get_args(Encoding), help="the encoding of the floor lines"
@@ -175,10 +175,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--contacts", choices=get_args(Level), help="level of a closed contact")
     parser.add_argument("--relays", choices=get_args(Level), help="level that switches a relay on")
     for name, (part, offered) in gateway.PLACES.items():
-        text = f"a gateway's place of {part}, such as {offered}"
+        text = f"the place of {part} on a gateway, such as {offered}"
         parser.add_argument(f"--{name.replace('_', '-')}", metavar="PLACE", help=text)
     for name, meanings in gateway.NUMBERS.items():
-        text = f"a gateway's numbers of {meanings}, such as 0,1,2"
+        text = f"a gateway's numbers for {meanings}, such as 0,1,2"
         parser.add_argument(f"--{name.replace('_', '-')}", metavar="N,N", help=text)
     parser.add_argument("--domain-id", help="RMF's ROS_DOMAIN_ID")
     parser.add_argument(
@@ -286,7 +286,9 @@ def _of_map(name: str, given: Given, found: BuildingMap | None) -> str | None:
 def _ask(question: Question, offered: str, given: Given, found: BuildingMap | None) -> str:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         option = question.name.replace("_", "-")
-        raise Impossible(f"no terminal to ask on: give --{option}, or --yes for '{offered}'")
+        raise Impossible(
+            f"there is no terminal for questions: give --{option}, or --yes for '{offered}'"
+        )
     try:
         import questionary
     except ModuleNotFoundError:

@@ -88,7 +88,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="listen for S seconds (default: until Ctrl-C, which judges)",
     )
     parser.add_argument("--json", action="store_true", help="the verdict as one JSON object")
-    parser.add_argument("--junit", type=Path, metavar="FILE", help="the verdict for a CI server")
+    parser.add_argument(
+        "--junit",
+        type=Path,
+        metavar="FILE",
+        help="write the verdict to FILE as JUnit XML, for a CI server",
+    )
     parser.add_argument(
         "--laws",
         action="store_true",

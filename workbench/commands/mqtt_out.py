@@ -36,18 +36,27 @@ PORTS: Final = {False: 1883, True: 8883}
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `mqtt-out`."""
     parser.add_argument(
-        "broker", type=_broker, metavar="HOST[:PORT]", help="the broker; port 1883, with TLS 8883"
+        "broker",
+        type=_broker,
+        metavar="HOST[:PORT]",
+        help="the broker; the default port is 1883, and 8883 with TLS",
     )
     parser.add_argument("--user", metavar="NAME", help="a user of the broker, who may only publish")
     parser.add_argument(
-        "--password-file", metavar="FILE", help="the user's password, in a file of yours alone"
+        "--password-file",
+        metavar="FILE",
+        help="a file with the user's password, which only you may read",
     )
     parser.add_argument("--tls", action="store_true", help="use TLS")
-    parser.add_argument("--ca-file", metavar="FILE", help="the broker's authority (PEM), for --tls")
+    parser.add_argument(
+        "--ca-file",
+        metavar="FILE",
+        help="the certificate of the broker's authority (PEM), for --tls",
+    )
     parser.add_argument(
         "--accept-unencrypted",
         action="store_true",
-        help="send the password without TLS, where the network is yours alone",
+        help="send the password without TLS, if nobody else uses the network",
     )
     parser.add_argument(
         "--prefix", type=_prefix, default="rmf", help="the first part of the topics (default: rmf)"
@@ -66,14 +75,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def _broker(text: str) -> tuple[str, int | None]:
     found = re.fullmatch(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9_.-]{1,253})(?::([0-9]{1,5}))?", text)
     if not found or (found[2] and not 1 <= int(found[2]) <= 65535):
-        raise argparse.ArgumentTypeError(f"'{text}' is not HOST:PORT, as 192.168.1.5:1883")
+        raise argparse.ArgumentTypeError(f"'{text}' is not HOST:PORT, such as 192.168.1.5:1883")
     return found[1].strip("[]"), int(found[2]) if found[2] else None
 
 
 def _prefix(text: str) -> str:
     if not re.fullmatch(r"[A-Za-z0-9_-]{1,64}(/[A-Za-z0-9_-]{1,64}){0,7}", text):
         raise argparse.ArgumentTypeError(
-            f"'{text}': write names of letters and digits, as site/rmf"
+            f"'{text}': write names of letters and digits, such as site/rmf"
         )
     return text
 

@@ -53,19 +53,23 @@ SERVICE_STATE: Final = Path("/var/lib/rmf-bridge-notify")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `notify`."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="the recipients (docs: Monitor)")
+    parser.add_argument(
+        "file", type=Path, metavar="FILE", help="the file of recipients (docs: Monitor)"
+    )
     parser.add_argument(
         "--test", action="store_true", help="send a test notice to each recipient, and end"
     )
     parser.add_argument(
-        "--ack", metavar="TROUBLE", help="stop the repeats of this trouble, as its notice names it"
+        "--ack",
+        metavar="TROUBLE",
+        help="stop the repeats of this trouble; the notice gives the name",
     )
     parser.add_argument(
         "--state",
         type=Path,
         default=_state(),
         metavar="DIR",
-        help="the folder that keeps what people were told",
+        help="the folder that keeps the troubles already reported",
     )
     add_graph_arguments(parser)
 
@@ -113,7 +117,7 @@ def _acknowledge(state: Path, key: str) -> int:
     except OSError as error:
         complain("notify", f"{state} cannot be written: {error.strerror}")
         return os.EX_CANTCREAT
-    print(f"{key}: no more repeats, if it is a present trouble (the log of notify says so)")
+    print(f"{key}: if this is a present trouble, its repeats stop, and the log of notify says so")
     return 0
 
 

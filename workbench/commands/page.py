@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=address_and_port,
         default=(LOOPBACK, PORT),
         metavar="ADDRESS:PORT",
-        help=f"default: {LOOPBACK}:{PORT}; with port 0 a free port",
+        help=f"default: {LOOPBACK}:{PORT}; with port 0, any free port",
     )
     parser.add_argument(
         "--host",

@@ -36,10 +36,12 @@ class PlotError(Exception):
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `plot`."""
     parser.add_argument(
-        "file", type=Path, metavar="FILE", help="a recording, as `explain` reads it"
+        "file", type=Path, metavar="FILE", help="a recording of any form that `explain` reads"
     )
     parser.add_argument("--device", metavar="NAME", help="default: the recording's only device")
-    parser.add_argument("--kind", choices=KINDS, help="where a lift and a door have the same name")
+    parser.add_argument(
+        "--kind", choices=KINDS, help="the kind, if a lift and a door have the same name"
+    )
     parser.add_argument(
         "-o",
         "--output",

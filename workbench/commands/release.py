@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--car-empty",
         action="store_true",
-        help="somebody has looked: no robot is in the car, so its own daemon may release the lift",
+        help="somebody has seen that the car is empty, so the lift's own daemon may release the lift",
     )
     parser.set_defaults(falls_back=True, direct=False)
     parser.set_defaults(kind="lift", end=True, floor=None, granted_only=False)

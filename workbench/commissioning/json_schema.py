@@ -27,7 +27,7 @@ FILE: dict[str, str] = {
     "rmf": "the way to Open-RMF.",
     "recording": "the recording of the daemon's work.",
     "buses": "name -> a bus, by its `type`.",
-    "type": "the sort of a bus, which decides its other keys.",
+    "type": "the type of a bus, which decides the other keys of the bus.",
 }
 """Meanings of the keys that no struct has."""
 

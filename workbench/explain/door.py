@@ -166,16 +166,16 @@ def _not_listed(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: T
         )
     else:
         found.say(
-            f"The door supervisor does not list {claim.who}: it takes its requests for replays, or"
+            f"The door supervisor does not list {claim.who}. It takes these requests for replays, or"
             " has too many requesters.",
             "the supervisor",
-            f"take the request of {claim.who}; its log says why it does not",
+            f"take the request of {claim.who}; the supervisor's log says why it does not",
         )
 
 
 def _not_let_go(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
     found.say(
-        f"It asks for CLOSE, and the supervisor's heartbeat has listed it"
+        f"{claim.who} asks for CLOSE, but the supervisor's heartbeat has listed {claim.who}"
         f" {clock.since(door.holders[claim.who])}.",
         "the supervisor",
         f"remove {claim.who} from its list",
@@ -222,13 +222,15 @@ def _nobody_tells(
     sends CLOSE at each state of the door (door_supervisor/Node.cpp).
     """
     if clock.now.at - door.began.at < REQUESTER_SILENT_S:
-        found.say("Whether a robot holds it is not known yet.", "nobody", "listen for longer")
+        found.say(
+            "It is not yet known whether a robot holds the door.", "nobody", "listen for longer"
+        )
         return
     doorway = f"look into the doorway of {door.name}"
     if around.nobody_publishes("door_requests"):
         found.say(
-            "No node publishes `door_requests`, so the door supervisor is not running. Whether a robot"
-            " holds the door is not known: it may stand in the doorway, where it says nothing.",
+            "No node publishes `door_requests`, so the door supervisor is not running. It is not known"
+            " whether a robot holds the door. A robot in the doorway says nothing.",
             "a person",
             f"{doorway}; when no robot stands in it, start the door supervisor, which lets go of every"
             " door whose holder is silent",
@@ -238,7 +240,7 @@ def _nobody_tells(
     if nodes := around.publishers("door_requests"):
         found.say(
             f"RMF's supervisor sends CLOSE at each state of an open door that nobody holds. {nodes}"
-            f" publishes `door_requests` and sends none: so {holds}.",
+            f" publishes `door_requests` and sends no CLOSE, so {holds}.",
             "the robot",
             f"drive through and send CLOSE; if {door.name} stays open for more than a minute, a person"
             " has to look into the doorway",

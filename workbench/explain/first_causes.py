@@ -37,7 +37,8 @@ OWN: Final[Mapping[str, tuple[str, str]]] = {
         " writes to it",
     ),
     "RELAY_RESTS": (
-        "While it rests the daemon asks the controller for nothing, so the controller is not to blame.",
+        "While the relay rests, the daemon asks the controller for nothing, so the controller is not to"
+        " blame.",
         FLICKERS,
     ),
     "DOOR_OPENING_FAULT": CONTACT,
@@ -111,14 +112,14 @@ def comes_and_goes(found: Answer, device: Device, clock: TimePhrases) -> bool:
     heard_s = lasted(min(FLAPS_WITHIN_S, clock.now.at - device.began.at))
     on, often = common.relays(device, clock), f"{len(ages)} changes in {heard_s}"
     if len(ages) == 1:
-        often = f"1 change in {heard_s}; its inputs are unsteady still:{inputs}"
+        often = f"1 change in {heard_s}; its inputs are still unsteady:{inputs}"
     flickers = "," not in inputs and max(ages) - min(ages) < STALLS_S
     found.because = () if flickers else READINGS
     why = (
         "though its readings are fresh: an input flickers, as a contact for manual mode may"
         if flickers
-        else "because its bus or module answers late, or at times not at all; what it shows between"
-        " proves nothing"
+        else "because its bus or module answers late, or at times not at all; the states in between"
+        " prove nothing"
     )
     bus = f" The last error on its bus: {device.bus_error}." if device.bus_error else ""
     again = " again and again" if len(ages) > 1 else ""

@@ -97,7 +97,9 @@ def not_passed_on(
         found.say(f"{says} the lift supervisor is not running, hangs, or is cut off.")
     found.acts("a person", restart)
     if claim.ended:
-        found.say("END does not prove an empty car: a fleet adapter sends it at its start too.")
+        found.say(
+            "END does not prove an empty car, because a fleet adapter also sends END at its start."
+        )
     elif lift.session.value == claim.who:
         found.say(lift.in_car(claim.who, clock.now))
 

@@ -68,7 +68,9 @@ def address_and_port(text: str) -> tuple[str, int]:
         ipaddress.ip_address(host)
         number = int(port)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"'{text}' is not ADDRESS:PORT, as 0.0.0.0:8080") from None
+        raise argparse.ArgumentTypeError(
+            f"'{text}' is not ADDRESS:PORT, such as 0.0.0.0:8080"
+        ) from None
     if not 0 <= number <= 65535:
         raise argparse.ArgumentTypeError(f"'{text}': a port is 0 to 65535")
     return host, number

@@ -201,7 +201,11 @@ def _stops_opening(history: AdapterHistory) -> Finding:
         return KEPT
     open_s = history.now - was.met.at
     goes_on = wish.met is was.met and open_s > FOR_EVER_S
-    return f"still asks for OPEN, {open_s:.0f} s after it was open for it" if goes_on else None
+    return (
+        f"still asks for OPEN, {open_s:.0f} s after the door was open for this robot"
+        if goes_on
+        else None
+    )
 
 
 LAWS: Final[tuple[Law[AdapterHistory], ...]] = (

@@ -221,7 +221,7 @@ LAWS: Final[tuple[Law[ChargerHistory], ...]] = (
     Law(
         "C1.keeps",
         "ASSIGNED and CHARGING keep their request_id until they end; a charge that nobody requested"
-        " (`unrequested/…`) may get that of the robot that it shows",
+        " (`unrequested/…`) may get the request_id of the robot on the pad",
         "a second request while the first is served",
         "The next robot's request must not take over a station that is promised to the first robot",
         "ChargerRequest.msg, request_id",

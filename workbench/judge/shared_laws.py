@@ -96,7 +96,7 @@ def fresh(stale_s: float = STALE_S) -> Callable[[AnyScene], Finding]:
 
 RATE: Final[Law[AnyScene]] = Law(
     "RATE",
-    "States keep coming, whether the hardware answers or not: never 5 s without one",
+    "States keep coming, whether the hardware answers or not: never 5 s without a state",
     "two states",
     "A fleet adapter sends a request at each state. Without states the robot waits for ever",
     "rmf_ros2 agv/RobotContext.cpp:1700-1735",

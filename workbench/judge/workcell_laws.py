@@ -108,7 +108,7 @@ LAWS: Final[tuple[Law[WorkcellHistory], ...]] = (
     Law(
         "W2.done",
         "A listed request leaves the queue only if it has succeeded",
-        "a state that lists a request no longer",
+        "a state that no longer lists a request",
         "RMF counts the request as complete, even after FAILED, and sends the robot off",
         SOURCE,
         _leaves_done,

@@ -98,7 +98,7 @@ def _trouble(
             fault.add_metric((*names, label(code)), 1)
     publishers = _gauge(
         "device_publishers",
-        "Nodes that publish states under this name; 0 if the transport does not tell.",
+        "Number of nodes that publish states under this name; 0 if unknown.",
         DEVICE,
     )
     refused = CounterMetricFamily(
@@ -144,17 +144,23 @@ def _waits(devices: Iterable[AnyDevice], now: Moment) -> Iterator[Metric]:
 
 def _counts(devices: Iterable[AnyDevice], tally: SiteTally) -> Iterator[Metric]:
     waits = _histogram(
-        "wait_seconds", "Time from a robot's request until RMF lets it go on.", DEVICE
+        "wait_seconds", "Time from a robot's request until RMF lets the robot go on.", DEVICE
     )
     rides = _histogram(
-        "lift_ride_seconds", "Time from a request in the car to its floor.", ("device",)
+        "lift_ride_seconds",
+        "Time from a robot's request in the car to the requested floor.",
+        ("device",),
     )
-    cycles = _counter("device_cycles", "Openings of a lift's or door's door; charges.", DEVICE)
+    cycles = _counter(
+        "device_cycles", "Number of door openings (lift, door) or charges (charger).", DEVICE
+    )
     energy = _counter(
         "charger_energy_joules", "Energy to robots, from reported V and A.", ("device",)
     )
     watched = _counter("device_watched_seconds", "Time in which states arrived.", DEVICE)
-    served = _counter("device_in_service_seconds", "Part of it in which robots are served.", DEVICE)
+    served = _counter(
+        "device_in_service_seconds", "Time in which states arrived and robots were served.", DEVICE
+    )
     for one in devices:
         names, counted = _names(one), tally.devices.get((one.kind, one.id), DeviceTally()).counts
         _add(waits, names, counted.waits)
@@ -178,7 +184,9 @@ def _nodes(graph: ObservedGraph[Any], now: Moment) -> Iterator[Metric]:
         facts = {key: label(report.value(key)) for key in ("version", "transport", "release")}
         info.add_metric((node,), {"kind": label(report.kind), **facts})
         up.add_metric((node,), report.is_current(now.at))
-    left_out = _gauge("devices_left_out", "1 if more devices were heard than are kept.", ("kind",))
+    left_out = _gauge(
+        "devices_left_out", "1 if devices were dropped, because too many were heard.", ("kind",)
+    )
     for kind in words.KINDS:
         left_out.add_metric((kind,), kind in graph.crowded)
     yield from (info, up, left_out)

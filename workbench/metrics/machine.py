@@ -56,7 +56,7 @@ def _daemons(every: Iterable[DaemonStatus]) -> Iterator[Metric]:
     age = _gauge("status_age_seconds", "Age of the daemon's status.", DAEMON)
     unreadable = _gauge("unreadable", "1 if this user may not see the daemon.", DAEMON)
     slack = _gauge(
-        "watchdog_slack_seconds", "Time that was left before systemd's watchdog.", DAEMON
+        "watchdog_slack_seconds", "Time that was left before systemd's watchdog acts.", DAEMON
     )
     fault = _gauge("fault", "1 while the daemon has this fault of its own.", (*DAEMON, "code"))
     for one in every:
@@ -79,7 +79,7 @@ def _devices(serving: Iterable[DaemonStatus]) -> Iterator[Metric]:
     counters = {key: _counter(f"device_{key}", text, DEVICE) for key, text in COUNTS.items()}
     longest = _gauge("device_longest_scan_seconds", "Longest scan in the last second.", DEVICE)
     switched = _counter(
-        "output_switched_on", "Times that an output was switched on.", (*DEVICE, "output")
+        "output_switched_on", "Number of times that an output was switched on.", (*DEVICE, "output")
     )
     age = _gauge("device_input_age_seconds", "Age of the last reading.", DEVICE)
     for one, name, device in _each(serving):

@@ -32,9 +32,9 @@ def worded(
     """Write a notice in words. `explained` is the device's present explanation, or None if the device
     is no longer known."""
     trouble = notice.trouble
-    lines = [f"It has lasted {_lasted(notice.for_s)}."]
+    lines = [f"The trouble has lasted {_lasted(notice.for_s)}."]
     if notice.event == "over":
-        lines = [f"It lasted {_lasted(notice.for_s)}."]
+        lines = [f"The trouble lasted {_lasted(notice.for_s)}."]
     else:
         lines += _explained(explained, trouble.what, remedies)
     if trouble.severity == "critical" and notice.event != "over":

@@ -43,10 +43,12 @@ Clock = Annotated[
 class QuietHours(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The time of day in which only critical notices are sent."""
 
-    begins: Annotated[Clock, tells("its beginning.")] = msgspec.field(name="from")
-    ends: Annotated[Clock, tells("its end, on the next day if it is earlier.")] = msgspec.field(
-        name="to"
+    begins: Annotated[Clock, tells("the beginning of the quiet hours.")] = msgspec.field(
+        name="from"
     )
+    ends: Annotated[
+        Clock, tells("the end of the quiet hours; an earlier time is on the next day.")
+    ] = msgspec.field(name="to")
 
     def contains(self, at: time) -> bool:
         """Return whether this time of day is in the quiet hours."""
@@ -63,14 +65,16 @@ class Recipient(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     webhook: Annotated[Url | None, tells("an address that takes a JSON object by POST.")] = None
     mail: Annotated[list[Name], Meta(max_length=20), tells("addresses for mail.")] = []
     least: Annotated[
-        Severity, tells("`critical`: only notices of robots shut in and of silent devices.")
+        Severity, tells("`critical`: only critical notices, such as of a silent device.")
     ] = "warning"
     token_file: Annotated[
         AbsolutePath | None,
-        tells("a file with a bearer token, or with the password of mail, for this user alone."),
+        tells("a file with a bearer token or a mail password, which only this user reads."),
     ] = None
     host: Annotated[Name | None, tells("the mail server.")] = None
-    port: Annotated[int, Meta(ge=1, le=65535), tells("its port; TLS is required.")] = 587
+    port: Annotated[
+        int, Meta(ge=1, le=65535), tells("the mail server's port; TLS is required.")
+    ] = 587
     user: Annotated[Name | None, tells("the user at the mail server.")] = None
     sender: Annotated[Name | None, tells("the address of the sender of mail.")] = msgspec.field(
         name="from", default=None
@@ -89,7 +93,10 @@ class Recipient(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         mail."""
         ways = [bool(self.ntfy), bool(self.webhook), bool(self.mail)]
         if sum(ways) != 1:
-            yield (), "write exactly one of ntfy, webhook and mail; another way is another entry"
+            yield (
+                (),
+                "write exactly one of ntfy, webhook and mail; for another way, add another entry",
+            )
             return
         mails = {"host": self.host, "from": self.sender}
         for key, value in mails.items():
@@ -106,12 +113,14 @@ class NotifySettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 
     to: Annotated[list[Recipient], Meta(min_length=1, max_length=20), tells("the recipients.")]
     page: Annotated[Url | None, tells("the page of `rmf-bridge page`, for links.")] = None
-    quiet: Annotated[QuietHours | None, tells("only critical notices are sent then.")] = None
-    after_s: Annotated[Patience, tells("how long a trouble must last before anybody is told.")] = (
+    quiet: Annotated[
+        QuietHours | None, tells("a time of day in which only critical notices are sent.")
+    ] = None
+    after_s: Annotated[Patience, tells("how long a trouble must last before its first notice.")] = (
         30.0
     )
     over_s: Annotated[
-        Patience, tells("how long a trouble must be gone before its end is told.")
+        Patience, tells("how long a trouble must be gone before the notice of its end.")
     ] = 60.0
     waits_s: Annotated[Patience, tells("a robot that waits longer than this is a trouble.")] = 300.0
     stuck_s: Annotated[

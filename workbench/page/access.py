@@ -93,7 +93,7 @@ def users(file: Path) -> dict[str, str]:
             raise PasswordError(f"{file}:{number}: {error}") from None
         found[user] = stored
     if not found:
-        raise PasswordError(f"{file}: it has no user; add one with rmf-bridge page --add-user NAME")
+        raise PasswordError(f"{file} has no user; add a user with rmf-bridge page --add-user NAME")
     return found
 
 

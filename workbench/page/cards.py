@@ -130,7 +130,7 @@ class Cards:
         for kind in sorted(self._site.crowded):
             yield f"more than {MOST_DEVICES} {kind}s are on the graph: some are not shown"
         if self._listener.lost:
-            yield f"{self._listener.lost} messages came too fast and were lost"
+            yield f"{self._listener.lost} messages came too fast, so the page lost them"
         if self._listener.cut:
             yield f"{self._listener.cut} messages were too long and are shown in part"
 

@@ -60,7 +60,7 @@ class IncidentViews:
         head(found.title if found else name, self._login, request)
         if found is None:
             with main():
-                part("<p>There is no incident of that name.</p>")
+                part("<p>There is no incident with this name.</p>")
             return client.build_response(request, 404)
         await self._view(self._folder / name, client, _about(found) + _download(name))
         return None
@@ -74,7 +74,7 @@ class IncidentViews:
     def download(self, name: str) -> Response:
         """Send the recording's file."""
         if self._file(name) is None:
-            return Response("there is no incident of that name", status_code=404)
+            return Response("there is no incident with this name", status_code=404)
         path = self._folder / name
         return FileResponse(path, filename=name, media_type="application/octet-stream")
 

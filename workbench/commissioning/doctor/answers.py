@@ -53,7 +53,9 @@ def answers(config: Config, bus_name: str, whole: bool) -> Iterator[Finding]:
     try:
         bus = _opened(config, bus_name)
     except HalError as error:
-        yield wrong(subject, str(error), "no device on it can be served", LOOK_AT.get(kind, TEXTS))
+        yield wrong(
+            subject, str(error), "no device on this bus can be served", LOOK_AT.get(kind, TEXTS)
+        )
         return
     try:
         yield from readings(config, bus_name, bus, subject)

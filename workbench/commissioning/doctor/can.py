@@ -101,7 +101,7 @@ def _controller(name: str, told: Controller, bitrate: int | None) -> Iterator[Fi
     elif state not in ("ERROR-ACTIVE", "?"):
         yield warning(CAN, f"{name} is {state.lower()}", "the controller counts many errors", check)
     if not told.restart_ms:
-        means = "after a bus-off nothing is heard until the interface is set down and up"
+        means = "after a bus-off the interface hears nothing until somebody sets it down and up"
         yield warning(CAN, f"{name} has no restart-ms", means, how)
 
 

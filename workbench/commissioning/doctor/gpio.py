@@ -57,7 +57,7 @@ def gpio(machine: Machine, chip: int | None, who: User) -> Iterator[Finding]:
             GPIO,
             f"the YAML names gpiochip{chip}, whose label is {found.label}",
             f"the header's label begins with {HEADER_LABEL}: this may be another chip",
-            "delete chip:, and the header is found by its label",
+            "delete chip:, and the daemon finds the header by its label",
         )
     yield _permission(machine, found, who)
 

@@ -68,7 +68,7 @@ CHARGER_HTTP: Final = """\
 CHARGER_CANOPEN: Final = """\
     node: 10                         # the receiver's node id
     heartbeat_timeout_s: 0.5         # a heartbeat comes each 0.1 s
-    on_death: stop                   # a charge under way when the daemon ends: stop, or keep"""
+    on_death: stop                   # at the daemon's end: stop or keep a running charge"""
 
 
 def draft(answers: DraftAnswers) -> str:
@@ -146,14 +146,14 @@ def _floor_code(answers: DraftAnswers, floors: list[str], points: FreePoints) ->
     yield "    floor_code:                # lines for the car's floor"
     yield f"      encoding: {answers.encoding}"
     if answers.encoding == "one_hot":
-        yield "      lines:                   # one for each floor; no line on is between floors"
+        yield "      lines:                   # one for each floor; between floors no line is on"
         for floor in floors:
             yield f"        {floor}: {{{points.contact()}}}"
         return
     yield "      bits:                    # least significant first"
     for _ in range(len(floors).bit_length()):
         yield f"        - {{{points.contact()}}}"
-    yield "      # The parity line shows a broken line. A lift without parity: delete it; check warns."
+    yield "      # The parity line shows a broken line. Without a parity line: delete it; check warns."
     yield f"      parity: {{{points.contact()}, total: even}}"
     codes = ", ".join(f"{number}: {floor}" for number, floor in enumerate(floors, start=1))
     yield f"      codes: {{{codes}}}"
@@ -182,7 +182,7 @@ def _charger(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
     yield "    inputs:"
     for signal in ("charging", "ready"):
         yield f"      {signal}: {{{points.contact()}}}   {_said(charger.ChargerInputWiring, signal)}"
-    yield f"      fault: {{{points.loop()}}}   # opens at a fault, as a cut wire does"
+    yield f"      fault: {{{points.loop()}}}   # opens at a fault; a cut wire reads as a fault too"
     yield "    outputs:"
     yield f"      enable: {{{points.relay()}}}   {_said(charger.ChargerOutputWiring, 'enable')}"
 

@@ -122,7 +122,7 @@ def _switch(memory: WalkMemory, step: int, now: float, steps: Sequence[WalkStep]
     proves = tried.seen is None or not tried.seen(memory.sample)
     told = "switched on, and nothing was seen"
     if not proves:
-        told = "switched on; the inputs showed the effect before, so they prove nothing"
+        told = "switched on; the inputs showed the effect before, so this proves nothing"
     return replace(
         memory,
         on=step,

@@ -104,8 +104,8 @@ class RequestProgress(Struct, frozen=True):
 
 
 WHERE: Final = (
-    "is it in another domain (--domain-id), on another transport (--transport), on another machine"
-    " (without --localhost)? rmf-bridge status shows a daemon's, on its own machine"
+    "is the device in another domain (--domain-id), on another transport (--transport), or on another"
+    " machine (without --localhost)? rmf-bridge status on the daemon's machine shows both"
 )
 
 

@@ -159,7 +159,7 @@ class QueuedCharge(RobotCharge):
         cancel = ("send", "charger", ANY, "--queue", "--cancel", self.request_id)
         return Obstacle(
             True,
-            f"no charger serves {self.who} yet: it waits in the {COORDINATOR}'s queue"
+            f"no charger serves {self.who} yet: the robot waits in the {COORDINATOR}'s queue"
             f" (see `{self.line.other('watch')}`), or the request was refused (see the"
             " coordinator's log)",
             f"to withdraw the request: {self.line.other(*cancel)}",
