@@ -1,1 +1,1 @@
-"""Benchmarks. They divide the daemons' cost by the cost of a bare transport node in the same run."""
+"""Benchmarks that compare the daemons' cost with the cost of a bare transport node in the same run."""

@@ -1,5 +1,5 @@
-"""Compare a door behind an MQTT broker with the same door on Modbus TCP, by a command's time and by
-memory.
+"""Compare a door behind an MQTT broker with the same door on Modbus TCP. The measures are a command's
+time, and memory.
 
 The two daemons run side by side and get their requests in turn. The time begins at RMF's request, and
 ends at the edge of the far side's relay. On MQTT, the message passes through the broker mosquitto.

@@ -47,7 +47,7 @@ def measure(scratch: Path) -> Tables:
     }
 
 
-# ---- a serial line: a whole poll cycle, compared with the least time on the wire
+# ---- serial line: a whole poll cycle, compared with the least time on the wire
 
 LINE: Final[Content] = {
     "type": "modbus",
@@ -66,7 +66,7 @@ REPLY: Final = 6
 """REQUEST and REPLY are numbers of characters, with unit and CRC. The request asks for bits, and the
 reply has the bits."""
 READINGS: Final = 2
-"""The number of readings of a door. One reading is of the coil, and the other of the inputs."""
+"""The number of readings for one door: one of the coil, and one of the inputs."""
 
 
 def _serial(scratch: Path) -> Rows:
@@ -157,7 +157,7 @@ def _ages(seen: States) -> Row:
     }
 
 
-# ---- HTTP chargers: the age of RMF's knowledge of the sound chargers, in poll periods
+# ---- HTTP chargers: the age (poll periods) of RMF's knowledge about the sound chargers
 
 SOUND, DEAD, TRICKLING = 35, 10, 5
 LOOK_S: Final = 0.02
@@ -222,7 +222,7 @@ def _sequential(ports: Sequence[int], known: Known, done: threading.Event) -> No
 
 
 def _known_ages(chargers: Sequence[int], knowns: dict[str, Known]) -> Rows:
-    """Return the ages of the known readings of these chargers, in poll periods."""
+    """Return the ages of these chargers' known readings, in poll periods."""
     never = time.time() - SETTLE_S
     ages: dict[str, list[float]] = {name: [] for name in knowns}
     for _ in range(round(1.5 * WATCHED_S / LOOK_S)):

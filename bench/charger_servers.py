@@ -16,7 +16,7 @@ from typing import Any, Final
 BODY: Final = b'{"state": 0, "error_msg": ""}'
 HEAD: Final = b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n"
 TRICKLE_S: Final = 0.25
-"""Time (s) between two bytes. It is less than any timeout for a single read."""
+"""Time (s) between two bytes, which is less than any timeout for a single read."""
 
 
 PERIOD_S: Final = 1.0

@@ -1,5 +1,5 @@
-"""Measure the cost of idle daemons and of each further device. Compare the cost with a bare transport
-node."""
+"""Measure idle daemons' cost, and the cost of each further device. Compare the cost with a bare
+transport node."""
 
 from itertools import count
 from pathlib import Path

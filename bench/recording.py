@@ -165,7 +165,7 @@ def _floor(now: float) -> str:
 
 
 def events(now: float) -> Iterator[object]:
-    """Yield the lift's readings and requests, with one ride every RIDE_S."""
+    """Yield the lift's readings and requests. One ride comes every RIDE_S (s)."""
     into, before = now % RIDE_S, _floor(now - RIDE_S)
     agv = 0.5 < into < 16.0
     if into < 2.0:

@@ -157,7 +157,7 @@ def _there(target: Path) -> dict[str, Distribution]:
 def _missing(
     target: Path, machine: dict[str, str], extras: dict[str, tuple[str, ...]], without: Without
 ) -> Iterator[tuple[str, str]]:
-    """Yield the name and the version of each missing requirement."""
+    """Yield each missing requirement as its name and version."""
     there = _there(target)
     for need in _needed(target, machine, extras, without):
         if (name := canonicalize_name(need.name)) not in there:

@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
 
 
-# ---- from a recording
+# ---- explain a recording
 
 
 def _recorded(args: argparse.Namespace) -> int:
@@ -149,7 +149,7 @@ def _tell(found: Explanation, *, as_json: bool) -> None:
     sys.stdout.flush()
 
 
-# ---- from the live graph
+# ---- explain the live graph
 
 
 def _live(args: argparse.Namespace) -> int:
@@ -164,7 +164,7 @@ def _live(args: argparse.Namespace) -> int:
 
 
 def _listen(ear: Ear, past: Ear, site: HeardDevices, for_s: float) -> None:
-    """Listen for `for_s` seconds. `past` also hears the requests that fleet adapters sent before."""
+    """Listen for `for_s` (s). `past` hears also the requests that fleet adapters sent before."""
     until = time.monotonic() + for_s
     site.pass_time(time.monotonic(), time.time())
     while (left_s := until - time.monotonic()) > 0:
@@ -177,7 +177,7 @@ def _listen(ear: Ear, past: Ear, site: HeardDevices, for_s: float) -> None:
 
 
 def _follow(ear: Ear, past: Ear, site: HeardDevices, args: argparse.Namespace) -> None:
-    """Print each changed explanation, until Ctrl-C."""
+    """Print an explanation each time it changes, until Ctrl-C."""
     told: object = None
     _listen(ear, past, site, args.for_s)
     while True:

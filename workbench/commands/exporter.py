@@ -120,7 +120,7 @@ class Site:
         self._listens = False
 
     def listen(self, ear: Ear) -> None:
-        """Take the messages of the next half second."""
+        """Listen for half a second, and take the messages heard."""
         for heard in ear.listen(LISTEN_S):
             with self._lock:
                 self._tally.take(self._graph, self._graph.hear(heard))
@@ -128,7 +128,7 @@ class Site:
             self._listens = True
 
     def collect(self) -> "Iterator[Metric]":
-        """Yield every metric family. The server's threads call this method for each scrape."""
+        """Yield every metric family. At each scrape, a thread of the HTTP server calls this method."""
         from workbench.metrics import families, machine
 
         now = Moment(time.monotonic(), time.time())

@@ -34,7 +34,7 @@ from workbench.commissioning.init.answers import (
 EX_USAGE, EX_NOINPUT, EX_CANTCREAT, EX_INTERRUPTED = 64, 66, 73, 130
 TABLE: Final = (*gateway.PLACES, *gateway.NUMBERS)
 Given = dict[str, Any]
-"""Answers so far. Each key is the name of a field of DraftAnswers."""
+"""Answers that are already known. The keys are names of DraftAnswers' fields."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +156,7 @@ QUESTIONS: Final = (
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the file, and an option for each question."""
+    """Add the argument for the file, and an option for each question."""
     parser.add_argument("file", type=Path, metavar="FILE", help="the YAML to write")
     parser.add_argument("--kind", choices=get_args(Kind))
     parser.add_argument("--name", help="the device's name, as on RMF's map")

@@ -1,7 +1,7 @@
 """`rmf-bridge notify FILE`: tell people about a site's troubles, through a webhook, mail or ntfy.
 
-The command only listens to RMF's graph. It runs beside the page or the recorder, never in a daemon that
-moves hardware.
+The command only listens to RMF's graph. The command runs beside the page or the recorder, and never
+inside a daemon that moves hardware.
 """
 
 import argparse
@@ -159,7 +159,7 @@ class Courier:
         threading.Thread(target=self._run, name=to.name, daemon=True).start()
 
     def take(self, notice: NoticeText) -> None:
-        """Queue a notice, if this recipient wants its severity."""
+        """Queue a notice, if its severity is high enough for this recipient."""
         if self._to.least == "critical" and notice.severity != "critical":
             return
         if len(self._waiting) == MOST_WAITING:

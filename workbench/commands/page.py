@@ -1,7 +1,7 @@
-"""`rmf-bridge page`: serve a web page of RMF's live graph, or of one recording.
+"""`rmf-bridge page`: serve a web page that shows RMF's live graph, or one recording.
 
-The page needs the extra `page` (NiceGUI), which no daemon imports. By default the page listens on
-127.0.0.1. Another address (`--listen`) needs a password file or a reverse proxy.
+The page needs the extra `page` (NiceGUI). No daemon imports NiceGUI. By default, the page listens on
+127.0.0.1. On another address (`--listen`), the page needs a password file or a reverse proxy.
 """
 
 import argparse

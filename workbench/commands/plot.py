@@ -176,7 +176,7 @@ def _page(picture: str, words: list[str], theme: Theme | None) -> Iterator[str]:
 
 
 def _write(file: Path, content: bytes) -> None:
-    """Write the whole file or nothing. Raises PlotError."""
+    """Write the whole file. If this fails, write nothing, and raise PlotError."""
     beside = file.with_name(f".{file.name}.{os.getpid()}")
     try:
         try:

@@ -1,9 +1,9 @@
 """`rmf-bridge release LIFT`: an operator ends a lift's present session.
 
 `release` does the same as `send lift LIFT --end`. It sends the session holder's END_SESSION to the lift
-supervisor, until the lift shows the session's end. The supervisor may be missing, or may not obey
-within seconds. Then `release` sends the request directly to the lift's own daemon. If a robot may be in
-the car, the direct request needs `--car-empty`.
+supervisor, until the lift shows the session's end. If no supervisor runs, or the supervisor does not
+obey within seconds, `release` asks the lift's own daemon. If a robot may be in the car, this direct
+request needs `--car-empty`.
 
 After the end, `release` watches the lift for 5 s. Then `release` prints which robot has the lift, and
 whether the car moves. A robot that keeps requesting the lift goes to the end of the queue.
@@ -15,7 +15,7 @@ from workbench.commands import send
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the lift, and the options that all sending commands share."""
+    """Add the argument for the lift, and the options that all sending commands share."""
     parser.add_argument("name", metavar="LIFT", help="the lift, as RMF names it")
     parser.add_argument(
         "--session", default="", metavar="ID", help="end only this session (default: any)"

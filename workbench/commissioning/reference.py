@@ -1,4 +1,4 @@
-"""Generate the page of the configuration reference from the structs of the YAML.
+"""Generate the page of the configuration reference. The YAML's structs are the source.
 
 Keys, types, bounds, units, defaults and meanings come from the structs' fields. Purposes come from the
 structs' docstrings.
@@ -197,7 +197,7 @@ def meaning(struct: type, key: str) -> str:
 
 
 def parts(info: mi.Type) -> list[type]:
-    """Return the structs inside a field's value."""
+    """Return the structs in a field's type."""
     match info:
         case mi.StructType(cls=cls):
             return [cls]

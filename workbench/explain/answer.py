@@ -1,4 +1,4 @@
-"""Parts of an answer, and the sentences that the answers of all kinds of device share."""
+"""The parts of an answer, and sentences for all kinds of device."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

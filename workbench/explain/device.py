@@ -25,8 +25,8 @@ reason."""
 BACK_S: Final = 0.2
 BACK_TIMES: Final = 3
 BACK_WITHIN_S: Final = 15.0
-"""BACK_S, BACK_TIMES and BACK_WITHIN_S show two publishers. Two nodes publish the states if stamps step
-back by at least BACK_S (s), at least BACK_TIMES times, within BACK_WITHIN_S (s)."""
+"""BACK_S, BACK_TIMES and BACK_WITHIN_S are limits that show two publishers. With two publishers, stamps
+step back by at least BACK_S (s). This happens at least BACK_TIMES times within BACK_WITHIN_S (s)."""
 
 
 class Device(ObservedDevice[Any]):

@@ -78,7 +78,8 @@ class Drawing:
         self._said: dict[str, Diagnosis] = {}
 
     def take(self, heard: Heard | Level | Own) -> None:
-        """Take the next message. A recorded message that is out of order counts as new."""
+        """Take the next message. If a recorded message is out of order, use the time of the message
+        before."""
         if isinstance(heard, Own):
             note = noted(heard.topic.rpartition("/")[2], heard.text)
             if note is not None and note.subject == self._device:
@@ -96,7 +97,7 @@ class Drawing:
                 self._hear(heard.topic.rpartition("/")[2], heard.message, heard.wall)
 
     def timeline(self, from_s: float = float("-inf"), to_s: float = float("inf")) -> Timeline:
-        """Return the timeline between these times, up to the last message."""
+        """Return the timeline between these times, but no later than the last message."""
         if self._began_at is None:
             return Timeline(self._kind, self._device, 0.0, 0.0, 0.0, ())
         to_s = max(self._began_at, min(to_s, self._now))
@@ -145,7 +146,7 @@ class Drawing:
         """Set the value of a lane that has only one row. The value comes from a state."""
         self._row(lane, fills=True).say(self._now, label(text), looks)
 
-    # ---- notes of our daemon
+    # ---- our daemon's notes
 
     def _note(self, level: Level) -> None:
         if level.lane not in self._noted:  # notes tell times more exactly than diagnostics
@@ -242,10 +243,10 @@ class Drawing:
             row.mark(self._now, label(f"refused: {refusal.text}"), "wrong")
 
     def _heartbeat(self, message: d.SupervisorHeartbeat) -> None:
-        """Fill the rows of the sessions that the door supervisor's heartbeat lists.
+        """Fill a row for each session in the door supervisor's heartbeat.
 
-        RMF's own supervisor sends a heartbeat only after requests. A session lasts until a heartbeat
-        omits it.
+        RMF's own supervisor sends a heartbeat only after requests. Therefore a session lasts until a
+        heartbeat omits the session.
         """
         holders = set(map(label, listed(message, self._device)))
         for who in holders:

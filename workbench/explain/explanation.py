@@ -61,7 +61,7 @@ class StoryLine:
 
 @dataclass(frozen=True, slots=True)
 class FaultTold:
-    """A present fault, with a remedy if `faults.yaml` has the fault."""
+    """A present fault. If `faults.yaml` has the fault, the fault has a remedy."""
 
     code: str
     detail: str

@@ -45,8 +45,8 @@ class HeardDevices(ObservedGraph[Device]):
     """All devices heard, or only the devices with one name.
 
     - `session`: the session whose last ride stays in the story, even if other sessions ride later.
-    - `senders`: the nodes that publish each topic on a live graph. `senders` is None if FLEET_STATES is
-      not heard on this graph, or if the nodes are unknown.
+    - `senders`: the nodes that publish each topic on a live graph. `senders` is None if the nodes are
+      unknown. On a graph with `senders`, FLEET_STATES is heard too.
     """
 
     makes: ClassVar = {
@@ -209,10 +209,10 @@ class HeardDevices(ObservedGraph[Device]):
             return device.kept
         return device.lines_since(max(answer.since, self._story_from))
 
-    # ---- messages to devices
+    # ---- sort messages by device
 
     def make(self, kind: Kind, name: str) -> Device:
-        """Make a device that has heard no messages."""
+        """Make a device that has not yet heard a message."""
         made = super().make(kind, name)
         made.focus = self._session
         made.lines = deque(maxlen=self._most_lines)

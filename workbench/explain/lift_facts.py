@@ -20,8 +20,8 @@ request."""
 
 @dataclass(slots=True)
 class Rides:
-    """Facts about all rides: the number of ended rides, the longest wait for the car, and the beginning
-    of the last ride."""
+    """Facts about all rides: how many have ended, the longest wait for the car, and when the last ride
+    began."""
 
     ended: int = 0
     longest_s: float = 0.0

@@ -80,7 +80,7 @@ def levels(at: float, note: Noted, on: dict[tuple[str, str], str]) -> Iterator[L
 
 
 def _fields(struct: object) -> Iterator[tuple[str, str]]:
-    """Yield the fields of a sample or of outputs. A field's value is on, off or a word. Leave out
+    """Yield each field of a sample or output. The value is on, off or a word. Leave out
     measurements."""
     if not isinstance(struct, dict):
         return

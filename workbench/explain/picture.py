@@ -24,7 +24,7 @@ TOP: Final = 82.0
 BOTTOM: Final = 56.0
 RIGHT: Final = 16.0
 CHAR: Final = 6.6
-"""Width (pixels) of a character of the 12-pixel font, rounded up."""
+"""Width (pixels) of one character, rounded up. The font has 12 pixels."""
 NARROW: Final = 1.2
 """Width (pixels). A narrower span is drawn together with its neighbours."""
 TICKS: Final = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200)
@@ -81,7 +81,7 @@ class Picture:
         self._steps()
         self._legend()
 
-    # ---- positions
+    # ---- where parts are
 
     def _wall(self, at: float) -> float:
         return self._timeline.wall + at - self._timeline.from_s
@@ -91,7 +91,7 @@ class Picture:
         share = (at - self._timeline.from_s) / length
         return self._left + share * (self._width - self._left - RIGHT)
 
-    # ---- elements
+    # ---- XML elements
 
     def _rect(self, x: float, y: float, wide: float, high: float, looks: str) -> Element:
         return SubElement(
@@ -136,7 +136,7 @@ class Picture:
             )
             SubElement(pattern, "path", {"d": path, "class": f"p-{tone}", "stroke-width": wide})
 
-    # ---- parts
+    # ---- parts of the picture
 
     def _head(self, name: str) -> None:
         timeline, clock = self._timeline, self._clock

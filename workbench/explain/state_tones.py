@@ -1,4 +1,5 @@
-"""The tone of each value of RMF's states. A number that RMF does not define has the tone `unknown`."""
+"""The tones for the values in RMF's states. A number that RMF does not define has the tone
+`unknown`."""
 
 from collections.abc import Mapping
 from enum import IntEnum

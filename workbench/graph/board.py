@@ -90,7 +90,7 @@ class Board:
         self.note(heard)
 
     def note(self, heard: Heard) -> None:
-        """Take the charging assignments of a message. `ObservedGraph` takes all other messages."""
+        """Take a message's charging assignments. `ObservedGraph` takes everything else."""
         if not isinstance(heard.message, d.ChargingAssignments):
             return
         for one in heard.message.assignments:
@@ -276,7 +276,8 @@ def change_line(row: BoardRow, wall: float) -> str:
 
 
 def json_line(row: BoardRow, wall: float) -> str:
-    """Format a changed row as one line of JSON, with the time of the change (s since the epoch)."""
+    """Format a changed row as one JSON line. The line has the time of the change (s since the
+    epoch)."""
     return json.dumps({"at": round(wall, 3), **asdict(row)})
 
 

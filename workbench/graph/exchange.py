@@ -36,7 +36,7 @@ class SendStep:
 
 
 def step(request: Request, seen: RequestProgress, now: float) -> SendStep:
-    """Return the next step."""
+    """Return the next step at time `now` (monotonic s)."""
     over = request.outcome(seen)
     if over is not None:
         return SendStep(outcome=over)
@@ -59,7 +59,7 @@ def _may_send(request: Request, seen: RequestProgress, now: float, *, direct: bo
 
 
 def _hint(request: Request, seen: RequestProgress, now: float) -> str:
-    """Return advice for the user, before the timeout."""
+    """Return a hint for the user, or "". The hint comes before the timeout."""
     if now < seen.began_at + HINT_AFTER_S:
         return ""
     if missed := _missed(request, seen):

@@ -1,5 +1,5 @@
-"""Talk to the plants (simulated devices) of a running simulation, through control sockets
-(`hal_fakes/control.py`)."""
+"""Talk to the plants of a running simulation, which are simulated devices. The plants have control
+sockets (`hal_fakes/control.py`)."""
 
 import argparse
 import json

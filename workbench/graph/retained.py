@@ -1,14 +1,15 @@
-"""The retained MQTT messages that show RMF's devices to other systems, made from rows and a time.
+"""The retained MQTT messages that show RMF's devices to other systems.
 
     PREFIX/status                     online, or offline by the last will
     PREFIX/KIND/ID/state              one JSON object
-    PREFIX/KIND/ID/availability       online while states come and their reading is fresh, else offline
+    PREFIX/KIND/ID/availability       online if states come and their reading is fresh, else offline
     HOMEASSISTANT/device/…/config     Home Assistant's discovery, one message for each device:
                                       https://www.home-assistant.io/integrations/mqtt/#device-discovery-payload
 
-A reader cannot see the age of a retained message. For this reason each message expires at the broker
-if it is not renewed (MQTT 5, 3.3.2.3.3). ID is the device's name. Every byte of the name other than
-A-Z a-z 0-9 and - is written as _XX, in hexadecimal. All functions are pure.
+A reader cannot see the age of a retained message. Therefore each message expires at the broker if
+nobody renews the message (MQTT 5, 3.3.2.3.3). ID is the device's name. A byte of the name other than
+A-Z a-z 0-9 and - becomes _XX, in hexadecimal. All functions are pure, because rows and the time are
+arguments.
 """
 
 import json

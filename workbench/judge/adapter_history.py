@@ -1,5 +1,5 @@
-"""The history of a fleet adapter. It has the requests of the adapter's robots to lifts and doors, and
-the states of these lifts and doors."""
+"""The history of a fleet adapter: its robots' requests to lifts and doors, and these devices'
+states."""
 
 from collections import deque
 from copy import copy
@@ -30,13 +30,13 @@ ADAPTERS: Final = (topics.ADAPTER_LIFT_REQUESTS.name, topics.ADAPTER_DOOR_REQUES
 class Wish(DeviceRequester):
     """One robot's visit to one device.
 
-    - `met`: when a state after the latest request first showed everything that RMF's phase waits for.
+    - `met`: when a state after the latest request first fulfilled all of RMF's conditions.
     - `whole`: whether the visit was heard from its beginning.
-    - `inside`: whether the robot is in the car. It is, if it requested another floor after `met`.
-    - `came_from`: the floor of the request before.
-    - `held_at`: the time of the last state that showed the visit's session.
+    - `inside`: whether the robot is in the car, because it requested another floor after `met`.
+    - `came_from`: the floor that the robot requested before.
+    - `held_at`: when a state last showed the visit's session.
     - `ignored`: number of states in a row without a request by the robot, although its fleet was heard.
-    - `ignored_since`: the time of the first of these states.
+    - `ignored_since`: when the first of these states came.
     - `lapsed`: whether the adapter failed to repeat the first request for IGNORED states.
     - `spare`: number of ENDs after the last state that showed the visit's session.
     - `passed`: whether a later passage began before the robot sent CLOSE for this passage.

@@ -23,8 +23,12 @@ class ChargeScenario(Scenario):
     """Request a station for a robot that does not come.
 
     After start_timeout has ended this request, make a second request and cancel the second request.
-    Other messages give a wrong node an occasion to break each law about requests. They are a request
-    for another station, a second request for this station, a cancel of another request, and repeats.
+    More messages give a wrong node an occasion to break each law about requests:
+
+    - a request for another station
+    - a second request for this station
+    - a cancel of another request
+    - repeats
 
     `robot` is FLEET/ROBOT. If the robot does come, the play cancels the robot's charge.
     """

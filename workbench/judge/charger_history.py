@@ -1,4 +1,4 @@
-"""The history of a charger: its requests and states."""
+"""The history of a charger, with its requests and states."""
 
 from typing import Final
 
@@ -15,8 +15,7 @@ ERROR: Final = d.ChargerStateValue.CHARGER_ERROR
 LOST: Final = float("inf")
 """Noted time of a cancel, if the station may not have received the cancel."""
 UNREQUESTED: Final = "unrequested/"
-"""Prefix of the ids of charges that nobody requested. A station may use the same id again for its next
-charge."""
+"""Prefix of a charge's id if nobody requested the charge. A station may use the same id again."""
 
 
 class ChargerHistory(History[d.ChargerState]):

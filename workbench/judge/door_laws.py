@@ -50,7 +50,7 @@ def _bypass(history: DoorHistory) -> bool:
 
 
 def _stays(history: DoorHistory) -> Finding:
-    """Check that the door does not close because RMF is silent."""
+    """Check that RMF's silence does not close the door."""
     if history.new is None or not history.latched or not history.was_open:
         return None
     if not _left_open(history) or _bypass(history):

@@ -1,4 +1,5 @@
-"""Check the messages of one device, or of one fleet adapter, against the laws of its kind."""
+"""Check one device's messages against the laws of the device's kind. A fleet adapter also counts as a
+device."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -102,7 +103,7 @@ class Judge:
         """Take three numbers: the fire topic's publishers, its retaining publishers, and the lift
         supervisors.
 
-        These numbers count only if one lift is on the graph, because the topic does not name the
+        The judge uses the numbers only if one lift is on the graph, because the topic does not name the
         alarm's lift. Jazzy's lift supervisor has a volatile publisher, and never uses the publisher
         (rmf_ros2 7eef65a, lift_supervisor/Node.cpp:52). Only a repeated finding counts, because the
         transport discovers publishers one by one.

@@ -1,5 +1,5 @@
-"""Run a judgement. Listen, perform a play if the user asked for it and it is allowed, release the
-device, and give the verdict.
+"""Run a judgement. Listen, perform a play, release the device, and give the verdict. A play needs a
+user who asks for it, and a device that allows it.
 
 This module has no I/O and no clock, so a judgement is the same on a wire and in virtual time. The
 caller passes messages in, publishes the returned messages, and calls `turn` at `wake_at`.
@@ -74,7 +74,7 @@ class JudgeRun:
         self._last = (at, wall)
 
     def hear(self, heard: Heard) -> list[Said]:
-        """Take a message of the graph that another node sent. Return messages to publish."""
+        """Take a message that another node sent. Return messages to publish."""
         self._last = (heard.at, heard.wall)
         self.judge.hear(heard)
         if self._scenario is None or self.act not in (Act.PLAY, Act.LEAVE):
@@ -122,8 +122,8 @@ class JudgeRun:
 
     @property
     def _now(self) -> float:
-        """Return RMF's clock (s since the epoch). It is the wall clock at the beginning plus the
-        monotonic time since the beginning, so steps of the wall clock do not change it."""
+        """Return RMF's clock (s since the epoch). The clock begins with the wall clock, and then
+        follows the monotonic clock. Thus steps of the wall clock change nothing."""
         return self._epoch + self._last[0]
 
     def _begin_play(self) -> list[Said]:

@@ -49,7 +49,7 @@ def numbers(history: LiftHistory) -> Finding:
 
 
 def other_lift(history: LiftHistory) -> Finding:
-    """Check that the lift is not given to a session that requested only another lift."""
+    """Check that a session that requested only another lift does not get this lift."""
     session = history.session
     if history.new is None or history.before is None:
         return None
@@ -65,7 +65,7 @@ def other_lift(history: LiftHistory) -> Finding:
 
 
 def own_name(history: LiftHistory) -> Finding:
-    """Check that the lift is not given to a session that sent no request."""
+    """Check that only a session that sent a request gets the lift."""
     session = history.session
     if history.new is None or history.before is None or not session:
         return None
@@ -278,7 +278,7 @@ def unserved(history: LiftHistory) -> Finding:
 
 
 def lets_nobody_in(history: LiftHistory) -> Finding:
-    """Check that no robot is let in during a hazard."""
+    """Check that the lift lets no robot in during a hazard."""
     state = history.new
     if state is None or state.current_mode not in HAZARDS or not state.session_id:
         return None

@@ -184,7 +184,7 @@ class LiftHistory(History[d.LiftState]):
         self.open_seen = self._open = ("", NOT_YET)
 
     def settle(self, state: d.LiftState) -> None:
-        """Note the session, the door, and whether the session was shown OPEN."""
+        """Note the session and the door. Note whether a state has shown OPEN for this session."""
         if self.before is not None and self.session != self.session_before:
             self._changed_hands(state)
         if self.session or state.current_mode in HAZARDS:

@@ -26,7 +26,7 @@ RETAINED: Final = topics.ADAPTER_LIFT_REQUESTS.publish.depth
 
 Step = Phase | float
 Script = Callable[[RobotContext], Iterator[Step]]
-"""A robot's steps. Each step is a phase, or a number of seconds of driving."""
+"""A robot's steps. Each step is a phase, or a drive's duration (s)."""
 
 
 class Traveller:

@@ -219,7 +219,7 @@ class RideScenario(Scenario):
     def _send(
         self, session: str, floor: str, now: float, kind: int = AGV, lift: str = ""
     ) -> tuple[AnyTopic, d.LiftRequest]:
-        """Make a supervisor's request."""
+        """Make a request in the supervisor's name."""
         door = d.LiftRequestDoor.DOOR_OPEN if kind == AGV else d.LiftRequestDoor.DOOR_CLOSED
         request = d.LiftRequest(lift or self.lift, stamp(now), session, kind, floor, door)
         return topics.LIFT_REQUESTS, request

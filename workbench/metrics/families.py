@@ -48,7 +48,7 @@ def label(text: str) -> str:
 
 
 def of_graph(graph: ObservedGraph[Any], tally: SiteTally, now: Moment) -> Iterator[Metric]:
-    """Yield the families of all devices that have published a state, and of our nodes."""
+    """Yield the families about our nodes, and about all devices that have published a state."""
     devices = graph.stated()
     yield from _states(graph, devices, now)
     yield from _trouble(graph, devices, now)

@@ -127,7 +127,7 @@ class Tries:
         return len(recent) < TRIES
 
     def failed(self, address: str, now: float) -> None:
-        """Count a failed try of this address."""
+        """Count a failed try from this address."""
         recent = [at for at in self._failed_at.pop(address, ()) if now - at < TRIES_IN_S]
         self._failed_at[address] = [*recent, now]
         while len(self._failed_at) > MOST_ADDRESSES:
@@ -170,7 +170,7 @@ class LoginSessions:
         return session
 
     def end(self, secret: str | None) -> None:
-        """End the session of this secret."""
+        """End the session that has this secret."""
         self._by_secret.pop(secret or "", None)
 
 

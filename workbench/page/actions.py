@@ -36,9 +36,9 @@ MOST_KEPT: Final = 100
 LONGEST_FILE: Final = 1_000_000
 RESET: Final = "The daemon clears each latched fault whose cause is gone."
 REPORTS: Final = re.compile(r"^rmf-bridge \S+: ", re.M)
-"""Pattern of the command's name at the beginning of an error message."""
+"""Pattern of the command's name, with which an error message begins."""
 PROGRESS: Final = re.compile(r"^[\d.]+ s  \S+ +\S.*?  ")
-"""Pattern of the time, the step and the device at the beginning of a line of `send`."""
+"""Pattern of the beginning of a line from `send`: the time, the step and the device."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +56,7 @@ class Action:
 
 @dataclass(frozen=True, slots=True)
 class Local:
-    """A daemon on this machine that serves the device. It has its YAML, and the actions of its
-    simulation.
+    """A daemon on this machine that serves the device, with the YAML and the simulation's actions.
 
     `presses` and `fails` are signals and parts of the simulated plant. Without a simulation, both are
     empty.

@@ -1,7 +1,7 @@
 """The site's cards in all browsers. A changed card is drawn once, and all browsers get that drawing.
 
-In each turn, every browser gets one script with all changes. All browsers get the same script. If each
-card had an update of its own, a browser could not keep up with 300 changes in a second.
+In each turn, all browsers get the same script with all changes. With a script for each card, a browser
+could not keep up with 300 changes in a second.
 """
 
 import json
@@ -113,7 +113,7 @@ class Cards:
         return f'<p class="status" role="status">{told}</p>'
 
     def robots(self) -> str:
-        """Draw the robots that fleets report."""
+        """Draw the table of robots. Fleet states list these robots."""
         return drawing.robots(self._site.robots(), self._clock())
 
     def _told(self) -> Iterable[str]:

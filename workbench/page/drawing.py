@@ -30,10 +30,11 @@ ROBOT_SILENT_S: Final = 10.0
 HALF: Final[Mapping[int, float]] = {d.LiftMotion.MOTION_UP: -0.5, d.LiftMotion.MOTION_DOWN: 0.5}
 """Motion -> offset of the car, in floors. The offset is half a floor in the direction of the motion."""
 LONGEST: Final = 160
-"""Maximum length (characters) of a text on a card. The list of troubles has LONGEST_FAULT instead."""
+"""Maximum length (characters) of a text on a card. In the list of troubles, LONGEST_FAULT is the
+limit."""
 LONGEST_FAULT: Final = 400
 MOST_FLOORS: Final = 40
-"""Maximum number of landings in a drawing of a shaft. With more landings, only words tell the car's
+"""Maximum number of landings in a shaft's drawing. With more landings, only words tell the car's
 place."""
 FLOOR_PX, SHAFT_PX, LABEL_PX = 22, 44, 46
 ARROWS: Final = {d.LiftMotion.MOTION_UP: "▲", d.LiftMotion.MOTION_DOWN: "▼"}
@@ -101,7 +102,8 @@ def _old(view: DeviceView) -> str:
 
 
 def when(wall: float) -> str:
-    """Return the HTML of a time (s since the epoch). The browser shows the time in its zone."""
+    """Return the HTML of a time (s since the epoch). The browser shows the time in the browser's
+    zone."""
     return f'<time data-at="{wall:.3f}"></time>'
 
 

@@ -2,9 +2,10 @@
 
 The guard checks the Host, the Origin and the login. The guard also limits a request's time and size.
 
-A web site that is open in the same browser can reach a page on 127.0.0.1. The site may use a name that
-resolves to 127.0.0.1 (DNS rebinding), or a socket or form of its own origin. Therefore the guard
-accepts only the page's configured names. Only the page's own origin may open the socket or post a form.
+Without a guard, a web site that is open in the same browser could reach a page on 127.0.0.1. The site
+could use a name that resolves to 127.0.0.1 (DNS rebinding), or its own socket or form. Therefore the
+guard accepts only the page's configured names. Only the page's own origin may open the socket or post a
+form.
 """
 
 import asyncio
@@ -81,7 +82,7 @@ def _is_address(host: str) -> bool:
 class RequestGuard:
     """The outermost layer of the page.
 
-    `gate` is a further check. It applies to each request whose Host and Origin are right.
+    `gate` is one more check, for each request whose Host and Origin are right.
     """
 
     def __init__(

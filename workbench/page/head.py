@@ -14,7 +14,7 @@ BLUE: Final = "#005a93"
 GREEN: Final = "#00674c"
 """Colour of success. On the library's own green, white text is unreadable."""
 RED: Final = "#b02a00"
-"""Colour of failure, and of the button that confirms an action."""
+"""Colour of a failure. The button that confirms an action has this colour too."""
 
 
 def head(title: str, login: Login, request: Request) -> None:

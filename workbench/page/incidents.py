@@ -1,5 +1,4 @@
-"""List the folder of recordings, and explain one of the recordings. The page never reads another
-folder.
+"""List the recordings in a folder, and explain a recording. The page never reads another folder.
 
 A recording may come from elsewhere and be hostile. Therefore a separate process reads the recording
 (`python -m workbench.page.incidents FILE`), with limited memory and time.

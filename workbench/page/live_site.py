@@ -1,5 +1,4 @@
-"""The page's memory of RMF's graph. It has each device's latest state, and the last ten minutes of each
-device.
+"""The page's memory of RMF's graph: each device's latest state, and its last ten minutes.
 
 All functions are pure, because time comes with each message. Anybody on the network may invent names.
 Therefore everything has a limit, and a new device never displaces a known device.
@@ -37,8 +36,8 @@ KEPT_S: Final = 600.0
 STEP_S: Final = 10.0
 """Time (s) by which the timeline moves in each step."""
 MOST_LINES: Final = 100
-"""Maximum number of story lines of one device, of which the device's view shows forty. With six hundred
-lines for each device, a large site would take 150 MB."""
+"""Maximum number of a device's story lines. The device's view shows forty. With six hundred lines for
+each device, a large site would take 150 MB."""
 MOST_ROBOTS: Final = 500
 
 HEARD: Final[tuple[AnyTopic, ...]] = (
@@ -236,7 +235,7 @@ class LiveSite:
 
     def _fleet(self, message: d.FleetState, now: Moment) -> None:
         """Take a fleet's robots. If the table is full, a new robot replaces the robot that was silent
-        for the longest time. That silence must have lasted at least FORGOTTEN_S."""
+        for the longest time, but only after a silence of FORGOTTEN_S or more."""
         for state in message.robots:
             key = (message.name, state.name)
             if self._robots.pop(key, None) is None and len(self._robots) >= MOST_ROBOTS:

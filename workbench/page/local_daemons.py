@@ -23,8 +23,7 @@ from workbench.page.levels import Levels, Rows
 
 @dataclass(frozen=True, slots=True)
 class ServedDevice:
-    """A device that a daemon on this machine serves. It has its YAML, its present inputs and its
-    outputs.
+    """A device that a daemon on this machine serves, with its YAML, its present inputs and its outputs.
 
     `contacts` is known signal -> whether the signal is asserted.
     """

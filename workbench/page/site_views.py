@@ -40,8 +40,8 @@ SECTIONS: Final = (
 )
 WIDE: Final = "panel wide-part"
 FEW: Final = 8
-"""Maximum number of devices in a section of half the page's width. A larger section takes the whole
-width."""
+"""Maximum number of devices in a section that takes half the page's width. A larger section takes the
+whole width."""
 LOST: Final = '<p id="lost" role="alert"></p>'
 """The element in which the browser tells that the page's server is silent."""
 FILTERS: Final = (

@@ -1,5 +1,4 @@
-"""One browser's tab. It has the browser's time zone, its question for the latest changes, and its
-view's changes."""
+"""One browser's tab: its time zone, its question for the latest changes, and its view's changes."""
 
 import json
 import math

@@ -176,7 +176,7 @@ async def _pump(cards: Cards) -> None:
 
 
 async def _look(here: LocalDaemons) -> None:
-    """Look for this machine's daemons in the background, so that the pump does not wait."""
+    """Look for this machine's daemons in the background, so that `_pump` does not wait."""
     while True:
         with suppress(OSError):
             await asyncio.to_thread(here.look)
@@ -184,8 +184,7 @@ async def _look(here: LocalDaemons) -> None:
 
 
 async def _end_useless() -> None:
-    """Close connections of browsers that do not read, or that send no request. Run until the page
-    ends."""
+    """Close connections if the browser does not read, or sends no request. Run until the page ends."""
     silent = Silent()
     ended: set[object] = set()
     told_at = AGES_AGO

@@ -37,8 +37,8 @@ LONGEST_MESSAGE: Final = 8 << 20
 
 
 Keep = Callable[[str, bytes, float], bool]
-"""A function that tells whether to decode a sample. It takes the topic, the sample, and the time of
-recording (s)."""
+"""A function that tells whether to decode a sample. The arguments are the topic, the sample, and the
+time of recording (s)."""
 
 
 def heard_in(path: Path, notes: Notes | None = None, keep: Keep | None = None) -> Iterator[Heard]:

@@ -1,5 +1,5 @@
-"""Open a recording for a replay. A recording is a file of our recorder, a directory of such files, or a
-ring."""
+"""Open a recording for a replay. A recording may be our recorder's file, a directory of such files, or
+a ring."""
 
 from collections.abc import Iterator
 from pathlib import Path

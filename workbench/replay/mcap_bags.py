@@ -1,4 +1,4 @@
-"""Read RMF's messages from an MCAP file of our recorder or of rosbag2."""
+"""Read RMF's messages from an MCAP file. The writer is our recorder or rosbag2."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -72,8 +72,7 @@ def records(path: Path) -> Iterator[McapRecord]:
 
 
 class _Allowances:
-    """The number of bytes that a file may still unpack, and the number of channels that a file may
-    still declare."""
+    """The limits that are left for a file: bytes to unpack, and channels and schemas to declare."""
 
     def __init__(self, size: int) -> None:
         self._unpacked = FIRST_UNPACKED + MOST_UNPACKED * size

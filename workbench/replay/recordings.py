@@ -22,8 +22,8 @@ SAME_S = 2.4
 """Time (s) between samples that differ only in numbers. A daemon counts as silent after 3 s, so this
 time is shorter."""
 STAMPED = 12
-"""Number of bytes before a DiagnosticArray's status. These bytes are CDR's head and the stamp (OMG
-DDSI-RTPS 10.2; Header)."""
+"""Number of bytes before a DiagnosticArray's status, which are CDR's head and the stamp (OMG DDSI-RTPS
+10.2; Header)."""
 MOST_TOLD = 512
 FIRST_OF_OTHERS = 300
 COORDINATOR = b"charger_coordinator"
@@ -122,8 +122,8 @@ class Sieve:
         return topic != topics.DIAGNOSTICS.name or self._is_news(sample, at)
 
     def _is_common(self, topic: str, sample: bytes) -> bool:
-        """Return whether the topic concerns all devices. One such topic is the heartbeat, because a
-        heartbeat that does not list a door means that nobody holds the door."""
+        """Return whether the topic concerns all devices. The heartbeat does, because a door that is
+        missing in the heartbeat is not held."""
         return topic == topics.DOOR_SUPERVISOR_HEARTBEAT.name or COORDINATOR in sample
 
     def _is_news(self, sample: bytes, at: float) -> bool:

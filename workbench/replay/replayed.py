@@ -36,7 +36,7 @@ from workbench.replay.typed import typed, types_of
 
 AnyDecision = Decision[Any, Any, Any]
 Parts = tuple[str, Tree, Tree]
-"""A part of a decision that differs. It has the part's name, its recorded value, and today's value."""
+"""A part of a decision that differs: the part's name, its recorded value, and today's value."""
 CONTEXT: Final = 6
 """Number of events that the report shows before a difference."""
 PARTS: Final = ("outputs", "news", "refused")

@@ -23,7 +23,7 @@ NEVER: Final = float("inf")
 
 
 class Party(ABC):
-    """A node on RMF's side. Some nodes have no timer."""
+    """A node on RMF's side. A node without a timer never ticks."""
 
     subscribes: Sequence[AnyTopic]
 

@@ -128,7 +128,7 @@ class FleetAdapter(Party):
             self._rest(robot, now)
 
     def strays(self, who: str, place: str, now: float) -> None:
-        """Drive the robot to a place that does not belong to its present task."""
+        """Drive the robot to a place outside its present task."""
         self._go(self.robots[who], place, now)
 
     def hear(self, message: d.Message, now: float) -> list[Said]:

@@ -20,8 +20,8 @@ REPEAT_S: Final = 1.0
 class RequestLift(Phase):
     """Wait for a LiftState with our floor, DOOR_OPEN and our session. RMF ignores modes.
 
-    After a destination is set, the phase's 1 s timer publishes nothing, because the context repeats the
-    request at each LiftState.
+    The phase has a 1 s timer, which publishes nothing after a destination is set. From then on, the
+    context repeats the request at each LiftState.
     """
 
     claims_lift = True
@@ -66,7 +66,7 @@ class EndLiftSession(Phase):
         return robot.release_lift()
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
-        """End the phase at the session's end (EndLiftSession.cpp, _init_obs)."""
+        """Take a message. End the phase when the session has ended (EndLiftSession.cpp, _init_obs)."""
         if isinstance(message, d.LiftState) and message.lift_name == self.lift:
             self.done = message.session_id != robot.requester_id
         return []
@@ -90,7 +90,7 @@ class DoorOpen(Phase):
         return self.tick(robot, now)
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
-        """Check the door and the heartbeat (DoorOpen.cpp, _update_status)."""
+        """Take a message. Check the door and the heartbeat (DoorOpen.cpp, _update_status)."""
         match message:
             case d.DoorState():
                 self._state = message
@@ -127,7 +127,7 @@ class DoorClose(Phase):
         return self.tick(robot, now)
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
-        """Check the heartbeat (DoorClose.cpp, _update_status)."""
+        """Take a message. Check the heartbeat (DoorClose.cpp, _update_status)."""
         if isinstance(message, d.SupervisorHeartbeat):
             self.done = not has_session(message, robot.requester_id, self.door)
         return []

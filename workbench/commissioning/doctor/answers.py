@@ -29,7 +29,8 @@ ANSWERS_S: Final = 0.5
 """Maximum time (s) for a device on MQTT to answer a question."""
 TOPICS_SHOWN: Final = 40
 UNITS_MOST: Final = {"modbus": 247, "can": 127}
-"""Highest unit or node number (Modbus over Serial Line V1.02, 2.2; CiA 301)."""
+"""Highest unit number on Modbus, and highest node number on CAN (Modbus over Serial Line V1.02, 2.2;
+CiA 301)."""
 SOME: Final = 16
 LOOK_AT: Final = {
     "modbus": 'supply and cable; docs/how-to/wire.md, "RS-485"',
@@ -69,14 +70,15 @@ def _opened(config: Config, bus_name: str) -> Bus:
 
 
 def unarmed(settings: msgspec.Struct) -> msgspec.Struct:
-    """Return a bus's settings without the modules' watchdogs, because a reading would arm them."""
+    """Return a bus's settings without the modules' watchdogs. With watchdogs, a reading would arm
+    them."""
     if getattr(settings, "module_watchdog", None) is None:
         return settings
     return msgspec.structs.replace(settings, module_watchdog=None)
 
 
 def readings(config: Config, bus_name: str, bus: Any, subject: str) -> Iterator[Finding]:
-    """Yield the answer of each device on this bus, decoded by its driver."""
+    """Yield the answer of each device on this bus, as the device's driver decodes the answer."""
     reads = {name: _reading(config, bus_name, name, bus) for name in config.devices_at(bus_name)}
     _listened(bus)
     for name, read in reads.items():
@@ -229,7 +231,7 @@ def _scanned(
 
 
 def numbers(config: Config, bus_name: str, what: str) -> Iterator[int]:
-    """Return the units or nodes that the file names on this bus."""
+    """Return the numbers of the units or nodes that the file names on this bus."""
     for name in config.devices_at(bus_name):
         settings, driver = config.devices[name], config.driver_type(name)
         claimed = [place for place, _ in driver.claims(settings)]

@@ -54,7 +54,7 @@ class _Timing(msgspec.Struct, frozen=True):
 
 
 class Controller(msgspec.Struct, frozen=True):
-    """State of a CAN controller, from `ip -details`."""
+    """State of a CAN controller, as `ip -details` prints it."""
 
     state: str = "?"
     bittiming: _Timing = _Timing()

@@ -29,7 +29,7 @@ class Chip:
 
     @property
     def number(self) -> int:
-        """Number N in gpiochipN."""
+        """The number N of gpiochipN."""
         return int(self.device.name.removeprefix("gpiochip"))
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from bridges.settings.building_map import BuildingMap
 
 XNERGY_BITRATE: Final = 250_000
-"""Default bitrate (bit/s) of the maker's receivers on CANopen (`drivers/charger/canopen.py`)."""
+"""Default bitrate (bit/s) of Xnergy's receivers on CANopen (`drivers/charger/canopen.py`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ def examined(
 
 
 def _file(config: Config, building: "BuildingMap | None") -> Iterator[Finding]:
-    """Examine `file`. The finding is a summary of the result of `check`."""
+    """Examine `file`. The finding summarises the output of `check`."""
     yield ok("file", f"{config.path} is a valid file of a {config.kind}")
     for problem in config.warnings:
         yield note("file", str(problem), "legal, and worth a look", "rmf-bridge check FILE")

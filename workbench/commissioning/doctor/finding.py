@@ -44,12 +44,12 @@ def unknown(subject: str, found: str, means: str = "", do: str = "") -> Finding:
 
 
 def warning(subject: str, found: str, means: str, do: str) -> Finding:
-    """Make a finding about something that works now, but may fail later."""
+    """Make a finding about a fact that does no harm now, but may do harm later."""
     return Finding(subject, "warning", found, means, do)
 
 
 def wrong(subject: str, found: str, means: str, do: str) -> Finding:
-    """Make a finding about something that cannot work."""
+    """Make a finding about a fact that prevents a working bridge."""
     return Finding(subject, "wrong", found, means, do)
 
 

@@ -72,8 +72,10 @@ def directories(machine: Machine, places: Directories, who: User) -> Iterator[Fi
 
 
 def disk(what: str, found: os.statvfs_result) -> Finding:
-    """Examine the free space of a disk. Warn below FREE_LEAST, but only below a twentieth of the disk,
-    so that a small disk in memory gives no warning."""
+    """Examine the free space of a disk. Warn if less than FREE_LEAST is free.
+
+    A disk may be small because it is in memory. Then the limit is a twentieth of the disk.
+    """
     means = "the device is served nevertheless, but status, log and the record of outputs get lost"
     if found.f_flag & os.ST_RDONLY:
         do = "an overlay or tmpfs for this directory; after errors of an SD card: replace it"

@@ -26,7 +26,7 @@ from workbench.commissioning.walk.core import WalkStep
 KILL_TEST: Final = "kill test"
 STARTS_S: Final = 15.0
 SEEN_S: Final = 1.0
-"""Time (s) for which a relay is on before the kill, long enough for a person to see."""
+"""Time (s) for which a relay is on before the kill. A person needs this time to see the relay."""
 OFF_WITHIN_S: Final = 15.0
 """Maximum time (s) until the output is off. `outputs-off` takes up to 5 s, and may run twice."""
 LOOK_S: Final = 0.02

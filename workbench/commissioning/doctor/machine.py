@@ -1,4 +1,4 @@
-"""The doctor's only access to this machine: files, output of commands, and answers of device files.
+"""The doctor's only access to this machine: files, commands' output, and device files' answers.
 
 In tests, `root` is the directory of a simulated machine. Scripts in `usr/bin` below `root` are the
 commands, and the test's `ioctl` answers for the device files.

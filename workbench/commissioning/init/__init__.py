@@ -1,5 +1,5 @@
-"""Draft a commented YAML for `rmf-bridge init`. All functions are pure. They take answers and return
-text.
+"""Draft a commented YAML for `rmf-bridge init`. All functions are pure: their input is answers, and
+their output is text.
 
 `points.py` gives each signal a pin or an address.
 """
@@ -188,7 +188,7 @@ def _charger(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
 
 
 def _said(struct: type, key: str) -> str:
-    """Return the comment for a key: the first clause of the key's description."""
+    """Return the YAML comment for a key. The comment is the first clause of the key's description."""
     return f"# {re.split('[;:.]', meaning(struct, key))[0]}"
 
 

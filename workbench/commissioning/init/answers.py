@@ -1,4 +1,4 @@
-"""The answers for a draft."""
+"""The user's answers, from which `init` drafts a YAML."""
 
 from collections.abc import Mapping
 from typing import Final, Literal
@@ -28,8 +28,8 @@ class DraftAnswers(msgspec.Struct, frozen=True, kw_only=True):
     - `address`: host, serial port or CAN interface; "" for the usual address.
     - `floors`: RMF's names of the floors, from the lowest floor up.
     - `signals`: a lift's inputs.
-    - `contacts`: the level of a closed contact on the header. The level is high if the contact is wired
-      to 3.3 V, and low if the contact is wired to ground.
+    - `contacts`: the level of a closed contact on the header. A wire to 3.3 V gives high, and a wire to
+      ground gives low.
     - `relays`: the level that switches relays on.
     - `places`: a gateway's answers, with the names in `gateway.py`.
     """

@@ -1,5 +1,4 @@
-"""Give each signal of a draft the next free pin of the header, or the next free address of the
-module."""
+"""Give each signal of a draft a free pin of the header, or a free address of the module."""
 
 from collections.abc import Iterator
 from itertools import count
@@ -9,8 +8,8 @@ from workbench.commissioning.init.answers import DraftAnswers, Impossible, Level
 
 REST_LOW: Final = (11, 13, 15, 16, 18, 22, 32, 33, 35, 36, 37, 38, 40, 12)
 REST_HIGH: Final = (7, 29, 31, 26, 24)
-"""Positions on J8 that the Pi pulls high from power-on until the daemon starts, and positions that the
-Pi pulls low.
+"""Positions on J8 with a level that the Pi sets from power-on until the daemon starts. The Pi pulls the
+positions of REST_HIGH high, and the positions of REST_LOW low.
 
 A relay belongs on a pin whose level keeps the relay off. Source: BCM2835 ARM Peripherals, table 6-31
 (BCM0 to 8 high).
@@ -33,7 +32,7 @@ class FreePoints(Protocol):
 
 
 class PinHeader:
-    """The Pi's 40-pin header. Its methods raise Impossible when no pin is left."""
+    """The Pi's 40-pin header. The methods raise Impossible if no pin is left."""
 
     def __init__(self, contacts: Level, relays: Level) -> None:
         self._closed, self._relays = contacts, relays
@@ -47,7 +46,7 @@ class PinHeader:
         return f'point: "J8:{self._input()}", active: {self._closed}, pull: {self._pull}'
 
     def loop(self) -> str:
-        """Take the next input pin. The signal is on while the contact is open."""
+        """Take the next input pin. The signal is on if the contact is open."""
         opened = "low" if self._closed == "high" else "high"
         return f'point: "J8:{self._input()}", active: {opened}, pull: {self._pull}'
 
@@ -81,7 +80,7 @@ class Module:
         return f'point: "unit {self._unit} discrete input {next(self._inputs)}", active: high'
 
     def loop(self) -> str:
-        """Take the next discrete input. The signal is on while the input reads 0."""
+        """Take the next discrete input. The signal is on if the input reads 0."""
         return f'point: "unit {self._unit} discrete input {next(self._inputs)}", active: low'
 
     def relay(self) -> str:

@@ -94,7 +94,7 @@ Event = InputsRead | InputsLost | Switch | ByEye | Tick
 
 
 def decide(memory: WalkMemory, event: Event, now: float, steps: Sequence[WalkStep]) -> WalkMemory:
-    """Return the memory after this event."""
+    """Return the memory after this event. The new memory tells which output is on."""
     match event:
         case InputsRead(sample):
             memory = replace(memory, sample=sample, read_at=now, why_lost="")
@@ -158,7 +158,7 @@ def _hindrance(memory: WalkMemory, now: float, step: WalkStep) -> str:
 
 
 def _feedback(memory: WalkMemory, now: float, steps: Sequence[WalkStep]) -> WalkMemory:
-    """Check the inputs for the feedback that a step waits for."""
+    """Look whether the inputs show the feedback for which a step waits."""
     if memory.waits is None:
         return memory
     step = steps[memory.waits]

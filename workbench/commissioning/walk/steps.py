@@ -142,7 +142,7 @@ OFF: Final = {
 
 
 def steps(config: Config, device: str) -> list[WalkStep]:
-    """Return every output of a device, in the order of testing."""
+    """Return a step for every output of a device, in the order of testing."""
     wires = config.wires(device)
     wired = {wire.signal for wire in wires if wire.direction == "out"} if wires else None
     return list(KINDS[config.kind](config.devices[device], wired))

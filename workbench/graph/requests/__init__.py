@@ -79,12 +79,12 @@ class RequestProgress(Struct, frozen=True):
         return sorted(name for one, name in self.there if one == kind)
 
     def sends(self, now: float) -> "RequestProgress":
-        """Record that the request is sent now."""
+        """Return the progress after the request is sent now."""
         first = now if self.first_sent_at is None else self.first_sent_at
         return replace(self, first_sent_at=first, last_sent_at=now)
 
     def states_of(self, kind: type[State]) -> list[State]:
-        """Return the states of this type that were heard, in order."""
+        """Return all states of this type that were heard, in order."""
         return [state for state in self.states if isinstance(state, kind)]
 
     def answer(self, kind: type[State]) -> State | None:

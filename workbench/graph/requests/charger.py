@@ -28,7 +28,7 @@ class _Charger(Request):
 
 @dataclass(frozen=True, slots=True)
 class RobotCharge(_Charger):
-    """Assign the charger to a robot, under a request id of our own."""
+    """A request that assigns the charger to a robot. The request has an id of our own."""
 
     fleet: str
     robot: str
@@ -85,7 +85,7 @@ def _error(state: d.ChargerState) -> Obstacle:
 
 @dataclass(frozen=True, slots=True)
 class ChargeCancel(_Charger):
-    """Cancel the request that the charger serves."""
+    """A cancel of the request that the charger serves."""
 
     request_id: str
 
@@ -111,7 +111,7 @@ class ChargeCancel(_Charger):
         return state.request_id == self.request_id and state.state not in released
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the obstacle: the charger still serves the request."""
+        """Return the obstacle that the charger still serves the request."""
         text = f"{self.name} still serves request {self.request_id}: see its daemon's log"
         return (Obstacle(True, text),)
 
@@ -121,7 +121,7 @@ COORDINATOR: Final = "charger coordinator"
 
 @dataclass(frozen=True, slots=True)
 class QueuedCharge(RobotCharge):
-    """Request a charger for this robot from the coordinator. `name` is the charger, or ANY for any
+    """A request to the coordinator for a charger. `name` is the wanted charger, or ANY for any
     charger."""
 
     own = topics.ADAPTER_CHARGER_REQUESTS
@@ -173,7 +173,7 @@ class QueuedCharge(RobotCharge):
 
 @dataclass(frozen=True, slots=True)
 class QueuedCancel(ChargeCancel):
-    """Withdraw a queued request. No state shows whether the request was in the queue."""
+    """A cancel of a queued request. No state shows whether the request was in the queue."""
 
     own = topics.ADAPTER_CHARGER_CANCELS
     listener = COORDINATOR

@@ -1,4 +1,4 @@
-"""The rules of the rollout. They are pure functions of files, texts and `rmf-bridge status --json`."""
+"""The rules of the rollout, as pure functions of files, texts and `rmf-bridge status --json`."""
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path, PurePath
@@ -42,8 +42,8 @@ def _yamls(folder: str) -> list[Path]:
 
 
 def rmf_untested(form: str, file: str) -> str:
-    """Return the reason why this form is no record of a good kill test of this YAML. Return "" if the
-    form is such a record.
+    """Return the reason why this form does not record a good kill test for this YAML. Return "" if the
+    form does.
 
     `form` is the text that `rmf-bridge doctor FILE --kill-test --form FORM` writes.
     """
