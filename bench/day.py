@@ -31,7 +31,7 @@ def measure(scratch: Path) -> Tables:
 
 
 class _Lift(LiftNode):
-    SCAN_S = 0.9  # more scans come at every wake_at, request and edge
+    SCAN_S = 0.9  # s; more scans come at every wake_at, request and edge
 
 
 class _Rider(Rider):

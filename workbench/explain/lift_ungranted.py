@@ -16,7 +16,7 @@ holder."""
 
 
 def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
-    """Explain why the free lift grants the requester no session."""
+    """Explain why the lift gives the requester no session, although the lift is free."""
     if lift.floors and claim.wants not in lift.floors:
         found.say(
             f"{lift.name} serves {', '.join(lift.floors[:12])}, not {claim.wants or 'an empty name'}:"

@@ -51,8 +51,8 @@ def on_graph(text: str, options: Sequence[str]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class TimePhrases:
-    """A converter of times to words, as seen from `now`. `zone` is the time zone, or None for this
-    machine's zone."""
+    """A writer of times in words, as seen from the time `now`. `zone` is the time zone, or None for
+    this machine's zone."""
 
     now: Moment
     zone: tzinfo | None

@@ -81,7 +81,7 @@ class Picture:
         self._steps()
         self._legend()
 
-    # ---- where parts are
+    # ---- positions of parts
 
     def _wall(self, at: float) -> float:
         return self._timeline.wall + at - self._timeline.from_s

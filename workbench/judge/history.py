@@ -185,7 +185,8 @@ class History(AnyHistory, Generic[T]):
 
     @abstractmethod
     def settle(self, state: T) -> None:
-        """Note the meaning of the new state. `before` and `state` already have their new values."""
+        """Update the memory of this kind of device with the new state. `before` and `state` already
+        have their new values."""
 
     @staticmethod
     @abstractmethod

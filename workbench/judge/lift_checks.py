@@ -81,7 +81,7 @@ def own_name(history: LiftHistory) -> Finding:
 
 
 def grants(history: LiftHistory) -> Finding:
-    """Check that a free lift in service grants the first request.
+    """Check that a free lift in service grants the first request for it.
 
     After a ride, the node may keep the lift for GRACE_S, because the robot may still be in the car.
     """

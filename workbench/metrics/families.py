@@ -43,7 +43,7 @@ MODES: Final[dict[str, type[IntEnum]]] = {
 
 
 def label(text: str) -> str:
-    """Return a name from the network as a label."""
+    """Return a name from the network as a printable label of at most LONGEST characters."""
     return words.printable(text[:LONGEST])[:LONGEST]
 
 

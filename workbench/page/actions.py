@@ -36,7 +36,7 @@ MOST_KEPT: Final = 100
 LONGEST_FILE: Final = 1_000_000
 RESET: Final = "The daemon clears each latched fault whose cause is gone."
 REPORTS: Final = re.compile(r"^rmf-bridge \S+: ", re.M)
-"""Pattern of the command's name, with which an error message begins."""
+"""Pattern of the beginning of an error message, which is the command's name."""
 PROGRESS: Final = re.compile(r"^[\d.]+ s  \S+ +\S.*?  ")
 """Pattern of the beginning of a line from `send`: the time, the step and the device."""
 

@@ -65,7 +65,7 @@ class Dispensing(Request):
 
 @dataclass(frozen=True, slots=True)
 class Ingesting(Dispensing):
-    """A request that an ingestor takes items. The rules of `Dispensing` apply."""
+    """A request to an ingestor to take items. The rules of `Dispensing` apply."""
 
     kind: ClassVar[str] = "ingestor"
     states: ClassVar[AnyTopic] = topics.INGESTOR_STATES
