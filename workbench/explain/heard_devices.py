@@ -287,8 +287,8 @@ def _before(device: Device, clock: TimePhrases) -> str:
             longest = ""
             if rides.longest_at is not None:
                 longest = (
-                    f"; the longest wait for the car was {lasted(rides.longest_s)}, by"
-                    f" {rides.longest_who}, and ended at {clock.time(rides.longest_at.wall)}"
+                    f"; the longest wait for the car was {lasted(rides.longest_s)}"
+                    f" ({rides.longest_who}, until {clock.time(rides.longest_at.wall)})"
                 )
             return f"{_count(rides.ended, 'ride')} ended in this time{longest}."
         case DoorFacts() if device.passages:
