@@ -1,1 +1,1 @@
-"""Benchmarks: the daemons' cost divided by a bare transport node's cost in the same run."""
+"""Benchmarks that compare the daemons' cost with the cost of a bare transport node in the same run."""

@@ -1,7 +1,8 @@
-"""`make bench`: latency and memory of the daemons compared with a bare transport node, in one run.
+"""`make bench`: compare the daemons' latency and memory with a bare transport node, in one run.
 
-Everything runs on loopback, on fake hardware, in processes of its own. The tables go to stdout, the
-figures to bench/results/bench.json. `python -m bench idle buses` runs only these two parts.
+Everything runs on loopback, on fake hardware, and in processes of its own. The tables go to stdout. The
+figures go to bench/results/bench.json. `python -m bench idle buses` runs only the parts `idle` and
+`buses`.
 """
 
 import json

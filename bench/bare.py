@@ -1,4 +1,4 @@
-"""The baseline: a transport node that only answers, in a separate process."""
+"""The baseline of the benchmarks. A bare transport node in a separate process only answers requests."""
 
 import signal
 import sys

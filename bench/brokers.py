@@ -1,7 +1,8 @@
-"""A door behind an MQTT broker and the same door on Modbus TCP: a command's time, and memory.
+"""Compare a door behind an MQTT broker with the same door on Modbus TCP. The measures are a command's
+time, and memory.
 
-The two daemons run side by side and get their requests in turn. The time begins at RMF's request and
-ends at the edge of the far side's relay. On MQTT the way leads through the broker, mosquitto.
+The two daemons run side by side and get their requests in turn. The time begins at RMF's request, and
+ends at the edge of the far side's relay. On MQTT, the message passes through the broker mosquitto.
 """
 
 import subprocess
@@ -55,7 +56,7 @@ def _door(
 
 
 def _held(requests: Publisher[DoorRequest], name: str, plant: Caller) -> float:
-    """Return the seconds from a request to the relay that holds the door. Release the door again."""
+    """Return the time (s) from a request to the relay that holds the door. Then release the door."""
     sent_at = time.monotonic()
     _request(requests, name, DoorModeValue.MODE_OPEN)
     took = plant.edge("hold_open", True) - sent_at

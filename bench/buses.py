@@ -1,5 +1,10 @@
-"""The limits of buses. One serial line has many doors; TCP has many doors with a dead one among them;
-some HTTP chargers are bad; a CAN bus is full. Each bus is compared with its theoretical least time."""
+"""The limits of four buses. Each bus is compared with the least time that is possible in theory.
+
+- One serial line has many doors.
+- TCP has many doors, and one of the doors is dead.
+- Some HTTP chargers are bad.
+- A CAN bus is full.
+"""
 
 import statistics
 import threading
@@ -42,7 +47,7 @@ def measure(scratch: Path) -> Tables:
     }
 
 
-# ---- a serial line: a whole poll cycle, compared with the least time on the wire
+# ---- serial line: a whole poll cycle, compared with the least time on the wire
 
 LINE: Final[Content] = {
     "type": "modbus",
@@ -58,15 +63,16 @@ CYCLES: Final = 60
 WARM_UP: Final = 3
 REQUEST: Final = 8
 REPLY: Final = 6
-"""REQUEST and REPLY count the characters of a request for bits and of its reply, with unit and CRC."""
+"""REQUEST and REPLY are numbers of characters, with unit and CRC. The request asks for bits, and the
+reply has the bits."""
 READINGS: Final = 2
-"""The number of readings of a door: its coil and its inputs."""
+"""The number of readings for one door: one of the coil, and one of the inputs."""
 
 
 def _serial(scratch: Path) -> Rows:
-    """Compare a poll cycle with the wire's least time.
+    """Compare a poll cycle with the least time on the wire.
 
-    The wire carries every character, and 3.5 characters of silence before each frame.
+    The least time has all characters on the wire, and 3.5 characters of silence before each frame.
     """
     daemon(doors(POLLED, LINE), scratch / "serial")  # writes the YAML
     config = load(scratch / "serial.yaml")
@@ -79,7 +85,7 @@ def _serial(scratch: Path) -> Rows:
 
 
 def _cycles(config: Config, scratch: Path) -> list[float]:
-    """Return the seconds of each poll of all doors."""
+    """Return the duration (s) of each poll of all doors."""
     simulation = Simulation(config, scratch)
     bus = cast(ModbusBus, simulation.open_bus("line"))
     drivers = [create(name, settings, bus) for name, settings in config.devices.items()]
@@ -107,7 +113,7 @@ States = dict[str, list[tuple[float, DoorState]]]
 
 
 def _many_doors(scratch: Path) -> Rows:
-    """Poll each door every 0.1 s. Each door's state comes each second."""
+    """Poll each door every 0.1 s. Each door's daemon publishes the state once a second."""
     with _doors(scratch, MANY):
         many = _ages(_door_states())
     with _doors(scratch, DEAD_OF) as plant:
@@ -129,7 +135,7 @@ def _doors(scratch: Path, many: int) -> Iterator[Caller]:
 
 
 def _door_states() -> States:
-    """Return (wall time of arrival, state) of the states heard in the measured time, by door."""
+    """Return door -> (wall time of arrival, state) of each state heard in the measured time."""
     seen: States = defaultdict(list)
     with graph() as transport:
         transport.subscribe(
@@ -151,7 +157,7 @@ def _ages(seen: States) -> Row:
     }
 
 
-# ---- HTTP chargers: the age of RMF's knowledge of the sound chargers, in poll periods
+# ---- HTTP chargers: the age (poll periods) of RMF's knowledge about the sound chargers
 
 SOUND, DEAD, TRICKLING = 35, 10, 5
 LOOK_S: Final = 0.02
@@ -169,10 +175,10 @@ class Known:
 
 
 def _bad_chargers(scratch: Path) -> Rows:
-    """Measure our daemon, and at the same time a naive loop on the same servers.
+    """Measure our daemon, and at the same time a naive loop, on the same servers.
 
-    The naive loop calls `requests.get` for each charger in turn, each second. Its timeout applies to
-    each read.
+    Each second, the naive loop calls `requests.get` for one charger after another. The timeout of
+    `requests.get` limits each single read.
     """
     rmf, plain, done = Known(), Known(), threading.Event()
     with http_chargers(SOUND, DEAD, TRICKLING) as ports, graph() as transport:
@@ -216,7 +222,7 @@ def _sequential(ports: Sequence[int], known: Known, done: threading.Event) -> No
 
 
 def _known_ages(chargers: Sequence[int], knowns: dict[str, Known]) -> Rows:
-    """Return the ages of the known readings of these chargers, in poll periods."""
+    """Return the ages of these chargers' known readings, in poll periods."""
     never = time.time() - SETTLE_S
     ages: dict[str, list[float]] = {name: [] for name in knowns}
     for _ in range(round(1.5 * WATCHED_S / LOOK_S)):
@@ -228,18 +234,18 @@ def _known_ages(chargers: Sequence[int], knowns: dict[str, Known]) -> Rows:
     return {name: {"p50 periods": cut[49], "p99 periods": cut[98]} for name, cut in cuts.items()}
 
 
-# ---- CAN: a bus of 250 kbit/s carries about 2,000 frames a second when it is full
+# ---- CAN: a full bus of 250 kbit/s carries about 2,000 frames a second
 
 RATE: Final = 2_000
 LASTS_S: Final = 10.0
 BATCH_S: Final = 0.005
 SCAN_S: Final = 0.2
 OURS: Final = (0x58A, 0x70A, 0x123, 0x321)
-"""Ids of every second frame. The other frames belong to other devices."""
+"""Ids of every second frame, which the reader wants. The other frames belong to other devices."""
 
 
 def _flooded(read: Callable[[str, threading.Event, list[int]], float]) -> Row:
-    """Send frames at a full bus's pace, and count the wanted frames at a reader."""
+    """Send frames at a full bus's pace. Count the wanted frames that a reader gets."""
     channel = f"bench-{read.__name__}"
     ended, heard, seconds = threading.Event(), [0], list[float]()
     reader = threading.Thread(target=lambda: seconds.append(read(channel, ended, heard)))
@@ -257,7 +263,7 @@ def _flooded(read: Callable[[str, threading.Event, list[int]], float]) -> Row:
 
 
 def _send(channel: str) -> tuple[int, float]:
-    """Send frames at a fixed pace. Return their number, and the seconds taken."""
+    """Send frames at a fixed pace. Return the number of frames, and the time (s) taken."""
     bus = can.Bus(channel, interface="virtual")
     begun_at = time.monotonic()
     sent = 0
@@ -274,7 +280,7 @@ def _send(channel: str) -> tuple[int, float]:
 
 
 def _bare_can(channel: str, ended: threading.Event, heard: list[int]) -> float:
-    """Return the CPU seconds of python-can alone."""
+    """Return the CPU time (s) of python-can alone."""
     bus = can.Bus(channel, interface="virtual")
     begun_s = time.thread_time()
     while not ended.wait(SCAN_S):
@@ -286,7 +292,7 @@ def _bare_can(channel: str, ended: threading.Event, heard: list[int]) -> float:
 
 
 def _our_can(channel: str, ended: threading.Event, heard: list[int]) -> float:
-    """Return the CPU seconds of our bus when a driver wants four ids."""
+    """Return the CPU time (s) of our bus, if a driver wants four ids."""
     settings = CanSettings(socketcan="can0", scan_s=SCAN_S)
     bus = CanBus(settings, vendor=lambda: can.Bus(channel, interface="virtual"))
 

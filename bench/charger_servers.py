@@ -16,7 +16,7 @@ from typing import Any, Final
 BODY: Final = b'{"state": 0, "error_msg": ""}'
 HEAD: Final = b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n"
 TRICKLE_S: Final = 0.25
-"""Seconds between two bytes, less than any timeout for one read."""
+"""Time (s) between two bytes, which is less than any timeout for a single read."""
 
 
 PERIOD_S: Final = 1.0
@@ -26,7 +26,7 @@ CODES: Final = {"idle": [0], "charging": [5], "error": [8]}
 
 @contextmanager
 def http_chargers(sound: int, dead: int = 0, trickling: int = 0) -> Iterator[list[int]]:
-    """Serve these numbers of chargers, and yield their ports."""
+    """Serve these numbers of chargers, and yield the ports."""
     counts = [str(count) for count in (sound, dead, trickling)]
     command = [sys.executable, "-m", "bench.charger_servers", *counts]
     far = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
@@ -66,7 +66,7 @@ async def _sound(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> 
 
 
 async def _dead(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """Accept the connection and send nothing."""
+    """Accept the connection, and send nothing."""
     with contextlib.suppress(OSError):
         while await reader.read(4096):
             pass
@@ -89,7 +89,7 @@ async def _serve(sound: int, dead: int, trickling: int) -> None:
     servers = [await asyncio.start_server(kind, "127.0.0.1", 0) for kind in kinds]
     print(json.dumps([server.sockets[0].getsockname()[1] for server in servers]), flush=True)
     await asyncio.get_running_loop().run_in_executor(None, sys.stdin.read)
-    os._exit(0)  # some connections would never close
+    os._exit(0)  # end at once, because some connections would never close
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Starts and stops the measured processes, talks to them, and measures their cost."""
+"""Start and stop the measured processes, talk to the processes, and measure their cost."""
 
 import os
 import signal
@@ -59,7 +59,7 @@ def running(command: list[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def shipped(name: str) -> Content:
-    """Return the content of an example of `config/`."""
+    """Return the content of an example file in `config/`."""
     content: Content = yaml.safe_load((ROOT / f"config/{name}.yaml").read_text())
     return content
 
@@ -67,7 +67,8 @@ def shipped(name: str) -> Content:
 def daemon(
     content: Content, directory: Path, transport: str = "dds", *, simulate: bool = True
 ) -> list[str]:
-    """Return a daemon's command. This transport and loopback replace those of the YAML."""
+    """Write the YAML, and return the command that starts its daemon. In the YAML, `transport` and
+    loopback replace the earlier settings."""
     file = directory.with_suffix(".yaml")
     rmf = {"transport": transport, "network": "localhost"}
     file.write_text(yaml.safe_dump({**content, "rmf": rmf}, sort_keys=False))
@@ -94,7 +95,8 @@ def wait_for_log(log: Path, word: str, deadline_s: float = 20.0) -> None:
 
 
 def cost(command: list[str], log: Path, watched_s: float = 10.0) -> Row:
-    """Return the cost of an idle process: memory, threads, CPU, and the time to be ready."""
+    """Return the cost of an idle process: memory, threads, CPU, and the time until the process is
+    ready."""
     started_at = time.monotonic()
     with ready(command, log) as child:
         ready_s = time.monotonic() - started_at
@@ -118,6 +120,6 @@ def memory_mb(pid: int) -> float:
 
 
 def cpu_s(pid: int) -> float:
-    """Return a process's user and system time (s)."""
+    """Return a process's user and system time together (s)."""
     fields = Path(f"/proc/{pid}/stat").read_text().rsplit(") ", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")

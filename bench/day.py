@@ -1,4 +1,5 @@
-"""The real time of a simulated day, in which two robots ride two lifts through our supervisor."""
+"""Measure the real time of a simulated day. In this day, two robots ride two lifts through our
+supervisor."""
 
 import time
 from pathlib import Path
@@ -13,7 +14,7 @@ DAY_S = 86400.0
 
 
 def measure(scratch: Path) -> Tables:
-    """Return the real seconds of the day, and the number of rides."""
+    """Return the day's duration in real time (s), and the number of rides."""
     began = time.perf_counter()
     world = World()
     for name in ("Lift1", "Lift2"):
@@ -30,7 +31,7 @@ def measure(scratch: Path) -> Tables:
 
 
 class _Lift(LiftNode):
-    SCAN_S = 0.9  # also at every wake_at, request and edge; in between nothing can change
+    SCAN_S = 0.9  # s; more scans come at every wake_at, request and edge
 
 
 class _Rider(Rider):

@@ -1,7 +1,7 @@
-"""The explanation of a busy lift's day: CPU (s) and memory in a process of its own.
+"""Measure the explanation of a busy lift's day: CPU time (s) and memory in a process of its own.
 
-The recording has 86,400 s and 4,000 rides of two robots, with states, requests, the supervisor's
-repeats and diagnostics at 1 Hz. The time to write the file does not count.
+The recording covers 86,400 s, with 4,000 rides of two robots. The recording has states, requests, the
+supervisor's repeats, and diagnostics at 1 Hz. The time for writing the file does not count.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Figures as tables: a title, named rows and named columns."""
+"""Figures as tables. A table has a title, named rows and named columns."""
 
 import statistics
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ def percentiles(values: Sequence[float]) -> tuple[float, float]:
 
 
 def compared(seconds: Sequence[float], bare: Sequence[float]) -> Row:
-    """Return milliseconds, and their ratio to the bare node's milliseconds."""
+    """Return times (ms), and the ratio to the bare node's times."""
     (p50, p99), (bare50, bare99) = percentiles(seconds), percentiles(bare)
     return {
         "p50 ms": p50 * 1e3,
@@ -26,7 +26,7 @@ def compared(seconds: Sequence[float], bare: Sequence[float]) -> Row:
 
 
 def each_more(rows: Rows, counts: Sequence[int]) -> Row:
-    """Return the cost of each further device, from the first and the last row."""
+    """Return the cost of each further device. The cost is computed from the first and the last row."""
     first, *_, last = rows.values()
     more = counts[-1] - counts[0]
     return {key: (last[key] - first[key]) / more for key in ("RSS MB", "CPU %")}

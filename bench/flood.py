@@ -1,7 +1,7 @@
-"""`make flood`: a lift's daemon under ten thousand requests a second for a minute.
+"""`make flood`: test a lift's daemon under ten thousand requests a second for a minute.
 
-Half of the requests are valid, and half name unknown floors. The daemon's memory must stay constant,
-its state must come once a second, and the last valid request must count.
+Half of the requests are valid. The other half name unknown floors. The daemon's memory must stay
+constant. The daemon must publish a state each second, and must obey the last valid request.
 """
 
 import sys
@@ -56,7 +56,7 @@ def measure(scratch: Path, seconds: float) -> dict[str, Any]:
 
 
 def _flood(requests: Publisher[LiftRequest], pid: int, seconds: float) -> tuple[list[float], int]:
-    """Send requests. Return the daemon's memory (MB) each 5 s, and the number sent."""
+    """Send requests. Return the daemon's memory (MB) each 5 s, and the number of requests sent."""
     sent, started_at = 0, time.monotonic()
     rss_mb: list[float] = []
     while (passed_s := time.monotonic() - started_at) < seconds:
@@ -83,7 +83,7 @@ def show(figures: dict[str, Any]) -> None:
 
 
 def main() -> int:
-    """Flood the daemon for the seconds of the command line, by default 60."""
+    """Flood the daemon. The command line gives the time (s), which is 60 by default."""
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else SECONDS
     with tempfile.TemporaryDirectory(prefix="rmf-flood-") as scratch:
         figures = measure(Path(scratch), seconds)

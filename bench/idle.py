@@ -1,4 +1,5 @@
-"""The cost of idle daemons compared with a bare transport node, and the cost of each further device."""
+"""Measure idle daemons' cost, and the cost of each further device. Compare the cost with a bare
+transport node."""
 
 from itertools import count
 from pathlib import Path
@@ -41,8 +42,8 @@ def _many(scratch: Path, name: str, contents: dict[int, Content]) -> Rows:
 
 
 def _http(scratch: Path) -> Rows:
-    """Measure HTTP chargers. Their servers run in a separate process, and so cost the daemon
-    nothing."""
+    """Measure HTTP chargers. Their servers run in a separate process, so the servers do not count to
+    the daemon's cost."""
     rows: Rows = {}
     for n in HTTP_CHARGERS:
         with http_chargers(n) as ports:
@@ -51,7 +52,7 @@ def _http(scratch: Path) -> Rows:
 
 
 def lifts(many: int) -> Content:
-    """Return a YAML with this number of the shipped lift, each on its own Modbus module."""
+    """Return a YAML with many copies of the shipped lift. Each lift has its own Modbus module."""
     content = shipped("lift_dry_contact")
     one = content["lifts"]["Lift1"]
     lifts = {f"Lift{unit}": _on_module(one, unit) for unit in range(1, many + 1)}
@@ -75,7 +76,7 @@ def _on_module(lift: Any, unit: int) -> Any:
 
 
 def doors(many: int, bus: Content = TCP) -> Content:
-    """Return a YAML of doors with two limit switches and a relay. Each door is a unit on one line."""
+    """Return a YAML of doors on one line. Each door is a unit with two limit switches and a relay."""
     return {
         "kind": "door",
         "driver": "dry_contact",

@@ -1,7 +1,8 @@
-"""Three times: request to relay, input to RMF, and hazard to all outputs off.
+"""Measure three times: from request to relay, from input to RMF, and from hazard to all outputs off.
 
-A bare round trip and a bare edge callback are the baseline. With ROS 2 installed a bare rclpy node is
-one more baseline. The same far end sends and measures for each path. It uses `dds`, which costs least.
+The baseline is a bare round trip and a bare edge callback. If ROS 2 is installed, a bare rclpy node is
+one more baseline. For each path, the same far end sends and measures. The far end uses `dds`, which
+costs least.
 """
 
 import queue
@@ -41,13 +42,14 @@ ROUNDS = 300
 HAZARDS = 100
 WARM_UP = 20
 PAUSE_S = 0.12
-"""Pause (s) between rounds. A daemon sends at most ten states a second, and idle CPUs sleep."""
+"""Pause (s) between rounds. A shorter pause would hide two facts. A daemon sends at most ten states a
+second, and idle CPUs sleep."""
 MINIMAL = [sys.executable, "-m", "bench.minimal_ros", str(DOMAIN)]
 Times = list[float]
 
 
 def measure(scratch: Path) -> Tables:
-    """Return the milliseconds of each path, p50 and p99."""
+    """Return p50 and p99 of each path (ms)."""
     latencies: Rows = {}
     for wire in reversed(WIRES):  # the hazard's figures are those of the last wire, dds
         round_trips = _bare_round_trips(scratch, wire)
@@ -86,7 +88,8 @@ def _with_ros(scratch: Path) -> Tables:
 
 
 class Graph:
-    """This process's end of the graph. It sends LiftRequests, and times the LiftStates received."""
+    """This process's end of the graph. `Graph` sends LiftRequests, and measures when LiftStates
+    arrive."""
 
     def __init__(self, transport: Transport) -> None:
         self._requests = transport.publisher(LIFT_REQUESTS)
@@ -97,7 +100,7 @@ class Graph:
         time.sleep(0.5)  # DDS may not have matched the other side yet
 
     def send(self, session: str, request_type: LiftRequestType, floor: str) -> float:
-        """Publish a request, and return the time (monotonic s)."""
+        """Publish a request. Return the time of publishing (monotonic s)."""
         at = time.monotonic()
         self._requests.publish(
             LiftRequest(
@@ -111,7 +114,8 @@ class Graph:
         return at
 
     def state(self, since: float, true: Callable[[LiftState], bool]) -> float:
-        """Return the arrival (monotonic s) of the first state after `since` that fulfils `true`."""
+        """Return the arrival time (monotonic s) of the first state after `since` that fulfils
+        `true`."""
         while True:
             at, state = self._states.get(timeout=10.0)
             if at > since and true(state):
@@ -156,7 +160,8 @@ def _contacts(part: Any) -> list[dict[str, Any]]:
 def daemon_paths(
     scratch: Path, transport: str, ours: Wire = "dds", *, keep: str = ""
 ) -> tuple[Times, Times, Times, float]:
-    """Return the seconds from request to relay, edge to RMF and hazard to all off, and the memory (MB).
+    """Return three lists of times (s), and the daemon's memory (MB). The times are from request to
+    relay, from edge to RMF, and from hazard to all outputs off.
 
     `ours` is the wire of this end. `keep` is the setting for recording, or "" for the default.
     """
@@ -200,7 +205,8 @@ def _to_outputs_off(far: Graph, plant: Caller, hand: Caller) -> float:
     hand.order("press Lift1 fire_alarm on")
     at = plant.edge("fire_alarm", True)
     took = plant.edge("agv_mode_request", False) - at
-    # End the session during the fire. If it survived the fire, it would switch its relay on again.
+    # End the session during the fire. Otherwise the session would switch its relay on again after the
+    # fire.
     ended_at = far.send("bench", LiftRequestType.REQUEST_END_SESSION, "")
     far.state(ended_at, lambda state: not state.session_id)
     hand.order("press Lift1 fire_alarm off")
@@ -210,7 +216,8 @@ def _to_outputs_off(far: Graph, plant: Caller, hand: Caller) -> float:
 
 
 def _bare_callbacks(scratch: Path) -> Times:
-    """Return the times from the contact to gpiozero's callback, in an otherwise idle process."""
+    """Return the times (s) from the contact to gpiozero's callback, in a process that is otherwise
+    idle."""
     daemon(_quick_lift(), scratch / "callbacks")  # writes the YAML
     settings = load(scratch / "callbacks.yaml").devices["Lift1"]
     assert isinstance(settings, DryContactLiftSettings)

@@ -1,8 +1,8 @@
-"""The baseline on ROS: an rclpy node that only sets a pin, in a separate process.
+"""The baseline on ROS. An rclpy node in a separate process only sets a pin.
 
-A LiftRequest switches the pin. `on` and `off` on stdin switch an input, and the node publishes each
-edge of the input as a LiftState. Each edge also gives a line on stdout: signal, level, time (monotonic
-s).
+A LiftRequest switches the pin. The words `on` and `off` on stdin switch an input. The node publishes
+each edge of the input as a LiftState. Each edge of the pin or input also gives a line on stdout with
+signal, level and time (monotonic s).
 """
 
 import os

@@ -1,13 +1,14 @@
-"""The page with 50 lifts, 200 doors and 50 chargers at 1 Hz, shown by three real browsers.
+"""Measure the page with 50 lifts, 200 doors and 50 chargers at 1 Hz. Three real browsers show the page.
 
-A lift's session holds the time of publishing. A script in each browser notes the time on screen. The
-row `a tenth changes` is like a busy site. In the row `all change` every card changes each second. Each
-device's daemon publishes its diagnostics too.
+A lift's session holds the time of publishing. A script in each browser notes the time at which the
+screen shows the session. The row `a tenth changes` is like a busy site. In the row `all change`, every
+card changes each second. Each device's daemon also publishes its diagnostics.
 
-The row `an hour` needs BENCH_PAGE_HOUR_S=N and runs for N seconds. Every half minute it notes the
-memory of the page. It also notes the memory of two browsers after a garbage collection; they show the
-site and a device. The first ten minutes do not count, because a device's page first fills with ten
-minutes of history. `first` and `last` are the least memory in ten minutes.
+The row `an hour` needs BENCH_PAGE_HOUR_S=N, and runs for N seconds. Every half minute, the benchmark
+notes the memory of the page and of two browsers, after a garbage collection in the browsers. One
+browser shows the site, and the other shows a device. The first ten minutes do not count, because a
+device's page first fills with ten minutes of history. `first` and `last` are the least memory in the
+first and in the last ten minutes.
 """
 
 import os
@@ -52,7 +53,7 @@ WATCH: Final = """() => { window.late = []; const seen = new Set();
 
 
 def measure(scratch: Path) -> Tables:
-    """Return the seconds from publishing to screen, the page's CPU and memory, and the browsers'
+    """Return the time from publishing to screen (s), the page's CPU and memory, and the browsers'
     heaps."""
     rows = {}
     for name, share in (("a tenth changes", 10), ("all change", 1)):
@@ -67,7 +68,7 @@ def measure(scratch: Path) -> Tables:
 
 @dataclass(frozen=True)
 class Seen:
-    """A page, its publisher, and the browsers that show it."""
+    """A page, its publisher, and the browsers that show the page."""
 
     pid: int
     site: "_Site"
@@ -106,7 +107,7 @@ def _tabs(playwright: Playwright, site: "_Site", address: str) -> list[Page]:
 
 
 class _Site:
-    """A publisher that sends every state once a second, spread over the second."""
+    """A publisher that sends every state once a second. The states are spread over the second."""
 
     def __init__(self, domain: int, share: int) -> None:
         self._share = share
@@ -156,7 +157,8 @@ class _Site:
         return d.ChargerState(stamp(time.time()), state, f"charger{number:02}")
 
     def live(self, seconds: float, tab: Page) -> None:
-        """Publish for this time (s). Events of `tab`, any one browser, are served in this time."""
+        """Publish for this time (s). Meanwhile, serve the events of `tab`, which is any one of the
+        browsers."""
         began, said = time.monotonic(), 0
         while (at := time.monotonic() - began) < seconds:
             while said < at * DEVICES:
@@ -170,7 +172,7 @@ class _Site:
 
 
 def _looked_at(seen: Seen) -> Row:
-    """Return the time from publishing to screen, and the cost."""
+    """Return the time from publishing to screen, and the page's cost."""
     loads: list[str] = []
     for tab in seen.tabs:
         tab.evaluate(WATCH)
@@ -191,7 +193,7 @@ def _looked_at(seen: Seen) -> Row:
 
 
 def _hour(seen: Seen) -> Rows:
-    """Return the memory kept, and its growth."""
+    """Return the memory in use, and the growth of this memory."""
     *_, site, device = seen.tabs
     device.goto(f"{device.url}lift/lift00")
     kept: list[tuple[float, float, float, float]] = []

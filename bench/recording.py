@@ -1,5 +1,5 @@
-"""The cost of a ring compared with a daemon without a ring, and the replay speed of a day's
-recording."""
+"""Measure the cost of a ring, and the replay speed of a day's recording. A daemon without a ring is the
+baseline."""
 
 import os
 import time
@@ -41,7 +41,8 @@ CONFIG = Path(__file__).parent.parent / "config/lift_dry_contact.yaml"
 
 
 def measure(scratch: Path) -> Tables:
-    """Measure a lift with and without a ring in turn, the lift's paths, and its day at 20 Hz."""
+    """Measure a lift with and without a ring in turn. Then measure the lift's paths, and the lift's day
+    at 20 Hz."""
     return {
         "a lift, left alone": _idle(scratch),
         "its paths, with a ring": _paths(scratch),
@@ -70,7 +71,8 @@ def _mean(rows: list[Row]) -> Row:
 
 
 def _paths(scratch: Path) -> Rows:
-    """Compare request to relay, input to RMF and hazard to off, with and without a ring."""
+    """Compare three paths with and without a ring: request to relay, input to RMF, and hazard to
+    outputs off."""
     with_ring = daemon_paths(scratch, "dds", keep="ring")
     without = daemon_paths(scratch, "dds", keep="nothing")
     names = ("LiftRequest to relay edge", "input edge to LiftState", "hazard to all outputs off")
@@ -104,7 +106,7 @@ def _day(scratch: Path) -> Row:
 
 
 class Day:
-    """One lift at 20 scans a second for a day, with its ring and a recorder, in virtual time."""
+    """A lift's day with 20 scans a second, in virtual time. The lift has its ring and a recorder."""
 
     def __init__(self, scratch: Path) -> None:
         self.now = 0.0
@@ -163,7 +165,7 @@ def _floor(now: float) -> str:
 
 
 def events(now: float) -> Iterator[object]:
-    """Yield the lift's readings and requests, with one ride every RIDE_S."""
+    """Yield the lift's readings and requests. One ride comes every RIDE_S (s)."""
     into, before = now % RIDE_S, _floor(now - RIDE_S)
     agv = 0.5 < into < 16.0
     if into < 2.0:

@@ -1,10 +1,12 @@
 #!/bin/sh
-# Builds the three Debian packages of one architecture and one Python: deb/build.sh ARCH PYTHON (`make deb`).
-# rmf-bridges has the daemons and the recorder, as one archive that its postinst unpacks; rmf-bridges-workbench adds the
-# workbench and the fakes; rmf-bridges-page adds the web page's libraries. The last two packages install into a
-# folder named after their version. Runs as an ordinary user, on any machine: wheels are fetched for the target, with the versions
-# and hashes of deb/lock/ (`make lock`). PyPI has no lgpio for Python 3.13: lgpio.sh builds it. Each package has its bill of
-# materials (sbom.py). `deb/reproducible.sh` shows that two builds are the same.
+# Builds the three Debian packages for one architecture and one Python: deb/build.sh ARCH PYTHON (`make deb`).
+# - rmf-bridges has the daemons and the recorder, as one archive that its postinst unpacks.
+# - rmf-bridges-workbench adds the workbench and the fakes.
+# - rmf-bridges-page adds the web page's libraries.
+# The last two packages install into a folder named after the version. The script runs as an ordinary user, on any machine,
+# because it fetches wheels for the target. The versions and hashes are in deb/lock/ (`make lock`). PyPI has no lgpio for
+# Python 3.13, so lgpio.sh builds lgpio. Each package has its bill of materials (sbom.py). `deb/reproducible.sh` shows that two
+# builds are the same.
 set -eu
 arch=$1 python=$2
 case $python in
@@ -21,12 +23,12 @@ site=$tree/lib/python$python/site-packages
 SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git -C "$here" log -1 --format=%ct 2>/dev/null || date +%s)}
 export SOURCE_DATE_EPOCH
 
-rm -rf "$work" "$here"/build/lib "$here"/build/bdist.* # otherwise a wheel keeps deleted modules
+rm -rf "$work" "$here"/build/lib "$here"/build/bdist.* # otherwise a wheel would keep deleted modules
 umask 022
 mkdir -p "$root/DEBIAN" "$bench/DEBIAN" "$page/DEBIAN" "$root/$lib/bin" "$root/usr/bin" "$tree/bin" "$work/wheel" "$wheels"
 
-# The workbench gets the libraries that the daemons lack; the page gets the libraries that daemons and workbench lack. Libraries of
-# Cyclone's own commands and colorzero's build tools are left out: they would double the byte code that an installation must make.
+# The workbench gets the libraries that the daemons lack. The page gets the libraries that daemons and workbench lack. Libraries of
+# Cyclone's own commands and colorzero's build tools are left out, because an installation would have to compile twice as much.
 built=
 [ "$python" != 3.13 ] || { "$here/deb/lgpio.sh" "$arch" "$wheels"; built="--built $wheels"; }
 "$bin/pip" wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation --wheel-dir "$work/wheel" "$here"
@@ -36,7 +38,7 @@ fill() {
   "$bin/python" "$here/deb/wheels.py" "$work"/wheel/*.whl --arch "$arch" --python "$python" \
     --lock "$here/deb/lock/runtime.txt" $built --without cyclonedds:rich-click --without colorzero:setuptools --target "$into" "$@"
 }
-# without PLACE OTHER: removes from PLACE every file that OTHER has too.
+# without PLACE OTHER: removes every file from PLACE that OTHER has too.
 without() { (cd "$2" && find . ! -type d -print0) | (cd "$1" && xargs -0 rm -f); }
 in_bench=$bench/usr/lib/rmf-bridges-workbench/$version in_page=$page/usr/lib/rmf-bridges-page/$version
 mkdir -p "$in_bench" "$in_page"
@@ -66,8 +68,8 @@ sbom rmf-bridges "$root" "$site"
 sbom rmf-bridges-workbench "$bench" "$in_bench" --with "$("$bin/pip" freeze | grep '^mkdocs-material==')"
 sbom rmf-bridges-page "$page" "$in_page"
 
-# A virtual environment that sees the system's packages (rclpy), on the system's own Python. postinst writes the first
-# line of its program, so that a daemon imports from its own tree, even if `current` later names another.
+# Make a virtual environment on the system's own Python. The environment sees the system's packages, such as rclpy. postinst
+# writes the first line of its program. Thus a daemon imports from its own tree, even if `current` later names another tree.
 ln -s "/usr/bin/python$python" "$tree/bin/python3"
 printf 'home = /usr/bin\ninclude-system-site-packages = true\nversion = %s\n' "$python" > "$tree/pyvenv.cfg"
 cat > "$tree/bin/rmf-bridge" <<'SCRIPT'
@@ -112,8 +114,8 @@ gzip -9nc "$here/build/rmf-bridge.1" > "$root/usr/share/man/man1/rmf-bridge.1.gz
 mkdir -p "$bench/usr/share/doc/rmf-bridges-workbench"
 cp -R "$here/build/site" "$bench/usr/share/doc/rmf-bridges-workbench/html" # `make docs`
 
-# package NAME ROOT DEPENDS SUMMARY [TREE]: builds a package with control files, changelog, copyright and lintian's
-# overrides; description on stdin. TREE: the tree that the package's postinst unpacks.
+# package NAME ROOT DEPENDS SUMMARY [TREE]: builds a package with control files, changelog, copyright and lintian's overrides.
+# The description comes on stdin. TREE is the tree that the package's postinst unpacks.
 package() {
   doc=$2/usr/share/doc/$1
   mkdir -p "$doc"
@@ -142,7 +144,7 @@ CONTROL
   dpkg-deb --root-owner-group -Zxz --build "$2" "$here/dist/$1_${version}_$arch.deb"
   ! command -v lintian > /dev/null || lintian --allow-root --fail-on error "$here/dist/$1_${version}_$arch.deb"
 }
-# Depend on this Python, not on `python3`, whose version changes with the release: an upgrade of Debian keeps us installed.
+# Depend on this exact Python. The version of `python3` changes with Debian's release, so an upgrade would remove our packages.
 libc='libc6 (>= 2.34)' # of the wheels' tags (wheels.py, lgpio.sh)
 package rmf-bridges "$root" "python$python, $libc, systemd (>= 252)" \
   "connect Open-RMF to lifts, doors and chargers" "$tree" <<'DESCRIPTION'

@@ -1,13 +1,13 @@
 #!/bin/sh
-# Builds lgpio's wheel for a Python without a wheel on PyPI: deb/lgpio.sh ARCH DIRECTORY.
-# Built from the sdist, with swig and the cross compiler zig from PyPI, as an ordinary user, on any machine. The
-# module uses only CPython's stable ABI, so this machine's Python.h serves every later Python too.
+# Builds lgpio's wheel for a Python that has no wheel on PyPI: deb/lgpio.sh ARCH DIRECTORY.
+# The script builds from the sdist, with swig and the cross compiler zig from PyPI. Any user can run the script, on any machine.
+# The module uses only CPython's stable ABI, so this machine's Python.h is right for every later Python too.
 set -eu
 arch=$1 wheels=$2
 case $arch in amd64) machine=x86_64 ;; arm64) machine=aarch64 ;; esac
 here=$(cd "$(dirname "$0")/.." && pwd)
 bin=$here/.venv/bin
-glibc=34 # as PyPI's own wheels; Debian 12 has 2.36
+glibc=34 # PyPI's own wheels have the same; Debian 12 has 2.36
 [ -z "$(find "$wheels" -name "lgpio-*_${machine}.whl" 2>/dev/null)" ] || exit 0
 
 headers=$("$bin/python" -c 'import sysconfig; print(sysconfig.get_path("include"))')

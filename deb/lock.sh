@@ -1,7 +1,7 @@
 #!/bin/sh
-# Renews the locks: deb/lock.sh (`make lock`). Each pins every library by version and by the SHA-256 of each file on PyPI.
-# deb/lock/runtime.txt has the libraries inside the packages, for every Python and architecture; deb/lock/tools.txt has the
-# programs that build the packages.
+# Renews the locks: deb/lock.sh (`make lock`). Each lock pins every library by its version, and by the SHA-256 of each of its
+# files on PyPI. deb/lock/runtime.txt has the libraries inside the packages, for every Python and architecture.
+# deb/lock/tools.txt has the programs that build the packages.
 set -eu
 cd "$(dirname "$0")/.."
 uv=.venv/bin/uv

@@ -1,6 +1,7 @@
 #!/bin/sh
-# Makes a release from its tag, in dist/: KEY=NAME deb/release.sh (`make release KEY=NAME`, a key of gpg).
-# The version is in bridges/__init__.py alone; tag, CHANGELOG.md and ros/package.xml must agree with it. Nothing is published.
+# Makes a release in dist/ from the release's tag: KEY=NAME deb/release.sh (`make release KEY=NAME`). NAME is a key of gpg.
+# Only bridges/__init__.py sets the version. Tag, CHANGELOG.md and ros/package.xml must have the same version. The script
+# publishes nothing.
 set -eu
 cd "$(dirname "$0")/.."
 bin=$PWD/.venv/bin
@@ -19,7 +20,7 @@ gpg --list-secret-keys "$KEY" > /dev/null 2>&1 || refuse "gpg has no secret key 
 SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
 export SOURCE_DATE_EPOCH
 rm -rf dist build/sdist && mkdir dist
-# tarball FILE FOLDER NAME: packs FOLDER/NAME so that the same content gives the same bytes.
+# tarball FILE FOLDER NAME: packs FOLDER/NAME into FILE. The same content always gives the same bytes.
 tarball() { tar -C "$2" --sort=name --owner=0 --group=0 --numeric-owner --mtime="@$SOURCE_DATE_EPOCH" -cf - "$3" | gzip -9n > "$1"; }
 make --no-print-directory deb
 "$bin/python" -m build --no-isolation --sdist --wheel --outdir build/sdist . > build/sdist.log
@@ -30,7 +31,7 @@ cp -R build/site "build/sdist/rmf-bridges-$version-documentation"
 tarball "dist/rmf-bridges-$version-documentation.tar.gz" build/sdist "rmf-bridges-$version-documentation"
 printf '%s\n' "$notes" > dist/NOTES.md
 
-# Each of both must serve a simulated lift in an empty environment, far from the checkout.
+# The source archive and the wheel must each serve a simulated lift in an empty environment, outside the checkout.
 for file in "$PWD/dist/rmf_bridges-$version.tar.gz" "$PWD/dist/rmf_bridges-$version-py3-none-any.whl"; do
   empty=$(mktemp -d)
   trap 'rm -rf "$empty"' EXIT

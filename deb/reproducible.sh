@@ -1,6 +1,6 @@
 #!/bin/sh
-# Builds the packages twice and compares them: deb/reproducible.sh (`make reproducible`). The second build has another time zone,
-# language, umask and time of the files, and builds lgpio anew. The packages of the first build stay in dist/.
+# Builds the packages twice, and compares the two builds: deb/reproducible.sh (`make reproducible`). The second build has
+# another time zone, language, umask and file time, and builds lgpio again. The packages of the first build stay in dist/.
 set -eu
 cd "$(dirname "$0")/.."
 build() { for arch in ${ARCHS:-amd64 arm64}; do for python in ${PYTHONS:-3.11 3.12 3.13}; do deb/build.sh "$arch" "$python" > /dev/null; done; done; }

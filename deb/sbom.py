@@ -1,7 +1,7 @@
 """Writes a package's bill of materials (CycloneDX JSON): python deb/sbom.py --help.
 
-Its components are the distributions in the package's folders. A library whose wheel has no licence text
-gets the text from deb/licences/; if there is none either, the build ends.
+The components are the distributions in the package's folders. If a library's wheel has no licence text,
+deb/licences/ gives the text. If deb/licences/ has none either, the build ends.
 """
 
 import argparse
@@ -34,7 +34,7 @@ def main() -> int:
     libraries = [one for one in found if canonicalize_name(one.name) != OURS]
     unlicensed = [one.name for one in libraries if not _has_text(one)]
     if unlicensed:
-        print(f"no licence text: {', '.join(unlicensed)} (deb/licences/)", file=sys.stderr)
+        print(f"no licence text in deb/licences/ for {', '.join(unlicensed)}", file=sys.stderr)
         return 1
     args.out.write_text(_bom(args, libraries) + "\n")
     return 0
@@ -53,7 +53,8 @@ def _arguments() -> argparse.Namespace:
 
 
 def _has_text(library: Distribution) -> bool:
-    """Is the licence's text beside the library, if need be now copied from deb/licences/?"""
+    """Return whether the licence's text is beside the library. If the text is missing, first copy it
+    from deb/licences/."""
     metadata = next(file for file in library.files or () if file.name == "METADATA")
     about = Path(str(library.locate_file(metadata))).parent
     if any(text.is_file() for pattern in TEXTS for text in about.glob(pattern)):
@@ -93,7 +94,8 @@ def _part(name: str, version: str) -> Component:
 
 
 def _licences(library: Distribution) -> Iterator[License]:
-    """Yield the licences that the metadata names: an expression, else the field, else classifiers."""
+    """Yield the licences that the metadata names. The expression comes first, then the field, then the
+    classifiers."""
     about, factory = library.metadata, LicenseFactory()
     said = about.get("License-Expression") or about.get("License", "").partition("\n")[0]
     classes = about.get_all("Classifier", [])

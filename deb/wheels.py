@@ -1,8 +1,9 @@
 """Installs a wheel and its requirements for another machine: python deb/wheels.py --help.
 
-pip can fetch wheels of another platform, but judges conditions (`; platform_machine == ...`) by the
-machine that it runs on. So each round of this script finds the requirements still missing for the
-target machine, and fetches them with pip: the version in the lock, if its SHA-256 is in the lock.
+pip can fetch wheels of another platform, but pip judges conditions (`; platform_machine == ...`) by the
+machine on which pip runs. Therefore this script works in rounds. Each round finds the requirements that
+the target machine still lacks, and fetches these requirements with pip. The version comes from the
+lock. The file's SHA-256 must be in the lock.
 """
 
 import argparse
@@ -21,14 +22,16 @@ from packaging.utils import canonicalize_name
 
 MACHINES = {"amd64": "x86_64", "arm64": "aarch64"}
 GLIBC = (34, 31, 28, 27, 24, 17)
-"""Minor versions in manylinux tags: Debian 12 has 2.36. A tag means that version or a newer version."""
+"""Minor versions of glibc in manylinux tags. Debian 12 has 2.36. A wheel runs with the tag's version or
+with a newer version."""
 
 Without = Collection[tuple[str, ...]]
-"""Pairs of a distribution and a requirement that it declares but does not need."""
+"""Pairs of a distribution and a requirement. The distribution declares this requirement, but does not
+need it."""
 
 
 def main() -> int:
-    """Fetch until nothing is missing. Return 1 if the result does not meet a requirement."""
+    """Fetch until no requirement is missing. Return 1 if the result does not meet a requirement."""
     args = _arguments()
     machine = {
         **default_environment(),
@@ -63,7 +66,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--lock",
         type=Path,
-        help="versions and hashes (`make lock`); without it, the newest fitting",
+        help="versions and hashes (`make lock`); without a lock, the newest version that fits",
     )
     parser.add_argument("--built", type=Path, help="a directory of wheels that were built here")
     parser.add_argument("--arch", choices=MACHINES, required=True)
@@ -80,7 +83,7 @@ def _arguments() -> argparse.Namespace:
 
 
 def _locked(text: str, machine: dict[str, str]) -> dict[str, str]:
-    """Return name -> its lines in the lock, for the target machine."""
+    """Return name -> the lines of this name in the lock, for the target machine."""
     found = {}
     for entry in re.split(r"\n(?=\S)", text):
         if entry and not entry.startswith("#"):
@@ -94,7 +97,7 @@ def _locked(text: str, machine: dict[str, str]) -> dict[str, str]:
 
 
 def _built(name: str, args: argparse.Namespace) -> list[Path]:
-    """Return the wheel of this distribution that was built here for the target."""
+    """Return the wheel of this distribution that was built on this machine for the target."""
     wheels = [] if args.built is None else sorted(args.built.glob("*.whl"))
     return [
         wheel
@@ -105,9 +108,10 @@ def _built(name: str, args: argparse.Namespace) -> list[Path]:
 
 
 def _fetch(what: Iterable[str], args: argparse.Namespace, listed: bool = False) -> None:
-    """Install these without their requirements. `listed`: lines of a requirements file, and not files.
+    """Install these distributions without their requirements. With `listed`, `what` has lines of a
+    requirements file instead of wheel files.
 
-    If one line has a hash, pip demands a hash of all.
+    If one line has a hash, pip demands a hash of every line.
     """
     if not (what := list(what)):
         return
@@ -118,7 +122,7 @@ def _fetch(what: Iterable[str], args: argparse.Namespace, listed: bool = False) 
     options += [f"cp{args.python.replace('.', '')}", "--abi", "abi3", "--abi", "none"]
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
     with tempfile.TemporaryDirectory() as closed:  # pip leaves out a package that is partly there
-        fresh = f"{closed}/fresh"  # open to all users, as a daemon's user must read the copy
+        fresh = f"{closed}/fresh"  # open to all users, because a daemon's user must read the copy
         place = ["--no-deps", "--no-compile", "--only-binary", ":all:", "--target", fresh]
         if listed:
             (lines := Path(closed, "lock.txt")).write_text("".join(what))
@@ -130,7 +134,7 @@ def _fetch(what: Iterable[str], args: argparse.Namespace, listed: bool = False) 
 def _needed(
     target: Path, machine: dict[str, str], extras: dict[str, tuple[str, ...]], without: Without
 ) -> Iterator[Requirement]:
-    """Yield what the distributions in the target require on the target's machine."""
+    """Yield the requirements of the distributions in the target, on the target's machine."""
     for found in distributions(path=[str(target)]):
         asked = extras.get(canonicalize_name(found.name), ())
         for text in found.requires or ():
@@ -153,7 +157,7 @@ def _there(target: Path) -> dict[str, Distribution]:
 def _missing(
     target: Path, machine: dict[str, str], extras: dict[str, tuple[str, ...]], without: Without
 ) -> Iterator[tuple[str, str]]:
-    """Yield the name and the version of each missing requirement."""
+    """Yield each missing requirement as its name and version."""
     there = _there(target)
     for need in _needed(target, machine, extras, without):
         if (name := canonicalize_name(need.name)) not in there:
@@ -163,7 +167,8 @@ def _missing(
 def _wrong(
     target: Path, machine: dict[str, str], extras: dict[str, tuple[str, ...]], without: Without
 ) -> Iterator[str]:
-    """Yield requirements unmet by the installed version: two packages want different versions."""
+    """Yield requirements that the installed version does not meet. Then two packages want different
+    versions."""
     there = _there(target)
     for need in _needed(target, machine, extras, without):
         version = there[canonicalize_name(need.name)].version

@@ -1,8 +1,8 @@
 #!/bin/sh
-# apt-repository.sh DEBS OUT KEY: make a signed apt repository in OUT of the packages in the folder DEBS.
+# apt-repository.sh DEBS OUT KEY: make a signed apt repository in the folder OUT from the packages in the folder DEBS.
 #
-# KEY is the id or fingerprint of a secret key in gpg's keyring (GNUPGHOME). OUT can be served by any web server, or be
-# a file system. The machines need OUT/rmf-bridges.gpg and OUT/rmf-bridges.sources (docs/how-to/roll-out.md).
+# KEY is the id or fingerprint of a secret key in gpg's keyring (GNUPGHOME). Any web server can serve OUT, or machines read OUT
+# as a folder. The machines need OUT/rmf-bridges.gpg and OUT/rmf-bridges.sources (docs/how-to/roll-out.md).
 set -eu
 [ $# = 3 ] || { sed -n '2,5s/^# \{0,1\}//p' "$0" >&2; exit 64; }
 debs=$1 out=$2 key=$3
@@ -15,7 +15,7 @@ gpg --batch --list-secret-keys "$key" > /dev/null 2>&1 || { echo "no secret key 
 new=$(mktemp -d "$out.XXXXXX")
 trap 'rm -rf "$new"' EXIT
 chmod 755 "$new"
-# Each release of Debian and Ubuntu has packages of its own, named after it (1.0.0+deb13): a suite for each.
+# Each release of Debian and Ubuntu has its own packages and its own suite. A version such as 1.0.0+deb13 names the release.
 for deb in "$debs"/*.deb; do
   version=$(dpkg-deb -f "$deb" Version)
   suite=${version##*+}
@@ -46,7 +46,7 @@ Components: main
 Signed-By: /etc/apt/keyrings/rmf-bridges.gpg
 SOURCES
 cd - > /dev/null
-# The old repository stays whole until the new one is complete.
+# The old repository stays whole until the new repository is complete.
 [ ! -e "$out" ] || mv "$out" "$new.old"
 mv "$new" "$out"
 rm -rf "$new.old"

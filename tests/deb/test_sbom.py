@@ -62,7 +62,7 @@ def test_a_library_without_its_licence_ends_the_build(
     library(tmp_path / "site", "silent", "License-Expression: MIT")
     with pytest.raises(subprocess.CalledProcessError):
         written(tmp_path / "site")
-    assert capfd.readouterr().err == "no licence text: silent (deb/licences/)\n"
+    assert capfd.readouterr().err == "no licence text in deb/licences/ for silent\n"
 
 
 @pytest.mark.parametrize(

@@ -1,1 +1,2 @@
-"""Subcommands of `rmf-bridge` that run apart from a daemon. Each has a file here."""
+"""Subcommands of `rmf-bridge` that run apart from a daemon. This folder has one file for each
+subcommand."""

@@ -1,8 +1,8 @@
 """`rmf-bridge doctor FILE`: find and explain the obstacles to a working bridge on this machine.
 
-Run `doctor` on the target machine, before and after installing. The doctor only reads; only
-`--kill-test` switches an output, and one output alone. The doctor opens no bus that a running service
-uses. `commissioning/doctor/` has the examinations, one file for each subject.
+Run `doctor` on the target machine, before and after installing. Without `--kill-test`, the doctor only
+reads. With `--kill-test`, the doctor switches one output. The doctor never opens a bus that a running
+service uses. `commissioning/doctor/` has the examinations, with one file for each subject.
 """
 
 import argparse
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=seconds(0, 60),
         default=LISTEN_S,
         metavar="SECONDS",
-        help="how long to hear RMF's graph (default 3; 0: do not join it)",
+        help="time (s) to hear RMF's graph (default 3; with 0, doctor does not join the graph)",
     )
     parser.add_argument(
         "--localhost", action="store_true", help="join the graph on the loopback interface only"
@@ -81,14 +81,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     completed_by(device, device_names)
     kill.add_argument("--output", metavar="NAME", help="the output, by its name in walk")
-    kill.add_argument("--yes", action="store_true", help="do not ask again")
+    kill.add_argument("--yes", action="store_true", help="do not ask for confirmation")
     parser.add_argument("--runtime-dir", metavar="DIR", help="the daemon's runtime directory")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0: all well, 1: warnings or unknown facts, 2: something is wrong, 64: not confirmed, 78:
-    wrong YAML."""
-    log.start("CRITICAL")  # the findings already say what the buses would log
+    """Return the exit code.
+
+    - 0: all is well.
+    - 1: there are warnings or unknown facts.
+    - 2: something is wrong.
+    - 64: nobody confirmed the kill test.
+    - 78: the YAML has an error.
+    """
+    log.start("CRITICAL")  # the findings report the same errors
     try:
         config = load(args.file)
         config = replace(config, rmf=overridden(config.rmf, args))
@@ -134,7 +140,7 @@ def _building(file: str | None) -> "BuildingMap | None":
 
 
 def _not_confirmed(config: Config, args: argparse.Namespace) -> str:
-    """Return why the kill test may not switch the output on; "" if the person confirmed."""
+    """Return the reason to refuse the kill test. Return "" if the person confirmed the kill test."""
     from workbench.commissioning.doctor.victim import step_called
 
     try:
@@ -175,18 +181,18 @@ def _examined(
 
 
 def _nothing(one: Finding) -> None:
-    """Print nothing now, because JSON follows at the end."""
+    """Print nothing for this finding, because `run` prints all findings as JSON at the end."""
 
 
 class FindingsText:
-    """Print findings when they come, under a heading for each subject."""
+    """A printer of findings. A heading comes before the findings of each subject."""
 
     def __init__(self, out: TextIO) -> None:
         self._out = out
         self._subject = ""
 
     def show(self, one: Finding) -> None:
-        """Print a finding's line, and its meaning and remedy below."""
+        """Print the finding's line. Below the line, print the finding's meaning and remedy."""
         if one.subject != self._subject:
             self._subject = one.subject
             print(bold(printable(one.subject), self._out), file=self._out)

@@ -1,7 +1,6 @@
-"""`rmf-bridge explain`: say why a robot waits for a lift, a door or a charger, in one screen of
-sentences.
+"""`rmf-bridge explain`: say on one screen why a robot waits for a lift, a door or a charger.
 
-The messages come from a recording, or live from the graph. `workbench/explain/` makes the sentences.
+The messages come from a recording or from the live graph. `workbench/explain/` makes the sentences.
 """
 
 import argparse
@@ -57,23 +56,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=seconds(0.1, 86400),
         default=LISTENS_S,
         metavar="SECONDS",
-        help=f"with --live: how long to listen (default {LISTENS_S:.0f})",
+        help=f"with --live: time (s) to listen (default {LISTENS_S:.0f})",
     )
     parser.add_argument(
         "--follow",
         action="store_true",
-        help="with --live: keep listening, and print each change; Ctrl-C ends",
+        help="with --live: print each change until Ctrl-C",
     )
-    parser.add_argument("--kind", choices=KINDS, help="where a lift and a door have the same name")
-    parser.add_argument("--session", default="", metavar="ID", help="the session in question")
+    parser.add_argument(
+        "--kind", choices=KINDS, help="the kind, if a lift and a door have the same name"
+    )
+    parser.add_argument("--session", default="", metavar="ID", help="the session to explain")
     parser.add_argument("--json", action="store_true", help="the explanation as JSON")
     add_span_arguments(parser)
     add_graph_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0; 1 if the device or RMF was not heard, or the graph cannot be joined; 66 if FILE is no
-    readable recording."""
+    """Return the exit code.
+
+    - 0: the explanation was printed.
+    - 1: no message of the device or of RMF was heard, or the program could not join the graph.
+    - 66: FILE is no readable recording.
+    """
     if (args.file is None) == (args.live is None):
         complain("explain", "name either a FILE or --live DEVICE")
         return 2
@@ -88,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
 
 
-# ---- from a recording
+# ---- explain a recording
 
 
 def _recorded(args: argparse.Namespace) -> int:
@@ -122,7 +127,7 @@ def _all(site: HeardDevices, devices: list[tuple[Kind, str]], *, as_json: bool) 
 
 
 def _one(site: HeardDevices, args: argparse.Namespace) -> int:
-    """Print the explanation of the named device, or of the only device."""
+    """Print the explanation of the named device. Without a name, explain the only device."""
     name = args.device or args.live or site.devices()[0][1]
     kinds = [args.kind] if args.kind else site.kinds(name) or ["lift"]
     if len(kinds) > 1:
@@ -144,7 +149,7 @@ def _tell(found: Explanation, *, as_json: bool) -> None:
     sys.stdout.flush()
 
 
-# ---- from the live graph
+# ---- explain the live graph
 
 
 def _live(args: argparse.Namespace) -> int:
@@ -159,7 +164,7 @@ def _live(args: argparse.Namespace) -> int:
 
 
 def _listen(ear: Ear, past: Ear, site: HeardDevices, for_s: float) -> None:
-    """Listen for `for_s` seconds. `past` also hears the requests that fleet adapters sent before."""
+    """Listen for `for_s` (s). `past` hears also the requests that fleet adapters sent before."""
     until = time.monotonic() + for_s
     site.pass_time(time.monotonic(), time.time())
     while (left_s := until - time.monotonic()) > 0:
@@ -172,7 +177,7 @@ def _listen(ear: Ear, past: Ear, site: HeardDevices, for_s: float) -> None:
 
 
 def _follow(ear: Ear, past: Ear, site: HeardDevices, args: argparse.Namespace) -> None:
-    """Print each changed explanation, until Ctrl-C."""
+    """Print an explanation each time it changes, until Ctrl-C."""
     told: object = None
     _listen(ear, past, site, args.for_s)
     while True:

@@ -1,8 +1,9 @@
-"""`rmf-bridge exporter`: publish metrics of RMF's graph and of this machine's daemons for Prometheus.
+"""`rmf-bridge exporter`: publish metrics for Prometheus about RMF's graph and this machine's daemons.
 
-The exporter only listens. It needs the extra `metrics` (prometheus_client), which no daemon imports. On
-an address other than 127.0.0.1, everybody on that network can read the names, states and faults of the
-site's devices. A reverse proxy with TLS and a login prevents this.
+The exporter only listens. The exporter needs prometheus_client, from the extra `metrics`. No daemon
+imports prometheus_client. On 127.0.0.1, only this machine can read the metrics. On another address,
+everybody on that network can read the names, states and faults of the site's devices. A reverse proxy
+with TLS and a login prevents this reading.
 """
 
 import argparse
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 
 PORT: Final = 9763
 RECORDER: Final = Path("/var/lib/rmf-bridge-recorder")
-"""Folder of recordings that `rmf-bridge-recorder.service` writes."""
+"""Folder in which `rmf-bridge-recorder.service` writes recordings."""
 LISTEN_S: Final = 0.5
 
 
@@ -47,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=address_and_port,
         default=("127.0.0.1", PORT),
         metavar="ADDRESS:PORT",
-        help=f"default: 127.0.0.1:{PORT}; with port 0 a free port",
+        help=f"default: 127.0.0.1:{PORT}; with port 0, any free port",
     )
     parser.add_argument(
         "--no-graph",
@@ -61,8 +62,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 after Ctrl-C or SIGTERM; 1 if the graph cannot be joined; 69 after printing the
-    remedy."""
+    """Return the exit code.
+
+    - 0: Ctrl-C or SIGTERM ended the exporter.
+    - 1: the exporter could not join the graph.
+    - 69: the exporter could not start, and has printed the remedy.
+    """
     log.start()
     try:
         from prometheus_client import CollectorRegistry, ProcessCollector, start_http_server
@@ -105,7 +110,8 @@ def _serve(args: argparse.Namespace, site: "Site") -> None:
 
 
 class Site:
-    """A collector for prometheus_client: the graph's devices, and this machine's daemons."""
+    """A collector for prometheus_client. The collector reads the graph's devices and this machine's
+    daemons."""
 
     def __init__(self, runtime_dirs: Path | None = None) -> None:
         self._runtime_dirs = runtime_dirs
@@ -114,7 +120,7 @@ class Site:
         self._listens = False
 
     def listen(self, ear: Ear) -> None:
-        """Take the messages of the next half second."""
+        """Listen for half a second, and take the messages heard."""
         for heard in ear.listen(LISTEN_S):
             with self._lock:
                 self._tally.take(self._graph, self._graph.hear(heard))
@@ -122,7 +128,7 @@ class Site:
             self._listens = True
 
     def collect(self) -> "Iterator[Metric]":
-        """Yield every metric family. The server's threads call this method for each scrape."""
+        """Yield every metric family. At each scrape, a thread of the HTTP server calls this method."""
         from workbench.metrics import families, machine
 
         now = Moment(time.monotonic(), time.time())

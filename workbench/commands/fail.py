@@ -22,7 +22,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0; 1 if the part cannot fail in this way; 69 if no simulation of the file runs."""
+    """Return the exit code.
+
+    - 0: the part now fails.
+    - 1: the part cannot fail in this way.
+    - 69: no simulation of the file runs.
+    """
     if args.part is None:
         return tell(args, "fail")
     if args.mode is None:

@@ -1,6 +1,6 @@
 """`rmf-bridge init FILE`: write a first YAML for the device in front of you.
 
-The command asks for the answers, or takes them from options. The new file passes `check`. The command
+The command takes answers from options, and asks for the rest. The new file passes `check`. The command
 never overwrites a file.
 """
 
@@ -34,14 +34,15 @@ from workbench.commissioning.init.answers import (
 EX_USAGE, EX_NOINPUT, EX_CANTCREAT, EX_INTERRUPTED = 64, 66, 73, 130
 TABLE: Final = (*gateway.PLACES, *gateway.NUMBERS)
 Given = dict[str, Any]
-"""Answers so far. Each key is the answer's name in DraftAnswers."""
+"""Answers that are already known. The keys are names of DraftAnswers' fields."""
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
     """A question: its name in DraftAnswers, its text and its condition.
 
-    `offered` is the default answer. `choices` are the possible answers; () allows any text.
+    `offered` is the default answer. `choices` lists the possible answers; with (), any text is
+    possible.
     """
 
     name: str
@@ -61,7 +62,7 @@ def _is_lift_on_contacts(given: Given) -> bool:
 
 
 def _in_table(name: str, given: Given) -> bool:
-    """Does the draft need this part of the register table?"""
+    """Return whether the draft needs this part of the register table."""
     if given["wiring"] != "gateway":
         return False
     if name == "motion_numbers":
@@ -155,10 +156,10 @@ QUESTIONS: Final = (
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the file, and an option for each question."""
+    """Add the argument for the file, and an option for each question."""
     parser.add_argument("file", type=Path, metavar="FILE", help="the YAML to write")
     parser.add_argument("--kind", choices=get_args(Kind))
-    parser.add_argument("--name", help="as on RMF's map")
+    parser.add_argument("--name", help="the device's name, as on RMF's map")
     parser.add_argument(
         "--wiring",
         choices=get_args(Wiring),
@@ -166,7 +167,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--address", help="host, serial port or CAN interface")
     parser.add_argument("--unit", help="unit id of a Modbus module")
-    parser.add_argument("--floors", help="such as L1,L2,L3, from below")
+    parser.add_argument("--floors", help="the floors, from the lowest up, such as L1,L2,L3")
     parser.add_argument("--signals", help=f"some of: {', '.join(LIFT_INPUTS)}")
     parser.add_argument(
         "--encoding", choices=get_args(Encoding), help="the encoding of the floor lines"
@@ -174,10 +175,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--contacts", choices=get_args(Level), help="level of a closed contact")
     parser.add_argument("--relays", choices=get_args(Level), help="level that switches a relay on")
     for name, (part, offered) in gateway.PLACES.items():
-        text = f"a gateway's place of {part}, such as {offered}"
+        text = f"the place of {part} on a gateway, such as {offered}"
         parser.add_argument(f"--{name.replace('_', '-')}", metavar="PLACE", help=text)
     for name, meanings in gateway.NUMBERS.items():
-        text = f"a gateway's numbers of {meanings}, such as 0,1,2"
+        text = f"a gateway's numbers for {meanings}, such as 0,1,2"
         parser.add_argument(f"--{name.replace('_', '-')}", metavar="N,N", help=text)
     parser.add_argument("--domain-id", help="RMF's ROS_DOMAIN_ID")
     parser.add_argument(
@@ -192,9 +193,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0; 64: an answer is missing, or answers contradict; 66: unreadable map; 73: the file
-    exists."""
-    if os.path.lexists(args.file):  # before the first question, so that nobody answers in vain
+    """Return the exit code.
+
+    - 0: the file was written.
+    - 64: an answer is missing, or answers contradict each other.
+    - 66: the map cannot be read.
+    - 73: the file exists.
+    """
+    if os.path.lexists(args.file):  # checked first, so that nobody answers in vain
         return _there_already(args.file)
     if why := no_folder(args.file):
         return not_written(args.file, why)
@@ -240,8 +246,8 @@ def _written(file: Path, given: Given) -> int:
 
 
 def answered(args: argparse.Namespace, found: BuildingMap | None) -> Given:
-    """Return every answer: from its option, else from the map, else from the person. Raises
-    Impossible."""
+    """Return every answer. An answer comes from its option, or else from the map, or else from the
+    person. Raises Impossible."""
     given: Given = {}
     for question in QUESTIONS:
         if not _needed(question, given, args):
@@ -267,7 +273,7 @@ def _needed(question: Question, given: Given, args: argparse.Namespace) -> bool:
 
 
 def _of_map(name: str, given: Given, found: BuildingMap | None) -> str | None:
-    """Return the answer if the map allows only one answer; else None."""
+    """Return the answer if the map allows only one answer. Otherwise return None."""
     if found is None:
         return None
     if name == "name" and len(names := tuple(found.named[given["kind"]])) == 1:
@@ -280,7 +286,9 @@ def _of_map(name: str, given: Given, found: BuildingMap | None) -> str | None:
 def _ask(question: Question, offered: str, given: Given, found: BuildingMap | None) -> str:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         option = question.name.replace("_", "-")
-        raise Impossible(f"no terminal to ask on: give --{option}, or --yes for '{offered}'")
+        raise Impossible(
+            f"there is no terminal for questions: give --{option}, or --yes for '{offered}'"
+        )
     try:
         import questionary
     except ModuleNotFoundError:
@@ -303,7 +311,8 @@ def _ask(question: Question, offered: str, given: Given, found: BuildingMap | No
 
 
 def answers(given: Given) -> DraftAnswers:
-    """Convert the answers to the draft's types. Raises Impossible with the remedy."""
+    """Convert the answers to the draft's types. Raises Impossible. The error's text gives the
+    remedy."""
     told = dict(given)
     for name, most in (("unit", 247), ("domain_id", 232)):
         if name in told:
@@ -335,8 +344,8 @@ def write(path: Path, text: str) -> None:
 
 
 def _schema_line() -> str:
-    """Store this version's schema in the user's data directory. Return the line that names the schema
-    for editors; "" if it cannot be stored."""
+    """Store this version's schema in the user's data directory. Return the comment line that names the
+    schema for editors. Return "" if the schema cannot be stored."""
     from workbench.commissioning.json_schema import schema
 
     base = os.environ.get("XDG_DATA_HOME") or os.path.expanduser("~/.local/share")

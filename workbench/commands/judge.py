@@ -1,9 +1,15 @@
 """`rmf-bridge judge`: check any lift, door or charger node, or a fleet adapter, against RMF's contract.
 
 `workbench/judge/` has the laws and the plays. This file has the options, the graph, the clock and the
-verdict. Exit code 0: every observed law is kept. 1: a law is broken. 2: a wrong command line. 66: the
-recording cannot be read. 69: nothing was heard, the graph cannot be joined, or the play was not
-performed.
+verdict.
+
+Exit codes:
+
+- 0: the device keeps every observed law.
+- 1: the device breaks a law.
+- 2: the command line is wrong.
+- 66: the recording cannot be read.
+- 69: no message was heard, the program could not join the graph, or the play was not performed.
 """
 
 import argparse
@@ -60,11 +66,11 @@ BESIDE: dict[str, tuple[str, ...]] = {
     "fleet": (topics.ADAPTER_LIFT_REQUESTS.name, topics.ADAPTER_DOOR_REQUESTS.name),
     "coordinator": (topics.CHARGER_REQUESTS.name, topics.CHARGER_CANCELS.name),
 }
-"""Topics that a play may share with another node, if `--beside` names the node."""
+"""Topics that a play may share with another node. The user names that node with `--beside`."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options: device, time, and play."""
+    """Add the options for the device, the time and the play."""
     parser.add_argument("kind", choices=KINDS)
     parser.add_argument(
         "name",
@@ -82,7 +88,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="listen for S seconds (default: until Ctrl-C, which judges)",
     )
     parser.add_argument("--json", action="store_true", help="the verdict as one JSON object")
-    parser.add_argument("--junit", type=Path, metavar="FILE", help="the verdict for a CI server")
+    parser.add_argument(
+        "--junit",
+        type=Path,
+        metavar="FILE",
+        help="write the verdict to FILE as JUnit XML, for a CI server",
+    )
     parser.add_argument(
         "--laws",
         action="store_true",
@@ -142,7 +153,7 @@ def _add_plays(parser: argparse.ArgumentParser) -> None:
 
 
 def performance_of(args: argparse.Namespace) -> Scenario | None:
-    """Return the play, or None to listen only. Exit with code 2 if options contradict."""
+    """Return the play, or None to listen only. Exit with code 2 if options contradict each other."""
     kinds: dict[JudgedKind, bool] = {
         "lift": args.ride is not None,
         "door": args.passages is not None,
@@ -175,12 +186,12 @@ def performance_of(args: argparse.Namespace) -> Scenario | None:
 
 
 def words_of(args: argparse.Namespace) -> str:
-    """Return the device's kind and name for messages."""
+    """Return the device's kind and name, for messages."""
     return f"the {args.kind} {shown(args.name)}"
 
 
 def run(args: argparse.Namespace) -> int:
-    """Listen, play or read a recording; then judge. Return the exit code."""
+    """Listen, perform a play, or read a recording. Then judge, and return the exit code."""
     if args.laws:
         print(markdown(args.kind))
         return 0
@@ -230,7 +241,7 @@ def _live(args: argparse.Namespace, performance: Scenario | None) -> int:
 
 
 def _begins(args: argparse.Namespace, performance: Scenario | None) -> str:
-    """Return the first line, which tells the waiting user what the program does."""
+    """Return the first line of output, which tells the waiting user what the program is doing."""
     if performance is not None:
         return f"plays with {words_of(args)}; Ctrl-C releases the device, and judges"
     until = "until Ctrl-C" if args.for_s == NEVER else f"for {args.for_s:g} s"
@@ -254,7 +265,7 @@ def tell(found: Judgement, args: argparse.Namespace) -> int:
 
 
 class Live:
-    """The live graph: hears messages in order of arrival, and publishes a play's messages."""
+    """The live graph. `Live` hears messages in order of arrival, and publishes a play's messages."""
 
     def __init__(
         self,
@@ -276,7 +287,7 @@ class Live:
         self._looked_at = 0.0
 
     def strangers(self) -> str:
-        """Name the other nodes that publish on the play's topics; "" if there are none."""
+        """Name the other nodes that publish on the play's topics. Return "" if no other node does."""
         found = [name for name in self._sole if self._ear.ends[name].matched()]
         if not found:
             return ""
@@ -323,8 +334,8 @@ class Live:
 
 @contextmanager
 def _told_to_end() -> Iterator[Callable[[], bool]]:
-    """Yield a question: has Ctrl-C, SIGTERM or SIGHUP come? Such a signal does not interrupt the
-    current step."""
+    """Yield a function that tells whether Ctrl-C, SIGTERM or SIGHUP has come. Such a signal does not
+    interrupt the current step."""
     told: list[int] = []
     with ended_by(lambda number, _: told.append(number)):
         yield lambda: bool(told)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 TURN_S: Final = 0.5
 KEEPALIVE_S: Final = 10
 WAITING: Final = 5000
-"""Maximum number of messages that wait for a slow broker. The next turn tries the rest again."""
+"""Maximum number of messages that wait for a slow broker. The next turn publishes the rest."""
 LEAVES_S: Final = 2.0
 PORTS: Final = {False: 1883, True: 8883}
 
@@ -36,18 +36,27 @@ PORTS: Final = {False: 1883, True: 8883}
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `mqtt-out`."""
     parser.add_argument(
-        "broker", type=_broker, metavar="HOST[:PORT]", help="the broker; port 1883, with TLS 8883"
+        "broker",
+        type=_broker,
+        metavar="HOST[:PORT]",
+        help="the broker; the default port is 1883, and 8883 with TLS",
     )
     parser.add_argument("--user", metavar="NAME", help="a user of the broker, who may only publish")
     parser.add_argument(
-        "--password-file", metavar="FILE", help="the user's password, in a file of yours alone"
+        "--password-file",
+        metavar="FILE",
+        help="a file with the user's password, which only you may read",
     )
     parser.add_argument("--tls", action="store_true", help="use TLS")
-    parser.add_argument("--ca-file", metavar="FILE", help="the broker's authority (PEM), for --tls")
+    parser.add_argument(
+        "--ca-file",
+        metavar="FILE",
+        help="the certificate of the broker's authority (PEM), for --tls",
+    )
     parser.add_argument(
         "--accept-unencrypted",
         action="store_true",
-        help="send the password without TLS, where the network is yours alone",
+        help="send the password without TLS, if nobody else uses the network",
     )
     parser.add_argument(
         "--prefix", type=_prefix, default="rmf", help="the first part of the topics (default: rmf)"
@@ -66,20 +75,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def _broker(text: str) -> tuple[str, int | None]:
     found = re.fullmatch(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9_.-]{1,253})(?::([0-9]{1,5}))?", text)
     if not found or (found[2] and not 1 <= int(found[2]) <= 65535):
-        raise argparse.ArgumentTypeError(f"'{text}' is not HOST:PORT, as 192.168.1.5:1883")
+        raise argparse.ArgumentTypeError(f"'{text}' is not HOST:PORT, such as 192.168.1.5:1883")
     return found[1].strip("[]"), int(found[2]) if found[2] else None
 
 
 def _prefix(text: str) -> str:
     if not re.fullmatch(r"[A-Za-z0-9_-]{1,64}(/[A-Za-z0-9_-]{1,64}){0,7}", text):
         raise argparse.ArgumentTypeError(
-            f"'{text}': write names of letters and digits, as site/rmf"
+            f"'{text}': write names of letters and digits, such as site/rmf"
         )
     return text
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 after Ctrl-C or SIGTERM; 1 if the graph is lost; else 64, 69 or 78."""
+    """Return the exit code.
+
+    - 0: Ctrl-C or SIGTERM ended the program.
+    - 1: the graph is lost.
+    - 64, 69 or 78: the program could not start, and has printed the reason.
+    """
     retainer = Retainer(args.prefix, args.home_assistant)
     if why := _unsafe(args):
         complain("mqtt-out", why)
@@ -110,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _unsafe(args: argparse.Namespace) -> str:
-    """Return why the program refuses these options; "" for safe options."""
+    """Return the reason to refuse these options. Return "" for safe options."""
     if bool(args.user) != bool(args.password_file):
         return "--user and --password-file need each other"
     if args.ca_file and not args.tls:
@@ -125,7 +139,7 @@ def _unsafe(args: argparse.Namespace) -> str:
 
 
 def publish(transport: Transport, broker: "Broker", retainer: Retainer) -> None:
-    """Publish until interrupted. Raises TransportError when the graph is lost."""
+    """Publish until a signal interrupts the program. Raises TransportError when the graph is lost."""
     ear, graph = listen_on(transport), PlainGraph()
     board = Board(graph)
     while transport.lives:
@@ -150,11 +164,14 @@ def publish(transport: Transport, broker: "Broker", retainer: Retainer) -> None:
 
 
 class Broker:
-    """A connection to a broker. paho-mqtt connects again after each loss."""
+    """A connection to a broker. After each loss, paho-mqtt connects again."""
 
     def __init__(self, args: argparse.Namespace, status: str) -> None:
-        """Begin to connect. Raises ImportError without paho-mqtt, SecretError for an unusable password
-        file, and OSError for an unreadable `ca_file`."""
+        """Begin to connect.
+
+        Raises ImportError without paho-mqtt, SecretError for an unusable password file, and OSError for
+        an unreadable `ca_file`.
+        """
         from paho.mqtt.client import Client, MQTTv5
         from paho.mqtt.enums import CallbackAPIVersion
 
@@ -179,13 +196,13 @@ class Broker:
         self._client.loop_start()
 
     def is_new(self) -> bool:
-        """Has paho-mqtt connected after the last call?"""
+        """Return whether paho-mqtt has made a new connection after the last call."""
         new = self._new.is_set()
         self._new.clear()
         return new
 
     def gives(self, message: Retained) -> bool:
-        """Give a message to the broker. Return False without a connection, or if too many messages
+        """Give a message to the broker. Return False if there is no connection, or if too many messages
         wait."""
         from paho.mqtt.packettypes import PacketTypes
         from paho.mqtt.properties import Properties
@@ -198,9 +215,9 @@ class Broker:
         return info.rc == 0
 
     def close(self) -> None:
-        """Publish that `mqtt-out` has stopped, and disconnect. Does not raise."""
+        """Publish the message that `mqtt-out` has stopped, and disconnect. Never raises."""
         if self._client.is_connected():
-            with suppress(RuntimeError, ValueError):  # the broker publishes the will
+            with suppress(RuntimeError, ValueError):  # else the will does it
                 self._client.publish(self._status, "offline", 1, True).wait_for_publish(LEAVES_S)
         self._client.disconnect()
         self._client.loop_stop()
@@ -219,7 +236,7 @@ class Broker:
             self._tell(f"is gone: {reason}")
 
     def _tell(self, trouble: str) -> None:
-        """Print a trouble, unless it was the last trouble printed. A connection clears the last
+        """Print a trouble, but not twice in a row. A new connection makes `Broker` forget the last
         trouble."""
         if trouble != self._trouble:
             self._trouble = trouble

@@ -1,7 +1,7 @@
 """`rmf-bridge notify FILE`: tell people about a site's troubles, through a webhook, mail or ntfy.
 
-The command only listens to RMF's graph. It runs beside the page or the recorder, never in a daemon that
-moves hardware.
+The command only listens to RMF's graph. The command runs beside the page or the recorder, and never
+inside a daemon that moves hardware.
 """
 
 import argparse
@@ -42,29 +42,34 @@ from workbench.notify.troubles import troubles
 logger = logging.getLogger(__name__)
 TURN_S: Final = 1.0
 RETRY_S: Final = (5.0, 30.0, 120.0, 600.0)
-"""Pauses (s) after failed tries. The last pause is repeated."""
+"""Pauses (s) after failed tries. After the last pause of the list, the program repeats the last
+pause."""
 MOST_WAITING: Final = 200
-"""Maximum number of notices that wait for an unreachable recipient. The oldest are dropped, and the log
-says so."""
+"""Maximum number of notices that wait for an unreachable recipient. The program drops the oldest
+notices, and logs that."""
 SERVICE_STATE: Final = Path("/var/lib/rmf-bridge-notify")
-"""Folder in which `rmf-bridge-notify.service` keeps what it has told."""
+"""Folder in which `rmf-bridge-notify.service` stores the troubles already reported."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `notify`."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="the recipients (docs: Monitor)")
+    parser.add_argument(
+        "file", type=Path, metavar="FILE", help="the file of recipients (docs: Monitor)"
+    )
     parser.add_argument(
         "--test", action="store_true", help="send a test notice to each recipient, and end"
     )
     parser.add_argument(
-        "--ack", metavar="TROUBLE", help="stop the repeats of this trouble, as its notice names it"
+        "--ack",
+        metavar="TROUBLE",
+        help="stop the repeats of this trouble; the notice gives the name",
     )
     parser.add_argument(
         "--state",
         type=Path,
         default=_state(),
         metavar="DIR",
-        help="the folder that keeps what people were told",
+        help="the folder that keeps the troubles already reported",
     )
     add_graph_arguments(parser)
 
@@ -78,10 +83,12 @@ def _state() -> Path:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 after Ctrl-C or SIGTERM, or if every recipient accepted its test notice.
+    """Return the exit code.
 
-    Return 1 if a recipient did not accept its test notice, or the graph cannot be joined; 73 if --ack
-    cannot be written; 78 if FILE has an error.
+    - 0: Ctrl-C or SIGTERM ended the program, or every recipient accepted its test notice.
+    - 1: a recipient refused its test notice, or the program could not join the graph.
+    - 73: the program cannot write the file of `--ack`.
+    - 78: FILE has an error.
     """
     log.start()
     try:
@@ -110,7 +117,7 @@ def _acknowledge(state: Path, key: str) -> int:
     except OSError as error:
         complain("notify", f"{state} cannot be written: {error.strerror}")
         return os.EX_CANTCREAT
-    print(f"{key}: no more repeats, if it is a present trouble (the log of notify says so)")
+    print(f"{key}: if this is a present trouble, its repeats stop, and the log of notify says so")
     return 0
 
 
@@ -142,7 +149,7 @@ def _serve(args: argparse.Namespace, settings: NotifySettings) -> None:
 
 
 class Courier:
-    """Sends one recipient's notices on a separate thread, so that no recipient delays another
+    """A sender of one recipient's notices, on a separate thread. A slow recipient delays no other
     recipient's notices."""
 
     def __init__(self, to: Recipient) -> None:
@@ -152,7 +159,7 @@ class Courier:
         threading.Thread(target=self._run, name=to.name, daemon=True).start()
 
     def take(self, notice: NoticeText) -> None:
-        """Queue a notice, if this recipient wants its severity."""
+        """Queue a notice, if its severity is high enough for this recipient."""
         if self._to.least == "critical" and notice.severity != "critical":
             return
         if len(self._waiting) == MOST_WAITING:
@@ -183,8 +190,8 @@ class Courier:
 
 
 class Desk:
-    """Finds the notices of each turn, gives them to the couriers, and stores on disk what people were
-    told."""
+    """A finder of new notices. Each turn, `Desk` gives the new notices to the couriers, and stores on
+    disk which notices people were sent."""
 
     def __init__(self, settings: NotifySettings, state: Path, couriers: list[Courier]) -> None:
         self._settings = settings
@@ -199,7 +206,7 @@ class Desk:
             self._notices.restore(kept, time.monotonic())
 
     def turn(self, site: HeardDevices) -> None:
-        """Look at the site once."""
+        """Look at the site once, and give new notices to the couriers."""
         self._take_acknowledgement()
         present = [*troubles(site, site.now, self._settings)]
         ids: dict[tuple[str, str], str] = {

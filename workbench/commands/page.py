@@ -1,7 +1,7 @@
-"""`rmf-bridge page`: serve a web page of RMF's live graph, or of one recording.
+"""`rmf-bridge page`: serve a web page that shows RMF's live graph, or one recording.
 
-The page needs the extra `page` (NiceGUI), which no daemon imports. By default the page listens on
-127.0.0.1. Another address (`--listen`) needs a password file or a reverse proxy.
+The page needs the extra `page` (NiceGUI). No daemon imports NiceGUI. By default, the page listens on
+127.0.0.1. On another address (`--listen`), the page needs a password file or a reverse proxy.
 """
 
 import argparse
@@ -27,7 +27,7 @@ from workbench.graph.join import (
 PORT: Final = 8080
 LOOPBACK: Final = "127.0.0.1"
 RECORDER: Final = Path("/var/lib/rmf-bridge-recorder")
-"""Folder of recordings that `rmf-bridge-recorder.service` writes."""
+"""Folder in which `rmf-bridge-recorder.service` writes recordings."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=address_and_port,
         default=(LOOPBACK, PORT),
         metavar="ADDRESS:PORT",
-        help=f"default: {LOOPBACK}:{PORT}; with port 0 a free port",
+        help=f"default: {LOOPBACK}:{PORT}; with port 0, any free port",
     )
     parser.add_argument(
         "--host",
@@ -76,15 +76,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _incidents() -> Path:
-    """Return the folder of the recorder service if this user may read it, else the folder of the user's
-    recorder."""
+    """Return the recorder service's folder if this user may read the folder. Otherwise return the
+    folder of the user's own recorder."""
     if os.access(RECORDER, os.R_OK | os.X_OK):
         return RECORDER
     return directories.state_base() / "recordings"
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 after Ctrl-C or SIGTERM; else print the remedy and return 64, 66, 69 or 78."""
+    """Return 0 after Ctrl-C or SIGTERM. Otherwise print the remedy, and return 64, 66, 69 or 78."""
     from workbench.page.access import PasswordError, users
 
     log.start()
@@ -113,7 +113,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _serve(args: argparse.Namespace, opened: socket.socket, known: Mapping[str, str]) -> int:
-    """Serve with NiceGUI. The import comes late, because it takes seconds on a Raspberry Pi."""
+    """Serve the page with NiceGUI. The import is in this function, because the import takes seconds on
+    a Raspberry Pi."""
     try:
         from workbench.page import web
     except ImportError as error:
@@ -128,7 +129,7 @@ def _family(address: str) -> socket.AddressFamily:
 
 
 def _unreadable(recording: Path) -> int:
-    """Return 0 if the page can show anything of this recording, else the exit code."""
+    """Return 0 if the page can show a part of this recording. Otherwise return the exit code."""
     from workbench.replay.bags import BagError, Notes, all_in
     from workbench.replay.recordings import unreadable
 
@@ -162,7 +163,7 @@ def _add_user(args: argparse.Namespace) -> int:
 
 
 def _unsafe(args: argparse.Namespace) -> str:
-    """Return why the page may not listen on the address; "" if allowed."""
+    """Return the reason not to listen on the address. Return "" if the page may listen."""
     loopback = ipaddress.ip_address(args.listen[0]).is_loopback
     if loopback or args.passwords or args.proxy:
         return ""

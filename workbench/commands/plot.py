@@ -1,7 +1,8 @@
 """`rmf-bridge plot`: draw a device's timeline from a recording into one HTML, SVG or PNG file.
 
-The file needs no network and no script. HTML has the explanation under the picture. resvg renders the
-PNG from the SVG. resvg is an extra, and only this module imports it.
+A browser shows the file without network and without script. In HTML, the explanation is below the
+picture. For a PNG file, the package resvg renders the SVG. resvg is an extra, and only this module
+imports resvg.
 """
 
 import argparse
@@ -29,16 +30,18 @@ NARROWEST, WIDEST = 480, 8000
 
 
 class PlotError(Exception):
-    """Error: no picture can be made. The text gives the remedy."""
+    """No picture can be made. The error's text gives the remedy."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `plot`."""
     parser.add_argument(
-        "file", type=Path, metavar="FILE", help="a recording, as `explain` reads it"
+        "file", type=Path, metavar="FILE", help="a recording of any form that `explain` reads"
     )
     parser.add_argument("--device", metavar="NAME", help="default: the recording's only device")
-    parser.add_argument("--kind", choices=KINDS, help="where a lift and a door have the same name")
+    parser.add_argument(
+        "--kind", choices=KINDS, help="the kind, if a lift and a door have the same name"
+    )
     parser.add_argument(
         "-o",
         "--output",
@@ -75,8 +78,12 @@ def _width(text: str) -> int:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0; 1 if there is nothing to draw or the picture cannot be written; 66 if FILE is no
-    readable recording."""
+    """Return the exit code.
+
+    - 0: the file was written.
+    - 1: there is nothing to draw, or the file cannot be written.
+    - 66: FILE is no readable recording.
+    """
     try:
         name = args.device or _only(args)
         timeline, words = _read(args, name)
@@ -94,7 +101,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _only(args: argparse.Namespace) -> str:
-    """Return the name of the recording's only device. Raises PlotError if there are more devices."""
+    """Return the name of the recording's only device. Raises PlotError if the recording has more
+    devices."""
     site = HeardDevices()
     for heard in told_between(args.file, RecordingSpan(args.from_, args.to), "plot", ""):
         site.take(heard)
@@ -137,7 +145,7 @@ def _picture(args: argparse.Namespace, timeline: Timeline, words: list[str]) -> 
 
 
 def _png(picture: str) -> bytes:
-    """Render the SVG as PNG. Raises PlotError without resvg."""
+    """Render the SVG as PNG. Raises PlotError if resvg is not installed."""
     try:
         import resvg_py
     except ImportError:
@@ -146,8 +154,8 @@ def _png(picture: str) -> bytes:
 
 
 def _page(picture: str, words: list[str], theme: Theme | None) -> Iterator[str]:
-    """Yield the parts of an HTML page with the picture and the words. A narrow screen scrolls the
-    picture."""
+    """Yield the parts of an HTML page with the picture and the words. On a narrow screen, people scroll
+    the picture."""
     colours = [
         f"body{{background:{PAPER[theme or 'light'][0]};color:{PAPER[theme or 'light'][1]}}}"
     ]
@@ -168,7 +176,7 @@ def _page(picture: str, words: list[str], theme: Theme | None) -> Iterator[str]:
 
 
 def _write(file: Path, content: bytes) -> None:
-    """Write the whole file or nothing. Raises PlotError."""
+    """Write the whole file. If this fails, write nothing, and raise PlotError."""
     beside = file.with_name(f".{file.name}.{os.getpid()}")
     try:
         try:

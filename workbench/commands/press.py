@@ -17,7 +17,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0; 1 if the file has no such signal; 69 if no simulation of the file runs."""
+    """Return the exit code.
+
+    - 0: the input has changed.
+    - 1: the file has no such signal.
+    - 69: no simulation of the file runs.
+    """
     if args.signal is None:
         return tell(args, "press")
     return obey(args, "press", args.signal, args.how)

@@ -1,10 +1,12 @@
 """`rmf-bridge release LIFT`: an operator ends a lift's present session.
 
-`release` does the same as `send lift LIFT --end`: it sends the holder's END_SESSION to the lift
-supervisor until the lift shows the session's end. If the supervisor is missing or does not obey within
-seconds, `release` sends the request directly to the lift's own daemon. If a robot may be in the car,
-the direct request needs `--car-empty`. After the end, `release` watches for 5 s. It then prints who has
-the lift and whether the car moves. A robot that keeps requesting the lift goes to the end of the queue.
+`release` does the same as `send lift LIFT --end`. It sends the session holder's END_SESSION to the lift
+supervisor, until the lift shows the session's end. If no supervisor runs, or the supervisor does not
+obey within seconds, `release` asks the lift's own daemon. If a robot may be in the car, this direct
+request needs `--car-empty`.
+
+After the end, `release` watches the lift for 5 s. Then `release` prints which robot has the lift, and
+whether the car moves. A robot that keeps requesting the lift goes to the end of the queue.
 """
 
 import argparse
@@ -13,7 +15,7 @@ from workbench.commands import send
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the lift, and the options that all sending commands share."""
+    """Add the argument for the lift, and the options that all sending commands share."""
     parser.add_argument("name", metavar="LIFT", help="the lift, as RMF names it")
     parser.add_argument(
         "--session", default="", metavar="ID", help="end only this session (default: any)"
@@ -21,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--car-empty",
         action="store_true",
-        help="somebody has looked: no robot is in the car, so its own daemon may release the lift",
+        help="somebody has seen that the car is empty, so the lift's own daemon may release the lift",
     )
     parser.set_defaults(falls_back=True, direct=False)
     parser.set_defaults(kind="lift", end=True, floor=None, granted_only=False)
@@ -29,6 +31,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the lift showed the session's end. Otherwise print the reason and return the exit
+    """Return 0 if the lift showed the session's end. Otherwise print the reason, and return the exit
     code of `send`."""
     return send.run(args)

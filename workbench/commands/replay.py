@@ -1,4 +1,4 @@
-"""`rmf-bridge replay FILE`: repeat the recorded decisions with the present program."""
+"""`rmf-bridge replay FILE`: repeat a recording's decisions with the present program."""
 
 import argparse
 import json
@@ -36,8 +36,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0: every decision is the same. 1: a decision differs. 65: FILE has nothing to replay. 66:
-    FILE is no readable recording. 78: a YAML is wrong."""
+    """Return the exit code.
+
+    - 0: every decision is the same.
+    - 1: a decision differs.
+    - 65: FILE has nothing to replay.
+    - 66: FILE is no readable recording.
+    - 78: a YAML has an error.
+    """
     notes = Notes()
     try:
         head, entries = opened(args.file, notes)
@@ -129,7 +135,8 @@ def _lines(
 
 
 def _changes(differences: list[Difference]) -> Iterator[str]:
-    """Yield a line for each change: when it began, when it ended, and how often it came."""
+    """Yield a line for each change. The line tells when the change began and ended, and how often the
+    change came."""
     times: dict[str, list[str]] = {}
     lasts: dict[tuple[str, str], list[str]] = {}
     for one in differences:
@@ -161,7 +168,7 @@ def _part(one: Difference) -> str:
 
 
 def _plain(told: Tree) -> str:
-    """Format one value of a decision for people; `-` for an empty text."""
+    """Format one value of a decision for people. An empty text becomes `-`."""
     if isinstance(told, list):
         return ", ".join(map(_plain, told)) or "-"
     try:

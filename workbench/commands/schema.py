@@ -1,4 +1,5 @@
-"""`rmf-bridge schema`: print the schema of a device YAML, for editors and for the documentation."""
+"""`rmf-bridge schema`: print the schema of a device YAML. Editors and the documentation use the
+schema."""
 
 import argparse
 import json

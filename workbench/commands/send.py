@@ -1,7 +1,11 @@
 """`rmf-bridge send`: send one request to a device, as RMF would, and show the effect.
 
-Exit code 0: the effect was seen. 1: no effect was seen, and the reason is printed. 2: a wrong command
-line. 130: Ctrl-C.
+Exit codes:
+
+- 0: the device showed the effect.
+- 1: the device did not show the effect. The program has printed the reason.
+- 2: the command line is wrong.
+- 130: Ctrl-C ended the program.
 """
 
 import argparse
@@ -44,11 +48,12 @@ STATES = (
     topics.DISPENSER_STATES,
     topics.INGESTOR_STATES,
 )
-"""State topics of all kinds. The given name may belong to a device of another kind."""
+"""State topics of all kinds. The program listens to all topics, because the given name may belong to a
+device of another kind."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add a subcommand for each kind of device, with the options of the graph."""
+    """Add a subcommand for each kind of device. Each subcommand also gets the options of the graph."""
     kinds = parser.add_subparsers(dest="kind", required=True, metavar="|".join(words.KINDS))
     for kind, (text, example, add) in {
         "lift": (
@@ -78,7 +83,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_shared_arguments(parser: argparse.ArgumentParser, *, direct: bool) -> None:
-    """Add the options for graph and time. `direct` adds `--direct`, which bypasses RMF's supervisor."""
+    """Add the options for the graph and the time. `direct` adds the option `--direct`, which bypasses
+    RMF's supervisor."""
     add_graph_arguments(parser)
     parser.add_argument(
         "--timeout",
@@ -153,7 +159,7 @@ def _workcell_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def request_of(args: argparse.Namespace) -> Request:
-    """Return the request of the command line. Exit with code 2 if options contradict."""
+    """Return the request of the command line. Exit with code 2 if options contradict each other."""
     match args.kind:
         case "lift":
             return _lift_request(args)
@@ -216,7 +222,7 @@ def run(args: argparse.Namespace) -> int:
     except TransportError as error:
         complain(args.command, error)
         return 1
-    except KeyboardInterrupt:  # Ctrl-C before the first request
+    except KeyboardInterrupt:  # the user pressed Ctrl-C before the first request
         return _interrupted(args.command, sent=False)
 
 
@@ -235,7 +241,11 @@ def send(
     command: str = "send",
     graph: str = "",
 ) -> int:
-    """Return 0 if the effect was seen within `timeout_s`, else 1; 130 after Ctrl-C.
+    """Return the exit code.
+
+    - 0: the device showed the effect within `timeout_s`.
+    - 1: the device did not show the effect.
+    - 130: Ctrl-C ended the program.
 
     `graph` names the graph in messages.
     """
@@ -250,7 +260,7 @@ def send(
 
 
 class _Exchange:
-    """Runs `exchange.step` with a clock, a transport and a terminal."""
+    """A loop around `exchange.step` that supplies the clock, the transport and the terminal."""
 
     def __init__(
         self,
@@ -278,7 +288,8 @@ class _Exchange:
         self._last_before = 0
 
     def look(self) -> int | None:
-        """Take the messages heard and do the next step. Return an exit code at the end."""
+        """Take the messages heard, and do the next step. Return an exit code at the end, and None
+        before."""
         for heard in self.ear.listen(LOOK_EVERY_S):
             self._take(heard)
         now = time.monotonic()
@@ -302,7 +313,7 @@ class _Exchange:
         return self.publishers[topic.name]
 
     def _listeners(self) -> int:
-        """Count the nodes that listen to the request; 0 if the node that forwards the request is
+        """Count the nodes that listen to the request. Return 0 if the node that forwards the request is
         missing."""
         if self.supervisor is not None and not self.supervisor.matched():
             return 0
@@ -344,7 +355,7 @@ class _Exchange:
         return None
 
     def _watch(self, now: float) -> int | None:
-        """Print at the end of the watch what the lift did. The outcome stays the same."""
+        """Print the lift's movements at the end of the watch. The outcome stays the same."""
         if self.watches_until is None or now < self.watches_until:
             return None
         self._line(now, "after", aftermath(self.seen.states_of(d.LiftState)[self._last_before :]))
@@ -358,7 +369,7 @@ class _Exchange:
 
 
 def _boarded(message: d.DiagnosticArray, lift: str) -> str:
-    """Return the value `boarded` of this lift's own diagnostics; "" for other diagnostics."""
+    """Return the value `boarded` from this lift's own diagnostics. Return "" for other diagnostics."""
     for status in message.status:
         values = {value.key: value.value for value in status.values}
         if (status.hardware_id, values.get("kind")) == (lift, "lift"):

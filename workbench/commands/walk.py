@@ -1,7 +1,8 @@
-"""`rmf-bridge walk FILE`: try every wire of a device with the electrician, and sign the results.
+"""`rmf-bridge walk FILE`: test every wire of a device together with the electrician, and sign the
+results.
 
 The screen shows every input live. A key switches one output on, for a few seconds. No daemon may serve
-the device during the walk. Every output is off at the end of the walk: a guard process switches the
+the device during the walk. At the end of the walk, every output is off. A guard process switches the
 outputs off even after a kill -9.
 """
 
@@ -50,8 +51,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0: all outputs off; 1: an output not verified off; 64: no terminal or no device; 69:
-    device in use; 73: record not writable; 78: wrong YAML."""
+    """Return the exit code.
+
+    - 0: all outputs are off.
+    - 1: the program could not verify that an output is off.
+    - 64: there is no terminal, or the YAML has no device.
+    - 69: the device is in use.
+    - 73: the record cannot be written.
+    - 78: the YAML has an error.
+    """
     log.start("WARNING")
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         print("walk needs a terminal: it switches outputs by keys", file=sys.stderr)
@@ -172,7 +180,7 @@ def _on(
                     noted = bench.memory.results
                     note("not ended")
     except OSError as error:
-        how = f"interrupted: {error.strerror}"  # the terminal is gone
+        how = f"interrupted: {error.strerror}"  # the terminal is gone, so nothing can be printed
     finally:
         off = "every output verified off" if bench.verified_off else "outputs NOT verified off"
         for bus in buses.values():

@@ -1,4 +1,5 @@
-"""`rmf-bridge watch`: show the lifts, doors and chargers of the RMF graph, live, one row each.
+"""`rmf-bridge watch`: show the RMF graph's lifts, doors and chargers live, with one row for each
+device.
 
 `board.py` makes the rows. A terminal shows one table that changes in place. A pipe gets one line for
 each change. Ctrl-C is the normal end, with exit code 0.
@@ -55,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0; 1 if `--once` heard nothing or the graph cannot be joined."""
+    """Return 0. Return 1 if `--once` heard nothing, or if the program could not join the graph."""
     try:
         with interruptible(), closing(open_graph(args, "rmf_bridge_watch")) as transport:
             ear = listen_on(transport)
@@ -87,7 +88,7 @@ def listen_on(transport: Transport) -> Ear:
 
 
 def show_once(ear: Ear, seconds: float, out: TextIO, *, as_json: bool = False) -> int:
-    """Listen for `seconds` and print the table, or JSON. Returns 0, or 1 if nothing was heard."""
+    """Listen for `seconds`, and print the table or JSON. Return 0. Return 1 if nothing was heard."""
     board, until = Board(), time.monotonic() + seconds
     while (left_s := until - time.monotonic()) > 0:
         for heard in ear.listen(left_s):
@@ -105,7 +106,8 @@ def show_once(ear: Ear, seconds: float, out: TextIO, *, as_json: bool = False) -
 
 
 def settled(board: Board, now: float, wall: float) -> list[BoardRow]:
-    """Return the rows, except devices that later messages may still prove to be simulated."""
+    """Return the rows. Leave out a device if later messages may still prove that a simulation publishes
+    the device."""
     young = board.unsettled(now)
     return [row for row in board.rows(now, wall) if (row.kind, row.name) not in young]
 
@@ -113,8 +115,8 @@ def settled(board: Board, now: float, wall: float) -> list[BoardRow]:
 def show(
     ear: Ear, out: TextIO, *, live: bool, line: Callable[[BoardRow, float], str] = change_line
 ) -> None:
-    """Show the rows until Ctrl-C. `live` redraws the table in place; otherwise print a line for each
-    change."""
+    """Show the rows until Ctrl-C. With `live`, redraw the table in place. Otherwise print a line for
+    each change."""
     board, rows, drawn = Board(), list[BoardRow](), 0
     next_at = 0.0
     while True:

@@ -1,1 +1,1 @@
-"""Commission a bridge: write a first YAML, examine the machine, try each wire."""
+"""Commission a bridge: write a first YAML, examine the machine, and test each wire."""

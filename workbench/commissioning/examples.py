@@ -1,7 +1,8 @@
-"""Examples for the keys of the reference. An example comes from a shipped file, else from the default,
-else it is some value of the type.
+"""Examples for the keys of the configuration reference.
 
-Shipped files are tested, so these examples stay valid.
+An example is the value in a shipped file. If no shipped file has the key, the example is the default.
+If there is no default, the example is some value of the right type. Shipped files are tested, so these
+examples stay valid.
 """
 
 import functools
@@ -60,7 +61,8 @@ Found = dict[tuple[type, str], str]
 
 
 def example(struct: type, field: mi.Field) -> str:
-    """Return `key: value` as in a YAML; "" for a section, whose keys have their own examples."""
+    """Return `key: value` as in a YAML. Return "" for a section, because the section's keys have their
+    own examples."""
     if is_section(field.type):
         return ""
     shown = next(
@@ -73,15 +75,15 @@ def example(struct: type, field: mi.Field) -> str:
 
 
 def device_yamls() -> list[Path]:
-    """Return the shipped device YAMLs. Files named `fleet_*.yaml` are left out, because they configure
-    RMF's fleet adapters."""
+    """Return the shipped device YAMLs. Leave out files named `fleet_*.yaml`, which configure RMF's
+    fleet adapters."""
     return sorted(f for f in CONFIG.glob("*.yaml") if not f.name.startswith("fleet_"))
 
 
 @functools.cache
 def _shipped() -> Found:
-    """Return the shortest value of each field in the shipped files. Values equal to the default are
-    left out."""
+    """Return the shortest value of each field in the shipped files. Leave out values equal to the
+    default."""
     found: Found = {}
     for file in device_yamls():
         config = load(file)
@@ -124,7 +126,7 @@ def _note(found: Found, struct: type, name: str, text: str) -> None:
 
 
 def field_names(base: type) -> tuple[str, ...]:
-    """Return a struct's field names; no names for msgspec.Struct and its bases."""
+    """Return a struct's field names. Return no names for msgspec.Struct and for its base classes."""
     if not issubclass(base, msgspec.Struct) or base is msgspec.Struct:
         return ()
     return base.__struct_fields__
@@ -139,7 +141,7 @@ def flow(value: object) -> str:
 
 
 def _is_numbered(info: mi.Type) -> bool:
-    """Are the mapping's keys numbers?"""
+    """Return whether the mapping's keys are numbers."""
     if isinstance(info, mi.Metadata):
         return _is_numbered(info.type)
     key = info.key_type if isinstance(info, mi.DictType) else None

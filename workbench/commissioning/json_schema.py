@@ -27,13 +27,13 @@ FILE: dict[str, str] = {
     "rmf": "the way to Open-RMF.",
     "recording": "the recording of the daemon's work.",
     "buses": "name -> a bus, by its `type`.",
-    "type": "the sort of a bus, which decides its other keys.",
+    "type": "the type of a bus, which decides the other keys of the bus.",
 }
 """Meanings of the keys that no struct has."""
 
 
 class Shape(msgspec.Struct, frozen=True):
-    """One `kind:` with one `driver:`, and the sections of such a file."""
+    """One `kind:` with one `driver:`, and the sections of a file with this kind and driver."""
 
     kind: str
     devices_key: str
@@ -50,7 +50,8 @@ def shapes() -> Iterator[Shape]:
 
 
 def shared_sections() -> Iterator[tuple[str, str, type]]:
-    """Yield each section that the devices of a kind share: the kind, the section's key, its struct."""
+    """Yield each section that all devices of a kind share, as the kind, the section's key and its
+    struct."""
     for name in kind_names():
         kind = kind_called(name)
         if not isinstance(kind, GraphKind) and kind.section:
@@ -58,7 +59,7 @@ def shared_sections() -> Iterator[tuple[str, str, type]]:
 
 
 def purpose(struct: type) -> str:
-    """Return the purpose of a section: its struct's docstring, as one line."""
+    """Return the purpose of a section. The purpose is the struct's docstring on one line."""
     return " ".join(inspect.cleandoc(struct.__doc__ or "").split())
 
 
@@ -101,8 +102,8 @@ def schema() -> Schema:
 def _for_editors(component: dict[str, Any]) -> None:
     """Remove titles, and give each nullable key its own description.
 
-    An editor would show the titles, which are class names. It would also show the struct's description
-    at such a key.
+    Otherwise an editor would show the titles, which are class names. At a nullable key, an editor would
+    show the struct's description.
     """
     component.pop("title")
     for told in component.get("properties", {}).values():
@@ -112,7 +113,8 @@ def _for_editors(component: dict[str, Any]) -> None:
 
 
 def _allow_type(components: dict[str, dict[str, dict[str, Schema]]], ref: Schema) -> None:
-    """Add `type:` to a bus. The program reads this key before the struct, so the key is not a field."""
+    """Add `type:` to the schema of a bus. No struct has the field `type`, because the program reads
+    this key before the program chooses the struct."""
     component = components[str(ref["$ref"]).rsplit("/", 1)[1]]
     component["properties"].setdefault("type", {"type": "string"})
     component["properties"]["type"]["description"] = FILE["type"]
@@ -124,7 +126,8 @@ def _key(name: str, schema: Schema) -> Schema:
 
 
 def _file(shape: Shape, buses: dict[str, type], by_type: dict[type, Schema]) -> Schema:
-    """Return the schema of a file with this driver; a device may name another driver of the kind."""
+    """Return the schema of a file with this driver. A device may name another driver of the same
+    kind."""
     of_kind = [other for other in shapes() if other.kind == shape.kind]
     kinds_of_bus = [
         {"allOf": [by_type[buses[name]], {"properties": _key("type", {"const": name})}]}

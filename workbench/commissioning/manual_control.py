@@ -1,5 +1,7 @@
-"""Control one device by hand (`walk`, the kill test): take its lock, write its record, start its guard,
-and switch its outputs off."""
+"""Control one device by hand, for `walk` and for the kill test.
+
+The module takes the device's lock, writes the record, starts the guard, and switches the outputs off.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -18,11 +20,11 @@ def guarded(
     held: runtime_directory.RuntimeDirectory,
     outputs_off: Sequence[str],
 ) -> tuple[dict[str, Bus], Callable[[], None]]:
-    """Return the device's buses by name, and a function to call once every output is verified off.
-    Raises HalError.
+    """Return the device's buses by name, and a function `all_off`. Raises HalError.
 
-    Record and guard (which runs `outputs_off` if we die) start once the buses are open, before an
-    output is claimed. A bus that cannot be opened leaves nothing to switch off.
+    The caller calls `all_off` after every output is verified off. Once the buses are open, but before
+    an output is claimed, the record is written and the guard starts. If this process dies, the guard
+    runs `outputs_off`. If a bus cannot be opened, there is nothing to switch off.
     """
     directories.work_somewhere(held.places)
     buses = {name: config.open_bus(name) for name in buses_of(config, device)}
@@ -37,18 +39,18 @@ def guarded(
 
 
 def buses_of(config: Config, device: str) -> list[str]:
-    """Return the names of the device's own bus and of its other buses, in this order."""
+    """Return the name of the device's own bus, and then the names of the device's other buses."""
     return [config.bus_of(device), *config.other_buses(device)]
 
 
 def driver_on(config: Config, device: str, buses: Mapping[str, Any]) -> Driver[Any, Any]:
-    """Make the device's driver, which reads every bus in the caller's thread."""
+    """Make the device's driver. This driver reads every bus in the caller's thread."""
     own, *others = buses_of(config, device)
     driver: Driver[Any, Any] = config.driver_type(device).create(
         device, config.devices[device], buses[own]
     )
     if others:
-        assert isinstance(driver, TakesInputs)  # only contacts have `bus` in the YAML
+        assert isinstance(driver, TakesInputs)  # only contacts may name another bus
         driver.take_inputs(
             _OtherInputs([Points(config.wires_on(name, device), buses[name]) for name in others])
         )
@@ -56,7 +58,7 @@ def driver_on(config: Config, device: str, buses: Mapping[str, Any]) -> Driver[A
 
 
 class _OtherInputs:
-    """Reads the inputs on other buses now; claims them the first time."""
+    """A reader of the inputs on other buses. The first reading claims the inputs."""
 
     def __init__(self, parts: Sequence[Points]) -> None:
         self._closed = list(parts)
@@ -70,9 +72,9 @@ class _OtherInputs:
 
 
 def not_off(driver: Driver[Any, Any], insist: Callable[[], None]) -> str:
-    """Switch every output off. Return "", or the reason why an output is not verified off.
+    """Switch every output off. Return "" if all is verified off, or the reason why an output is not.
 
-    `insist`: function that ends the bus's pauses.
+    `insist` is a function that ends the bus's pauses.
     """
     insist()
     try:

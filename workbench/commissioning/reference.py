@@ -1,4 +1,4 @@
-"""Generate the page of the configuration reference from the structs of the YAML.
+"""Generate the page of the configuration reference. The YAML's structs are the source.
 
 Keys, types, bounds, units, defaults and meanings come from the structs' fields. Purposes come from the
 structs' docstrings.
@@ -64,7 +64,7 @@ def _keys_of(same: list[Shape]) -> str:
 
 
 def _tops() -> Headings:
-    """Return a file's sections and their headings. Structs that several sections share come first."""
+    """Return a file's sections with their headings. Structs that several sections share come first."""
     found: Headings = {Rmf: "## `rmf`", RecordingSettings: "## `recording`"}
     for name in named.bus_types():
         found[named.bus_called(name).settings] = f"## Bus of `type: {name}`"
@@ -101,7 +101,7 @@ def _headings(tops: Headings) -> Headings:
     everywhere = [struct for top in tops for struct, _ in _inside(top, ())]
     heirs = Counter(base for struct in {*tops, *everywhere} for base in _bases(struct))
     shared = (base for base, many in heirs.items() if many > 1 and len(_fields(base)) > 1)
-    printed = {*tops, *everywhere, *shared}  # a base with a single key is printed by its heirs
+    printed = {*tops, *everywhere, *shared}  # heirs print the key of a base with one key
     inside = {top: list(_inside(top, printed)) for top in tops}
     tops_of = Counter(struct for found in inside.values() for struct in {s for s, _ in found})
     ordered: Headings = {}
@@ -115,8 +115,8 @@ def _headings(tops: Headings) -> Headings:
 
 
 def _inside(top: type, printed: Container[type]) -> Iterator[tuple[type, str]]:
-    """Yield the structs inside a struct, each with its relative path. Structs of printed bases are left
-    out."""
+    """Yield the structs inside a struct, each with its relative path. Leave out the structs of a base
+    that the page prints elsewhere."""
     todo, seen = [(top, "")], {top}
     while todo:
         struct, path = todo.pop(0)
@@ -129,7 +129,7 @@ def _inside(top: type, printed: Container[type]) -> Iterator[tuple[type, str]]:
 
 
 def _bases(struct: type) -> list[type]:
-    """Return the base structs with fields, nearest first."""
+    """Return the base structs that have fields, nearest first."""
     return [base for base in struct.__mro__[1:] if field_names(base)]
 
 
@@ -140,7 +140,7 @@ def _fields(struct: type) -> tuple[mi.Field, ...]:
 
 
 def _own(struct: type, printed: Container[type]) -> list[mi.Field]:
-    """Return the fields that the nearest printed base lacks or defines otherwise."""
+    """Return the fields that the nearest printed base lacks or defines in another way."""
     base = _printed_base(struct, printed)
     known = _fields(base) if base else ()
     return [field for field in _fields(struct) if field not in known]
@@ -197,7 +197,7 @@ def meaning(struct: type, key: str) -> str:
 
 
 def parts(info: mi.Type) -> list[type]:
-    """Return the structs inside a field's value."""
+    """Return the structs in a field's type."""
     match info:
         case mi.StructType(cls=cls):
             return [cls]

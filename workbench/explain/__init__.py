@@ -1,5 +1,6 @@
-"""Explain the events at a lift, door or charger: lanes to draw, and sentences. All functions are pure.
+"""Explain the events at a device, as lanes to draw and as sentences. All functions are pure.
 
-The input is messages heard on RMF's graph (`bridges/messages/heard.py`), live or from a recording. The
-notes that our daemons keep about their own devices are a second input, if a recording has them.
+The first input is messages heard on RMF's graph (`bridges/messages/heard.py`), live or from a
+recording. The second input is the notes that our daemons record about their own devices. Not every
+recording has such notes.
 """

@@ -1,4 +1,4 @@
-"""Parts of an answer, and the sentences that the answers of all kinds of device share."""
+"""The parts of an answer, and sentences for all kinds of device."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,20 +15,21 @@ from workbench.explain.phrases import TimePhrases, lasted, listed
 from workbench.explain.rows import label
 
 Remedies = Mapping[str, tuple[str, str]]
-"""Remedies by fault code: the likely cause, and a remedy."""
+"""Fault code -> the likely cause and the remedy."""
 SILENCES: Final = ("LIFT_SILENT", "DOOR_SILENT", "STATION_SILENT")
 MOST_NAMES: Final = 8
 RELAYS_OFF: Final = "; its daemon has every relay off"
 LISTENS_S: Final = 2.5
-"""Minimum time (s) to listen before a sentence may call a node missing."""
+"""Minimum time (s) of listening. Before that time, no sentence may call a node missing."""
 
 
 @dataclass(slots=True)
 class Answer:
     """Sentences, the fields that RMF checks, and the next step.
 
-    The verdict rests on the faults with the codes in `because`. Only these faults keep their remedies,
-    because other remedies may contradict the verdict. With None, all faults keep their remedies.
+    `because` lists the codes of the faults that caused the device's condition. Only these faults keep
+    their remedies, because other remedies may contradict the answer. If `because` is None, all faults
+    keep their remedies.
     """
 
     now: list[str] = field(default_factory=list)
@@ -52,7 +53,7 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class FileReason:
-    """Reason for which our recorder kept a file: a fixed name, a text, and the time."""
+    """Our recorder's reason to keep a file. The reason has a fixed name, a text, and the time."""
 
     code: str
     text: str
@@ -60,11 +61,12 @@ class FileReason:
 
     @property
     def fault(self) -> str:
-        """Code of the fault for which the recorder kept the file; "" for other reasons."""
+        """The code of the fault that made the recorder keep the file. "" stands for any other
+        reason."""
         return self.text.partition(":")[0] if self.code == FAULT else ""
 
     def told(self, clock: TimePhrases) -> str:
-        """Say why the recorder kept the file, and at which time the explanation stops."""
+        """Say why the recorder kept the file, and which time the next sentences describe."""
         why = {
             FAULT: f"for the fault {self.text}",
             REFUSED: f"because a request was refused: {self.text}",
@@ -78,12 +80,15 @@ class FileReason:
 
 @dataclass(frozen=True, slots=True)
 class OthersHeard:
-    """Knowledge besides the device's own messages.
+    """Knowledge that does not come from the device's own messages.
 
-    It has the names of each kind, the number of messages, the last words of fleet adapters
-    (`ObservedGraph.spoke`), the faults' remedies, and the reason for the file. `senders` are the nodes
-    that publish each topic on a live graph. `senders` is None for a recording, because a recording
-    names no nodes.
+    - `names`: the names of the devices heard, by kind.
+    - `messages`: the number of messages heard.
+    - `spoke`: the time of each fleet adapter's last message (`ObservedGraph.spoke`).
+    - `remedies`: the faults' remedies.
+    - `reason`: the recorder's reason to keep the file.
+    - `senders`: the nodes that publish each topic on a live graph. For a recording, `senders` is None,
+      because a recording does not name nodes.
     """
 
     names: Mapping[Kind, tuple[str, ...]]
@@ -94,17 +99,17 @@ class OthersHeard:
     senders: Mapping[str, Sequence[str]] | None = None
 
     def nobody_publishes(self, topic: str) -> bool:
-        """Is it known that no node publishes this topic?"""
+        """Return whether it is certain that no node publishes this topic."""
         return self.senders is not None and not self.senders.get(topic)
 
     def publishers(self, topic: str) -> str:
-        """Name the nodes that publish this topic; "" if none is known."""
+        """Name the nodes that publish this topic. Return "" if no such node is known."""
         nodes = [label(node) for node in (self.senders or {}).get(topic, ())]
         return listed(nodes[:MOST_NAMES]) if nodes else ""
 
 
 def unheard(device: Device, around: OthersHeard) -> Answer:
-    """Answer for a device of which no state was heard."""
+    """Answer for a device whose states were never heard."""
     answer = Answer(since=device.began.at, because=SILENCES)
     others = around.names.get(device.kind, ())
     if not around.messages:
@@ -128,7 +133,8 @@ def unheard(device: Device, around: OthersHeard) -> Answer:
 
 
 def _others(around: OthersHeard) -> str:
-    """Return the names heard, such as `these were heard: lifts Lift2; doors ward`."""
+    """Return a clause that names the devices heard, such as `these were heard: lifts Lift2; doors
+    ward`."""
     parts = [
         f"{kind}s {', '.join(names[:MOST_NAMES])}" for kind, names in around.names.items() if names
     ]
@@ -136,8 +142,8 @@ def _others(around: OthersHeard) -> str:
 
 
 def stopped(device: Device, around: OthersHeard, clock: TimePhrases) -> Answer | None:
-    """Answer for a device whose states have stopped, or whose daemon died according to the file's
-    reason."""
+    """Answer for a device whose states have stopped, or whose daemon has died. The reason to keep the
+    file may tell of the death. Return None for any other device."""
     last = device.last_state
     if last is not None and around.reason is not None and around.reason.code == DIED:
         return Answer(since=last.at - 60.0, because=()).say(
@@ -159,7 +165,8 @@ def stopped(device: Device, around: OthersHeard, clock: TimePhrases) -> Answer |
 
 
 def old_reading(device: Device, clock: TimePhrases) -> str:
-    """Return a sentence that the device's readings are old or missing; "" if the readings are fresh."""
+    """Return a sentence that the device's readings are old or missing. Return "" if the readings are
+    fresh."""
     match device.reading.value:
         case "was never read":
             return f"States of {device.name} come, but its inputs were never read."
@@ -180,7 +187,7 @@ def say_waits(found: Answer, device: Device, clock: TimePhrases) -> None:
 
 
 def notes(device: Device, clock: TimePhrases) -> tuple[str, ...]:
-    """Return notes on conditions that may mislead the reader."""
+    """Return notes about conditions that may mislead the reader of the answer."""
     found = []
     if device.reading.value == "is from the future":
         ahead = lasted(-device.stamp_age_s)
@@ -198,12 +205,13 @@ def notes(device: Device, clock: TimePhrases) -> tuple[str, ...]:
 
 
 def clock_off(claim: DeviceRequester) -> bool:
-    """Does the clock that stamps this requester's requests differ from ours?"""
+    """Return whether the clock that stamps this requester's requests differs from our clock."""
     return claim.stamped and abs(claim.stamp_age_s) >= CLOCKS_DIFFER_S
 
 
 def clock_of(claim: DeviceRequester) -> tuple[str, ...]:
-    """Note that a requester's clock differs from ours: the requests look too old or too new."""
+    """Note that a requester's clock differs from our clock. With such a clock, requests look too old or
+    too new."""
     if not clock_off(claim):
         return ()
     side = "behind" if claim.stamp_age_s > 0 else "ahead of"
@@ -218,7 +226,7 @@ def clock_of(claim: DeviceRequester) -> tuple[str, ...]:
 def faults(
     device: Device, clock: TimePhrases, remedies: Remedies, because: tuple[str, ...] | None
 ) -> tuple[FaultTold, ...]:
-    """Return the present faults, with their remedies. `because` is the same as in `Answer`."""
+    """Return the present faults with their remedies. `because` has the same meaning as in `Answer`."""
     kept = {code: one for code, one in remedies.items() if because is None or code in because}
     return tuple(
         FaultTold(code, detail, clock.since(moment), *kept.get(code, ()))
@@ -227,8 +235,10 @@ def faults(
 
 
 def relays(device: Device, clock: TimePhrases) -> str:
-    """Return the relays that are on, such as `; its daemon has these on: agv_request, call L3`; "" if
-    unknown."""
+    """Return a clause that lists the relays that are on. Return "" if the relays' state is unknown.
+
+    An example is `; its daemon has these on: agv_request, call L3`.
+    """
     told = device.told("outputs", clock.now)
     shown = [part.removesuffix(" yes") for part in told.split(", ") if not part.endswith(" 0")]
     if not told:

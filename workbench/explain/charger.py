@@ -1,7 +1,9 @@
-"""Explain a charger: its holder, and why a robot is not charged, in sentences from its messages.
+"""Explain a charger in sentences. The sentences tell which robot has the charger, and why a robot is
+not charged.
 
-RMF itself sends no requests to chargers. Requests come from the charger coordinator, another node or an
-operator. A daemon publishes each refusal on `charger_refusals` (`bridges/kinds/charger/refusals.py`).
+RMF itself sends no requests to chargers. A request comes from the charger coordinator, from another
+node, or from an operator. A daemon publishes each refusal on `charger_refusals`
+(`bridges/kinds/charger/refusals.py`).
 """
 
 from collections.abc import Mapping
@@ -19,11 +21,12 @@ from workbench.explain.phrases import TimePhrases, lasted
 from workbench.explain.rows import label
 
 LONG_S: Final = 120.0
-"""Time (s) after which somebody should look why a robot has not come to its charger."""
+"""Time (s) after which a person should look why a robot has not come to its charger."""
 REFUSED_LATELY_S: Final = 60.0
 
 Coordinator = Mapping[str, str]
-"""Diagnostics of the coordinator: each charger's state, and the keys `queue`, `schedule`, `assigns`."""
+"""Diagnostics of the coordinator. The keys are the chargers' names, `queue`, `schedule` and
+`assigns`."""
 
 
 def answer(
@@ -31,7 +34,7 @@ def answer(
 ) -> Answer:
     """Explain the charger at the last message.
 
-    `coordinator`: the coordinator's present diagnostics; {} without a coordinator.
+    `coordinator` holds the coordinator's present diagnostics, or {} if there is no coordinator.
     """
     if charger.last_state is None:
         found = common.unheard(charger, around)
@@ -120,7 +123,7 @@ def _idle(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
 
 
 def _error(found: Answer, charger: ChargerFacts) -> None:
-    """Name the robot or the station as the side at fault, as far as the error's text tells."""
+    """Blame the robot or the station, if the error's text tells which side is at fault."""
     text = charger.error.value
     misplaced = misplaced_in(text)
     if misplaced is not None and misplaced.robot is not None:

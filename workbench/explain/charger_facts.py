@@ -1,4 +1,4 @@
-"""Facts about one charger from its messages, and its story: requests and refusals."""
+"""Facts about one charger, from its messages. The charger's story tells requests and refusals."""
 
 from dataclasses import dataclass
 
@@ -22,7 +22,7 @@ class HeardRefusal:
 
 
 class ChargerFacts(Device, ObservedCharger):
-    """A charger with its story. `refusal`: the last refusal. `charges`: number of charges begun."""
+    """A charger with its story. `refusal` is the last refusal. `charges` counts the charges begun."""
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
@@ -31,11 +31,11 @@ class ChargerFacts(Device, ObservedCharger):
 
     @property
     def full_in_s(self) -> float:
-        """Time (s) until the robot is full, as the charger last published."""
+        """The time (s) until the robot is full, according to the charger's last state."""
         return in_seconds(self.state.time_to_fully_charged) if self.state else 0.0
 
     def says(self, one: News) -> str:
-        """Return a line of the story; "" if the event is not told."""
+        """Return a line of the story. Return "" if the story leaves the event out."""
         match one.what:
             case "asks" if one.requester:
                 robot = one.requester.wants

@@ -1,4 +1,5 @@
-"""Facts that all kinds of device share: states and their age, faults from daemons, and the story."""
+"""Facts that all kinds of device share: states and their age, faults that daemons report, and the
+story."""
 
 import sys
 from abc import abstractmethod
@@ -19,20 +20,21 @@ from workbench.explain.rows import label
 
 MOST_LINES: Final = 600
 LONGEST_DETAIL: Final = 300
-"""Maximum length (characters) of a fault's detail. Details of HTTP drivers have an address and a
+"""Maximum length (characters) of a fault's detail. The details of HTTP drivers have an address and a
 reason."""
 BACK_S: Final = 0.2
 BACK_TIMES: Final = 3
 BACK_WITHIN_S: Final = 15.0
-"""Two nodes publish the states if stamps step back by at least BACK_S (s), at least BACK_TIMES times,
-within BACK_WITHIN_S (s)."""
+"""BACK_S, BACK_TIMES and BACK_WITHIN_S are limits that show two publishers. With two publishers, stamps
+step back by at least BACK_S (s). This happens at least BACK_TIMES times within BACK_WITHIN_S (s)."""
 
 
 class Device(ObservedDevice[Any]):
-    """One device, from its messages, and its story.
+    """One device, built from its messages, and its story.
 
-    `name` is in a printable form. `focus` is a session; the story of its last ride is kept whole, even
-    if others ride later. `bus_error` is the last bus error that the device's daemon noted.
+    - `name`: the device's name in a printable form.
+    - `focus`: a session whose last ride stays complete in the story, even if other sessions ride later.
+    - `bus_error`: the last bus error in the notes of the device's daemon.
     """
 
     def __init__(self, name: str, began: Moment) -> None:
@@ -45,11 +47,11 @@ class Device(ObservedDevice[Any]):
         self.bus_error = ""
 
     def hear(self, moment: Moment, topic: str, message: d.Message) -> list[News]:
-        """Take a message about the device; add the changes to the story."""
+        """Take a message about the device, and add the changes to the story."""
         return self._tell_all(super().hear(moment, topic, message))
 
     def diagnose(self, moment: Moment, status: d.DiagnosticStatus) -> list[News]:
-        """Take our daemon's diagnostics about the device; add the changes to the story."""
+        """Take our daemon's diagnostics about the device, and add the changes to the story."""
         return self._tell_all(super().diagnose(moment, status))
 
     def _tell_all(self, news: Iterable[News]) -> list[News]:
@@ -69,7 +71,7 @@ class Device(ObservedDevice[Any]):
 
     @abstractmethod
     def says(self, one: News) -> str:
-        """Return a line of the story; "" if the event is not told."""
+        """Return a line of the story. Return "" if the story leaves the event out."""
 
     def notice(self, one: News) -> None:
         """Count the events that the story tells."""
@@ -102,23 +104,23 @@ class Device(ObservedDevice[Any]):
         return tuple(line for line in self.lines if line.at >= at)
 
     def two_nodes(self, now: Moment) -> bool:
-        """Do two nodes publish this device's states? Two publishers take turns, or stamps jump back and
-        forth."""
+        """Return whether two nodes publish this device's states. Then publishers take turns, or stamps
+        jump back and forth."""
         return (
             len(self.publishers(now)) > 1
             or self.steps_back(now.at, BACK_S, BACK_WITHIN_S) >= BACK_TIMES
         )
 
     def nodes(self, now: Moment) -> list[str]:
-        """Name the nodes that publish the device's states now, as far as known."""
+        """Name the nodes that publish the device's states now. Leave out unknown nodes."""
         if len(senders := {label(one.node) for one in self.publishers(now) if one.node}) > 1:
             return sorted(senders)
         every = (one for one in self.diagnoses.values() if one.is_current(now.at))
         return sorted({one.name.partition(": ")[0] for one in every if one.kind == self.kind})
 
     def note(self, moment: Moment, note: Noted) -> None:
-        """Take a note of the device's own daemon. A daemon notes changes: a value holds until the next
-        note."""
+        """Take a note of the device's own daemon. A daemon notes only changes, so a value holds until
+        the next note."""
         if self.noted is None:
             near = moment.at - self.began.at <= SILENT_S
             self.noted = Diagnosis(self.kind, Moment(moment.at, moment.wall, seen=not near))
@@ -136,7 +138,8 @@ class Device(ObservedDevice[Any]):
             self._tell_all(known.refuses(moment, label(note.refused.partition(": ")[0])))
 
     def _daemons(self) -> Iterator[Diagnosis]:
-        """Yield the notes of the device's own daemon, then the diagnostics of all our daemons."""
+        """Yield the notes of the device's own daemon first, and then the diagnostics of all our
+        daemons."""
         if self.noted is not None:
             yield self.noted
         yield from self.diagnoses.values()
@@ -146,17 +149,19 @@ class Device(ObservedDevice[Any]):
         return (o for o in self._daemons() if o is self.noted or o.is_current(now.at))
 
     def own(self, now: Moment) -> Diagnosis | None:
-        """Return the present diagnostics of the device's own daemon; None if the daemon is silent or
-        not ours."""
+        """Return the present diagnostics of the device's own daemon. Return None if the daemon is
+        silent or not ours."""
         return next((one for one in self.heard_from(now) if one.kind == self.kind), None)
 
     def told(self, key: str, now: Moment) -> str:
-        """Return the present value of this key from the device's own daemon; "" if unknown."""
+        """Return the present value of this key from the device's own daemon. Return "" if the value is
+        unknown."""
         own = (one for one in self.heard_from(now) if one.kind == self.kind)
         return next((one.values[key] for one in own if key in one.values), "")
 
     def faults(self, now: Moment) -> dict[str, tuple[str, Moment]]:
-        """Return each fault's code -> its detail and beginning. The own daemon's faults come first."""
+        """Return fault code -> detail and beginning. The faults from the device's own daemon come
+        first."""
         found: dict[str, tuple[str, Moment]] = {}
         for one in sorted(self.heard_from(now), key=lambda one: one.kind != self.kind):
             for code, fault in one.faults.items():
@@ -164,12 +169,12 @@ class Device(ObservedDevice[Any]):
         return found
 
     def waits_said(self, now: Moment) -> dict[str, str]:
-        """Return why requesters wait, by the kind of our daemon that gives the reason."""
+        """Return kind of daemon -> why requesters wait, as our daemon of that kind says."""
         said = ((one.kind, one.values.get("waits")) for one in self.heard_from(now))
         return {kind: label(text, 200) for kind, text in said if text}
 
     def refusals(self, now: Moment, since: float) -> list[str]:
-        """Return the reasons of refusals since time `since` (s), the last first."""
+        """Return the reasons of refusals since time `since` (s). The latest reason comes first."""
         found = [
             (last.at, reason)
             for one in self.heard_from(now)
@@ -179,8 +184,8 @@ class Device(ObservedDevice[Any]):
         return [reason for _, reason in sorted(found, reverse=True)]
 
     def _fault(self, one: News) -> str:
-        """Return the story line of a fault. A daemon notes a fault and later publishes it: tell the
-        fault once."""
+        """Return the story line of a fault, or "". A daemon first notes a fault and later publishes the
+        same fault, but the story tells the fault only once."""
         found = self.diagnoses[one.who] if one.who else self.noted
         assert found is not None
         if self.notes_faults and one.who and found.kind == self.kind:

@@ -1,11 +1,11 @@
 """The timeline of one device as lanes, for `plot` and the web page.
 
 A lane has one or more rows, such as one row for each relay. The spans of a row never overlap. Times are
-on `Heard.at`'s clock. Every number of parts has a limit. Each row keeps its newest spans, and each lane
-keeps the rows with the latest news. `left_out` counts the dropped parts.
+on `Heard.at`'s clock. The numbers of lanes, rows and spans are limited. Each row keeps its newest
+spans, and each lane keeps the rows with the latest news. `left_out` counts the dropped parts.
 
-`Drawing` grows message by message, for a live page; `lanes` draws a whole recording. Both return a
-`Timeline` of plain values, which `dataclasses.asdict` converts for JSON.
+For a live page, `Drawing` grows message by message. For a whole recording, `lanes` draws once. Both
+return a `Timeline` of plain values, which `dataclasses.asdict` converts for JSON.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -27,9 +27,10 @@ from workbench.explain.state_tones import tone
 from workbench.explain.timeline import LANES, Lane, LaneName, Level, Timeline, Tone
 
 MOST_ROWS: Final = 12
-"""Maximum number of a lane's rows. A flood of made-up requesters or faults must not fill a page."""
+"""Maximum number of a lane's rows. Without a maximum, made-up requesters or faults could fill the
+page."""
 STAMP: Final = "stamp"
-"""Name of the row in lane `faults` for states that are too old."""
+"""Name of a row in lane `faults`. The row shows states whose stamps are too old."""
 AGES: Final = {
     "": "",
     "was never read": "never read",
@@ -37,7 +38,8 @@ AGES: Final = {
     "is from the future": "the stamp is in the future",
 }
 SUPERVISOR: Final = "supervisor"
-"""Name of the row in lane `requests` for the supervisor's requests to the device's own daemon."""
+"""Name of a row in lane `requests`. The row shows the supervisor's requests to the device's own
+daemon."""
 
 
 def lanes(
@@ -47,7 +49,7 @@ def lanes(
     from_s: float = float("-inf"),
     to_s: float = float("inf"),
 ) -> Timeline:
-    """Return the timeline of a recording between two times. `heard` is in the order of time."""
+    """Return the timeline of a recording between two times. `heard` must be in the order of time."""
     drawing = Drawing(kind, device)
     for one in heard:
         if one.at > to_s:
@@ -57,7 +59,8 @@ def lanes(
 
 
 class Drawing:
-    """A growing timeline of one device. It forgets spans that ended more than `past_s` (s) ago."""
+    """A growing timeline of one device. `Drawing` forgets spans that ended more than `past_s` (s)
+    ago."""
 
     def __init__(self, kind: Kind, device: str, past_s: float = float("inf")) -> None:
         self._kind: Kind = kind
@@ -75,7 +78,8 @@ class Drawing:
         self._said: dict[str, Diagnosis] = {}
 
     def take(self, heard: Heard | Level | Own) -> None:
-        """Take the next message. A recorded message that is out of order counts as new."""
+        """Take the next message. If a recorded message is out of order, use the time of the message
+        before."""
         if isinstance(heard, Own):
             note = noted(heard.topic.rpartition("/")[2], heard.text)
             if note is not None and note.subject == self._device:
@@ -93,7 +97,7 @@ class Drawing:
                 self._hear(heard.topic.rpartition("/")[2], heard.message, heard.wall)
 
     def timeline(self, from_s: float = float("-inf"), to_s: float = float("inf")) -> Timeline:
-        """Return the timeline between these times, up to the last message."""
+        """Return the timeline between these times, but no later than the last message."""
         if self._began_at is None:
             return Timeline(self._kind, self._device, 0.0, 0.0, 0.0, ())
         to_s = max(self._began_at, min(to_s, self._now))
@@ -111,7 +115,8 @@ class Drawing:
                     yield Lane(name, part, spans, marks, row.left_out)
 
     def _clock(self, heard: Heard) -> None:
-        """Compare the wall clock with the steady clock, and mark a step of the wall clock."""
+        """Compare the wall clock with the steady clock. If the wall clock was stepped, mark the
+        step."""
         offset = heard.wall - heard.at
         if self._wall and abs(offset - self._wall) > STEP_S:
             self._steps.mark(
@@ -127,8 +132,8 @@ class Drawing:
         *,
         fills: bool = False,
     ) -> LaneRow:
-        """Return the row of this name. A full lane drops the row that was silent for the longest
-        time."""
+        """Return the row of this name. If the lane is full, drop the row that was silent for the
+        longest time."""
         rows, part = self._rows[lane], label(part)
         if part not in rows:
             if len(rows) >= MOST_ROWS:
@@ -138,13 +143,13 @@ class Drawing:
         return rows[part]
 
     def _say(self, lane: LaneName, text: str, looks: Tone) -> None:
-        """Set the value of a lane with only one row, from a state."""
+        """Set the value of a lane that has only one row. The value comes from a state."""
         self._row(lane, fills=True).say(self._now, label(text), looks)
 
-    # ---- notes of our daemon
+    # ---- our daemon's notes
 
     def _note(self, level: Level) -> None:
-        if level.lane not in self._noted:  # notes are more exact than diagnostics at 1 Hz
+        if level.lane not in self._noted:  # notes tell times more exactly than diagnostics
             self._noted.add(level.lane)
             self._rows[level.lane].clear()
         looks: Tone = "wrong" if level.lane == "faults" else "works"
@@ -187,7 +192,7 @@ class Drawing:
                 self._say("mode", text, tone(d.ChargerStateValue, state.state))
 
     def _age(self, stamped_at: float, wall: float) -> None:
-        """Show an old reading, or a reading from another clock, as a separate fault."""
+        """Show an old reading, or a reading stamped by another clock, as a separate fault."""
         text = AGES[reading_age(stamped_at, wall)]
         if text or STAMP in self._rows["faults"]:
             self._row("faults", STAMP).say(self._now, text, "wrong")
@@ -207,7 +212,8 @@ class Drawing:
         self._destination = state.destination_floor
 
     def _request(self, topic: str, message: words.Requested) -> None:
-        """Fill a row for each requester, and a row for the supervisor, which forwards requests."""
+        """Fill a row for each requester. Fill another row for the supervisor, which forwards
+        requests."""
         match message:
             case d.LiftRequest():
                 ends = message.request_type == d.LiftRequestType.REQUEST_END_SESSION
@@ -237,10 +243,10 @@ class Drawing:
             row.mark(self._now, label(f"refused: {refusal.text}"), "wrong")
 
     def _heartbeat(self, message: d.SupervisorHeartbeat) -> None:
-        """Fill the rows of the sessions that the door supervisor's heartbeat lists.
+        """Fill a row for each session in the door supervisor's heartbeat.
 
-        RMF's own supervisor sends a heartbeat only after requests. A session lasts until a heartbeat
-        omits it.
+        RMF's own supervisor sends a heartbeat only after requests. Therefore a session lasts until a
+        heartbeat omits the session.
         """
         holders = set(map(label, listed(message, self._device)))
         for who in holders:
@@ -250,8 +256,8 @@ class Drawing:
                 row.say(self._now, "", "held")
 
     def _diagnosis(self, status: d.DiagnosticStatus) -> None:
-        """Fill the fault rows. A device and its supervisor may report the same fault; the fault lasts
-        while one of the two reports it."""
+        """Fill the fault rows. A device and its supervisor may report the same fault. The fault lasts
+        as long as one of the two reports the fault."""
         now = Moment(self._now, self._wall + self._now)
         ours = about(status) == (self._kind, self._device)
         said = report(self._said, MOST_NODES, status, now) if ours else None
@@ -276,7 +282,7 @@ class Drawing:
 
 
 def _floor(floor: str, runs: Tone) -> Tone:
-    """Return a floor's tone. A lift without motion lines counts as standing if its floor is known."""
+    """Return a floor's tone. If a lift has no motion lines, a known floor means that the car stands."""
     if not floor:
         return "unknown"
     return "works" if runs == "works" else "calm"
@@ -287,5 +293,5 @@ def _outputs(told: str) -> Iterator[tuple[str, str]]:
     (`bridges.system.log.plain`)."""
     for part in told.split(", ") if told != "-" else ():
         name, _, value = part.partition(" ")
-        if value != "0":  # 0 of a counter means off
+        if value != "0":  # a counter with the value 0 is off
             yield name, value

@@ -1,8 +1,9 @@
-"""Explain why a robot waits at a door or a door stays open, in sentences from its messages.
+"""Explain, in sentences from a door's messages, why a robot waits at the door or why the door stays
+open.
 
-RMF's DoorOpen waits for two conditions: the door's state is OPEN, and a heartbeat of the door
-supervisor lists the robot for this door. DoorClose waits until no heartbeat lists the robot (rmf_ros2,
-DoorOpen.cpp and DoorClose.cpp). The robot sends no request while it drives through.
+RMF's DoorOpen waits for two conditions. The door's state must be OPEN, and a heartbeat of the door
+supervisor must list the robot for this door. RMF's DoorClose waits until no heartbeat lists the robot
+(rmf_ros2, DoorOpen.cpp and DoorClose.cpp). The robot sends no request while the robot drives through.
 """
 
 from shlex import quote
@@ -22,15 +23,15 @@ SETTLES_S: Final = 2.0
 LONG_S: Final = 60.0
 """Maximum normal time (s) of a robot's drive through a doorway."""
 OPENS_S, MOVES_S = 5.0, 15.0
-"""Normal times (s) until a door that nobody holds begins to close, and until the door is closed."""
+"""Normal times (s) of a door that nobody holds: OPENS_S in state OPEN, and MOVES_S in motion."""
 AWAY: Final = ("offline", "unknown")
 
 
 def answer(
     door: DoorFacts, clock: TimePhrases, around: common.OthersHeard, focus: str = ""
 ) -> Answer:
-    """Explain the door at the last message. `focus`: the requester to explain; "" for the requester who
-    waits."""
+    """Explain the door at the last message. `focus` is the requester to explain. With "", explain the
+    requester who waits."""
     if door.last_state is None:
         return _with_askers(common.unheard(door, around), door, clock)
     stopped = common.stopped(door, around, clock)
@@ -95,8 +96,8 @@ def _with_askers(found: Answer, door: DoorFacts, clock: TimePhrases) -> Answer:
 def _fields(
     door: DoorFacts, claim: DeviceRequester, clock: TimePhrases
 ) -> tuple[CheckedField, ...]:
-    """Return the fields that DoorOpen or DoorClose checks, as the fleet adapter of this requester sees
-    them."""
+    """Return the fields that DoorOpen or DoorClose checks, as this requester's fleet adapter sees the
+    fields."""
     told = {
         "door": door.mode.since,
         "heartbeat": door.holders.get(claim.who) or claim.since,
@@ -165,16 +166,16 @@ def _not_listed(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: T
         )
     else:
         found.say(
-            f"The door supervisor does not list {claim.who}: it takes its requests for replays, or"
+            f"The door supervisor does not list {claim.who}. It takes these requests for replays, or"
             " has too many requesters.",
             "the supervisor",
-            f"take the request of {claim.who}; its log says why it does not",
+            f"take the request of {claim.who}; the supervisor's log says why it does not",
         )
 
 
 def _not_let_go(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
     found.say(
-        f"It asks for CLOSE, and the supervisor's heartbeat has listed it"
+        f"{claim.who} asks for CLOSE, but the supervisor's heartbeat has listed {claim.who}"
         f" {clock.since(door.holders[claim.who])}.",
         "the supervisor",
         f"remove {claim.who} from its list",
@@ -215,19 +216,21 @@ def _nobody_asks(
 def _nobody_tells(
     found: Answer, door: DoorFacts, clock: TimePhrases, around: common.OthersHeard
 ) -> None:
-    """Explain an open door that nobody is known to hold.
+    """Explain an open door that no requester is known to hold.
 
-    RMF's supervisor sends a heartbeat only after requests. It sends CLOSE at each state of an open door
-    that nobody holds (door_supervisor/Node.cpp).
+    RMF's supervisor sends a heartbeat only after requests. If nobody holds an open door, the supervisor
+    sends CLOSE at each state of the door (door_supervisor/Node.cpp).
     """
     if clock.now.at - door.began.at < REQUESTER_SILENT_S:
-        found.say("Whether a robot holds it is not known yet.", "nobody", "listen for longer")
+        found.say(
+            "It is not yet known whether a robot holds the door.", "nobody", "listen for longer"
+        )
         return
     doorway = f"look into the doorway of {door.name}"
     if around.nobody_publishes("door_requests"):
         found.say(
-            "No node publishes `door_requests`, so the door supervisor is not running. Whether a robot"
-            " holds the door is not known: it may stand in the doorway, where it says nothing.",
+            "No node publishes `door_requests`, so the door supervisor is not running. It is not known"
+            " whether a robot holds the door. A robot in the doorway says nothing.",
             "a person",
             f"{doorway}; when no robot stands in it, start the door supervisor, which lets go of every"
             " door whose holder is silent",
@@ -237,7 +240,7 @@ def _nobody_tells(
     if nodes := around.publishers("door_requests"):
         found.say(
             f"RMF's supervisor sends CLOSE at each state of an open door that nobody holds. {nodes}"
-            f" publishes `door_requests` and sends none: so {holds}.",
+            f" publishes `door_requests` and sends no CLOSE, so {holds}.",
             "the robot",
             f"drive through and send CLOSE; if {door.name} stays open for more than a minute, a person"
             " has to look into the doorway",
@@ -251,8 +254,8 @@ def _nobody_tells(
 
 
 def _asked_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
-    """Explain requests heard only on the daemon's own topic. The supervisor sends such requests, or a
-    person does with `send --direct`."""
+    """Explain requests heard only on the daemon's own topic. The sender is the supervisor, or a person
+    with `send --direct`."""
     assert door.asked is not None
     found.say(
         f"On door_requests {door.asked_by} has asked for OPEN {clock.since(door.asked.since)}."
@@ -263,8 +266,8 @@ def _asked_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
 
 
 def _held_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
-    """Name the holders, and the last request of each. Silence is normal, because a robot in a doorway
-    sends nothing."""
+    """Name the holders, and tell when the last request came. Silence is normal, because a robot in a
+    doorway sends nothing."""
     who, since = min(door.holders.items(), key=lambda one: one[1].at)
     claim = door.requesters.get(who)
     last: Moment | None = claim.last if claim else None

@@ -1,4 +1,4 @@
-"""Facts about one door from its messages, and its story."""
+"""Facts about one door, from its messages, and the door's story."""
 
 from bridges.observe.device import Check
 from bridges.observe.door import OPEN, SUPERVISOR, ObservedDoor
@@ -10,7 +10,7 @@ from workbench.explain.phrases import lasted
 
 
 class DoorFacts(Device, ObservedDoor):
-    """A door with its story. `passages`: number of holds that have ended."""
+    """A door with its story. `passages` counts the holds that have ended."""
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
@@ -18,22 +18,23 @@ class DoorFacts(Device, ObservedDoor):
 
     @property
     def asked_by(self) -> str:
-        """Name of the last requester on `door_requests`."""
+        """The name of the last requester on `door_requests`."""
         return "the supervisor" if self.sender == SUPERVISOR else self.sender
 
     @property
     def hears_lists(self) -> bool:
-        """Would this listener hear the supervisor's heartbeat? The recording of a door's daemon has no
-        heartbeat."""
+        """Return whether this listener would hear the supervisor's heartbeat. The recording of a door's
+        daemon has no heartbeat."""
         return self.last_heartbeat is not None or self.noted is None
 
     def checks(self, one: DeviceRequester) -> tuple[Check, ...]:
-        """Return those conditions of this requester's DoorOpen or DoorClose that can be known."""
+        """Return this requester's conditions of DoorOpen or DoorClose. Leave out conditions that cannot
+        be known."""
         found = super().checks(one)
         return tuple(check for check in found if check.name == "door" or self.hears_lists)
 
     def says(self, one: News) -> str:
-        """Return a line of the story; "" if the event is not told."""
+        """Return a line of the story. Return "" if the story leaves the event out."""
         who, by = one.who, one.requester
         match one.what:
             case "passed on":

@@ -1,6 +1,6 @@
-"""An explanation as values: for one screen of text, and for JSON through `dataclasses.asdict`.
+"""An explanation as values, for one screen of text, and for JSON through `dataclasses.asdict`.
 
-Every text is one printable line. Parts from the network are escaped.
+Every text is one printable line. Texts from the network are escaped.
 """
 
 from dataclasses import dataclass
@@ -18,19 +18,20 @@ Who = Literal[
     "the controller",
     "a person",
 ]
-"""Party that has to act next.
+"""The party that has to act next.
 
-`the device's node` is the device's daemon, ours or another maker's. `the controller` is the controller
-of the lift, door or charger itself.
+`the device's node` is the device's daemon, which may be ours or another maker's. `the controller` is
+the maker's controller of the lift, door or charger.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class CheckedField:
-    """One of RMF's conditions.
+    """One of the fields that RMF checks.
 
-    `wanted`: the value that the requester waits for. `met`: does the present value satisfy RMF?
-    `since`: beginning of the present value, in words.
+    - `wanted`: the value that the requester waits for.
+    - `met`: whether the present value satisfies RMF.
+    - `since`: the beginning of the present value, in words.
     """
 
     name: str
@@ -42,7 +43,7 @@ class CheckedField:
 
 @dataclass(frozen=True, slots=True)
 class NextStep:
-    """Next step, and the party that has to act."""
+    """The next step, and the party that has to take the step."""
 
     who: Who
     what: str
@@ -50,8 +51,8 @@ class NextStep:
 
 @dataclass(frozen=True, slots=True)
 class StoryLine:
-    """One event of the story. `at`: seconds on the recording's steady clock. `wall`: seconds since the
-    epoch."""
+    """One event of the story. `at` is in seconds on the recording's steady clock. `wall` is in seconds
+    since the epoch."""
 
     at: float
     wall: float
@@ -60,7 +61,7 @@ class StoryLine:
 
 @dataclass(frozen=True, slots=True)
 class FaultTold:
-    """A present fault, with a remedy if `faults.yaml` has the fault."""
+    """A present fault. If `faults.yaml` has the fault, the fault has a remedy."""
 
     code: str
     detail: str
@@ -73,9 +74,11 @@ class FaultTold:
 class Explanation:
     """The explanation of one device, at the last message.
 
-    `now`: sentences, the most important first. `asks`: the requester who waits for `fields`. `story`:
-    the events of the explained ride. `left_out`: number of story lines that were dropped. `before`: a
-    summary of the earlier events.
+    - `now`: sentences, the most important first.
+    - `asks`: the requester who waits for `fields`.
+    - `story`: the events of the explained ride.
+    - `left_out`: the number of story lines that were dropped.
+    - `before`: a summary of the earlier events.
     """
 
     kind: Kind

@@ -1,7 +1,7 @@
-"""Causes that come before all others, at every kind of device.
+"""Causes that an answer names before any other cause, for every kind of device.
 
-The causes are two nodes under one name, readings that come and go, and the device's own faults. As long
-as one of them lasts, an answer blames nobody else.
+There are three such causes: two nodes that publish under one name, readings that come and go, and a
+fault of the device itself. As long as such a cause lasts, an answer blames nothing else.
 """
 
 from collections.abc import Mapping
@@ -37,7 +37,8 @@ OWN: Final[Mapping[str, tuple[str, str]]] = {
         " writes to it",
     ),
     "RELAY_RESTS": (
-        "While it rests the daemon asks the controller for nothing, so the controller is not to blame.",
+        "While the relay rests, the daemon asks the controller for nothing, so the controller is not to"
+        " blame.",
         FLICKERS,
     ),
     "DOOR_OPENING_FAULT": CONTACT,
@@ -62,7 +63,7 @@ OWN: Final[Mapping[str, tuple[str, str]]] = {
 }
 """Faults of the device itself, the most telling first.
 
-Each code has an explanation, and the place where a person looks. "" stands for the text in
+Each code has an explanation, and the place where a person should look. "" stands for the text in
 `bridges/runtime/faults.yaml`.
 """
 READINGS: Final = ("INPUTS_NOT_FRESH", "COMMUNICATION_LOST")
@@ -70,13 +71,15 @@ OFFLINE: Final = (*READINGS, "OUTPUTS_NOT_WRITTEN", "MANUAL", "OUT_OF_SERVICE")
 """Faults that make a device OFFLINE."""
 UNSTEADY: Final = "not steady:"
 STALLS_S: Final = 0.5
-"""Difference (s) between the ages of two readings which shows that no new reading came."""
+"""Limit (s) for the ages that readings have when the device changes. Ages that differ by this limit or
+more show that new readings did not come."""
 
 
 def two_nodes(
     found: Answer, device: Device, clock: TimePhrases, around: OthersHeard, topic: str
 ) -> bool:
-    """Explain that two nodes publish one device's states on this topic. Return whether that is so."""
+    """Explain that two nodes publish one device's states on this topic. Return whether this is the
+    cause."""
     if TWO_NODES not in device.faults(clock.now) and not device.two_nodes(clock.now):
         return False
     names, nodes = device.nodes(clock.now), around.publishers(topic)
@@ -95,11 +98,11 @@ def two_nodes(
 
 
 def comes_and_goes(found: Answer, device: Device, clock: TimePhrases) -> bool:
-    """Explain a device that goes OFFLINE and comes back. True if the device does so.
+    """Explain a device that goes OFFLINE and comes back. Return whether the device does.
 
-    A listener of a few seconds may hear few changes, so the present faults from the daemon count too:
-    lost readings or unsteady inputs. Old readings, or several unsteady inputs, show that no new
-    readings came. Otherwise an input flickers.
+    A listener of a few seconds may hear few changes. Therefore present faults from the daemon count
+    too, such as lost readings or unsteady inputs. Old readings, or several unsteady inputs, show that
+    no new readings came. Otherwise an input flickers.
     """
     ages = device.flaps(clock.now)
     _, unsteady, inputs = device.waits_said(clock.now).get(device.kind, "").partition(UNSTEADY)
@@ -109,14 +112,14 @@ def comes_and_goes(found: Answer, device: Device, clock: TimePhrases) -> bool:
     heard_s = lasted(min(FLAPS_WITHIN_S, clock.now.at - device.began.at))
     on, often = common.relays(device, clock), f"{len(ages)} changes in {heard_s}"
     if len(ages) == 1:
-        often = f"1 change in {heard_s}; its inputs are unsteady still:{inputs}"
+        often = f"1 change in {heard_s}; its inputs are still unsteady:{inputs}"
     flickers = "," not in inputs and max(ages) - min(ages) < STALLS_S
     found.because = () if flickers else READINGS
     why = (
         "though its readings are fresh: an input flickers, as a contact for manual mode may"
         if flickers
-        else "because its bus or module answers late, or at times not at all; what it shows between"
-        " proves nothing"
+        else "because its bus or module answers late, or at times not at all; the states in between"
+        " prove nothing"
     )
     bus = f" The last error on its bus: {device.bus_error}." if device.bus_error else ""
     again = " again and again" if len(ages) > 1 else ""
@@ -136,10 +139,10 @@ def own_fault(
     shown: str = "",
     end: str = "open",
 ) -> bool:
-    """Explain the most telling fault of the device itself. True if there is one.
+    """Explain the most telling fault of the device itself. Return whether the device has such a fault.
 
-    `shown`: the door's published state. `end`: the state that the door should have. A door shown closed
-    has not moved, so no contact is to blame.
+    `shown` is the door's published state. `end` is the state that the door should have. A door that is
+    shown closed has not moved, so no contact is to blame.
     """
     present = {code: detail for code, (detail, _) in device.faults(clock.now).items()}
     if around.reason is not None and around.reason.fault:

@@ -1,7 +1,7 @@
 """Sort a graph's messages by device, and explain each device.
 
-Call `HeardDevices.take` in the order of time. Its memory has a limit: a recording of a day takes no
-more memory than a recording of a minute.
+Call `HeardDevices.take` in the order of time. The memory of `HeardDevices` is limited. A recording of a
+day takes no more memory than a recording of a minute.
 """
 
 from collections import deque
@@ -37,14 +37,16 @@ from workbench.explain.workcell_facts import DispenserFacts, IngestorFacts, Work
 
 STORY_LINES: Final = 40
 SHOWS_S: Final = 1.5
-"""Time (s) after which the device's states show the effect of a file's reason. States come at 1 Hz."""
+"""Time (s) after the recorder's reason to keep a file. After this time, the device's states show the
+reason's effect. States come at 1 Hz."""
 
 
 class HeardDevices(ObservedGraph[Device]):
-    """All devices heard, or only the devices with this `name`.
+    """All devices heard, or only the devices with one name.
 
-    `session`: the session whose last ride stays in the story, even if others ride later. `senders`: the
-    nodes that publish each topic on a live graph where FLEET_STATES is heard too; None if unknown.
+    - `session`: the session whose last ride stays in the story, even if other sessions ride later.
+    - `senders`: the nodes that publish each topic on a live graph. `senders` is None if the nodes are
+      unknown. On a graph with `senders`, FLEET_STATES is heard too.
     """
 
     makes: ClassVar = {
@@ -64,8 +66,9 @@ class HeardDevices(ObservedGraph[Device]):
     ) -> None:
         """Make an empty collection.
 
-        `most_lines`: maximum number of story lines for each device. `graph`: options that name this
-        graph, for the commands in sentences.
+        - `name`: the name of the devices to explain; "" for all devices.
+        - `most_lines`: maximum number of story lines for each device.
+        - `graph`: options that name this graph. The commands in sentences get these options.
         """
         super().__init__()
         self._most_lines = most_lines
@@ -81,7 +84,7 @@ class HeardDevices(ObservedGraph[Device]):
         self.senders: Mapping[str, Sequence[str]] | None = None
 
     def take(self, heard: Heard | Own) -> None:
-        """Take the next message, or the next text of our recorder."""
+        """Take the next message from the graph, or the next note of our recorder."""
         for name in [name for name, at in self._due.items() if heard.at > at]:
             del self._due[name]
             self._keep(name)
@@ -94,8 +97,11 @@ class HeardDevices(ObservedGraph[Device]):
             self._refusal(self.now, heard.message)
 
     def retained(self, heard: Heard) -> None:
-        """Take a request that a fleet adapter sent earlier. It matters for a lift without states,
-        because no adapter repeats its request there."""
+        """Take a request that a fleet adapter sent before we listened.
+
+        The request matters for a lift without states, because no adapter repeats the request to such a
+        lift.
+        """
         if isinstance(heard.message, d.LiftRequest):
             found = self.device("lift", heard.message.lift_name, self.now)
             if isinstance(found, LiftFacts) and found.state is None:
@@ -103,7 +109,7 @@ class HeardDevices(ObservedGraph[Device]):
                 found.retain(heard.message, self.now)
 
     def at_its_end(self) -> None:
-        """Explain the recording's end instead of the moment for which our recorder kept the file."""
+        """Explain the end of the recording. Ignore the moment for which our recorder kept the file."""
         self._reason.clear()
         self._then.clear()
 
@@ -116,8 +122,8 @@ class HeardDevices(ObservedGraph[Device]):
         return [(kind, one) for kind in KINDS for one in sorted(d.id for d in self.stated(kind))]
 
     def kinds(self, name: str) -> list[Kind]:
-        """Return the kinds of the devices with this name, according to their states, else according to
-        requests."""
+        """Return the kinds of the devices with this name. States tell the kinds. Without states,
+        requests tell the kinds."""
         found = [kind for kind in KINDS if (kind, name) in self.known]
         stated = [kind for kind in found if self.known[kind, name].state is not None]
         return stated or found or (["charger"] if name in self._coordinates() else [])
@@ -125,8 +131,8 @@ class HeardDevices(ObservedGraph[Device]):
     def explain(
         self, kind: Kind, name: str, zone: tzinfo | None, remedies: Remedies | None = None
     ) -> Explanation:
-        """Explain the device at the last message. `zone`: time zone of the texts; None: this machine's
-        zone."""
+        """Explain the device at the last message. `zone` is the time zone of the texts, or None for
+        this machine's zone."""
         began = self.began or self.now
         last = self.known.get((kind, name)) or self.make(kind, name)
         at_end = self.now, last, self.spoke
@@ -198,15 +204,15 @@ class HeardDevices(ObservedGraph[Device]):
         raise AssertionError(device)
 
     def _story(self, device: Device, answer: Answer) -> tuple[StoryLine, ...]:
-        """Return the remembered story of the ride that the answer explains."""
+        """Return the story of the ride that the answer explains."""
         if isinstance(device, LiftFacts) and device.kept and not answer.asks:
             return device.kept
         return device.lines_since(max(answer.since, self._story_from))
 
-    # ---- messages to devices
+    # ---- sort messages by device
 
     def make(self, kind: Kind, name: str) -> Device:
-        """Make a device that has heard no messages."""
+        """Make a device that has not yet heard a message."""
         made = super().make(kind, name)
         made.focus = self._session
         made.lines = deque(maxlen=self._most_lines)
@@ -215,7 +221,8 @@ class HeardDevices(ObservedGraph[Device]):
     def device(
         self, kind: Kind, name: str, moment: Moment, *, stated: bool = False
     ) -> Device | None:
-        """Return the device of this name; None if this collection does not explain the device."""
+        """Return the device of this name. Return None if this collection does not explain the
+        device."""
         if self._name in ("", name):
             return super().device(kind, name, moment, stated=stated)
         if stated and name and len(self._others[kind]) < MOST_DEVICES:
@@ -241,7 +248,8 @@ class HeardDevices(ObservedGraph[Device]):
                 self.known[kind, note.subject].note(moment, note)
 
     def _keep(self, name: str) -> None:
-        """Keep a copy of the present state of the devices with this name; "" means all devices."""
+        """Copy the present state of the devices with this name. With "", copy the state of all
+        devices."""
         for key, device in self.known.items():
             if name in ("", device.id) and key not in self._then:
                 self._then[key] = self.now, deepcopy(device), {**self.spoke}
@@ -260,7 +268,7 @@ class HeardDevices(ObservedGraph[Device]):
 
 
 def _act_on(answer: Answer, reason: FileReason, remedies: Remedies) -> None:
-    """Propose a step for the file's reason, if the device's state itself shows nothing to do."""
+    """Propose a step for the file's reason, if the device's state alone calls for no step."""
     if any(step.who != "nobody" for step in answer.next):
         return
     do = remedies[reason.fault][1] if reason.fault in remedies else ""
@@ -272,15 +280,15 @@ def _act_on(answer: Answer, reason: FileReason, remedies: Remedies) -> None:
 
 
 def _before(device: Device, clock: TimePhrases) -> str:
-    """Summarise the earlier events in one sentence; "" if there were none."""
+    """Summarise the earlier events in one sentence. Return "" if there were none."""
     match device:
         case LiftFacts() if device.rides.ended:
             rides = device.rides
             longest = ""
             if rides.longest_at is not None:
                 longest = (
-                    f"; the longest wait for the car was {lasted(rides.longest_s)}, of"
-                    f" {rides.longest_who} until {clock.time(rides.longest_at.wall)}"
+                    f"; the longest wait for the car was {lasted(rides.longest_s)}"
+                    f" ({rides.longest_who}, until {clock.time(rides.longest_at.wall)})"
                 )
             return f"{_count(rides.ended, 'ride')} ended in this time{longest}."
         case DoorFacts() if device.passages:

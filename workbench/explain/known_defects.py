@@ -1,7 +1,10 @@
-"""Known defects of RMF, each with its issue. A note appears only where the messages leave no doubt.
+"""Known defects of RMF, each with its issue. A note appears only if the messages leave no doubt.
 
-Messages of lifts and doors cannot prove three other defects, so no note names them. #389: a robot
-enters without a session. PR#490: mutex groups. Jazzy's RequestLift accepts a match without arrival.
+No note names three other defects, because messages of lifts and doors cannot prove these three:
+
+- #389: a robot enters without a session.
+- PR#490: mutex groups.
+- Jazzy's RequestLift accepts a match without arrival.
 """
 
 from collections.abc import Callable, Iterator
@@ -13,7 +16,7 @@ from bridges.observe.requesters import Moment
 from workbench.explain.device import Device
 
 SPAM: Final = 10
-"""Number of END requests that shows a defect. Normally an adapter sends one END, or a few until a state
+"""Number of END requests that shows a defect. A sound adapter sends one END, or a few until a state
 comes."""
 
 
@@ -52,11 +55,12 @@ PATTERNS: Final[tuple[tuple[Callable[[ObservedLift, Moment], str], str], ...]] =
         " fleet adapters (rmf_ros2#382, #415).",
     ),
 )
-"""Defects: a function, which returns the affected requester or "", and the sentence."""
+"""Pairs of a function and a sentence, one pair for each defect. The function returns the affected
+requester, or ""."""
 
 
 def notes(device: Device, now: Moment) -> Iterator[str]:
-    """Yield a note for each known defect that shows at this device."""
+    """Yield a note for each known defect that this device's messages show."""
     waits = any(one.ended is None and not one.gone for one in device.requesters)
     if device.kind != "charger" and waits and (device.state is None or device.is_silent(now)):
         yield (

@@ -1,8 +1,8 @@
-"""Explain why a robot waits for a lift, in sentences from its messages.
+"""Explain why a robot waits for a lift, in sentences from the lift's messages.
 
-RMF's RequestLift checks only four fields of LiftState: the lift's name, its session, its floor and its
-door (rmf_ros2, RequestLift.cpp:322-326). The answer names the fields that do not match, the reason, and
-the party that has to act next.
+RMF's RequestLift checks only four fields of LiftState: the lift's name, session, floor and door
+(rmf_ros2, RequestLift.cpp:322-326). The answer names the fields that do not match, the reason, and the
+party that has to act next.
 """
 
 from typing import Final
@@ -20,17 +20,20 @@ from workbench.explain.phrases import TimePhrases
 from workbench.explain.rows import label
 
 STANDS_S: Final = 5.0
-"""Maximum time (s) in which a fleet adapter that knows the recall floor requests this floor."""
+"""Maximum time (s) from a recall's open door to a request for the recall floor.
+
+Only a fleet adapter that knows the recall floor sends this request.
+"""
 FLOOR_S: Final = 20.0
-"""Maximum normal time (s) of a moving car between two floors."""
+"""Maximum normal time (s) of a car's move between two floors."""
 ALARMS: Final = {"FIRE": "fire alarm", "EMERGENCY": "emergency (stop, code blue, earthquake)"}
 
 
 def answer(
     lift: LiftFacts, clock: TimePhrases, around: common.OthersHeard, focus: str = ""
 ) -> Answer:
-    """Explain the lift at the last message. `focus`: the session to explain; "" for a session that
-    waits."""
+    """Explain the lift at the last message. `focus` is the session to explain. With "", explain a
+    session that waits."""
     if lift.last_state is None:
         return _with_askers(common.unheard(lift, around), lift, clock)
     stopped = common.stopped(lift, around, clock)
@@ -65,7 +68,8 @@ def _why(
     clock: TimePhrases,
     around: common.OthersHeard,
 ) -> None:
-    """Find the cause: first the lift itself, then the path of the requests, then the holder."""
+    """Find the cause. Look first at the lift itself, then at the path of the requests, then at the
+    holder."""
     silent = lift.not_passed_on(clock.now)
     if first_causes.two_nodes(found, lift, clock, around, "lift_states"):
         return
@@ -94,8 +98,11 @@ def _why(
 
 
 def _in_question(lift: LiftFacts, clock: TimePhrases, focus: str) -> DeviceRequester | None:
-    """Return the claim to explain: of `focus`, else of the longest waiting requester, else of the
-    holder."""
+    """Return the claim to explain, or None.
+
+    The claim is the claim of `focus`. Without `focus`, it is the claim of the requester who waits
+    longest. If nobody waits, it is the holder's claim.
+    """
     if focus:
         return lift.requesters.get(focus)
     waiting = [one for one in lift.asking(clock.now) if not lift.matches(one)]
@@ -105,8 +112,8 @@ def _in_question(lift: LiftFacts, clock: TimePhrases, focus: str) -> DeviceReque
 
 
 def _begins(lift: LiftFacts, claim: DeviceRequester | None) -> float:
-    """Return when the story begins (s): at the waiting requester's request, or at the holder's
-    grant."""
+    """Return the time (s) at which the story begins. The story begins at the waiting requester's
+    request or at the holder's first request, whichever came first."""
     holder = lift.requesters.get(lift.session.value)
     starts = [claim.first.at] if claim else []
     if holder is not None:
@@ -129,8 +136,8 @@ def _with_askers(found: Answer, lift: LiftFacts, clock: TimePhrases) -> Answer:
 
 
 def _hold(found: Answer, lift: LiftFacts, clock: TimePhrases, *, then: bool = False) -> None:
-    """Name the holder and the car's place. `then` selects the past tense, for the last state before
-    silence."""
+    """Name the holder and the place of the car. `then` selects the past tense, for the last state
+    before silence."""
     holder = "nobody" if lift.session.value == NOBODY else lift.session.value
     motion = "" if lift.motion.value == "unknown" else f", {_motion(lift.motion.value)}"
     car = f"at {lift.floor.value}, door {lift.door.value}{motion}, mode {lift.mode.value}"
@@ -148,8 +155,8 @@ def _motion(motion: str) -> str:
 def _fields(
     lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases
 ) -> tuple[CheckedField, ...]:
-    """Return RequestLift's fields, as this requester's fleet adapter sees them. The lift's name counts
-    as matching."""
+    """Return RequestLift's fields, as this requester's fleet adapter sees the fields. The lift's name
+    always counts as a match."""
     since = (lift.session.since, lift.floor.since, lift.door.since)
     return tuple(
         CheckedField(*check, clock.since(moment))
@@ -207,7 +214,7 @@ def _alarm(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
 
 
 def _held(found: Answer, lift: LiftFacts, clock: TimePhrases, around: common.OthersHeard) -> None:
-    """Explain the holder's wait, or why the holder keeps the lift."""
+    """Explain why the holder waits, or why the holder keeps the lift."""
     holder = lift.session.value
     theirs = lift.requesters.get(holder)
     if theirs is not None and theirs.ended is not None:
@@ -227,7 +234,8 @@ def _held(found: Answer, lift: LiftFacts, clock: TimePhrases, around: common.Oth
 
 
 def _missing(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
-    """Explain which of mode, floor and door a granted session still lacks."""
+    """Explain which conditions a granted session still lacks. The conditions are mode, floor and
+    door."""
     on = common.relays(lift, clock)
     if lift.floor.value == NO_FLOOR and lift.door.value == "open":
         found.say(
@@ -268,13 +276,14 @@ def _missing(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: Time
 
 
 def _rides(lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> bool:
-    """Is the robot in a car that has just moved?"""
+    """Return whether the robot is in a car that has just moved."""
     inside = claim.boarded is not None or lift.told("boarded", clock.now) == "yes"
     return inside and lift.floor.since.seen and clock.now.at - lift.floor.since.at < FLOOR_S
 
 
 def _human(found: Answer, lift: LiftFacts, clock: TimePhrases, on: str) -> None:
-    """Explain a session in HUMAN mode: does the daemon ask the controller for AGV mode at all?"""
+    """Explain a session in HUMAN mode. Tell whether the daemon asks the controller for AGV mode at
+    all."""
     human = (
         f"{lift.session.value} has the session, but the lift has been in HUMAN mode"
         f" {clock.since(lift.mode.since)}"

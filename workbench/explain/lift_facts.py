@@ -1,4 +1,4 @@
-"""Facts about one lift from its messages, and the story of each ride."""
+"""Facts about one lift, from its messages, and the story of each ride."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -14,13 +14,14 @@ from workbench.explain.phrases import lasted
 from workbench.explain.rows import label
 
 DIRECT: Final = "the supervisor, or a person with `send --direct`,"
-"""Sender of a request on `lift_requests`, if no fleet adapter was heard to send the same request."""
+"""The likely sender of a request on `lift_requests`, if no fleet adapter was heard to send the same
+request."""
 
 
 @dataclass(slots=True)
 class Rides:
-    """Totals of all rides: the number ended, the longest wait for the car, and the beginning of the
-    last ride."""
+    """Facts about all rides: how many have ended, the longest wait for the car, and when the last ride
+    began."""
 
     ended: int = 0
     longest_s: float = 0.0
@@ -30,7 +31,7 @@ class Rides:
 
 
 class LiftFacts(Device, ObservedLift):
-    """A lift with its story. `kept`: the story of the last ride of session `focus`."""
+    """A lift with its story. `kept` is the story of the last ride of session `focus`."""
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
@@ -44,7 +45,8 @@ class LiftFacts(Device, ObservedLift):
         return tuple(map(label, served))
 
     def sender(self, who: str) -> str:
-        """Name the sender of this session's requests on `lift_requests`, as far as known."""
+        """Name the sender of this session's requests on `lift_requests`. If the sender is unknown, name
+        the likely senders."""
         one = self.requesters.get(who)
         return "the supervisor" if one is not None and one.own else DIRECT
 
@@ -58,8 +60,8 @@ class LiftFacts(Device, ObservedLift):
         return f"Whether {who} is in the car is not known."
 
     def keeps(self, now: Moment) -> str:
-        """Say that the holder keeps the session during a hazard, and whether the holder may be in the
-        car."""
+        """Say that the holder keeps the session during a hazard. Say also whether the holder may be in
+        the car."""
         who = self.session.value
         return (
             f"{who} keeps the session meanwhile, because only END from {who} ends it."
@@ -67,8 +69,8 @@ class LiftFacts(Device, ObservedLift):
         )
 
     def retain(self, request: d.LiftRequest, now: Moment) -> None:
-        """Take a request that the fleet adapter sent before we listened. The request's stamp tells
-        when."""
+        """Take a request that the fleet adapter sent before we listened. The request's stamp tells the
+        time of the request."""
         wall, who = in_seconds(request.request_time), self.text(request.session_id)
         if request.request_type == END:
             self.requesters.drop(who)
@@ -78,10 +80,10 @@ class LiftFacts(Device, ObservedLift):
         one, _ = self.requesters.ask(who, wants, asked, stands=True)
         one.own = True
         if one.times > 1 and one.given_up:
-            one.boarded = asked  # a robot that asks for another floor is in the car
+            one.boarded = asked  # a robot is in the car if the robot asks for another floor
 
     def says(self, one: News) -> str:
-        """Return a line of the story; "" if the event is not told."""
+        """Return a line of the story. Return "" if the story leaves the event out."""
         who, by = one.who, one.requester
         match one.what:
             case "asks" if by:

@@ -1,4 +1,5 @@
-"""Explain a lift's holder: the holder is silent, has sent END, or sees all conditions met."""
+"""Explain a lift's holder. The holder may be silent, may have sent END, or may see all conditions
+met."""
 
 from shlex import quote
 from typing import Final
@@ -14,7 +15,7 @@ from workbench.explain.phrases import TimePhrases, lasted, listed
 from workbench.explain.rows import label
 
 LONG_S: Final = 60.0
-"""Maximum normal time (s) until a robot drives after all its conditions are met."""
+"""Maximum normal time (s) from the moment at which all conditions are met to the robot's start."""
 
 
 def release(lift: LiftFacts) -> str:
@@ -75,8 +76,8 @@ def _of_fleet(
     clock: TimePhrases,
     around: OthersHeard,
 ) -> tuple[list[str], list[str]]:
-    """Return the robots for which the holder's adapter speaks now, and the robots that fell silent with
-    the holder."""
+    """Return two lists. The holder's adapter speaks now for the robots in the first list. The robots in
+    the second list fell silent together with the holder."""
     ended = theirs.last.at if theirs else float("-inf")
     speaks: list[str] = []
     together: list[str] = []
@@ -92,7 +93,7 @@ def _of_fleet(
 
 
 def _robots(found: list[str], fleet: str) -> list[str]:
-    """Name the robots. Name the fleet if the adapter spoke only for the whole fleet."""
+    """Name the robots. If the adapter spoke only for the whole fleet, name the fleet."""
     robots = sorted(who for who in found if who not in (fleet, f"{fleet}/"))
     return robots[:4] or ([f"the rest of {fleet}"] if found else [])
 
@@ -146,7 +147,7 @@ def drives(found: Answer, claim: DeviceRequester, clock: TimePhrases) -> None:
 
 
 def forgotten(found: Answer, lift: LiftFacts, holder: str, clock: TimePhrases) -> None:
-    """Explain that the supervisor sends requests for another session than the holder's session."""
+    """Explain that the supervisor sends requests for a session other than the holder's session."""
     asks = lift.supervisor
     if asks is None or asks.value in ("", holder, NOBODY):
         return

@@ -11,11 +11,12 @@ from workbench.explain.lift_facts import LiftFacts
 from workbench.explain.phrases import TimePhrases, lasted
 
 SETTLES_S: Final = 2.0
-"""Normal time (s) from a request to its grant, or to a change of holder by the supervisor."""
+"""Normal time (s) from a request to the lift's grant. The supervisor needs the same time to change the
+holder."""
 
 
 def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
-    """Explain why the free lift grants the requester no session."""
+    """Explain why the lift gives the requester no session, although the lift is free."""
     if lift.floors and claim.wants not in lift.floors:
         found.say(
             f"{lift.name} serves {', '.join(lift.floors[:12])}, not {claim.wants or 'an empty name'}:"
@@ -48,7 +49,7 @@ def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: T
 def _asks_for_another(
     found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases
 ) -> bool:
-    """Explain that the supervisor does not forward this request. Return whether that is so."""
+    """Explain that the supervisor does not forward this request. Return whether this is the cause."""
     passed = claim.passed_on
     if not claim.own or (passed is not None and clock.now.at - passed.at < 5.0):
         return False
@@ -96,13 +97,15 @@ def not_passed_on(
         found.say(f"{says} the lift supervisor is not running, hangs, or is cut off.")
     found.acts("a person", restart)
     if claim.ended:
-        found.say("END does not prove an empty car: a fleet adapter sends it at its start too.")
+        found.say(
+            "END does not prove an empty car, because a fleet adapter also sends END at its start."
+        )
     elif lift.session.value == claim.who:
         found.say(lift.in_car(claim.who, clock.now))
 
 
 def _clock(found: Answer, lift: LiftFacts, claim: DeviceRequester) -> None:
-    """Explain that the supervisor drops requests because of their stamps."""
+    """Explain that the supervisor drops requests because of wrong stamps."""
     whose = f"the machine with the fleet adapter of {claim.who.rpartition('/')[0] or claim.who}"
     if abs(lift.stamp_age_s) >= CLOCKS_DIFFER_S:
         whose += ", or of this machine (the states' stamps do not fit either)"

@@ -1,7 +1,7 @@
 """Notes in a recording. Our daemons note inputs, outputs, faults, bus errors and refusals of their own
-devices. Our recorder notes why it kept a file.
+devices. Our recorder notes the reason to keep a file.
 
-In an incident file the notes are JSON texts under `/rmf_bridge/` (`bridges/blackbox/incident.py`,
+In an incident file, the notes are JSON texts under `/rmf_bridge/` (`bridges/blackbox/incident.py`,
 `readable`). A file may come from anywhere, so the reader ignores texts of another shape.
 """
 
@@ -15,16 +15,18 @@ from workbench.explain.timeline import Level
 
 TOPICS: Final = ("samples", "outputs", "faults", "decisions", "bus_errors", "notes")
 MOST: Final = 40
-"""Maximum number of inputs, outputs or faults that are read from one note."""
+"""Maximum number of inputs, outputs or faults that the reader takes from one note."""
 
 
 @dataclass(frozen=True, slots=True)
 class Noted:
     """One note about `subject`.
 
-    `inputs`, `outputs` and `faults` are complete: name -> value, where "" means off. Each is None if
-    the note is about something else. `refused`: why the daemon refused a request. `bus_error`: why the
-    bus failed. `kept_for`: the reason for the file, as a fixed name and a text.
+    - `inputs`, `outputs`, `faults`: name -> value; "" means off. Each lists everything that is on. None
+      means that the note has another topic.
+    - `refused`: why the daemon refused a request.
+    - `bus_error`: why the bus failed.
+    - `kept_for`: the recorder's reason to keep the file, as a fixed name and a text.
     """
 
     subject: str
@@ -37,7 +39,7 @@ class Noted:
 
 
 def noted(topic: str, text: str) -> Noted | None:
-    """Return the note in this text; None if the text is no note. `topic` is the last part of the
+    """Return the note in this text. Return None if the text is no note. `topic` is the last part of the
     topic's name."""
     try:
         told = msgspec.json.decode(text)
@@ -64,7 +66,8 @@ def noted(topic: str, text: str) -> Noted | None:
 
 
 def levels(at: float, note: Noted, on: dict[tuple[str, str], str]) -> Iterator[Level]:
-    """Yield the changes that this note makes. `on`, name -> value before the note, is updated here."""
+    """Yield the changes that this note makes. `on` is name -> value before the note. This function
+    updates `on`."""
     lanes = (("inputs", note.inputs), ("relays", note.outputs), ("faults", note.faults))
     for lane, found in lanes:
         if found is None:
@@ -77,8 +80,8 @@ def levels(at: float, note: Noted, on: dict[tuple[str, str], str]) -> Iterator[L
 
 
 def _fields(struct: object) -> Iterator[tuple[str, str]]:
-    """Yield the fields of a sample or of outputs: each is on, off or a word. Measurements are left
-    out."""
+    """Yield each field of a sample or output. The value is on, off or a word. Leave out
+    measurements."""
     if not isinstance(struct, dict):
         return
     for name, value in [*struct.items()][:MOST]:

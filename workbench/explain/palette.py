@@ -1,8 +1,8 @@
-"""The look of each tone, in the light and the dark theme: colours safe for the colour-blind, and
-patterns.
+"""The look of each tone in the light and the dark theme. Patterns help where colours are not enough.
 
-The colours are from Okabe and Ito (https://jfly.uni-koeln.de/color/). Colour alone never tells two
-tones apart: each span has a label, and the wrong, unknown and requested tones also have a pattern.
+The colours are safe for colour-blind readers, and come from Okabe and Ito
+(https://jfly.uni-koeln.de/color/). Colour alone never tells two tones apart. Each span has a label, and
+the tones wrong, unknown and requested also have a pattern.
 """
 
 from dataclasses import dataclass
@@ -25,8 +25,8 @@ MEANING: Final[dict[Tone, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class ToneStyle:
-    """A tone in one theme. `text`: colour of text on the fill. `pattern`: lines over the fill; "" for
-    none."""
+    """A tone's look in one theme. `text` is the colour of text on the fill. `pattern` names the lines
+    over the fill, or is ""."""
 
     fill: str
     text: str
@@ -56,9 +56,9 @@ PAPER: Final[dict[Theme, tuple[str, str, str, str]]] = {
     "light": ("#ffffff", "#1b1d21", "#5b616b", "#d3d7dd"),
     "dark": ("#17191d", "#eceff3", "#a7adb8", "#363b44"),
 }
-"""Colours of the background, the text, the weaker text and the grid."""
+"""Colours of the background, the text, the weaker text and the grid, in this order."""
 STEP: Final[dict[Theme, str]] = {"light": "#b54a12", "dark": "#e8854a"}
-"""Colour of the line that marks a clock's step, or the moment of a file's reason."""
+"""Colour of the line at a clock's step, or at the moment for which a file was kept."""
 
 
 def css(theme: Theme) -> str:
@@ -81,7 +81,8 @@ def css(theme: Theme) -> str:
 
 
 def style(theme: Theme | None) -> str:
-    """Return the style sheet of one theme. None returns both themes; the reader's screen chooses."""
+    """Return the style sheet of one theme. With None, return both themes, and let the reader's screen
+    choose."""
     if theme is not None:
         return css(theme)
     return f"{css('light')}@media (prefers-color-scheme: dark){{{css('dark')}}}"

@@ -12,7 +12,7 @@ from bridges.observe.requesters import Moment
 JOINS: Final = re.compile(
     r"`(rmf-bridge (doctor|explain|exporter|judge|mqtt-out|notify|page|release|send|watch)\b[^`]*)`"
 )
-"""Pattern of a command in a sentence, if the command joins RMF's graph."""
+"""Pattern of a command in a sentence. The pattern matches only commands that join RMF's graph."""
 
 
 def lasted(seconds: float) -> str:
@@ -41,7 +41,7 @@ def on_graph(text: str, options: Sequence[str]) -> str:
     def joined(found: re.Match[str]) -> str:
         command, name = found.groups()
         words = [*options]
-        if name == "doctor" and "--config" in words:  # the file names the graph
+        if name == "doctor" and "--config" in words:  # doctor's FILE names the graph
             at = words.index("--config")
             del words[at : at + 2]
         return f"`{command} {shlex.join(words)}`" if words else found[0]
@@ -51,23 +51,24 @@ def on_graph(text: str, options: Sequence[str]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class TimePhrases:
-    """Puts times into words, in one time zone (None: this machine's zone), as seen from `now`."""
+    """A writer of times in words, as seen from the time `now`. `zone` is the time zone, or None for
+    this machine's zone."""
 
     now: Moment
     zone: tzinfo | None
 
     def time(self, wall: float, *, tenths: bool = False) -> str:
-        """Return `14:03:07`. A day other than today adds the date."""
+        """Return a time such as `14:03:07`. If the day is not today, add the date."""
         at = self._local(wall)
         text = f"{at:%H:%M:%S}" + (f".{at.microsecond // 100000}" if tenths else "")
         return text if at.date() == self._local(self.now.wall).date() else f"{at:%Y-%m-%d} {text}"
 
     def date(self, wall: float) -> str:
-        """Return `2026-11-22 14:03:07`."""
+        """Return a date and time such as `2026-11-22 14:03:07`."""
         return f"{self._local(wall):%Y-%m-%d %H:%M:%S}"
 
     def since(self, moment: Moment) -> str:
-        """Return `since 14:03:07 (12 s)`."""
+        """Return a phrase such as `since 14:03:07 (12 s)`."""
         for_s = lasted(self.now.at - moment.at)
         if moment.seen:
             return f"since {self.time(moment.wall)} ({for_s})"
@@ -80,5 +81,5 @@ class TimePhrases:
             OverflowError,
             ValueError,
             OSError,
-        ):  # a recording may hold a time outside the calendar
+        ):  # a recording may have a time that no calendar has
             return datetime.fromtimestamp(0, self.zone)

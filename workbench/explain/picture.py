@@ -1,5 +1,5 @@
-"""Draw a timeline as SVG: lanes from left to right, a label in each span, and details under the
-pointer.
+"""Draw a timeline as SVG. Lanes run from left to right, each span has a label, and details appear under
+the pointer.
 
 Every text becomes a text node of an XML tree, so a name from the network cannot become markup. The
 picture needs no script, font or network.
@@ -24,12 +24,12 @@ TOP: Final = 82.0
 BOTTOM: Final = 56.0
 RIGHT: Final = 16.0
 CHAR: Final = 6.6
-"""Width (pixels) of a character of the 12-pixel font, rounded up."""
+"""Width (pixels) of one character, rounded up. The font has 12 pixels."""
 NARROW: Final = 1.2
-"""Width (pixels) below which a span is drawn together with its neighbours."""
+"""Width (pixels). A narrower span is drawn together with its neighbours."""
 TICKS: Final = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200)
 ROBOT: Final = re.compile(r"(?:^|(?<= for ))[^\s/]+/(?=[^\s/]+(?: \(request \S*\))?$)")
-"""Pattern of the fleet in front of a robot's name."""
+"""Pattern of the fleet's name and slash in front of a robot's name."""
 FONT: Final = "font-family:system-ui,'Noto Sans','DejaVu Sans',sans-serif"
 TEXT: Final = ".txt{font-size:12px}.small{font-size:11px}.title{font-size:16px;font-weight:600}"
 
@@ -40,13 +40,13 @@ def svg(
     zone: tzinfo | None = None,
     theme: Theme | None = None,
 ) -> str:
-    """Draw the picture. `zone`: time zone of the axis; None: this machine's zone. `theme`: None lets
-    the reader's screen choose."""
+    """Draw the picture. `zone` is the time zone of the axis, or None for this machine's zone. If
+    `theme` is None, the reader's screen chooses the theme."""
     return tostring(Picture(timeline, max(LEAST_WIDE, width), zone, theme).root, "unicode")
 
 
 class Picture:
-    """The tree of one picture."""
+    """The XML tree of one picture."""
 
     def __init__(
         self, timeline: Timeline, width: int, zone: tzinfo | None, theme: Theme | None
@@ -81,7 +81,7 @@ class Picture:
         self._steps()
         self._legend()
 
-    # ---- positions
+    # ---- positions of parts
 
     def _wall(self, at: float) -> float:
         return self._timeline.wall + at - self._timeline.from_s
@@ -91,7 +91,7 @@ class Picture:
         share = (at - self._timeline.from_s) / length
         return self._left + share * (self._width - self._left - RIGHT)
 
-    # ---- elements
+    # ---- XML elements
 
     def _rect(self, x: float, y: float, wide: float, high: float, looks: str) -> Element:
         return SubElement(
@@ -116,7 +116,7 @@ class Picture:
         return SubElement(self.root, "line", place)
 
     def _patterns(self) -> None:
-        """Define the patterns: hatches for wrong spans, dots for unknown spans, lines for requested
+        """Define the patterns: hatches for wrong spans, dots for unknown spans, and lines for requested
         spans."""
         defs = SubElement(self.root, "defs")
         for tone, size, path, wide in (
@@ -136,7 +136,7 @@ class Picture:
             )
             SubElement(pattern, "path", {"d": path, "class": f"p-{tone}", "stroke-width": wide})
 
-    # ---- parts
+    # ---- parts of the picture
 
     def _head(self, name: str) -> None:
         timeline, clock = self._timeline, self._clock
@@ -191,7 +191,7 @@ class Picture:
         self._marks(lane, y, what)
 
     def _marks(self, lane: Lane, y: float, what: str) -> None:
-        """Draw a pointer at each mark. Add the label if there is room before the next mark."""
+        """Draw a pointer at each mark. Add the mark's label if there is space before the next mark."""
         busy = [(self._x(span.from_s), self._x(span.to_s)) for span in lane.spans]
         places = [self._x(mark.at_s) for mark in lane.marks]
         for number, (mark, x) in enumerate(zip(lane.marks, places, strict=True)):
@@ -242,19 +242,23 @@ def _legend_height(width: int) -> float:
 
 
 def _gutter(lanes: Iterable[Lane], width: int) -> float:
-    """Return the width of the names on the left: at most a quarter of the picture."""
+    """Return the width (pixels) of the names on the left. The width is at most a quarter of the
+    picture."""
     longest = max((_wide(lane.row) for lane in lanes), default=0.0)
     return min(max(96.0, 12 + 76 + longest + 8), max(150.0, width / 4))
 
 
 def _wide(text: str) -> float:
-    """Return a text's approximate width (pixels); a wide character such as 走 counts twice."""
+    """Return a text's approximate width (pixels). A wide character such as 走 counts twice."""
     return CHAR * sum(1.7 if unicodedata.east_asian_width(c) in "WF" else 1.0 for c in text)
 
 
 def _fitted(text: str, room: float) -> str:
-    """Cut the text to fit; return "" if almost nothing fits. A robot's text loses its fleet, never its
-    name. Thus two robots of a fleet never look the same."""
+    """Shorten the text to fit. Return "" if almost nothing fits.
+
+    A robot's text loses the fleet, but never the robot's name. Thus two robots of a fleet never look
+    the same.
+    """
     if _wide(text) <= room:
         return text
     if (robot := ROBOT.sub("", text)) != text:
@@ -287,7 +291,8 @@ WORST: Final[dict[Tone, int]] = {"wrong": 2, "unknown": 1}
 def _drawable(
     spans: Iterable[LaneSpan], x: Callable[[float], float]
 ) -> Iterator[tuple[LaneSpan, int]]:
-    """Yield each span with its number of original spans. Spans too narrow to see are joined."""
+    """Yield each span with the number of original spans in the span. Join spans that are too narrow to
+    see."""
     joined: list[LaneSpan] = []
     for span in spans:
         gap = joined and x(span.from_s) - x(joined[-1].to_s) > NARROW
@@ -304,7 +309,7 @@ def _drawable(
 
 
 def _one(spans: list[LaneSpan]) -> LaneSpan:
-    """Join narrow spans into one span, which has the worst tone among them."""
+    """Join narrow spans into one span. The new span has the worst tone of the narrow spans."""
     tone = max(spans, key=lambda span: (WORST.get(span.tone, 0), span.to_s - span.from_s)).tone
     label = spans[0].label if len(spans) == 1 else ""
     return LaneSpan(spans[0].from_s, spans[-1].to_s, label, tone)

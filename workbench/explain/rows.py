@@ -1,4 +1,4 @@
-"""Rows of a growing timeline: a value holds until the next value, or until it expires."""
+"""Rows of a growing timeline. A value holds until the next value comes, or until the value expires."""
 
 import sys
 from collections import deque
@@ -10,20 +10,20 @@ from workbench.explain.timeline import LaneSpan, Mark, Tone
 
 LONGEST_LABEL: Final = 120
 MOST_SPANS: Final = 2000
-"""Maximum number of a row's spans and marks. The newest are kept."""
+"""Maximum number of a row's spans and marks. The row drops the oldest."""
 NOT_HEARD: Final = "not heard"
 
 
 def label(text: str, longest: int = LONGEST_LABEL) -> str:
-    """Make a label of a text from the network: one line of at most `longest` characters."""
+    """Convert a text from the network to a label, which is one line of at most `longest` characters."""
     shown = words.printable(text[: longest + 1])
     return shown if len(shown) <= longest else shown[: longest - 1] + "…"
 
 
 class LaneRow:
-    """A row of spans that never overlap, and marks.
+    """A row of marks and of spans that never overlap.
 
-    A value holds for `keeps_s` (s) at most. After that time, `fills` adds a span NOT_HEARD. The row
+    A value holds for `keeps_s` (s) at most. If `fills` is true, a span NOT_HEARD follows. The row
     forgets spans that ended more than `past_s` (s) before the newest span.
     """
 
@@ -44,12 +44,12 @@ class LaneRow:
         self._open: tuple[float, str, Tone] | None = None
 
     def say(self, at: float, text: str, tone: Tone) -> None:
-        """Set the row's value from `at` on; "" ends the value."""
+        """Set the row's value from `at` on. "" ends the value."""
         self._expire(at)
         if self._open is not None and self._open[1:] != (text, tone):
             self._close(at)
         if text and self._open is None:
-            self._open = at, sys.intern(text), tone  # thousands of spans have few texts
+            self._open = at, sys.intern(text), tone  # thousands of spans share few texts
         self.heard_at = at
 
     def mark(self, at: float, text: str, tone: Tone) -> None:
@@ -61,7 +61,7 @@ class LaneRow:
         self.heard_at = max(self.heard_at, at)
 
     def spans(self, from_s: float, to_s: float) -> Iterator[LaneSpan]:
-        """Yield the spans between these times, cut at both ends. The last span may not have ended."""
+        """Yield the spans between these times, cut at both ends. The last span may still go on."""
         for span in (*self._spans, *self._going_on(to_s)):
             if span.to_s > from_s and span.from_s < to_s:
                 yield LaneSpan(
@@ -82,7 +82,8 @@ class LaneRow:
             yield LaneSpan(self.heard_at, to_s, NOT_HEARD, "unknown")
 
     def _expire(self, at: float) -> None:
-        """End a span that nothing has confirmed for `keeps_s`, at the last confirmation."""
+        """End a span that no message has confirmed for `keeps_s`. The span ends at the last
+        confirmation."""
         if at <= self.heard_at + self._keeps_s or self.heard_at == float("-inf"):
             return
         self._close(self.heard_at)

@@ -1,4 +1,5 @@
-"""The tone of each value of RMF's states. A number that RMF does not define has the tone `unknown`."""
+"""The tones for the values in RMF's states. A number that RMF does not define has the tone
+`unknown`."""
 
 from collections.abc import Mapping
 from enum import IntEnum
@@ -14,10 +15,10 @@ TONES: Final[Mapping[type[IntEnum], tuple[Tone, ...]]] = {
     d.LiftMode: ("unknown", "calm", "works", "wrong", "wrong", "wrong"),
     d.ChargerStateValue: ("calm", "asks", "works", "calm", "wrong"),
 }
-"""Tones of each field's values, in the order of RMF's numbers."""
+"""Field's type -> the tone of each value, in the order of RMF's numbers."""
 
 
 def tone(kind: type[IntEnum], number: int) -> Tone:
-    """Return the tone of this number; `kind` is the type of the field."""
+    """Return the tone of this number. `kind` is the type of the field."""
     known: dict[int, Tone] = dict(zip(kind, TONES[kind], strict=True))
     return known.get(number, "unknown")

@@ -15,7 +15,7 @@ MOST_WIDE: Final = 100
 SCREEN_LINES: Final = 40
 LEAST_STORY: Final = 6
 FIRST: Final = 2
-"""Number of lines that always show the beginning of a story."""
+"""Number of lines at the beginning of a story that the screen always shows."""
 MOST_FAULTS: Final = 4
 
 
@@ -25,7 +25,7 @@ def lines(
     width: int = MOST_WIDE,
     height: int = SCREEN_LINES,
 ) -> list[str]:
-    """Return a screen of lines. A line is wider than `width` only if one word is."""
+    """Return one screen of lines. A line is wider than `width` only if a single word is wider."""
     found = [*_answer(explanation, min(width, MOST_WIDE))]
     room = max(LEAST_STORY, height - len(found) - 1)
     return [*found, *_story(explanation, zone, room)]
@@ -57,7 +57,7 @@ def _answer(one: Explanation, width: int) -> Iterator[str]:
 
 
 def _story(one: Explanation, zone: tzinfo | None, room: int) -> Iterator[str]:
-    """Yield the story's beginning, and as much of the story's end as fits."""
+    """Yield the beginning of the story. Then yield as much of the story's end as fits."""
     shown = one.story
     if not shown:
         return
@@ -75,7 +75,8 @@ def _story(one: Explanation, zone: tzinfo | None, room: int) -> Iterator[str]:
 
 
 def _table(fields: tuple[CheckedField, ...]) -> Iterator[str]:
-    """Yield a row for each field: its value, and the wanted value if it differs."""
+    """Yield a row for each field. A row has the present value. If the wanted value differs, the row has
+    that value too."""
     widths = [
         max(len(text) for text in column) for column in zip(*map(_cells, fields), strict=True)
     ]

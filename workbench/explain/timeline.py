@@ -1,7 +1,7 @@
 """A timeline as values, for `plot`, the web page, and JSON through `dataclasses.asdict`.
 
-Times are seconds on `Heard.at`'s clock. Every text is printable and has a limited length. A text may
-come from the network, so treat it as text, never as markup.
+Times are seconds on `Heard.at`'s clock. Every text is printable and has a limited length. Never use a
+text as markup, because the text may come from the network.
 """
 
 from dataclasses import dataclass
@@ -23,16 +23,16 @@ LANES: Final[tuple[LaneName, ...]] = (
     "requests",
     "faults",
 )
-"""Lanes in the order of drawing."""
+"""Names of the lanes, in the order of drawing."""
 Tone = Literal["calm", "works", "open", "held", "asks", "wrong", "unknown"]
-"""The look of a span, besides its label.
+"""The meaning of a span's look.
 
 - calm: the device rests.
 - works: the device moves, charges or is on.
 - open: a robot may pass.
-- held: somebody has a session.
-- asks: somebody requests something.
-- wrong: a fault or hazard.
+- held: a requester has a session.
+- asks: a requester sends requests.
+- wrong: there is a fault or hazard.
 - unknown: nothing was heard.
 """
 
@@ -58,10 +58,10 @@ class Mark:
 
 @dataclass(frozen=True, slots=True)
 class Lane:
-    """One row of a lane; its spans never overlap.
+    """One row of a lane. The spans of a row never overlap.
 
-    `row`: name of a relay, input, requester or fault; "" if the lane has only one row. `left_out`:
-    number of the oldest spans and marks that the row dropped because there were too many.
+    - `row`: name of a relay, input, requester or fault; "" if the lane has only one row.
+    - `left_out`: number of old spans and marks that the row dropped, because there were too many.
     """
 
     name: LaneName
@@ -75,8 +75,10 @@ class Lane:
 class Timeline:
     """One device between two times.
 
-    `wall`: seconds since the epoch at `from_s`, on the listener's clock. `steps`: the steps of that
-    clock. `lanes`: lanes with messages, in the order of LANES. `left_out`: number of dropped rows.
+    - `wall`: the time at `from_s`, in seconds since the epoch, on the listener's clock.
+    - `steps`: the steps of the listener's clock.
+    - `lanes`: lanes with messages, in the order of LANES.
+    - `left_out`: number of dropped rows.
     """
 
     kind: Kind
@@ -91,10 +93,11 @@ class Timeline:
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """A note of our daemon about its device: from `at` on, `name` has the value `value`; "" means off,
-    or over.
+    """A note of our daemon about its device. From `at` on, `name` has the value `value`. The value ""
+    means off or over.
 
-    `lane` is relays (an output and its value), inputs, or faults (a code and its detail).
+    `lane` is `relays`, `inputs` or `faults`. A relay has an output's value, and a fault has a code and
+    its detail.
     """
 
     at: float

@@ -1,8 +1,8 @@
-"""Explain a dispenser or ingestor: which request waits, and who must act next.
+"""Explain a dispenser or ingestor. The sentences tell which request waits, and who must act next.
 
-RMF's fleet adapter continues after a result SUCCESS. It also continues after a newer state that no
-longer lists an acknowledged request (rmf_ros2, DispenseItem.cpp and IngestItem.cpp). The adapter has no
-time limit.
+RMF's fleet adapter continues after a result SUCCESS. The adapter also continues after a newer state
+that no longer lists an acknowledged request (rmf_ros2, DispenseItem.cpp and IngestItem.cpp). The
+adapter has no time limit.
 """
 
 from typing import Final
@@ -44,7 +44,7 @@ def answer(workcell: WorkcellFacts, clock: TimePhrases, around: common.OthersHea
 
 
 def _doubt(found: Answer, workcell: WorkcellFacts, clock: TimePhrases) -> None:
-    """Say that the outcome of a request is in doubt, which no repeat and no restart will settle."""
+    """Say that the outcome of a request is in doubt. No repeat and no restart will end this doubt."""
     for wait in workcell.waits(clock.now):
         if workcell.mode.value == "offline" and wait.who not in workcell.results:
             found.say(f"Request {wait.who} has had no answer, and RMF repeats it without end.")

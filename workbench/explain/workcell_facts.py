@@ -1,4 +1,4 @@
-"""Facts about one dispenser or ingestor from its messages, and its story."""
+"""Facts about one dispenser or ingestor, from its messages, and the workcell's story."""
 
 from bridges.observe.news import News
 from bridges.observe.workcell import ObservedDispenser, ObservedIngestor, ObservedWorkcell
@@ -9,7 +9,7 @@ class WorkcellFacts(Device, ObservedWorkcell):
     """A workcell with its story."""
 
     def says(self, one: News) -> str:
-        """Return a line of the story; "" if the event is not told."""
+        """Return a line of the story. Return "" if the story leaves the event out."""
         match one.what:
             case "asks" if one.requester:
                 return f"{self.name} is asked for {one.requester.wants} (request {one.who})"

@@ -1,1 +1,2 @@
-"""RMF's graph, for the commands that people use: join it, watch it, and send requests."""
+"""Join RMF's graph, watch the graph, and send requests. The commands that people use need this
+package."""

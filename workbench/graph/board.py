@@ -1,6 +1,6 @@
 """The rows of `watch`, made from messages and a time. All functions are pure.
 
-RMF's states have no field for faults, queues and simulations. Our daemons publish this information on
+RMF's states have no fields for faults, queues and simulations. Our daemons publish this information on
 `/diagnostics`.
 """
 
@@ -25,10 +25,11 @@ from bridges.system.columns import aligned, clipped, hanging, width
 from bridges.system.paint import repainted
 
 SETTLES_S: Final = 1.5
-"""Time (s) after which a daemon's diagnostics must have come. They come at 1 Hz."""
+"""Time (s) after the first state. Within this time, the daemon's diagnostics must have come, because
+they come at 1 Hz."""
 HEADINGS: Final = ("kind", "name", "state", "held by", "waiting", "age", "", "faults")
 MOST_PLACES: Final = 500
-"""Maximum number of robots to remember. Anybody can invent names, and the page listens for months."""
+"""Maximum number of robots in memory. Anybody can invent names, and the page listens for months."""
 SECONDS: Final = re.compile(r"\d+(\.\d+)? (s|min)\b")
 
 Device = tuple[str, str]
@@ -38,9 +39,11 @@ Device = tuple[str, str]
 class BoardRow(Struct, frozen=True):
     """One device, an alarm, the charger coordinator, or a robot with its assigned place.
 
-    `waiting`: the waiting robots, or what the holder waits for. `age`: the reading's age, in words.
-    `mark`: why the row may be wrong. `simulated`: is the device without hardware? `faults`: the faults
-    that its daemons report.
+    - `waiting`: the waiting robots, or the thing that the holder waits for.
+    - `age`: the reading's age, in words.
+    - `mark`: the reason why the row may be wrong.
+    - `simulated`: whether the device has no hardware.
+    - `faults`: the faults that the device's daemons report.
     """
 
     kind: str
@@ -55,7 +58,7 @@ class BoardRow(Struct, frozen=True):
 
     @property
     def wrong(self) -> bool:
-        """Does the row need attention?"""
+        """Return whether the row needs a person's attention."""
         return bool(self.mark or self.faults)
 
     def cells(self) -> tuple[str, ...]:
@@ -67,7 +70,7 @@ class BoardRow(Struct, frozen=True):
         return (*state, self.waiting, self.age, marks, self.faults)
 
     def news(self) -> tuple[object, ...]:
-        """Values whose change is worth a new line, without running seconds."""
+        """The row's values without running seconds. A change of these values deserves a new line."""
         told = (self.state, self.held_by, self.waiting, self.mark, self.faults)
         return (self.simulated, *(SECONDS.sub("", text) for text in told))
 
@@ -76,7 +79,7 @@ class Board:
     """The latest state and diagnosis of each device."""
 
     def __init__(self, graph: ObservedGraph[Any] | None = None) -> None:
-        """Begin without messages. `graph`: the memory of the devices, if another object fills that
+        """Begin without messages. `graph` is the memory of the devices, if another object fills that
         memory."""
         self._graph = graph or PlainGraph()
         self._places: dict[str, str] = {}
@@ -87,7 +90,7 @@ class Board:
         self.note(heard)
 
     def note(self, heard: Heard) -> None:
-        """Take the charging assignments of a message. `ObservedGraph` takes all other messages."""
+        """Take a message's charging assignments. `ObservedGraph` takes everything else."""
         if not isinstance(heard.message, d.ChargingAssignments):
             return
         for one in heard.message.assignments:
@@ -97,8 +100,8 @@ class Board:
                 self._places[who] = place
 
     def unsettled(self, now: float) -> set[Device]:
-        """Return kind and name of the devices whose daemons may still report a simulation, because they
-        were just heard."""
+        """Return kind and name of the devices that were first heard a moment ago. Their daemons may
+        still report a simulation."""
         return {
             (one.kind, words.printable(one.id))
             for one in self._graph.stated()
@@ -107,11 +110,12 @@ class Board:
         }
 
     def rows_of(self, devices: Iterable[AnyDevice], now: float, wall: float) -> list[BoardRow]:
-        """Return these devices' rows, in the given order; each device has published a state."""
+        """Return these devices' rows, in the given order. Each device must have published a state."""
         return [self._device(one, now, wall) for one in devices]
 
     def rows(self, now: float, wall: float) -> list[BoardRow]:
-        """Return the rows, sorted by kind and name. `now`: monotonic s; `wall`: the stamps' clock."""
+        """Return the rows, sorted by kind and name. `now` is monotonic (s). `wall` is the time (s) on
+        the stamps' clock."""
         every = [one for kind in words.KINDS for one in sorted(self._graph.stated(kind), key=_name)]
         devices = self.rows_of(every, now, wall)
         return [*devices, *self._alarms(now), *self._coordinators(now), *self._robots()]
@@ -189,7 +193,7 @@ class Board:
         daemon = self._daemon(diagnosis, now)
         simulated = (
             daemon.value("simulated") == "yes" if daemon else False
-        )  # a fault replaces the message
+        )  # the row shows a fault instead of the daemon's message
         return daemon is not None and (simulated or SIMULATED in daemon.message)
 
 
@@ -241,8 +245,8 @@ def _mark(device: AnyDevice, now: float) -> str:
 
 
 def table(rows: Iterable[BoardRow]) -> list[str]:
-    """Format the rows in columns under headings. Columns for queues, marks and faults appear only if
-    needed."""
+    """Format the rows in columns under headings. Columns for queues, marks and faults appear only if a
+    row needs them."""
     shown = [row.cells() for row in rows]
     if not shown:
         return ["nothing heard yet"]
@@ -256,7 +260,7 @@ def table(rows: Iterable[BoardRow]) -> list[str]:
 
 
 def changes(before: list[BoardRow], after: list[BoardRow]) -> list[BoardRow]:
-    """Return the rows that have changed. A new age or a running second is no change."""
+    """Return the rows that have changed. A new age or a running second does not count as a change."""
     known = {(row.kind, row.name): row.news() for row in before}
     return [row for row in after if known.get((row.kind, row.name)) != row.news()]
 
@@ -272,7 +276,8 @@ def change_line(row: BoardRow, wall: float) -> str:
 
 
 def json_line(row: BoardRow, wall: float) -> str:
-    """Format a changed row as one line of JSON, with the time of the change (s since the epoch)."""
+    """Format a changed row as one JSON line. The line has the time of the change (s since the
+    epoch)."""
     return json.dumps({"at": round(wall, 3), **asdict(row)})
 
 
@@ -281,7 +286,8 @@ def repaint(
 ) -> tuple[str, int]:
     """Return the text that redraws the table on a terminal, and the new number of lines.
 
-    The terminal shows `lines_before` lines of the table now. No line wraps and nothing scrolls away.
+    `lines_before` is the number of table lines on the terminal now. No line wraps, and nothing scrolls
+    away.
     """
     shown = list(fitting(rows, columns - 1))
     if len(shown) >= lines:
@@ -295,7 +301,7 @@ def repaint(
 
 def fitting(rows: list[BoardRow], columns: int) -> Iterator[tuple[str, bool]]:
     """Yield each line of the table, and whether the line needs attention. If a line is too long for the
-    terminal, its marks and faults follow on separate lines."""
+    terminal, the row's marks and faults follow on separate lines."""
     heading, *lines = table(rows)
     wide = any(width(line) > columns for line in (heading, *lines))
     if wide and rows:

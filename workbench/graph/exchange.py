@@ -1,7 +1,7 @@
-"""Decide when `send` publishes, when it ends, and what it prints if the request has no effect.
+"""Decide when `send` publishes, when `send` ends, and the text if the request has no effect.
 
-`step(request, seen, now)` is pure. `send` repeats a request at 1 Hz until its effect is seen, as RMF
-does. Only a state heard after the first request counts, because an earlier state may show the same for
+`step(request, seen, now)` is pure. Like RMF, `send` repeats a request at 1 Hz until a state shows the
+effect. Only a state heard after the first request counts. An earlier state may show the same effect for
 another reason. `requests/` has each request's message and the condition that fulfils the request.
 """
 
@@ -15,17 +15,18 @@ from workbench.graph.requests import Failed, Fulfilled, Obstacle, Request, Reque
 
 REPEAT_S: Final = 1.0
 PATIENCE_S: Final = 2.0
-"""Silence (s) of the device after which a request is sent nevertheless. States come at 1 Hz."""
+"""Time (s) to wait for the device's first state. After this time, `send` sends the request to a silent
+device too. States come at 1 Hz."""
 HINT_AFTER_S: Final = 3.0
-"""Time (s) after which `send` prints what is missing. A starting node needs a second or two to find
-other nodes."""
+"""Time (s) after which `send` prints a hint about a missing node. A starting node needs a second or two
+to find other nodes."""
 
 
 @dataclass(frozen=True, slots=True)
 class SendStep:
     """The next step: a request to send now, a hint to print once, or the outcome.
 
-    `direct`: the request goes to the device's own daemon instead of the supervisor.
+    With `direct`, the request goes to the device's own daemon instead of the supervisor.
     """
 
     send: words.Requested | None = None
@@ -35,7 +36,7 @@ class SendStep:
 
 
 def step(request: Request, seen: RequestProgress, now: float) -> SendStep:
-    """Return the next step."""
+    """Return the next step at time `now` (monotonic s)."""
     over = request.outcome(seen)
     if over is not None:
         return SendStep(outcome=over)
@@ -58,7 +59,7 @@ def _may_send(request: Request, seen: RequestProgress, now: float, *, direct: bo
 
 
 def _hint(request: Request, seen: RequestProgress, now: float) -> str:
-    """Return advice for the user, before the timeout."""
+    """Return a hint for the user, or "". The hint comes before the timeout."""
     if now < seen.began_at + HINT_AFTER_S:
         return ""
     if missed := _missed(request, seen):
@@ -85,14 +86,14 @@ def _reason(request: Request, seen: RequestProgress, now: float) -> str:
 
 
 def _missed(request: Request, seen: RequestProgress) -> Obstacle | None:
-    """Return who is missing on the graph: the request's receiver, or the device."""
+    """Return the node that is missing on the graph: the request's receiver, or the device."""
     if seen.first_sent_at is None and seen.listeners == 0:
         return request.nobody(seen)
     return None if seen.states else request.unheard(seen)
 
 
 def _given_up(more: str, seen: RequestProgress) -> str:
-    """Return the text of a timeout. The hint before has already given the reason."""
+    """Return the text of a timeout. An earlier hint has already given the reason."""
     return f"gave up after {seen.timeout_s:g} s{more}"
 
 

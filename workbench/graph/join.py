@@ -1,4 +1,4 @@
-"""The part that all commands on a graph share: options, joining, durations, ending."""
+"""Functions that all commands on a graph share: options, joining, durations and ending."""
 
 import argparse
 import ipaddress
@@ -61,14 +61,16 @@ def seconds(least: float, most: float) -> Callable[[str], float]:
 
 
 def address_and_port(text: str) -> tuple[str, int]:
-    """Read `--listen ADDRESS:PORT`, for argparse."""
+    """Parse ADDRESS:PORT of `--listen`, for argparse."""
     host, _, port = text.rpartition(":")
     host = host.strip("[]")
     try:
         ipaddress.ip_address(host)
         number = int(port)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"'{text}' is not ADDRESS:PORT, as 0.0.0.0:8080") from None
+        raise argparse.ArgumentTypeError(
+            f"'{text}' is not ADDRESS:PORT, such as 0.0.0.0:8080"
+        ) from None
     if not 0 <= number <= 65535:
         raise argparse.ArgumentTypeError(f"'{text}': a port is 0 to 65535")
     return host, number
@@ -86,7 +88,7 @@ def open_graph(args: argparse.Namespace, node_name: str) -> Transport:
 class Renamed:
     """A transport that uses the site's topic names (`rmf.topics` of a YAML).
 
-    `names`: RMF's topic name -> the site's.
+    `names` is RMF's topic name -> the site's topic name.
     """
 
     def __init__(self, transport: Transport, names: Mapping[str, str]) -> None:
@@ -109,16 +111,16 @@ class Renamed:
 
     @property
     def release(self) -> Release:
-        """Release of RMF's messages in use."""
+        """The release of RMF's messages that this transport uses."""
         return self._transport.release
 
     def faults(self) -> list[tuple[str, str]]:
-        """Return (code, detail) of the present obstacles between this node and others."""
+        """Return (code, detail) of each present obstacle between this node and other nodes."""
         return self._transport.faults()
 
     @property
     def lives(self) -> bool:
-        """Is the transport's thread alive?"""
+        """Return whether the transport's thread is alive."""
         return self._transport.lives
 
     def _named(self, topic: Topic[M]) -> Topic[M]:
@@ -149,7 +151,7 @@ def _configured(file: Path | None) -> Rmf:
 def interruptible() -> AbstractContextManager[None]:
     """Let SIGINT, SIGTERM and SIGHUP raise KeyboardInterrupt.
 
-    Otherwise the node of a killed command would stay on the graph for over 10 s.
+    Without this exception, the node of a killed command would stay on the graph for over 10 s.
     """
     return ended_by(signal.default_int_handler)
 
@@ -167,15 +169,17 @@ def ended_by(action: Callable[[int, FrameType | None], object]) -> Iterator[None
 
 
 def complain(command: str, text: object) -> None:
-    """Write one line to standard error: the command's name and the text, control characters escaped."""
+    """Write one line to standard error, with the command's name and the text. Control characters are
+    escaped."""
     sys.stderr.write(words.printable(f"rmf-bridge {command}: {text}") + "\n")
 
 
 @dataclass(frozen=True, slots=True)
 class CommandLine:
-    """The command line as typed. Proposed commands repeat its options, so that a user can copy them.
+    """The command line as the user typed it. Proposed commands repeat these options, so that a user can
+    copy the proposed commands.
 
-    `typed`: every word after `rmf-bridge`. `options`: the options for another command on the same
+    `typed` has every word after `rmf-bridge`. `options` has the options for another command on the same
     graph.
     """
 
@@ -187,13 +191,14 @@ class CommandLine:
         return shlex.join(("rmf-bridge", *self.typed, option))
 
     def other(self, *command: str) -> str:
-        """Return another command for the same graph. Only `send` accepts `--direct`."""
+        """Return another command for the same graph. Leave out `--direct`, unless the command is
+        `send`."""
         options = [one for one in self.options if one != "--direct" or command[0] == "send"]
         return shlex.join(("rmf-bridge", *command, *options))
 
 
 def command_line(args: argparse.Namespace) -> CommandLine:
-    """Make the CommandLine from parsed arguments. `args.typed`: the words given to `cli`."""
+    """Make the CommandLine from parsed arguments. `args.typed` has the words given to `cli`."""
     options = ["--direct"] if getattr(args, "direct", False) else []
     if args.config is not None:
         options += ["--config", str(args.config)]

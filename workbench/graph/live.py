@@ -1,4 +1,4 @@
-"""A live graph as a stream of `Heard`, the form in which recordings are read too."""
+"""A live graph as a stream of `Heard`. A reader of a recording gives the same stream."""
 
 import time
 from collections.abc import Iterable
@@ -34,13 +34,15 @@ OF_DEVICES: Final[tuple[AnyTopic, ...]] = (
     topics.INGESTOR_RESULTS,
     topics.DIAGNOSTICS,
 )
-"""Topics about devices. The subscriptions are volatile, so that no retained request looks like a new
-request."""
+"""Topics about devices. The subscriptions are volatile, because a retained request would look like a
+new request."""
 
 
 class Ear:
-    """Hears these topics from now on. `others_only`: without the messages of this transport itself.
-    `ends`: topic -> subscription. A ROS machine without the packages of workcells hears no workcells.
+    """A listener that hears these topics from now on.
+
+    With `others_only`, the listener ignores the messages of its own transport. `ends` is topic ->
+    subscription. A ROS machine without the workcells' packages hears no workcells.
     """
 
     def __init__(
@@ -68,7 +70,8 @@ class Ear:
         self._waiting.put(Heard(at, wall, topic, bounded(message), self._sender()))
 
     def listen(self, timeout_s: float) -> list[Heard]:
-        """Yield all messages that have arrived, in order; wait up to `timeout_s` for the first."""
+        """Return all messages that have arrived, in order. Wait up to `timeout_s` for the first
+        message."""
         heard = []
         try:
             heard.append(self._waiting.get(timeout=max(0.0, timeout_s)))

@@ -1,5 +1,5 @@
-"""Talk to the simulated plants of a running simulation through their control sockets
-(`hal_fakes/control.py`)."""
+"""Talk to the plants of a running simulation, which are simulated devices. The plants have control
+sockets (`hal_fakes/control.py`)."""
 
 import argparse
 import json
@@ -27,8 +27,7 @@ def add_simulation(parser: argparse.ArgumentParser) -> None:
 
 
 def names(verb: str) -> Completer:
-    """Return a completer of the names for `press` or `fail`. The running simulation, if any, lists the
-    names."""
+    """Return a completer of the names for `press` or `fail`. A running simulation lists these names."""
 
     def complete(prefix: str, parsed_args: argparse.Namespace, **_: object) -> list[str]:
         found = set[str]()
@@ -53,7 +52,7 @@ def _folder(args: argparse.Namespace) -> Path:
 
 
 def tell(args: argparse.Namespace, verb: str) -> int:
-    """Print the names that each device offers to `press` or `fail`. Return 0; 69 if no simulation
+    """Print the names that each device offers to `press` or `fail`. Return 0, or 69 if no simulation
     runs."""
     try:
         answers = [json.loads(ask(path, ["names"])) for path in _sockets(args)]
@@ -69,10 +68,13 @@ def tell(args: argparse.Namespace, verb: str) -> int:
 
 
 def obey(args: argparse.Namespace, verb: str, *words: str) -> int:
-    """Send one command and print its effect.
+    """Send one command to the plant, and print the effect. Return the exit code.
 
-    Return 0; 1 if the plant refuses; 64 for an unknown device; 69 without a simulation; 78 for a wrong
-    YAML.
+    - 0: the plant obeyed.
+    - 1: the plant refused.
+    - 64: the device is unknown.
+    - 69: no simulation runs.
+    - 78: the YAML has an error.
     """
     from bridges.settings.load import SettingsError, load
     from workbench.graph.which_device import NoDevice, device_of
@@ -111,7 +113,7 @@ def _nobody(args: argparse.Namespace) -> int:
 
 
 def ask(path: Path, words: list[str]) -> str:
-    """Send one line; return the answer, `ok` or `error TEXT`. Raises OSError."""
+    """Send one line, and return the answer, which is `ok` or `error TEXT`. Raises OSError."""
     with socket.socket(socket.AF_UNIX) as caller:
         caller.settimeout(ANSWER_S)
         caller.connect(str(path))

@@ -1,14 +1,15 @@
-"""The retained MQTT messages that show RMF's devices to other systems, made from rows and a time.
+"""The retained MQTT messages that show RMF's devices to other systems.
 
     PREFIX/status                     online, or offline by the last will
     PREFIX/KIND/ID/state              one JSON object
-    PREFIX/KIND/ID/availability       online while states come and their reading is fresh, else offline
+    PREFIX/KIND/ID/availability       online if states come and their reading is fresh, else offline
     HOMEASSISTANT/device/…/config     Home Assistant's discovery, one message for each device:
                                       https://www.home-assistant.io/integrations/mqtt/#device-discovery-payload
 
-A reader cannot see the age of a retained message. For this reason each message expires at the broker
-if it is not renewed (MQTT 5, 3.3.2.3.3). ID is the device's name. Every byte of the name other than
-A-Z a-z 0-9 and - is written as _XX, in hexadecimal. All functions are pure.
+A reader cannot see the age of a retained message. Therefore each message expires at the broker if
+nobody renews the message (MQTT 5, 3.3.2.3.3). ID is the device's name. A byte of the name other than
+A-Z a-z 0-9 and - becomes _XX, in hexadecimal. All functions are pure, because rows and the time are
+arguments.
 """
 
 import json
@@ -26,14 +27,15 @@ from workbench.graph.board import BoardRow
 
 RENEWED_S: Final = 60.0
 EXPIRES_S: Final = 180
-"""Time (s) until a message expires: three renewals. The broker then drops a device that nobody
-renews."""
+"""Time (s) until a message expires, which is three renewals. If nobody renews a device's messages, the
+broker drops the device."""
 TEXT_MAX: Final = 255
 """Maximum length (characters) of an entity's state in Home Assistant."""
 
 
 class Retained(NamedTuple):
-    """One message. `news`: its content without times. A change of `news` is published immediately."""
+    """One message. `news` is the message's content without times. When `news` changes, the message is
+    published immediately."""
 
     topic: str
     payload: str
@@ -41,16 +43,16 @@ class Retained(NamedTuple):
 
 
 class ShownDevice(NamedTuple):
-    """A device with its row of `watch`."""
+    """A device, together with its row of `watch`."""
 
     device: AnyDevice
     row: BoardRow
 
 
 class Retainer:
-    """The messages that the broker should hold, and the messages that the broker already got.
+    """The messages that the broker should hold, and the messages already given to the broker.
 
-    `discovery`: Home Assistant's prefix; None without discovery.
+    `discovery` is Home Assistant's prefix, or None without discovery.
     """
 
     def __init__(self, prefix: str, discovery: str | None) -> None:
@@ -60,7 +62,7 @@ class Retainer:
 
     @property
     def status(self) -> str:
-        """Topic that says whether this publisher lives."""
+        """The topic that tells whether this publisher lives."""
         return f"{self._prefix}/status"
 
     def forget(self) -> None:
@@ -68,7 +70,8 @@ class Retainer:
         self._held.clear()
 
     def due(self, shown: Iterable[ShownDevice], now: float, wall: float) -> Iterator[Retained]:
-        """Yield the messages to publish at `now` (monotonic s); an empty payload deletes its topic."""
+        """Yield the messages to publish at `now` (monotonic s). An empty payload deletes the message of
+        its topic."""
         wanted = {self.status: Retained(self.status, "online", "online")}
         wanted |= {m.topic: m for one in shown for m in self._messages(one, now, wall)}
         for topic in [topic for topic in self._held if topic not in wanted]:
@@ -172,8 +175,8 @@ def _content(state: object) -> dict[str, object]:
 
 
 def _identifier(name: str) -> str:
-    """Return a name in the characters that topics and discovery allow. Different names stay
-    different."""
+    """Return a name in the characters that topics and discovery allow. Two different names never become
+    the same."""
     return re.sub(
         r"[^A-Za-z0-9-]",
         lambda found: "".join(f"_{byte:02X}" for byte in found[0].encode("utf-8", "surrogatepass")),
@@ -182,7 +185,8 @@ def _identifier(name: str) -> str:
 
 
 def _iso(at: float) -> str | None:
-    """Return a time (s since the epoch) as ISO 8601; None for never, and for an impossible time."""
+    """Return a time (s since the epoch) as ISO 8601. Return None for never, and for a time that the
+    calendar does not have."""
     try:
         return (
             datetime.fromtimestamp(at, UTC).isoformat(timespec="milliseconds") if at > 0 else None

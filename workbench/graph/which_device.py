@@ -1,14 +1,14 @@
-"""Find the device in a file that a command is about."""
+"""Find the device of a file that a command names."""
 
 from bridges.settings.config import Config
 
 
 class NoDevice(Exception):
-    """Error: the command names no device of the file. The text gives the remedy."""
+    """The command names no device of the file. The error's text gives the remedy."""
 
 
 def device_of(config: Config, name: str | None) -> str:
-    """Return the named device. Without a name return the only device. Raises NoDevice."""
+    """Return the named device. Without a name, return the only device. Raises NoDevice."""
     names = list(config.devices)
     if not names:
         raise NoDevice(f"a {config.kind} has no wires")

@@ -1,1 +1,1 @@
-"""RMF's contract as laws, and a judge: does a lift, door or charger node on the graph keep the laws?"""
+"""RMF's contract as laws, and a judge. The judge tells whether a node on the graph keeps the laws."""

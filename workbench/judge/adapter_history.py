@@ -1,5 +1,5 @@
-"""The history of a fleet adapter: the requests of its robots to lifts and doors, and the states of
-these devices."""
+"""The history of a fleet adapter: its robots' requests to lifts and doors, and these devices'
+states."""
 
 from collections import deque
 from copy import copy
@@ -18,10 +18,10 @@ from bridges.observe.requesters import DeviceRequester, Moment
 from workbench.judge.history import NOT_YET, REMEMBERED, AnyHistory, keep
 
 IGNORED: Final = 5
-"""Number of states that an adapter must leave unanswered, while its fleet is heard, before network loss
-is ruled out."""
+"""Number of states in a row without the adapter's answer, although its fleet is heard. After so many
+states, lost messages can no longer be the cause."""
 ALARMS_S: Final = 60.0
-"""Time (s) after an alarm's start or end in which robots may change their way."""
+"""Time (s) after the start or end of an alarm. Within this time, robots may change their way."""
 BACK_S: Final = 0.5
 ADAPTERS: Final = (topics.ADAPTER_LIFT_REQUESTS.name, topics.ADAPTER_DOOR_REQUESTS.name)
 
@@ -30,17 +30,16 @@ ADAPTERS: Final = (topics.ADAPTER_LIFT_REQUESTS.name, topics.ADAPTER_DOOR_REQUES
 class Wish(DeviceRequester):
     """One robot's visit to one device.
 
-    - `met`: the device has shown all that RMF's phase waits for, at least once after the latest
-      request.
-    - `whole`: the visit was heard from its beginning.
-    - `inside`: the robot requested another floor after a wish was met, so the robot is in the car.
-    - `came_from`: the floor before.
-    - `held_at`: the time of the last state that showed the visit's session.
+    - `met`: when a state after the latest request first fulfilled all of RMF's conditions.
+    - `whole`: whether the visit was heard from its beginning.
+    - `inside`: whether the robot is in the car, because it requested another floor after `met`.
+    - `came_from`: the floor that the robot requested before.
+    - `held_at`: when a state last showed the visit's session.
     - `ignored`: number of states in a row without a request by the robot, although its fleet was heard.
-    - `ignored_since`: the time of the first of these states.
-    - `lapsed`: the adapter did not repeat the first request for IGNORED states.
+    - `ignored_since`: when the first of these states came.
+    - `lapsed`: whether the adapter failed to repeat the first request for IGNORED states.
     - `spare`: number of ENDs after the last state that showed the visit's session.
-    - `passed`: a later passage began before the robot sent CLOSE for this passage.
+    - `passed`: whether a later passage began before the robot sent CLOSE for this passage.
     - `visits`: the kind of device, and the visitor.
     """
 
@@ -57,7 +56,8 @@ class Wish(DeviceRequester):
     visits: str = ""
 
     def ignored_s(self, now: float) -> float:
-        """Return for how long (s) the robot has ignored states; 0 for fewer than IGNORED states."""
+        """Return the time (s) for which the robot has ignored states. Return 0 for fewer than IGNORED
+        states."""
         return now - self.ignored_since if self.ignored >= IGNORED else 0.0
 
 
@@ -65,11 +65,14 @@ class AdapterHistory(AnyHistory):
     """The history of one fleet adapter.
 
     - `name`: a fleet, or fleet/robot.
-    - `device`, `wish`, `was`: of the latest request; `was` is the visit before `wish`.
+    - `device`: the device of the latest request.
+    - `wish`: the visit of the latest request.
+    - `was`: the same visit as it was before the request.
     - `stated`: the visits to the device of the latest state.
-    - `listed`: the robots in the fleet's states. `lists`: number of fleet states heard.
+    - `listed`: the robots in the fleet's states.
+    - `lists`: number of fleet states heard.
     - `back`: number of times that stamps stepped back, by robot and topic.
-    - `lapses`: number of waits in a row with only one request, by `Wish.visits`.
+    - `lapses`: number of waits in a row in which the adapter sent only one request, by `Wish.visits`.
     - `unclosed`: number of passages without CLOSE, by robot.
     """
 
@@ -126,20 +129,20 @@ class AdapterHistory(AnyHistory):
         self.network_s = 0.0
 
     def is_ours(self, who: str) -> bool:
-        """Is this requester the judged robot, or one of the judged fleet?"""
+        """Return whether this requester is the judged robot, or a robot of the judged fleet."""
         return who == self.name or who.startswith(f"{self.name}/")
 
     def excused(self, wish: Wish) -> bool:
-        """May the robot change its way? A hazard, an alarm, or a new task after its request is an
-        excuse."""
+        """Return whether the robot may change its way. A hazard, an alarm, or a new task after the
+        robot's request is an excuse."""
         state = self.device.state if self.device else None
         hazard = isinstance(state, d.LiftState) and state.current_mode in HAZARDS
         task_at = self._tasks.get(wish.who, ("", NOT_YET))[1]
         return hazard or self.now - self._alarm_at < ALARMS_S or task_at >= wish.since.at
 
     def _forget(self, now: float) -> None:
-        """Forget the visits after a silence of the whole network, because messages may have been
-        missed."""
+        """Forget the visits after the whole network was silent, because the listener may have missed
+        messages."""
         self._began = now
         self._wishes.clear()
 
@@ -157,7 +160,8 @@ class AdapterHistory(AnyHistory):
     # ---- requests
 
     def _is_replayed(self, message: d.LiftRequest | d.DoorRequest) -> bool:
-        """Note the stamp. Is this an old message, which its publisher retained for late listeners?"""
+        """Note the stamp. Return whether this is an old message that its publisher retained for late
+        listeners."""
         who = message.session_id if isinstance(message, d.LiftRequest) else message.requester_id
         key, at = f"{words.kind(message)} {who}", in_seconds(message.request_time)
         newest, recent = self._stamps.get(key, (0.0, deque(maxlen=100)))
@@ -233,7 +237,7 @@ class AdapterHistory(AnyHistory):
         return silent_s > GIVEN_UP_S and not _holds(device, wish.who)
 
     def _begin_passage(self, begun: Wish, device: AnyDevice) -> None:
-        """Count the robot's earlier passages of doors for which no CLOSE was heard."""
+        """Count the robot's earlier passages through doors if no CLOSE was heard for them."""
         if not isinstance(device, ObservedDoor) or begun.wants != "open":
             return
         for key, wish in self._wishes.items():
@@ -260,12 +264,12 @@ class AdapterHistory(AnyHistory):
             if _holds(device, wish.who):
                 wish.held_at, wish.spare = self.now, 0
             elif wish.held_at > NOT_YET and self.now - wish.last.at > REQUESTER_SILENT_S:
-                wish.ended = wish.ended or now  # the listener missed the END
+                wish.ended = wish.ended or now  # the END was not heard
         self._meet(device, now)
         return bool(self.stated)
 
     def _count(self, wish: Wish, before: float) -> None:
-        """Count the state as ignored, if the robot sent no request after the state before."""
+        """Count the state as ignored if the robot has sent no request since the previous state."""
         if wish.last.at >= before:
             wish.ignored = 0
         elif self._alive_at > before:

@@ -1,7 +1,7 @@
-"""The laws of a fleet adapter, for all lifts and doors that it uses.
+"""The laws of a fleet adapter, for all lifts and doors that the adapter uses.
 
-The robot's place is not on the graph. A request for another floor counts as its entry, and END counts
-as its exit. The published states show how much its adapter could know.
+The robot's place is not on the graph. Therefore a request for another floor counts as the robot's
+entry, and END counts as the robot's exit. The published states show the adapter's possible knowledge.
 """
 
 from collections.abc import Callable
@@ -18,14 +18,14 @@ CONTEXT: Final = "rmf_ros2 agv/RobotContext.cpp:1700-1735"
 REQUEST_LIFT: Final = "rmf_ros2 phases/RequestLift.cpp:322-326"
 DOOR_OPEN: Final = "rmf_ros2 phases/DoorOpen.cpp"
 NEVER_ENDS_S: Final = 60.0
-"""Time (s) after which a silent robot can no longer be driving out of a car."""
+"""Time (s). A robot that has been silent for longer can no longer be on its way out of a car."""
 FOR_EVER_S: Final = 60.0
 AGAIN: Final = 2
 """Number of breaches in a row that a restart of the adapter cannot explain."""
 SPAM: Final = 5
 LISTS: Final = 5
 TASKS_S: Final = 3.0
-"""Maximum delay (s) of a fleet state that tells of a new task."""
+"""Maximum delay (s) with which a fleet state tells of a new task."""
 GOES: Final = (d.LiftRequestType.REQUEST_END_SESSION, d.LiftRequestType.REQUEST_AGV_MODE)
 
 
@@ -71,7 +71,7 @@ def _floors(history: AdapterHistory) -> Finding:
 
 
 def _repeats(kind: str) -> Callable[[AdapterHistory], Finding]:
-    """Return a check that the adapter repeats its requests in a wait, for a lift or for a door."""
+    """Return a check that the adapter repeats its requests during a wait. `kind` is lift or door."""
 
     def check(history: AdapterHistory) -> Finding:
         wish, was = history.wish, history.was
@@ -93,7 +93,8 @@ STATES: Final = {"lift": d.LiftState, "door": d.DoorState}
 
 
 def _changes(history: AdapterHistory) -> Wish | None:
-    """Return the visit before this request, if the request is for another floor; else None."""
+    """Return the visit as it was before this request, if the request is for another floor. Otherwise
+    return None."""
     wish, was = history.wish, history.was
     if wish is None or was is None or wish.ended or not isinstance(history.device, ObservedLift):
         return None
@@ -102,8 +103,8 @@ def _changes(history: AdapterHistory) -> Wish | None:
 
 
 def _explained(history: AdapterHistory, was: Wish, text: str) -> Finding:
-    """Return a breach. It is withdrawn if a late message excuses it: a state, an alarm or a new
-    task."""
+    """Return a breach. The judge withdraws the breach if a late message excuses it. Such a message is a
+    state, an alarm or a new task."""
     lift = history.device
     assert lift is not None
     return Doubt(text, lambda: lift.matches(was) or history.excused(was), TASKS_S)
@@ -160,7 +161,8 @@ def _ends_again(history: AdapterHistory) -> Finding:
 
 
 def _holders(history: AdapterHistory) -> list[Wish]:
-    """Return the visit whose session the latest message shows, in a list; [] if there is none."""
+    """Return a list with the visit whose session the latest message shows. Return [] if no visit
+    matches."""
     news = history.news
     holder = news.session_id if isinstance(news, d.LiftState) else None
     return [one for one in history.stated if one.who == holder]
@@ -199,7 +201,11 @@ def _stops_opening(history: AdapterHistory) -> Finding:
         return KEPT
     open_s = history.now - was.met.at
     goes_on = wish.met is was.met and open_s > FOR_EVER_S
-    return f"still asks for OPEN, {open_s:.0f} s after it was open for it" if goes_on else None
+    return (
+        f"still asks for OPEN, {open_s:.0f} s after the door was open for this robot"
+        if goes_on
+        else None
+    )
 
 
 LAWS: Final[tuple[Law[AdapterHistory], ...]] = (

@@ -1,4 +1,4 @@
-"""The play for a charger: two requests, and the end of each."""
+"""The play for a charger, with two requests and the end of each request."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -14,19 +14,23 @@ from workbench.rmf_model import Said
 SERVED: Final = (d.ChargerStateValue.CHARGER_ASSIGNED, d.ChargerStateValue.CHARGER_CHARGING)
 START_TIMEOUT_S: Final = 10.0
 LATEST_S: Final = START_TIMEOUT_S + 15.0
-"""Time (s) after which the play cancels the first request, if start_timeout has not ended the
-request."""
+"""Time (s) after which the play cancels the first request, if start_timeout has not ended the request
+by then."""
 REPEATS: Final = 6
 
 
 class ChargeScenario(Scenario):
     """Request a station for a robot that does not come.
 
-    When start_timeout has ended this request, make a second request and cancel it. Other messages give
-    a wrong node an occasion to break each law of requests: a request for another station, a second
-    request for this station, a cancel of another request, and repeats.
+    After start_timeout has ended this request, make a second request and cancel the second request.
+    More messages give a wrong node an occasion to break each law about requests:
 
-    `robot`: FLEET/ROBOT. If the robot does come, the play cancels its charge.
+    - a request for another station
+    - a second request for this station
+    - a cancel of another request
+    - repeats
+
+    `robot` is FLEET/ROBOT. If the robot does come, the play cancels the robot's charge.
     """
 
     def __init__(self, charger: str, robot: str, request_id: str, patience_s: float) -> None:
@@ -45,7 +49,7 @@ class ChargeScenario(Scenario):
 
     @property
     def over(self) -> bool:
-        """Are both requests over, or did the station never grant the first request?"""
+        """Return whether both requests are over, or the station never granted the first request."""
         return bool(self.failed) or self._over
 
     def begin(self, now: float) -> list[Said]:
@@ -53,7 +57,7 @@ class ChargeScenario(Scenario):
         return self.tick(now)
 
     def _play(self) -> Iterator[list[Said]]:
-        """Yield the messages of each step, REPEAT_S apart."""
+        """Yield the messages of each step. REPEAT_S (s) lie between two steps."""
         first, second = self._ids
         yield [self._ask(f"{first}-elsewhere", station=NOWHERE)]
         yield from [[]] * 3
@@ -104,11 +108,11 @@ class ChargeScenario(Scenario):
 
     @property
     def left(self) -> bool:
-        """Has the charger stopped serving our requests?"""
+        """Return whether the charger has stopped serving our requests."""
         return self._leaving and not self._shows(self._ids[0])
 
     def _shows(self, request_id: str) -> bool:
-        """Does the station serve this request, or a request whose id begins with this id?"""
+        """Return whether the station serves this request, or a request whose id begins with this id."""
         state = self._state
         if state is None or state.state not in SERVED:
             return False

@@ -1,4 +1,4 @@
-"""The history of a charger: its requests and states."""
+"""The history of a charger, with its requests and states."""
 
 from typing import Final
 
@@ -13,23 +13,23 @@ CHARGING: Final = d.ChargerStateValue.CHARGER_CHARGING
 RELEASED: Final = d.ChargerStateValue.CHARGER_RELEASED
 ERROR: Final = d.ChargerStateValue.CHARGER_ERROR
 LOST: Final = float("inf")
-"""Time noted for a cancel that the station may not have received."""
+"""Noted time of a cancel, if the station may not have received the cancel."""
 UNREQUESTED: Final = "unrequested/"
-"""Prefix of the ids of charges that nobody requested. A station may use the same id for its next
-charge."""
+"""Prefix of a charge's id if nobody requested the charge. A station may use the same id again."""
 
 
 class ChargerHistory(History[d.ChargerState]):
     """The history of one charger.
 
-    - `requests`: id -> the latest request. `first_asked`: id -> time of the first request.
+    - `requests`: id -> the latest request.
+    - `first_asked`: id -> time of the first request.
     - `elsewhere`: ids of requests to other stations.
-    - `second_at`: time of the last request with another id than the served request.
-    - `cancels`: id -> time of the first cancel. When a charge that nobody requested ends, its cancel is
-      forgotten.
+    - `second_at`: time of the last request whose id differs from the served request's id.
+    - `cancels`: id -> time of the first cancel. The cancel of an unrequested charge is forgotten when
+      that charge ends.
     - `foreign_at`: time of the last cancel of an id that the station does not show.
-    - `same_since`: when the present state and request began. `same_before`: when the state and request
-      before began.
+    - `same_since`: when the present state and request began.
+    - `same_before`: when the previous state and request began.
     """
 
     seen: ObservedCharger
@@ -45,7 +45,7 @@ class ChargerHistory(History[d.ChargerState]):
 
     @staticmethod
     def claims(state: d.ChargerState) -> bool:
-        """Is the state anything but ERROR?"""
+        """Return whether the state differs from ERROR."""
         return state.state != ERROR
 
     def take_other(self, heard: Heard) -> bool:
@@ -75,7 +75,7 @@ class ChargerHistory(History[d.ChargerState]):
         self.cancels = dict.fromkeys(self.cancels, LOST)
 
     def settle(self, state: d.ChargerState) -> None:
-        """Note when the state began; forget the cancels of finished charges."""
+        """Note when the state began. Forget the cancels of finished charges."""
         if self.before is None or _served(self.before) != _served(state):
             self.same_before, self.same_since = self.same_since, self.now
         if state.state in (IDLE, RELEASED):
@@ -90,7 +90,7 @@ class ChargerHistory(History[d.ChargerState]):
 
 
 def unrequested(request_id: str) -> bool:
-    """Is this the id of a charge that nobody requested?"""
+    """Return whether this is the id of a charge that nobody requested."""
     return request_id.startswith(UNREQUESTED)
 
 

@@ -1,7 +1,7 @@
 """The laws of a charger's node.
 
-No part of RMF sends ChargerRequest. These laws follow from the comments in the message files, and from
-the needs of robots and coordinators.
+No part of RMF sends ChargerRequest. Therefore these laws follow from the comments in the message files,
+and from the needs of robots and coordinators.
 """
 
 from typing import Final
@@ -24,7 +24,7 @@ from workbench.judge.shared_laws import ANSWERED, ONE, RATE, STAMP, fresh, named
 
 LATE_S: Final = 10.0
 SEEN_S: Final = 1.0
-"""Time (s) after its beginning in which an ASSIGNED state may be heard late."""
+"""Maximum delay (s) with which an ASSIGNED state may be heard."""
 ENDS_WITHIN_S: Final[dict[int, float]] = {int(ASSIGNED): 5.0, int(CHARGING): 120.0}
 """Maximum time (s) for which a station may serve a cancelled request, by state. A charger needs up to
 120 s to ramp down."""
@@ -40,7 +40,7 @@ def _numbers(history: ChargerHistory) -> Finding:
 
 
 def _known(history: ChargerHistory) -> d.ChargerState | None:
-    """Return the new state, if its number is a state of RMF."""
+    """Return the new state if RMF defines the state's number. Otherwise return None."""
     state = history.new
     return state if state is not None and state.state in list(d.ChargerStateValue) else None
 
@@ -84,7 +84,7 @@ def _keeps(history: ChargerHistory) -> Finding:
     """Check that a station belongs to one request until that request ends.
 
     Two changes are allowed. The request of the robot on the pad may take over an unrequested charge. A
-    restarted node may have forgotten its request.
+    node may have forgotten its request in a restart.
     """
     state, before = history.new, history.before
     if state is None or before is None or not {state.state, before.state} <= ENDS_WITHIN_S.keys():
@@ -99,7 +99,8 @@ def _keeps(history: ChargerHistory) -> Finding:
 
 
 def _is_over(history: ChargerHistory, before: d.ChargerState) -> bool:
-    """May a cancel or the start_timeout have ended this promise between the two states?"""
+    """Return whether a cancel or the start_timeout may have ended this promise between the two
+    states."""
     if before.state != ASSIGNED or unrequested(before.request_id):
         return False
     known = before.request_id in history.requests and before.request_id not in history.cancels
@@ -109,8 +110,8 @@ def _is_over(history: ChargerHistory, before: d.ChargerState) -> bool:
 
 
 def _overdue_s(history: ChargerHistory, state: d.ChargerState, since: float) -> float:
-    """Return how long (s) the start_timeout has been over, if it began at `since`; negative before its
-    end."""
+    """Return the time (s) since the end of the start_timeout, if it began at `since`. The time is
+    negative before that end."""
     asked = history.requests.get(state.request_id)
     limit_s = in_seconds(asked.start_timeout) if asked else 0.0
     return history.now - since - limit_s if limit_s > 0.0 else NOT_YET
@@ -156,7 +157,7 @@ def _foreign_cancel(history: ChargerHistory) -> Finding:
     if state is None or before is None or before.state != ASSIGNED or not before.request_id:
         return None
     if unrequested(before.request_id):
-        return None  # an unrequested charge ends when its robot leaves, which no message announces
+        return None  # an unrequested charge ends when its robot leaves, without a message
     if history.now - history.foreign_at > FOREIGN_S:
         return None
     if state.state not in (IDLE, RELEASED):
@@ -220,7 +221,7 @@ LAWS: Final[tuple[Law[ChargerHistory], ...]] = (
     Law(
         "C1.keeps",
         "ASSIGNED and CHARGING keep their request_id until they end; a charge that nobody requested"
-        " (`unrequested/…`) may get that of the robot that it shows",
+        " (`unrequested/…`) may get the request_id of the robot on the pad",
         "a second request while the first is served",
         "The next robot's request must not take over a station that is promised to the first robot",
         "ChargerRequest.msg, request_id",

@@ -1,4 +1,4 @@
-"""The history of a door: its requests and movements."""
+"""The history of a door, with its requests and movements."""
 
 from collections import deque
 from typing import Final
@@ -15,27 +15,30 @@ BLIND: Final = (d.DoorModeValue.MODE_OFFLINE, d.DoorModeValue.MODE_UNKNOWN)
 REOPENS_WITHIN_S: Final = 1.0
 AT_ONCE_S: Final = 0.3
 CROSSES_S: Final = 0.5
-"""Time (s) by which a state may be heard later than its cause, a CLOSE."""
+"""Maximum delay (s) with which a state may be heard after the CLOSE that caused the state."""
 DWELLS_S: Final = 0.5
-"""Minimum time (s) for which a door operator keeps a door open that people have opened."""
+"""Minimum time (s) for which a door operator keeps a door open for people."""
 OPENING_S: Final = 1.0
-"""Minimum time (s) before a door operator reverses an opening door."""
+"""Minimum time (s) for which a door operator opens a door before the operator can reverse the door."""
 
 
 class DoorHistory(History[d.DoorState]):
     """The history of one door. A latch lasts from an OPEN request to the next CLOSE request.
 
-    - `latched`: the last request was OPEN. `was_closed`: the door was closed at that request.
+    - `latched`: whether the last request was OPEN.
+    - `was_closed`: whether the door was closed at that request.
     - `asked_at`: time of the first OPEN of this latch.
-    - `openings`: number of OPENs after `not_closed_at`, when the door was last seen not closed.
+    - `openings`: number of OPENs after `not_closed_at`.
+    - `not_closed_at`: when the door was last seen not closed.
     - `closed_at`: time of the last CLOSE on door_requests.
     - `adapter_closed_at`: time of a fleet adapter's last CLOSE to the supervisor in this latch.
-    - `was_open`: the door has been open in this latch.
+    - `was_open`: whether the door has been open in this latch.
     - `reopened`: times at which the door reopened immediately, in this latch.
     - `instant`: how many times in a row the door showed OPEN immediately after the request.
-    - `opened`: the latest state is the first OPEN state of this latch.
+    - `opened`: whether the latest state is the first OPEN state of this latch.
     - `shut`: how many times in a row RMF's CLOSE closed a door that people had opened.
-    - `left`: the latest state ends such an opening.
+    - `left`: whether the latest state ends an opening by people, and RMF sent CLOSE during that
+      opening.
     """
 
     observes = ObservedDoor
@@ -53,17 +56,17 @@ class DoorHistory(History[d.DoorState]):
 
     @property
     def mode(self) -> int:
-        """Present mode of the door."""
+        """The door's present mode."""
         return self.state.current_mode.value if self.state else -1
 
     @property
     def mode_before(self) -> int:
-        """Mode in the state before; -1 without such a state."""
+        """The door's mode in the previous state, or -1 if there is no previous state."""
         return self.before.current_mode.value if self.before else -1
 
     @staticmethod
     def claims(state: d.DoorState) -> bool:
-        """Is the door OPEN?"""
+        """Return whether the door is OPEN."""
         return state.current_mode.value == OPEN
 
     def take_other(self, heard: Heard) -> bool:

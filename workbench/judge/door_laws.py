@@ -9,13 +9,13 @@ from workbench.judge.shared_laws import ANSWERED, ONE, RATE, STAMP, fresh, named
 
 OPENS_WITHIN_S: Final = 30.0
 SILENCE_S: Final = 10.0
-"""Maximum time (s) after which faulty nodes close a door because RMF is silent (lci-rmf-adapter)."""
+"""Time (s) of RMF's silence. Within this time, faulty nodes such as lci-rmf-adapter close a door."""
 ASKED: Final = 5
 INSTANT: Final = 2
 SHUT: Final = 3
 BYPASS_S: Final = 5.0
 FLICKERS_S: Final = 0.9
-"""Time (s) too short for a real door to close and open again."""
+"""Time (s) that is too short for a real door to close and open again."""
 LATE_S: Final = FLICKERS_S + 1.0
 
 
@@ -39,7 +39,8 @@ def _opens(history: DoorHistory) -> Finding:
 
 
 def _left_open(history: DoorHistory) -> bool:
-    """Was the door open for a requester until the state before, and is it no longer open?"""
+    """Return whether the door was open for a requester up to the previous state, and is no longer
+    open."""
     moves = history.mode in (CLOSED, d.DoorModeValue.MODE_MOVING)
     return history.latched and history.was_open and moves and history.mode_before == OPEN
 
@@ -49,7 +50,7 @@ def _bypass(history: DoorHistory) -> bool:
 
 
 def _stays(history: DoorHistory) -> Finding:
-    """Check that the door does not close because RMF is silent."""
+    """Check that RMF's silence does not close the door."""
     if history.new is None or not history.latched or not history.was_open:
         return None
     if not _left_open(history) or _bypass(history):
@@ -59,7 +60,8 @@ def _stays(history: DoorHistory) -> Finding:
 
 
 def _left(text: str, history: DoorHistory) -> Doubt:
-    """Return a doubt. A CLOSE on its way is an excuse, and so is a contact that flickers (another law).
+    """Return a doubt. A CLOSE that is still on its way excuses the door. A flickering contact excuses
+    the door too, because another law covers such a contact.
 
     Stamps count too, because a busy network may deliver the next state late.
     """
@@ -73,8 +75,8 @@ def _left(text: str, history: DoorHistory) -> Doubt:
 
 
 def _bypassed(history: DoorHistory) -> Finding:
-    """Check that a fleet adapter's CLOSE, which is meant for the supervisor, does not close the
-    door."""
+    """Check that a fleet adapter's CLOSE does not close the door. Only the supervisor may act on this
+    CLOSE."""
     if history.new is None or not history.latched or not _bypass(history):
         return None
     if not _left_open(history):

@@ -1,6 +1,6 @@
-"""The history of one device, from its messages. Its memory has a limit.
+"""The history of one device, from its messages. The memory of a history is limited.
 
-A history takes messages and decides nothing; laws read the history. This file has the part that all
+A history takes messages and decides nothing. Laws read the history. This file has the part that all
 kinds share: messages, the pace and stamps of states, and the answers to requests.
 """
 
@@ -19,24 +19,26 @@ from bridges.observe.limits import SLOWEST_S
 from bridges.observe.requesters import Moment
 
 REMEMBERED: Final = 200
-"""Maximum number of requesters that a history remembers; a site has some dozens."""
+"""Maximum number of requesters in a history. A site has some dozens of requesters."""
 BURST: Final = 20
 FROZEN_S: Final = 0.05
 ANSWERS_WITHIN_S: Final = 0.1
 OFTEN_S: Final = 30.0
 EARLY_S: Final = 0.15
-"""Time (s) by which a state must come early before a timer's jitter cannot explain it."""
+"""Time (s). If a state comes early by more than this time, a timer's jitter cannot be the cause."""
 PAUSE_S: Final = 2.0
 PAUSE: Final = 1.4
-"""A pause may be a restart if it lasts this many usual gaps, and at least PAUSE_S."""
+"""Number of usual gaps. A pause may be a restart if the pause lasts this many usual gaps, and at least
+PAUSE_S."""
 KNOWN: Final = 3
 RHYTHM: Final = 10
 TURNS: Final = 4
-"""Number of turns between two publishers in OFTEN_S that a restart of one node cannot explain."""
+"""Number of turns between two publishers within OFTEN_S. A restart of one node cannot explain so many
+turns."""
 STEADY_S: Final = 0.05
 UNEVEN_S: Final = 0.1
 CROSSED_S: Final = 1.0
-"""Time (s) after which a state shows the effect of a request. A request may have no effect."""
+"""Time (s) after which a state shows the effect of a request, if the request has an effect."""
 TESTED_S: Final = 5.0
 SILENCES: Final = 5
 
@@ -47,7 +49,7 @@ V = TypeVar("V")
 
 
 def keep(known: dict[str, V], key: str, value: V, most: int = REMEMBERED) -> None:
-    """Put an entry last; forget the oldest entry if there are more than `most`."""
+    """Put an entry last. If there are more than `most` entries, forget the oldest entry."""
     known.pop(key, None)
     known[key] = value
     if len(known) > most:
@@ -57,14 +59,15 @@ def keep(known: dict[str, V], key: str, value: V, most: int = REMEMBERED) -> Non
 class AnyHistory(ABC):
     """The part that all histories share. Times are the messages' times (s).
 
-    - `news`: the latest message; None when only time has passed. `own`: the judge sent it.
-    - `states`: number of states, or of an adapter's requests.
+    - `news`: the latest message; None if only time has passed.
+    - `own`: whether the judge sent the latest message.
+    - `states`: number of states; for an adapter, number of its requests.
     - `senders`: the publishers on the topic of the states; empty for a recording.
-    - `others`: names of other devices of the kind.
-    - `network_s`: how long (s) the whole network was silent after the state before. Silence counts only
-      after another device was heard.
+    - `others`: names of other devices of the same kind.
+    - `network_s`: how long (s) the whole network was silent after the previous state. Silence counts
+      only after another device was heard.
     - `silences`: the first SILENCES such silences, each with its beginning (wall clock) and length (s).
-    - `burst_s`: duration of the latest BURST unchanged states.
+    - `burst_s`: duration (s) of the latest BURST unchanged states.
     """
 
     def __init__(self, name: str) -> None:
@@ -82,11 +85,12 @@ class AnyHistory(ABC):
 
     @abstractmethod
     def take(self, heard: Heard, own: bool = False) -> bool:
-        """Take a message; `own`: the judge sent it. Return False if no law needs a check."""
+        """Take a message. `own` tells whether the judge sent the message. Return False if no law needs
+        a check."""
 
     @property
     def state(self) -> words.Stated | None:
-        """Latest state, if the history is of a device."""
+        """The latest state, if the history is about a device."""
         return None
 
     @abstractmethod
@@ -107,11 +111,11 @@ class AnyHistory(ABC):
             self._any_at = heard.at
 
     def _end_silence(self, now: float, wall: float) -> None:
-        """Note a silence of the network: no device was heard, although other devices had been heard
-        before."""
+        """Note a silence of the network. In such a silence no device is heard, although other devices
+        were heard before."""
         silent_s = now - self._any_at
         if silent_s > PAUSE_S and self._any_at - self._other_at <= SLOWEST_S:
-            self.network_s += silent_s - PAUSE_S  # the slowest node may be silent for PAUSE_S
+            self.network_s += silent_s - PAUSE_S  # even a sound network may pause for PAUSE_S
             if silent_s > SLOWEST_S:
                 self.silences = [*self.silences, (wall - silent_s, silent_s)][:SILENCES]
 
@@ -120,11 +124,12 @@ class History(AnyHistory, Generic[T]):
     """The history of one device.
 
     - `seen`: the device's observations.
-    - `before`: the state before the latest. None at the first state and after a pause, because the node
-      may have restarted. `since`: the time when `before` was last None.
+    - `before`: the state before the latest state. None at the first state and after a pause, because
+      the node may have restarted.
+    - `since`: the time at which `before` was last None.
     - `frozen_s`: how long (s) the states have shown the same stamp.
-    - `claimed_s`: how long (s) every state has said something on which a robot acts (see `claims`).
-    - `asked_last`: the latest request.
+    - `claimed_s`: how long (s) every state has had a claim on which a robot acts (see `claims`).
+    - `asked_last`: time of the latest request.
     - `turns`: times at which two publishers took turns.
     """
 
@@ -147,8 +152,8 @@ class History(AnyHistory, Generic[T]):
         self.turns: deque[float] = deque(maxlen=TURNS)
 
     def take(self, heard: Heard, own: bool = False) -> bool:
-        """Take a message; `own`: the judge sent it. Return False for a message about other devices,
-        which needs no check."""
+        """Take a message. `own` tells whether the judge sent the message. Return False for a message
+        about another device, which needs no check."""
         self._begin(heard, own)
         message = heard.message
         if not isinstance(message, words.Stated | words.Requested):
@@ -167,7 +172,7 @@ class History(AnyHistory, Generic[T]):
         return self.take_other(heard)
 
     def _published_by(self, heard: Heard) -> None:
-        """Note the state's publisher, and the time if two publishers have taken turns."""
+        """Note the state's publisher. If two publishers have taken turns, note the time."""
         moment, before = Moment(heard.at, heard.wall), self._sender
         self.seen.published_by(heard.sender, moment)
         self._sender = heard.sender
@@ -180,18 +185,19 @@ class History(AnyHistory, Generic[T]):
 
     @abstractmethod
     def settle(self, state: T) -> None:
-        """Note the meaning of the new state; `before` and `state` are already set."""
+        """Update the memory of this kind of device with the new state. `before` and `state` already
+        have their new values."""
 
     @staticmethod
     @abstractmethod
     def claims(state: Any) -> bool:
-        """Would a robot act on this state?"""
+        """Return whether a robot would act on this state."""
 
     def forget(self) -> None:
         """Forget the requests that may have ended during a silence."""
 
     def often(self, times: deque[float]) -> bool:
-        """Is `times` full, and are all its times within OFTEN_S?"""
+        """Return whether `times` is full, and all its times are within OFTEN_S."""
         return len(times) == times.maxlen and self.now - times[0] < OFTEN_S
 
     def asked(self) -> None:
@@ -200,49 +206,50 @@ class History(AnyHistory, Generic[T]):
 
     @property
     def state(self) -> T | None:
-        """Latest state."""
+        """The latest state."""
         return self.seen.state
 
     @property
     def heard_at(self) -> float:
-        """Time of the latest state."""
+        """Time (s) of the latest state."""
         return self.seen.last_state.at if self.seen.last_state else NOT_YET
 
     @property
     def new(self) -> T | None:
-        """Latest state if it is the latest message, else None."""
+        """The latest state, if it is the latest message. Otherwise None."""
         return self.state if self.news is self.state else None
 
     @property
     def tested(self) -> int:
-        """Number of the latest 8 requests that were followed by an unchanged state."""
+        """How many of the latest 8 requests were followed by an unchanged state."""
         return len(self._answers)
 
     @property
     def answers(self) -> int:
-        """Number of the latest 8 requests that were answered by a state that was not due.
+        """How many of the latest 8 requests were followed immediately by a state that was not due.
 
-        Load bunches messages but adds no state: at the usual pace no state counts as an answer.
+        A loaded machine sends messages in bunches, but sends no more states than usual. Therefore no
+        state counts as an answer if states come at the usual pace.
         """
         pace_s = sum(gap_s for _, gap_s in self._answers) / max(1, self.tested)
         return sum(early for early, _ in self._answers) if pace_s < self._early_s else 0
 
     @property
     def has_rhythm(self) -> bool:
-        """Have states come for long enough to show their rhythm and their publishers?"""
+        """Return whether states have come for long enough to show their rhythm and their publishers."""
         return len(self._gaps) == RHYTHM
 
     @property
     def two_rhythms(self) -> bool:
-        """Do long and short gaps alternate, with one length for all long gaps and one for all short
-        gaps?"""
+        """Return whether long and short gaps alternate. All long gaps must have one length, and all
+        short gaps another length."""
         gaps = [*self._gaps]
         steady = all(abs(b - a) < STEADY_S for a, b in zip(gaps, gaps[2:], strict=False))
         uneven = all(abs(b - a) > UNEVEN_S for a, b in pairwise(gaps))
         return self.has_rhythm and steady and uneven
 
     def was_tested(self, at: float) -> bool:
-        """Has any later state had the time to show the effect of a request at `at`?"""
+        """Return whether later states have had enough time to show the effect of a request at `at`."""
         return CROSSED_S < self.now - at < TESTED_S
 
     @property
@@ -250,7 +257,7 @@ class History(AnyHistory, Generic[T]):
         return self._usual_s - EARLY_S
 
     def _take_state(self, state: T, earlier: float) -> bool:
-        """Take the new state. `earlier`: time of the state before."""
+        """Take the new state. `earlier` is the time (s) of the previous state."""
         self.states += 1
         self.before = self.seen.before
         if self.before is None or self._paused(words.stamped_at(self.before)):
@@ -263,14 +270,15 @@ class History(AnyHistory, Generic[T]):
         return True
 
     def checked(self) -> None:
-        """Begin the next gap. The laws have read the present gap."""
+        """Begin the next gap, because the laws have read the present gap."""
         if self.new is not None:
             self.network_s = 0.0
 
     def _paused(self, stamped_before: float) -> bool:
-        """Was there a pause that is long enough for a restart?
+        """Return whether there was a pause that is long enough for a restart.
 
-        After a pause a network may deliver several states together. They count to the same pause.
+        After a pause, a network may deliver several states together. All these states belong to the
+        same pause.
         """
         gap_s, step_s = self.seen.gap_s, self.seen.stamped_at - stamped_before
         known = len(self._quiet) >= KNOWN
@@ -291,8 +299,8 @@ class History(AnyHistory, Generic[T]):
         self.claimed_s = self.now - self._claims_since
 
     def _look_at_pace(self, state: T, earlier: float) -> None:
-        """Note the pace of unchanged states. Such states are due at the node's own rate, never in
-        answer to a request."""
+        """Note the pace of unchanged states. A node sends unchanged states at its own rate, and never
+        as the answer to a request."""
         self._gaps.append(self.seen.gap_s)
         quiet_since, self._quiet_since = self._quiet_since, earlier
         if self.before is None or _content(state) != _content(self.before):

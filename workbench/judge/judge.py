@@ -1,4 +1,5 @@
-"""Check the messages of one device, or of one fleet adapter, against the laws of its kind."""
+"""Check one device's messages against the laws of the device's kind. A fleet adapter also counts as a
+device."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -39,15 +40,16 @@ SCENES: Final[Mapping[JudgedKind, Callable[[str], AnyHistory]]] = MappingProxyTy
     }
 )
 MUTE_S: Final = 10.0
-"""Time (s) without a state after which a publisher counts as mute, for RMF too."""
+"""Time (s) without a state after which a publisher counts as mute. RMF also calls such a publisher
+mute."""
 SHOWN: Final = 3
 """Maximum number of breaches that a law keeps as evidence."""
 
 
 @dataclass
 class _Tally:
-    """The score of one law. `doubt`: a possible breach that a later message may still excuse, with its
-    evidence."""
+    """The score of one law. `doubt` is a possible breach with its evidence. A later message may still
+    excuse the doubt."""
 
     law: Law[Any]
     kept: int = 0
@@ -69,10 +71,10 @@ class _Tally:
 
 
 class Judge:
-    """Judges one device, by the device's name in RMF, in limited memory.
+    """A judge of one device, in limited memory. The judge knows the device by its name in RMF.
 
-    `only`: the ids of the laws to check; empty means all laws of the kind. `broken`: is one of these
-    laws broken?
+    - `only`: the ids of the laws to check; empty means all laws of the kind.
+    - `broken`: whether the device has broken a law of `only`.
     """
 
     def __init__(self, kind: JudgedKind, name: str, only: Iterable[str] | None = None) -> None:
@@ -86,7 +88,8 @@ class Judge:
         self._tallies = [_Tally(law) for law in LAWS[kind] if law.id in ids]
 
     def hear(self, heard: Heard, own: bool = False) -> None:
-        """Take the next message of any device, in order of arrival. `own`: the judge published it."""
+        """Take the next message of any device, in order of arrival. `own` tells whether the judge
+        published the message."""
         self.first = self.first or heard
         if self.history.take(heard, own):
             for tally in self._tallies:
@@ -97,12 +100,13 @@ class Judge:
     def fire_ends(
         self, publishers: int, retaining: int, supervisors: int, at: float, wall: float
     ) -> None:
-        """Take the number of the fire topic's publishers, of retaining publishers, and of supervisors.
+        """Take three numbers: the fire topic's publishers, its retaining publishers, and the lift
+        supervisors.
 
-        These numbers count only if one lift is on the graph, because the topic does not name the
-        alarm's lift. Jazzy's lift supervisor has a volatile publisher, and never uses it (rmf_ros2
-        7eef65a, lift_supervisor/Node.cpp:52). Only a repeated finding counts, because publishers are
-        discovered one by one.
+        The judge uses the numbers only if one lift is on the graph, because the topic does not name the
+        alarm's lift. Jazzy's lift supervisor has a volatile publisher, and never uses the publisher
+        (rmf_ros2 7eef65a, lift_supervisor/Node.cpp:52). Only a repeated finding counts, because the
+        transport discovers publishers one by one.
         """
         if isinstance(self.history, LiftHistory) and publishers and not self.history.others:
             volatile = publishers - retaining
@@ -124,7 +128,7 @@ class Judge:
         return self.verdicts()
 
     def verdicts(self) -> tuple[JudgedLaw, ...]:
-        """Return each law with its verdict so far."""
+        """Return each law with its present verdict."""
         return tuple(tally.judged() for tally in self._tallies)
 
     def _breaks(self, tally: _Tally, evidence: Evidence) -> None:

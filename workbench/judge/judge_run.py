@@ -1,7 +1,8 @@
-"""Run a judgement: listen, perform a play if asked and allowed, release the device, give the verdict.
+"""Run a judgement. Listen, perform a play, release the device, and give the verdict. A play needs a
+user who asks for it, and a device that allows it.
 
 This module has no I/O and no clock, so a judgement is the same on a wire and in virtual time. The
-caller passes its messages in, publishes the returned messages, and calls `turn` at `wake_at`.
+caller passes messages in, publishes the returned messages, and calls `turn` at `wake_at`.
 """
 
 from collections.abc import Callable
@@ -15,15 +16,16 @@ from workbench.judge.shared_laws import BURST_WITHIN_S
 from workbench.rmf_model import NEVER, Said
 
 LISTENS_S: Final = 4.0
-"""Time (s) before a play in which the judge listens for the device's state and for other nodes."""
+"""Time (s) of listening before a play, for the device's state and for other nodes."""
 APPEARS_S: Final = 15.0
-"""Maximum wait (s) for the device's first state, because nodes must first discover each other."""
+"""Maximum time (s) to wait for the device's first state, because nodes must first discover each
+other."""
 SETTLES_S: Final = 4.0
-"""Time (s) after a play in which the judge listens for late breaches."""
+"""Time (s) of listening after a play, for late breaches."""
 
 
 class Act(Enum):
-    """Part of a judgement that runs now."""
+    """The part of a judgement that runs now."""
 
     LISTEN = auto()
     PLAY = auto()
@@ -35,8 +37,9 @@ class Act(Enum):
 class JudgeRun:
     """One judgement.
 
-    `for_s`: listening time without a play; inf: until `stop`. `strangers()`: names of other publishers
-    on the play's topics; "" for none. `note`: why a play was not performed, or did not reach its end.
+    - `for_s`: time (s) of listening without a play; inf means until `stop`.
+    - `strangers()`: names of other publishers on the play's topics; "" if there are none.
+    - `note`: why a play was not performed, or did not reach its end.
     """
 
     def __init__(
@@ -61,17 +64,17 @@ class JudgeRun:
 
     @property
     def done(self) -> bool:
-        """Is there a verdict?"""
+        """Return whether there is a verdict."""
         return self.act is Act.DONE
 
     def begin(self, at: float, wall: float) -> None:
-        """Listen from now on. `at`: monotonic time (s). `wall`: seconds since the epoch."""
+        """Start to listen. `at` is the monotonic time (s). `wall` is in seconds since the epoch."""
         self.began_at, self._until = at, at + self._for_s
         self._epoch = wall - at
         self._last = (at, wall)
 
     def hear(self, heard: Heard) -> list[Said]:
-        """Take a message of the graph that another node sent. Return messages to publish."""
+        """Take a message that another node sent. Return messages to publish."""
         self._last = (heard.at, heard.wall)
         self.judge.hear(heard)
         if self._scenario is None or self.act not in (Act.PLAY, Act.LEAVE):
@@ -101,13 +104,14 @@ class JudgeRun:
         return []
 
     def wake_at(self) -> float:
-        """The latest time to call `turn` (monotonic s)."""
+        """The latest time (monotonic s) at which the caller must call `turn`."""
         if self.act is Act.PLAY and self._scenario is not None:
             return min(self._scenario.wake_at() - self._epoch, self._last[0] + REPEAT_S)
         return NEVER if self.act is Act.DONE else self._until
 
     def stop(self) -> list[Said]:
-        """End early. If we have the device, release it first. May be called again."""
+        """End early. If we have the device, release the device first. A caller may call `stop`
+        again."""
         if self.act is Act.PLAY:
             self.note, self._in_haste = "interrupted", True
             return self._begin_leaving()
@@ -118,8 +122,8 @@ class JudgeRun:
 
     @property
     def _now(self) -> float:
-        """Return RMF's clock: the wall clock at the beginning plus the time since then. Clock steps do
-        not change it."""
+        """Return RMF's clock (s since the epoch). The clock begins with the wall clock, and then
+        follows the monotonic clock. Thus steps of the wall clock change nothing."""
         return self._epoch + self._last[0]
 
     def _begin_play(self) -> list[Said]:
@@ -170,7 +174,7 @@ class JudgeRun:
         self._until = self._last[0] + SETTLES_S
 
     def _told(self, said: list[Said]) -> list[Said]:
-        """Judge our own messages like the messages of other nodes, and return them."""
+        """Judge our own messages like the messages of other nodes. Return our messages."""
         at, wall = self._last
         for topic, message in said:
             self.judge.hear(Heard(at, wall, topic.name, message), own=True)

@@ -1,4 +1,4 @@
-"""Laws, and a judge's findings: a law is kept, broken, or not seen."""
+"""Laws, and a judge's findings. A law is kept, broken, or not seen."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from bridges.messages import words
 S_contra = TypeVar("S_contra", contravariant=True)
 
 LEEWAY_S: Final = 1.0
-"""Maximum difference (s) between the arrival times of two topics."""
+"""Maximum difference (s) between the arrival times of related messages on two topics."""
 LONGEST: Final = 60
 """Maximum length (characters) of a network name in a text."""
 
@@ -25,10 +25,10 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Doubt:
-    """A law looks broken, but a message that is still on its way may explain the breach.
+    """A possible breach of a law. A message that is still on its way may explain the breach.
 
-    Topics have no common order on a wire: a lift's state may be heard before the END that caused the
-    state. The judge calls `excused()` at each message, for `leeway_s`.
+    Topics have no common order on a wire. For example, a lift's state may be heard before the END that
+    caused the state. The judge calls `excused()` at each message, for `leeway_s`.
     """
 
     text: str
@@ -37,8 +37,8 @@ class Doubt:
 
 
 Finding = str | Doubt | None
-"""A law's finding in the latest message: a breach as text, a doubt, KEPT, or None. None means that the
-message gave no occasion to break the law."""
+"""A law's finding about the latest message: a breach as text, a doubt, KEPT, or None. None means that
+the message gave no occasion to break the law."""
 KEPT: Final = ""
 
 
@@ -46,9 +46,11 @@ KEPT: Final = ""
 class Law(Generic[S_contra]):
     """One sentence of RMF's contract, and a check after each message.
 
-    `occasion`: the event at which a wrong node would break the law; without such an event the law is
-    not seen. `source`: the reference. `check(history)`: a pure function of the messages heard.
-    `sensed`: a stuck or noisy wire at a correct node can break the law too.
+    - `occasion`: the event at which a wrong node would break the law. Without such an event, the
+      verdict is "not seen".
+    - `source`: the reference.
+    - `check(history)`: a pure function of the messages heard.
+    - `sensed`: whether a stuck or noisy wire at a correct node can break the law too.
     """
 
     id: str
@@ -62,7 +64,8 @@ class Law(Generic[S_contra]):
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """Evidence of a breach. `at`: seconds on the messages' clock. `wall`: seconds since the epoch."""
+    """Evidence of a breach. `at` is in seconds on the messages' clock. `wall` is in seconds since the
+    epoch."""
 
     at: float
     wall: float
@@ -71,8 +74,8 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True)
 class JudgedLaw:
-    """A law and its verdict. `times`: how often the law was kept or broken. `evidence`: the first few
-    breaches."""
+    """A law and its verdict. `times` counts how often the law was kept or broken. `evidence` has the
+    first few breaches."""
 
     law: Law[object]
     verdict: Verdict
@@ -81,6 +84,6 @@ class JudgedLaw:
 
 
 def shown(name: str) -> str:
-    """Return a name from the network, quoted, on one line, and cut to LONGEST characters."""
+    """Return a name from the network on one line, in quotes, and cut to LONGEST characters."""
     text = words.printable(name[: LONGEST + 1])
     return f"'{text}'" if len(text) <= LONGEST else f"'{text[:LONGEST]}…'"

@@ -1,4 +1,4 @@
-"""Checks of a lift's laws after each message. The laws themselves are in `lift_laws.py`."""
+"""Checks of a lift's laws after each message. `lift_laws.py` has the laws themselves."""
 
 from typing import Final
 
@@ -10,20 +10,20 @@ from workbench.judge.law import KEPT, Doubt, Finding, shown
 from workbench.judge.lift_history import ASKED_S, GRACE_S, LATE_S, LiftHistory, moves
 
 ENDS_WITHIN_S: Final = 3.0
-"""Maximum time (s) until an END takes effect: a state period of 2 s, and one scan."""
+"""Maximum time (s) until an END takes effect, which is a state period of 2 s and one scan."""
 GRANTS_WITHIN_S: Final = 30.0
 GRANT_ASKED: Final = 10
 JUMPS_WITHIN_S: Final = 1.5
 REFUSED: Final = 3
 FOREIGN_S: Final = 2.0
 SUPERVISED_S: Final = 10.0
-"""Time (s) without a request on lift_requests after which the supervisor may be dead, or not
-recorded."""
+"""Time (s) without a request on lift_requests. After this time, the supervisor may be dead, or the
+recording may lack the supervisor."""
 SETTLED_S: Final = 3.0
-"""Time (s) after a node's first state in which the node may still obey requests that we have not
-heard."""
+"""Time (s) after a node's first state. Within this time, the node may still obey requests that we did
+not hear."""
 ALARMS_END_S: Final = 3.0
-"""Maximum time (s) between the `false` messages of nodes that end one alarm together."""
+"""Maximum time (s) between the `false` messages of several nodes that end one alarm together."""
 
 
 def _is_open(history: LiftHistory) -> d.LiftState | None:
@@ -49,7 +49,7 @@ def numbers(history: LiftHistory) -> Finding:
 
 
 def other_lift(history: LiftHistory) -> Finding:
-    """Check that the lift is not given to a session that only requested another lift."""
+    """Check that a session that requested only another lift does not get this lift."""
     session = history.session
     if history.new is None or history.before is None:
         return None
@@ -65,7 +65,7 @@ def other_lift(history: LiftHistory) -> Finding:
 
 
 def own_name(history: LiftHistory) -> Finding:
-    """Check that the lift is not given to a session that sent no request."""
+    """Check that only a session that sent a request gets the lift."""
     session = history.session
     if history.new is None or history.before is None or not session:
         return None
@@ -81,9 +81,9 @@ def own_name(history: LiftHistory) -> Finding:
 
 
 def grants(history: LiftHistory) -> Finding:
-    """Check that a free lift in service grants the first request.
+    """Check that a free lift in service grants the first request for it.
 
-    After a ride the node may keep the lift for GRACE_S, because the robot may still be in the car.
+    After a ride, the node may keep the lift for GRACE_S, because the robot may still be in the car.
     """
     if history.new is None or history.before is None:
         return None
@@ -104,7 +104,8 @@ def grants(history: LiftHistory) -> Finding:
 
 
 def bypassed(history: LiftHistory) -> Finding:
-    """Check that requests from fleet adapters to the supervisor grant nothing."""
+    """Check that a fleet adapter's request to the supervisor grants nothing. Only the supervisor may
+    act on this request."""
     session = history.session
     supervised = history.now - history.direct_at <= SUPERVISED_S
     if history.new is None or history.before is None or not supervised:
@@ -139,7 +140,7 @@ def ended_unasked(history: LiftHistory) -> Finding:
         return KEPT if tested else None
     ask = history.asks.get(old)
     if ask is None and since > history.since + SETTLED_S:
-        return None  # the session sent no request, which breaks L4.own
+        return None  # the session never sent a request, so law L4.own reports the breach
     if history.has_ended(old, since) or (ask and ask.human) or _foreign_end(history, old, since):
         return None
     what = f"session {shown(old)} became {shown(new)}" if new else f"session {shown(old)} ended"
@@ -151,7 +152,8 @@ def ended_unasked(history: LiftHistory) -> Finding:
 
 
 def _foreign_end(history: LiftHistory, session: str, since: float) -> str:
-    """Return the other session whose END has just come during this session; "" for none."""
+    """Return the other session whose END has come a moment ago, during this session. Return "" if there
+    is no such session."""
     if history.has_ended(session, since):
         return ""
     others = ((who, at) for who, at in history.ended.items() if who not in ("", session))
@@ -160,7 +162,7 @@ def _foreign_end(history: LiftHistory, session: str, since: float) -> str:
 
 
 def ended_by_another(history: LiftHistory) -> Finding:
-    """Check that nothing changes at the END of a session that does not have the lift."""
+    """Check that the END of a session without the lift changes nothing."""
     old = history.session_before
     if history.new is None or history.before is None or not old:
         return None
@@ -175,7 +177,7 @@ def ended_by_another(history: LiftHistory) -> Finding:
 
 
 def ends(history: LiftHistory) -> Finding:
-    """Check that the holder's END ends the session, with any floor and door in the request."""
+    """Check that the holder's END ends the session, whatever floor and door the request has."""
     if history.new is None:
         return None
     if history.bare_refused >= REFUSED:
@@ -217,7 +219,7 @@ def no_jump(history: LiftHistory) -> Finding:
 
 
 def in_agv(history: LiftHistory) -> Finding:
-    """Check that the door opens for a boarding robot only while the car is closed to the public."""
+    """Check that the door opens for a boarding robot only if the car is closed to the public."""
     state = history.new
     if state is None or not (history.offers and history.offered):
         return None
@@ -259,7 +261,7 @@ def destination(history: LiftHistory) -> Finding:
     if history.was_asked_to(floor, within_s):
         return KEPT
     if not history.known or state.session_id not in history.asks:
-        return None  # requested before we listened, or another law reports the breach
+        return None  # the request came before we listened, or another law reports the breach
     return Doubt(
         f"destination {shown(floor)}, which {shown(state.session_id)} did not ask for",
         lambda: history.was_asked_to(floor, within_s) or history.session != state.session_id,
@@ -276,7 +278,7 @@ def unserved(history: LiftHistory) -> Finding:
 
 
 def lets_nobody_in(history: LiftHistory) -> Finding:
-    """Check that no robot is let in during a hazard."""
+    """Check that the lift lets no robot in during a hazard."""
     state = history.new
     if state is None or state.current_mode not in HAZARDS or not state.session_id:
         return None
@@ -305,7 +307,8 @@ def grants_nothing(history: LiftHistory) -> Finding:
 
 
 def no_false(history: LiftHistory) -> Finding:
-    """Check that `false` comes only after an alarm. With several lifts the publisher is unknown."""
+    """Check that `false` comes only after an alarm. If several lifts are on the graph, the publisher is
+    unknown."""
     if not isinstance(history.news, d.Bool) or history.others:
         return None
     if history.often(history.false_alarms):

@@ -1,4 +1,4 @@
-"""The history of a lift: requests, sessions, and the places of its open door."""
+"""The history of a lift, with its requests, its sessions, and the floors at which its door was open."""
 
 from collections import deque
 from dataclasses import dataclass, field
@@ -12,16 +12,18 @@ from bridges.observe.limits import SLOWEST_S
 from workbench.judge.history import NOT_YET, REMEMBERED, History, keep
 
 GRACE_S: Final = 65.0
-"""Time (s) in which a session may resume, because its robot may still be in the car."""
+"""Time (s) in which an ended session may resume, because its robot may still be in the car."""
 LATE_S: Final = 5.0
-"""Maximum time (s) from an END to a late state that shows the session for the first time."""
+"""Maximum time (s) from an END to a late state that shows the ended session for the first time."""
 FLOORS: Final = 8
 OURS_S: Final = 2.0
-"""Time (s) after a session's end. An END that we send in this time did not cause the end."""
+"""Time (s) after a session's end. If we send an END in this time, our END did not cause the session's
+end."""
 ASKED_S: Final = 10.0
 """Time (s) after which a floor counts as given up. An adapter repeats a request at each state."""
 AT_ONCE_S: Final = 0.3
-"""Time (s) longer than a scan, and longer than a state and a request need to cross on the wire."""
+"""Time (s) that is longer than a scan. The time is also longer than the way of a state and a request on
+the wire."""
 REOPENS_WITHIN_S: Final = 1.0
 END: Final = d.LiftRequestType.REQUEST_END_SESSION
 
@@ -30,9 +32,12 @@ END: Final = d.LiftRequestType.REQUEST_END_SESSION
 class Ask:
     """The requests of one session after `first_at`.
 
-    `floors`: floor -> time of the last request. `direct`: a request was heard on lift_requests.
-    `direct_at`: time of the latest such request. `since`: the time when the present gapless row of
-    `times` such requests began. `human`: the session requested HUMAN mode.
+    - `floors`: floor -> time of the last request.
+    - `direct`: whether a request was heard on lift_requests.
+    - `direct_at`: time of the latest request on lift_requests.
+    - `times`: number of requests on lift_requests in the present row without a gap.
+    - `since`: the time at which this row began.
+    - `human`: whether the session requested HUMAN mode.
     """
 
     first_at: float
@@ -45,17 +50,20 @@ class Ask:
 
     @property
     def floor(self) -> str:
-        """Floor of the latest request."""
+        """The floor of the latest request."""
         return next(reversed(self.floors), "")
 
 
 @dataclass
 class Ending:
-    """Times of the ENDs of the present session on lift_requests.
+    """Times of the present session's ENDs on lift_requests.
 
-    `at`: the first END. `bare_at`: the first END without a floor. `floor_at`: the first END with a
-    floor. RMF's supervisor sends an END with a floor if the lift still shows the session after an END
-    without a floor.
+    - `at`: the first END.
+    - `bare_at`: the first END without a floor.
+    - `floor_at`: the first END with a floor.
+
+    RMF's supervisor first sends an END without a floor. If the lift still shows the session, the
+    supervisor sends an END with a floor.
     """
 
     at: float = NOT_YET
@@ -64,33 +72,35 @@ class Ending:
 
 
 class LiftHistory(History[d.LiftState]):
-    """The history of one lift. "Present" means the session that the latest state shows.
+    """The history of one lift. The present session is the session that the latest state shows.
 
-    - `asks`, `elsewhere`: requests for this lift, and for other lifts. `ended`: session -> its last
-      END.
-    - `granted_at`: when the present session was first shown. `held_since`: the same for the session
-      before.
-    - `known`: the beginning of the present session was seen.
-    - `last`: the session before. `last_at`: the end of that session.
-    - `offered`: the present session has been shown OPEN at its destination. `offers`: OPEN is shown,
-      and `offered` is not yet true.
+    - `asks`: the requests for this lift.
+    - `elsewhere`: the requests for other lifts.
+    - `ended`: session -> its last END.
+    - `granted_at`: when a state first showed the present session.
+    - `held_since`: when a state first showed the previous session.
+    - `known`: whether the beginning of the present session was seen.
+    - `last`: the previous session.
+    - `last_at`: the end of the previous session.
+    - `offered`: whether a state has shown the present session OPEN at its destination.
+    - `offers`: whether OPEN is shown before `offered` is true.
     - `ending`: the ENDs of the present session.
-    - `bare_refused`: how many sessions in a row outlived an END without a floor and ended at an END
-      with a floor.
+    - `bare_refused`: number of sessions in a row that outlived an END without a floor, and ended at an
+      END with a floor.
     - `reopened`: times at which the door reopened immediately, in one stop.
     - `open_seen`: floor and time of the last OPEN at another floor.
     - `direct_at`: time of the last request on lift_requests by another session, for any lift.
-      `rival_at`: the same for this lift.
+    - `rival_at`: time of the last request on lift_requests by another session, for this lift.
     - `foreign_end_at`: time of the last END of another session.
     - `unserved_at`: time of the last request for an unserved floor, by the holder or for a free lift.
-    - `travelled`: the car has moved in this session.
-    - `bare_end`: the session before ended at an END without a floor.
-    - `free_since`: when the present time without session and hazard began.
+    - `travelled`: whether the car has moved in this session.
+    - `bare_end`: whether the previous session ended at an END without a floor.
+    - `free_since`: the beginning of the present time without session and hazard.
     - `false_alarms`: times of needless `false` messages on the fire topic.
-    - `called_off`: the latest message on the fire topic ended an alarm.
-    - `alarming`: sender -> its last message on the fire topic. `ended_by`: sender of the latest
-      `false`.
-    - `volatile`: the fire topic's publisher retains nothing; None if unknown.
+    - `called_off`: whether the latest message on the fire topic ended an alarm.
+    - `alarming`: sender -> its last message on the fire topic.
+    - `ended_by`: sender of the latest `false`.
+    - `volatile`: whether the fire topic's publisher retains nothing; None if unknown.
     """
 
     seen: ObservedLift
@@ -122,27 +132,28 @@ class LiftHistory(History[d.LiftState]):
 
     @property
     def session(self) -> str:
-        """Present session."""
+        """The present session."""
         return self.state.session_id if self.state else ""
 
     @property
     def session_before(self) -> str:
-        """Session in the state before."""
+        """The session in the previous state."""
         return self.before.session_id if self.before else ""
 
     def has_ended(self, session: str, since: float) -> bool:
-        """Has an END for this session come after `since`?"""
+        """Return whether an END for this session has come after `since`."""
         return self.ended.get(session, NOT_YET) > since - LATE_S
 
     def was_asked_to(self, floor: str, within_s: float = float("inf")) -> bool:
-        """Has the present session requested this floor, in its last request or within `within_s`?"""
+        """Return whether the present session requested this floor in its last request or within
+        `within_s`."""
         ask = self.asks.get(self.session)
         if ask is None or floor not in ask.floors:
             return False
         return floor == ask.floor or self.now - ask.floors[floor] < within_s
 
     def take_other(self, heard: Heard) -> bool:
-        """Take requests for this lift and other lifts, and the fire alarm."""
+        """Take requests for this lift and for other lifts, and the fire alarm."""
         message = heard.message
         if isinstance(message, d.Bool) and heard.topic == topics.FIRE_ALARM_TRIGGER.name:
             return self._alarm(message.data, heard.sender)
@@ -173,7 +184,7 @@ class LiftHistory(History[d.LiftState]):
         self.open_seen = self._open = ("", NOT_YET)
 
     def settle(self, state: d.LiftState) -> None:
-        """Note the session, the door, and whether the session was shown OPEN."""
+        """Note the session and the door. Note whether a state has shown OPEN for this session."""
         if self.before is not None and self.session != self.session_before:
             self._changed_hands(state)
         if self.session or state.current_mode in HAZARDS:
@@ -189,7 +200,7 @@ class LiftHistory(History[d.LiftState]):
 
     @staticmethod
     def claims(state: d.LiftState) -> bool:
-        """Is the door OPEN?"""
+        """Return whether the door is OPEN."""
         return state.door_state == d.LiftDoor.DOOR_OPEN
 
     def _wanted(self) -> tuple[str, ...]:
@@ -209,7 +220,8 @@ class LiftHistory(History[d.LiftState]):
         self.reopened.clear()
 
     def _count_bare(self, before: str) -> None:
-        """Count whether the session ended at an END without a floor, or only at an END with a floor."""
+        """Count whether the session ended at an END without a floor, or only later at an END with a
+        floor."""
         ending = self.ending
         if not before or ending.bare_at == NOT_YET:
             return
@@ -265,7 +277,7 @@ class LiftHistory(History[d.LiftState]):
             self.reopened.clear()
 
     def _hear_direct(self, request: d.LiftRequest) -> None:
-        """Note requests on lift_requests that must not change the session."""
+        """Note requests on lift_requests that must not change the present session."""
         here, holds = request.lift_name == self.name, request.session_id == self.session
         served = self.state.available_floors if self.state else ()
         if not holds:
@@ -287,5 +299,5 @@ class LiftHistory(History[d.LiftState]):
 
 
 def moves(state: d.LiftState) -> bool:
-    """Does the state say that the car moves?"""
+    """Return whether the state says that the car moves."""
     return state.motion_state in (d.LiftMotion.MOTION_UP, d.LiftMotion.MOTION_DOWN)

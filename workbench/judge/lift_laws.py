@@ -118,9 +118,9 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     ),
     Law(
         "L7.agv",
-        "A robot is let in only in MODE_AGV; in LiftState that is 2, and MODE_HUMAN is 1",
+        "A robot is let in only in MODE_AGV, which is 2 in LiftState; MODE_HUMAN is 1",
         "the door opens for a robot that boards",
-        "RMF does not read the mode, so OPEN must wait for AGV mode. Else people call the car away",
+        "RMF does not read the mode, so OPEN must wait for AGV mode. If not, people call the car away",
         "LiftState.msg; " + REQUEST_LIFT,
         checks.in_agv,
         sensed=True,
@@ -145,7 +145,7 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     ),
     Law(
         "L8.destination",
-        "destination_floor is one that the holder asked for",
+        "destination_floor is a floor that the holder asked for",
         "a state with a destination, in a session seen from its beginning",
         "The supervisor repeats a request until destination_floor is the requested floor",
         A6,
@@ -194,8 +194,8 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
     Law(
         "L12.retained",
         "fire_alarm_trigger is published TRANSIENT_LOCAL",
-        "a publisher of fire_alarm_trigger, beside one lift",
-        "Fleet adapters subscribe transient-local. A volatile publisher never reaches them",
+        "a publisher of fire_alarm_trigger, with only one lift on the graph",
+        "Fleet adapters subscribe transient-local. A volatile publisher never reaches an adapter",
         "rmf_ros2#341, agv/Node.cpp:73-79",
         checks.retained,
     ),

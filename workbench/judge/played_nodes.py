@@ -1,8 +1,10 @@
-"""RMF's nodes, played for one device: fleet adapters with their robots, and the supervisor.
+"""RMF's nodes as the judge plays them for one device: fleet adapters with their robots, and the
+supervisor.
 
-The nodes follow RMF's rules (`workbench/rmf_model/`), without I/O and clock. The played supervisor does
-not get the states of other devices, because it would end their sessions. If the graph already has a
-supervisor, only fleet adapters are played, and their requests go through that supervisor.
+The played nodes follow RMF's rules (`workbench/rmf_model/`), without I/O and clock. The played
+supervisor does not get the states of other devices, because it would end the sessions of these devices.
+If the graph already has a supervisor, the judge plays only fleet adapters. Their requests go through
+that supervisor.
 """
 
 from collections import deque
@@ -17,18 +19,19 @@ from workbench.rmf_model.robot import Phase, RobotContext
 DEAF_S: Final = 6.0
 """Time (s) for which the played supervisor is silent after an END without a floor.
 
-RMF's supervisor would immediately send an END with a floor. This would hide that the lift refused the
-first END.
+RMF's supervisor would immediately send an END with a floor. That second END would hide that the lift
+refused the first END.
 """
 RETAINED: Final = topics.ADAPTER_LIFT_REQUESTS.publish.depth
 
 Step = Phase | float
 Script = Callable[[RobotContext], Iterator[Step]]
-"""A robot's steps: each is a phase, or seconds of driving."""
+"""A robot's steps. Each step is a phase, or a drive's duration (s)."""
 
 
 class Traveller:
-    """A robot with its fleet adapter. `waits_since`: when its phase began; inf while it drives."""
+    """A robot with its fleet adapter. `waits_since` is the time at which the robot's phase began.
+    During a drive, `waits_since` is inf."""
 
     def __init__(self, requester_id: str, script: Script) -> None:
         self.robot = RobotContext(requester_id)
@@ -39,7 +42,7 @@ class Traveller:
 
     @property
     def waits_for(self) -> str:
-        """The name of the phase that waits."""
+        """The name of the phase in which the robot waits."""
         phase = self.robot.phase
         return type(phase).__name__ if phase is not None and not phase.done else ""
 
@@ -59,7 +62,7 @@ class Traveller:
         return []
 
     def wake_at(self) -> float:
-        """Time of the robot's next timer, or of the end of its drive."""
+        """Time of the robot's next timer, or the end of the robot's drive."""
         drives = self._drives_until if self.robot.done and not self.done else NEVER
         return min(self.robot.wake_at(), drives)
 
@@ -67,9 +70,10 @@ class Traveller:
 class PlayedNodes:
     """One scenario for one device. `now` is RMF's clock (s since the epoch).
 
-    `supervisor`: a function that makes a new supervisor; None if the graph has one. `over`: every step
-    is done, or `failed` gives the reason. Methods return messages, which the caller publishes and
-    judges.
+    - `supervisor`: a function that makes a new supervisor; None if the graph has a supervisor.
+    - `over`: whether every step is done, or `failed` gives a reason.
+
+    Methods return messages. The caller publishes and judges these messages.
     """
 
     def __init__(
@@ -90,12 +94,12 @@ class PlayedNodes:
 
     @property
     def over(self) -> bool:
-        """Is there nothing more to play?"""
+        """Return whether there is nothing more to play."""
         return bool(self.failed) or all(traveller.done for traveller in self.travellers)
 
     @property
     def names(self) -> set[str]:
-        """Names of our own sessions."""
+        """The names of our own sessions."""
         return {traveller.robot.requester_id for traveller in self.travellers}
 
     def begin(self, now: float) -> list[Said]:
@@ -103,7 +107,7 @@ class PlayedNodes:
         return self._go_on(now)
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
-        """Take a message of the graph that another node sent. `topic`: the topic's name."""
+        """Take a message of the graph that another node sent. `topic` is the topic's name."""
         if isinstance(message, words.Stated) and words.device(message) != self.device:
             return []
         said = self._spread(topic, message, now)
@@ -119,13 +123,13 @@ class PlayedNodes:
         return said + self._go_on(now)
 
     def wake_at(self) -> float:
-        """The latest time to call `tick`."""
+        """The latest time at which the caller must call `tick`."""
         waits = (t.waits_since + self._patience_s for t in self.travellers)
         return min([*(t.wake_at() for t in self.travellers), *waits])
 
     def restart_supervisor(self, now: float) -> list[Said]:
-        """Replace the played supervisor. The new supervisor hears the messages that each fleet adapter
-        retained, one adapter after another."""
+        """Replace the played supervisor. The new supervisor hears the retained messages of each fleet
+        adapter, one adapter after another."""
         if self._makes is None:
             return []
         self._supervisor = self._makes()
@@ -135,8 +139,8 @@ class PlayedNodes:
         return said
 
     def deafen(self, until: float) -> None:
-        """Pass no states to the played supervisor before `until`, because it would repair a wrong
-        node's error."""
+        """Pass no states to the played supervisor before `until`. With states, the supervisor would
+        repair a wrong node's error."""
         self._deaf_until = until
 
     def _go_on(self, now: float) -> list[Said]:
@@ -153,7 +157,7 @@ class PlayedNodes:
         self.failed = f"{traveller.waits_for} of {who} has not ended in {self._patience_s:.0f} s"
 
     def _say(self, said: list[Said], now: float) -> list[Said]:
-        """Return these messages, with the answers of the other played nodes."""
+        """Return these messages, together with the answers of the other played nodes."""
         out = []
         for topic, message in said:
             out.append((topic, message))

@@ -18,10 +18,15 @@ NARROWEST: Final = 60
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """One judgement. `wall`: its beginning (s since the epoch). `heard_s`: time of listening (s).
-    `states`: number of states heard, or of an adapter's requests. `others`: names of other devices
-    of the kind. `notes`: the listener's remarks. `silences` of the whole network: beginning (s since
-    the epoch) and length (s)."""
+    """One judgement.
+
+    - `wall`: the beginning (s since the epoch).
+    - `heard_s`: the time of listening (s).
+    - `states`: number of states heard; for an adapter, number of its requests.
+    - `others`: names of other devices of the same kind.
+    - `notes`: the listener's remarks.
+    - `silences`: the beginning (s since the epoch) and length (s) of each silence of the whole network.
+    """
 
     kind: JudgedKind
     name: str
@@ -47,7 +52,8 @@ def report(judge: Judge, judged: tuple[JudgedLaw, ...], heard_s: float, *notes: 
 
 
 def text(report: Judgement, width: int) -> str:
-    """Format one screen: first the broken laws with their evidence, then a line for each other law."""
+    """Format one screen. First come the broken laws with their evidence, then a line for each other
+    law."""
     name = words.printable(report.name)
     if not report.states and not report.of(Verdict.BROKEN):
         heard = f"no {_counted(report)} heard in {report.heard_s:.0f} s"
@@ -91,8 +97,8 @@ def _cut(sentence: str, room: int) -> str:
 
 
 def _time(wall: float) -> str:
-    """Format the local time of day, to the millisecond. Format a time outside the calendar as a
-    number."""
+    """Format the local time of day, to the millisecond. If no calendar has the time, format the time as
+    a number."""
     try:
         return f"{datetime.fromtimestamp(wall):%H:%M:%S}.{int(wall * 1000) % 1000:03d}"
     except (OverflowError, ValueError, OSError):
@@ -129,7 +135,7 @@ def as_json(report: Judgement) -> str:
 
 
 def junit(report: Judgement) -> str:
-    """Return JUnit's XML. Each law is a test case; a broken law is a failure, and an unseen law is
+    """Return JUnit's XML. Each law is a test case. A broken law is a failure, and an unseen law is
     skipped."""
     suite = ElementTree.Element(
         "testsuite",

@@ -1,4 +1,5 @@
-"""Plays for a lift and a door: each has conditions, a course, and the release of the device."""
+"""Plays for a lift and for a door. Each play has conditions, a course, and the release of the
+device."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
@@ -19,9 +20,11 @@ from workbench.rmf_model.supervisors import DoorSupervisor, LiftSupervisor
 FLEET: Final = "rmf_bridge_judge"
 DRIVES_S: Final = 6.0
 DOORWAY_S: Final = 12.0
-"""Time (s) longer than any node waits before it closes a door because of silence."""
+"""Time (s) for which the robot stands in the doorway. A node that closes a door because of silence
+waits for a shorter time."""
 SHOWS_S: Final = 4.0
-"""Time (s) in which a wrong node would show the effect of a message that must have no effect."""
+"""Time (s) to wait after a message that must have no effect. Within this time, a wrong node would show
+an effect."""
 STRANGER: Final = f"{FLEET}/nobody"
 BYPASSER: Final = f"{FLEET}/robot_without_supervisor"
 NOWHERE: Final = f"{FLEET} nowhere"
@@ -34,7 +37,7 @@ MOST_FLOORS: Final = 20
 
 
 def busy(state: words.Stated) -> str:
-    """Return why the device must not be moved now; "" if it is idle."""
+    """Return the reason why nobody may move the device now. Return "" if the device is idle."""
     match state:
         case d.LiftState():
             idle = not state.session_id and state.current_mode not in HAZARDS
@@ -50,9 +53,10 @@ def busy(state: words.Stated) -> str:
 class Scenario(ABC):
     """A play, its topics, and its end.
 
-    `speaks`: the topics that we publish. `sole`: topics that must have no other publisher, because two
-    supervisors would spoil the test. After every end of a play, the caller calls `leave` each REPEAT_S
-    until `left`.
+    - `speaks`: the topics on which we publish.
+    - `sole`: topics that must have no other publisher, because two supervisors would spoil the test.
+
+    After every end of a play, the caller calls `leave` every REPEAT_S (s), until `left` is true.
     """
 
     speaks: tuple[AnyTopic, ...]
@@ -63,16 +67,16 @@ class Scenario(ABC):
 
     @property
     def over(self) -> bool:
-        """Is the play finished, or can it not go on?"""
+        """Return whether the play is finished, or cannot go on."""
         return bool(self.failed) or self.play.over
 
     @property
     def why(self) -> str:
-        """Reason why the play did not reach its end; "" if it did."""
+        """The reason why the play did not reach its end; "" if the play did."""
         return self.failed or self.play.failed
 
     def unfit(self, state: words.Stated) -> str:
-        """Return why the play may not begin now; "" if allowed."""
+        """Return the reason why the play may not begin now. Return "" if the play may begin."""
         return busy(state)
 
     def begin(self, now: float) -> list[Said]:
@@ -84,7 +88,7 @@ class Scenario(ABC):
         return self.play.hear(topic, message, now)
 
     def _disturb(self, now: float) -> list[Said]:
-        """Send the disturbing messages that were to come between two states."""
+        """Send the disturbing messages that belong between two states."""
         disturbs, self._disturbs = self._disturbs, None
         return disturbs(now) if disturbs else []
 
@@ -93,7 +97,7 @@ class Scenario(ABC):
         return self.play.tick(now)
 
     def wake_at(self) -> float:
-        """Time of the next timer."""
+        """Time (s) of the next timer."""
         return self.play.wake_at()
 
     @abstractmethod
@@ -103,17 +107,20 @@ class Scenario(ABC):
     @property
     @abstractmethod
     def left(self) -> bool:
-        """Is the device released?"""
+        """Return whether the device is released."""
 
 
 class RideScenario(Scenario):
     """Robots ride from one floor to another, and every second robot rides back.
 
-    `through`: a supervisor is on the graph. `restarts`: the played supervisor restarts with a robot in
-    the car. Without `through`, further messages give each law of sessions an occasion. Before the ride
-    come a request for another lift, and a request that no supervisor forwards. During the first robot's
-    session come an END of another session, in rmf-web's form, a request of that session, and a request
-    for an unknown floor.
+    `through` tells whether a supervisor is on the graph. `restarts` tells whether the played supervisor
+    restarts with a robot in the car.
+
+    Without `through`, more messages give a wrong node an occasion to break each law about sessions.
+
+    - Before the ride: a request for another lift, and a request that no supervisor forwards.
+    - During the first robot's session: an END of another session in rmf-web's form, a request of that
+      session, and a request for an unknown floor.
     """
 
     def __init__(
@@ -166,8 +173,8 @@ class RideScenario(Scenario):
         yield EndLiftSession(self.lift)
 
     def _ask_aside(self, floor: str, first: bool) -> Iterator[Step]:
-        """Request another lift, then request this lift without the supervisor. The other robots wait
-        meanwhile."""
+        """Request another lift. Then request this lift without the supervisor. Meanwhile, the other
+        robots wait."""
         if first:
             self._disturbs = lambda now: [self._send(STRANGER, floor, now, lift=NOWHERE)]
         yield SHOWS_S
@@ -177,7 +184,7 @@ class RideScenario(Scenario):
         yield SHOWS_S
 
     def unfit(self, state: words.Stated) -> str:
-        """Require an idle lift that serves both floors."""
+        """Refuse a lift that is not idle, or that does not serve both floors."""
         served = state.available_floors if isinstance(state, d.LiftState) else ()
         missing = [shown(floor) for floor in self._floors if served and floor not in served]
         if not missing:
@@ -185,7 +192,7 @@ class RideScenario(Scenario):
         return f"{', '.join(missing)}: it serves {', '.join(map(shown, served[:MOST_FLOORS]))}"
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
-        """Take states. The play fails when another session has the lift."""
+        """Take states. The play fails if another session has the lift."""
         stated = isinstance(message, d.LiftState) and message.lift_name == self.lift
         if isinstance(message, d.LiftState) and stated:
             self._state = message
@@ -200,8 +207,8 @@ class RideScenario(Scenario):
         return {*self.play.names, STRANGER, BYPASSER}
 
     def leave(self, now: float) -> list[Said]:
-        """Send END for each of our sessions, as fleet adapters do. If END has no effect, send END with
-        a floor."""
+        """Send END for each of our sessions, as fleet adapters do. If this END has no effect, send END
+        with a floor."""
         self._leaving += 1
         floor = self._state.current_floor if self._state and self._leaving > 3 else ""
         shown_now = {self._state.session_id} & self._names if self._state else set()
@@ -212,21 +219,22 @@ class RideScenario(Scenario):
     def _send(
         self, session: str, floor: str, now: float, kind: int = AGV, lift: str = ""
     ) -> tuple[AnyTopic, d.LiftRequest]:
-        """Make a supervisor's request."""
+        """Make a request in the supervisor's name."""
         door = d.LiftRequestDoor.DOOR_OPEN if kind == AGV else d.LiftRequestDoor.DOOR_CLOSED
         request = d.LiftRequest(lift or self.lift, stamp(now), session, kind, floor, door)
         return topics.LIFT_REQUESTS, request
 
     @property
     def left(self) -> bool:
-        """Was END sent, and does the lift show no session of ours?"""
+        """Return whether END was sent, and the lift shows no session of ours."""
         free = self._state is None or self._state.session_id not in self._names
         return self._leaving > 0 and free
 
 
 class PassageScenario(Scenario):
-    """A robot passes a door, several times. While the robot stands in the doorway, two CLOSE messages
-    come that must not close this door: for another door, and from an unknown fleet adapter."""
+    """A robot passes a door, several times. The robot also stands in the doorway, where two CLOSE
+    messages come that must not close this door. One CLOSE is for another door. The other CLOSE is
+    from an unknown fleet adapter."""
 
     def __init__(
         self,
@@ -262,15 +270,15 @@ class PassageScenario(Scenario):
             yield from self._until_closed()
 
     def _until_closed(self) -> Iterator[Step]:
-        """Wait until the door is closed, so that the next passage begins at a closed door. RMF would
-        not wait."""
+        """Wait until the door is closed, because the next passage must begin at a closed door. RMF
+        itself does not wait."""
         for _ in range(30):
             if self._mode == d.DoorModeValue.MODE_CLOSED:
                 return
             yield 1.0
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
-        """Take states and heartbeats. A disturbing message follows the next state."""
+        """Take states and heartbeats. After the next state, a disturbing message follows."""
         stated = isinstance(message, d.DoorState) and message.door_name == self.door
         if isinstance(message, d.DoorState) and stated:
             self._mode = message.current_mode.value
@@ -284,7 +292,7 @@ class PassageScenario(Scenario):
         return [] if direct and self._through else [_closes(door, now, who)]
 
     def leave(self, now: float) -> list[Said]:
-        """Send CLOSE to the supervisor, or in the supervisor's name."""
+        """Send CLOSE to the supervisor, or send CLOSE in the supervisor's name."""
         self._leaving += 1
         [name] = self.play.names
         said = [_closes(self.door, now, name)]
@@ -292,7 +300,7 @@ class PassageScenario(Scenario):
 
     @property
     def left(self) -> bool:
-        """Was CLOSE sent, and is the door no longer OPEN?"""
+        """Return whether CLOSE was sent, and the door is no longer OPEN."""
         return self._leaving > 0 and self._mode != d.DoorModeValue.MODE_OPEN
 
 

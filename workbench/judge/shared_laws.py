@@ -13,7 +13,7 @@ from workbench.judge.law import KEPT, Finding, Law
 AnyScene = History[Any]
 
 STALE_S: Final = 5.0
-"""Age (s) from which every site calls a reading old."""
+"""Age (s) from which a reading is old at every site."""
 BURST_WITHIN_S: Final = 1.0
 ANSWERS: Final = 5
 BACK_S: Final = 0.5
@@ -22,7 +22,7 @@ STEPS_WITHIN_S: Final = 30.0
 
 
 def rate(history: AnyScene) -> Finding:
-    """Check that states keep coming, unless the whole network is silent."""
+    """Check that states keep coming. A silence of the whole network is an excuse."""
     if history.news is None and not history.states:
         return f"no state, though its topic has a publisher: {', '.join(history.senders[:4])}"
     if history.news is None:
@@ -38,7 +38,7 @@ def rate(history: AnyScene) -> Finding:
 
 
 def answers(history: AnyScene) -> Finding:
-    """Check that no request alone causes a state."""
+    """Check that a request alone never causes a state."""
     if history.new is None or history.often(history.turns):
         return None
     if history.burst_s < BURST_WITHIN_S:
@@ -49,7 +49,8 @@ def answers(history: AnyScene) -> Finding:
 
 
 def one_node(history: AnyScene) -> Finding:
-    """Check that stamps go forwards. The clock of one node steps back once, not again and again."""
+    """Check that stamps go forwards. The clock of a single node steps back once, but not again and
+    again."""
     if history.new is None:
         return None
     if history.seen.steps_back(history.now, BACK_S, STEPS_WITHIN_S) >= STEPS_BACK:
@@ -63,8 +64,8 @@ def one_node(history: AnyScene) -> Finding:
 
 
 def stamped(blind: Callable[[Any], bool]) -> Callable[[AnyScene], Finding]:
-    """Return a check that a state with a claim has a stamp. `blind(state)`: the state claims
-    nothing."""
+    """Return a check that a state with a claim has a stamp. `blind(state)` tells whether the state
+    claims nothing."""
 
     def check(history: AnyScene) -> Finding:
         state = history.new
@@ -78,7 +79,7 @@ def stamped(blind: Callable[[Any], bool]) -> Callable[[AnyScene], Finding]:
 
 
 def fresh(stale_s: float = STALE_S) -> Callable[[AnyScene], Finding]:
-    """Return a check that no reading gets old, because a robot would act on it."""
+    """Return a check that no reading gets old. A robot would act on an old reading."""
 
     def check(history: AnyScene) -> Finding:
         state = history.new
@@ -95,7 +96,7 @@ def fresh(stale_s: float = STALE_S) -> Callable[[AnyScene], Finding]:
 
 RATE: Final[Law[AnyScene]] = Law(
     "RATE",
-    "States keep coming, whether the hardware answers or not: never 5 s without one",
+    "States keep coming, whether the hardware answers or not: never 5 s without a state",
     "two states",
     "A fleet adapter sends a request at each state. Without states the robot waits for ever",
     "rmf_ros2 agv/RobotContext.cpp:1700-1735",
@@ -108,7 +109,7 @@ ANSWERED: Final[Law[AnyScene]] = Law(
     "RMF repeats its request at each state. A state for each request would loop for ever",
     "rmf_ros2 agv/RobotContext.cpp:1732-1735, lift_supervisor/Node.cpp:58-140",
     answers,
-    sensed=True,  # a noisy wire may change the other fields of the state ten times a second
+    sensed=True,  # a noisy wire may change the state's other fields ten times a second
 )
 ONE: Final[Law[AnyScene]] = Law(
     "ONE",
@@ -129,5 +130,5 @@ STAMP: Final[Law[AnyScene]] = Law(
 
 
 def named(law: Law[AnyScene], id: str, **changes: Any) -> Law[Any]:
-    """Return a shared law with its number in one kind's contract."""
+    """Return a shared law with its number in the contract of one kind."""
     return replace(law, id=id, **changes)

@@ -1,4 +1,5 @@
-"""The history of a dispenser or ingestor: its requests, the requests in its states, and its results."""
+"""The history of a dispenser or ingestor: its requests, the requests that its states list, and its
+results."""
 
 from typing import Any
 
@@ -12,16 +13,16 @@ from workbench.judge.history import NOT_YET, History, keep
 
 
 class WorkcellHistory(History[d.DispenserState]):
-    """The history of one workcell.
+    """The history of one workcell. A guid names a request.
 
     - `listed`: guid -> time of the first state that listed the guid.
     - `results`: guid -> the last status.
     - `acknowledged`: guid -> stamp of its result ACKNOWLEDGED, until a state lists the guid.
     - `left`: the guids that the latest state no longer lists.
-    - `unexplained`: guid -> the time when the guid left without SUCCESS.
+    - `unexplained`: guid -> the time at which the guid left without SUCCESS.
     - `asked_since`: guid -> the times of the requests after its last result.
-    - `result`: the latest message, if it is a result of this workcell.
-    - `result_before`: the status of the result before `result`, for the same guid.
+    - `result`: the latest message, if the message is a result of this workcell.
+    - `result_before`: the status of the previous result for the same guid.
     """
 
     def __init__(self, name: str) -> None:
@@ -37,7 +38,7 @@ class WorkcellHistory(History[d.DispenserState]):
 
     @staticmethod
     def claims(state: Any) -> bool:
-        """Is the state anything but OFFLINE?"""
+        """Return whether the state differs from OFFLINE."""
         return bool(state.mode != d.WorkcellMode.OFFLINE)
 
     def take(self, heard: Heard, own: bool = False) -> bool:
@@ -46,7 +47,7 @@ class WorkcellHistory(History[d.DispenserState]):
         return super().take(heard, own)
 
     def take_other(self, heard: Heard) -> bool:
-        """Take requests to this workcell, and results of this workcell."""
+        """Take this workcell's requests and results."""
         message = heard.message
         if not isinstance(message, words.WorkcellRequested | words.WorkcellResulted):
             return False
@@ -69,7 +70,7 @@ class WorkcellHistory(History[d.DispenserState]):
         return True
 
     def settle(self, state: d.DispenserState) -> None:
-        """Note the requests that the state lists, and the requests that it no longer lists."""
+        """Note the requests that the state lists, and the requests that the state no longer lists."""
         queue = set(state.request_guid_queue)
         before = set(self.before.request_guid_queue) if self.before else set(self.listed)
         self.left = tuple(sorted(before - queue))
@@ -82,7 +83,7 @@ class WorkcellHistory(History[d.DispenserState]):
                 keep(self.unexplained, guid, self.now)
 
     def waited_s(self, guid: str) -> float:
-        """Return for how long (s) RMF has repeated this request without a result."""
+        """Return the time (s) for which RMF has repeated this request without a result."""
         times = self.asked_since.get(guid) or [self.now]
         return self.now - times[0] if len(times) > 2 else NOT_YET
 

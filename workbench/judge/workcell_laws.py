@@ -1,5 +1,5 @@
-"""The laws of a dispenser's or ingestor's node. RMF completes a request according to states and
-results."""
+"""The laws of a dispenser's or ingestor's node. RMF decides from states and results whether a request
+is complete."""
 
 from functools import partial
 from typing import Final
@@ -28,8 +28,8 @@ def _numbers(history: WorkcellHistory) -> Finding:
 def _lists_first(history: WorkcellHistory) -> Finding:
     """Check that a state newer than an acknowledgement lists the acknowledged request.
 
-    RMF compares stamps and ignores an older state. The first state that lists the request may have been
-    lost.
+    RMF compares stamps and ignores an older state. The network may have lost the first state that lists
+    the request.
     """
     result, state = history.result, history.new
     if result is not None:
@@ -49,8 +49,9 @@ def _excused(history: WorkcellHistory, guid: str) -> bool:
 def _leaves_done(history: WorkcellHistory) -> Finding:
     """Check that a listed request leaves only after SUCCESS.
 
-    A SUCCESS may get lost. RMF then continues and asks for no repeat. For this reason one request
-    without a result is no breach; the second is, and the first after a restart of the node is too.
+    A message SUCCESS may get lost. RMF then continues, and asks for no repeat. Therefore one request
+    without a result is no breach, but the second is. After a restart of the node, the first is a breach
+    too.
     """
     for guid in history.left:
         result = history.results.get(guid)
@@ -107,7 +108,7 @@ LAWS: Final[tuple[Law[WorkcellHistory], ...]] = (
     Law(
         "W2.done",
         "A listed request leaves the queue only if it has succeeded",
-        "a state that lists a request no longer",
+        "a state that no longer lists a request",
         "RMF counts the request as complete, even after FAILED, and sends the robot off",
         SOURCE,
         _leaves_done,

@@ -1,1 +1,1 @@
-"""Metrics for Prometheus: of RMF's graph, and of the daemons on this machine."""
+"""Metrics for Prometheus about RMF's graph and about the daemons on this machine."""

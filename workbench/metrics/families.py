@@ -1,8 +1,9 @@
-"""Metric families of RMF's graph, from the memory of its devices. Pure: `now` is an argument.
+"""Metric families about RMF's graph, made from the memory of its devices. All functions are pure,
+because `now` is an argument.
 
 Names and labels follow Prometheus' conventions: base units, `_total` for counters, `_info` for facts.
-Every label from the network is printable and of bounded length, and the devices are those that an
-`ObservedGraph` keeps, so invented names cannot make series without end.
+Every label from the network is printable and at most LONGEST characters long. `ObservedGraph` limits
+the number of devices, so invented names cannot create an unlimited number of series.
 """
 
 from collections.abc import Iterable, Iterator
@@ -31,7 +32,7 @@ from bridges.observe.workcell import ObservedWorkcell
 PREFIX: Final = "rmf_bridge_"
 DEVICE: Final = ("kind", "device")
 LONGEST: Final = 128
-"""The longest label from the network (characters)."""
+"""Maximum length (characters) of a label from the network."""
 MODES: Final[dict[str, type[IntEnum]]] = {
     "lift": d.LiftMode,
     "door": d.DoorModeValue,
@@ -42,12 +43,12 @@ MODES: Final[dict[str, type[IntEnum]]] = {
 
 
 def label(text: str) -> str:
-    """Return a name from the network as a label."""
+    """Return a name from the network as a printable label of at most LONGEST characters."""
     return words.printable(text[:LONGEST])[:LONGEST]
 
 
 def of_graph(graph: ObservedGraph[Any], tally: SiteTally, now: Moment) -> Iterator[Metric]:
-    """Yield the families of all devices that have published a state, and of our nodes."""
+    """Yield the families about our nodes, and about all devices that have published a state."""
     devices = graph.stated()
     yield from _states(graph, devices, now)
     yield from _trouble(graph, devices, now)
@@ -97,7 +98,7 @@ def _trouble(
             fault.add_metric((*names, label(code)), 1)
     publishers = _gauge(
         "device_publishers",
-        "Nodes that publish states under this name; 0 if the transport does not tell.",
+        "Number of nodes that publish states under this name; 0 if unknown.",
         DEVICE,
     )
     refused = CounterMetricFamily(
@@ -143,17 +144,23 @@ def _waits(devices: Iterable[AnyDevice], now: Moment) -> Iterator[Metric]:
 
 def _counts(devices: Iterable[AnyDevice], tally: SiteTally) -> Iterator[Metric]:
     waits = _histogram(
-        "wait_seconds", "Time from a robot's request until RMF lets it go on.", DEVICE
+        "wait_seconds", "Time from a robot's request until RMF lets the robot go on.", DEVICE
     )
     rides = _histogram(
-        "lift_ride_seconds", "Time from a request in the car to its floor.", ("device",)
+        "lift_ride_seconds",
+        "Time from a robot's request in the car to the requested floor.",
+        ("device",),
     )
-    cycles = _counter("device_cycles", "Openings of a lift's or door's door; charges.", DEVICE)
+    cycles = _counter(
+        "device_cycles", "Number of door openings (lift, door) or charges (charger).", DEVICE
+    )
     energy = _counter(
         "charger_energy_joules", "Energy to robots, from reported V and A.", ("device",)
     )
     watched = _counter("device_watched_seconds", "Time in which states arrived.", DEVICE)
-    served = _counter("device_in_service_seconds", "Part of it in which robots are served.", DEVICE)
+    served = _counter(
+        "device_in_service_seconds", "Time in which states arrived and robots were served.", DEVICE
+    )
     for one in devices:
         names, counted = _names(one), tally.devices.get((one.kind, one.id), DeviceTally()).counts
         _add(waits, names, counted.waits)
@@ -177,7 +184,9 @@ def _nodes(graph: ObservedGraph[Any], now: Moment) -> Iterator[Metric]:
         facts = {key: label(report.value(key)) for key in ("version", "transport", "release")}
         info.add_metric((node,), {"kind": label(report.kind), **facts})
         up.add_metric((node,), report.is_current(now.at))
-    left_out = _gauge("devices_left_out", "1 if more devices were heard than are kept.", ("kind",))
+    left_out = _gauge(
+        "devices_left_out", "1 if devices were dropped, because too many were heard.", ("kind",)
+    )
     for kind in words.KINDS:
         left_out.add_metric((kind,), kind in graph.crowded)
     yield from (info, up, left_out)
@@ -188,7 +197,7 @@ def _names(device: AnyDevice) -> tuple[str, str]:
 
 
 def _mode(device: AnyDevice) -> int:
-    """Return the number of the present mode or state, as RMF's message has it."""
+    """Return the number of the present mode or state from the device's RMF message."""
     state = device.state
     match state:
         case d.LiftState():
@@ -216,7 +225,8 @@ def _held(device: AnyDevice) -> bool:
 
 
 def _simulated(graph: ObservedGraph[Any], reporter: str) -> bool:
-    """Does the daemon of the report `<node>: <device>` move no hardware?"""
+    """Return whether the report's daemon is simulated, so that it moves no hardware. A report's name is
+    `<node>: <device>`."""
     daemon = graph.nodes.get(f"{reporter.partition(': ')[0]}: daemon")
     return daemon is not None and SIMULATED in daemon.message
 

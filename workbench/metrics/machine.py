@@ -1,4 +1,4 @@
-"""Metric families of the daemons on this machine, from the status files that they write anyway."""
+"""Metric families about the daemons on this machine. The values come from the daemons' status files."""
 
 import os
 from collections.abc import Iterable, Iterator, Mapping
@@ -21,10 +21,10 @@ COUNTS: Final = {
 
 
 def of_machine(found: Iterable[DaemonStatus]) -> Iterator[Metric]:
-    """Yield the families of these daemons, without stopped ones.
+    """Yield the families about these daemons. Leave out stopped daemons.
 
-    A status that its daemon has not renewed gives only its age. Of a daemon whose files this user may
-    not read, nothing but `unreadable` is known.
+    If a daemon no longer renews its status, only the status's age appears. If this user may not read a
+    daemon's files, only `unreadable` appears.
     """
     every = [one for one in found if one.state != "stopped"]
     yield from _daemons(every)
@@ -33,9 +33,9 @@ def of_machine(found: Iterable[DaemonStatus]) -> Iterator[Metric]:
 
 
 def of_recordings(folder: Path) -> Iterator[Metric]:
-    """Yield the size of the recorder's folder and its disk's free space (bytes).
+    """Yield the size (bytes) of the recorder's folder, and the free space (bytes) of the folder's disk.
 
-    A folder that this user cannot read yields nothing, because its size is unknown.
+    If this user cannot read the folder, yield nothing, because the size is unknown.
     """
     try:
         with os.scandir(folder) as entries:
@@ -56,7 +56,7 @@ def _daemons(every: Iterable[DaemonStatus]) -> Iterator[Metric]:
     age = _gauge("status_age_seconds", "Age of the daemon's status.", DAEMON)
     unreadable = _gauge("unreadable", "1 if this user may not see the daemon.", DAEMON)
     slack = _gauge(
-        "watchdog_slack_seconds", "Time that was left before systemd's watchdog.", DAEMON
+        "watchdog_slack_seconds", "Time that was left before systemd's watchdog acts.", DAEMON
     )
     fault = _gauge("fault", "1 while the daemon has this fault of its own.", (*DAEMON, "code"))
     for one in every:
@@ -79,7 +79,7 @@ def _devices(serving: Iterable[DaemonStatus]) -> Iterator[Metric]:
     counters = {key: _counter(f"device_{key}", text, DEVICE) for key, text in COUNTS.items()}
     longest = _gauge("device_longest_scan_seconds", "Longest scan in the last second.", DEVICE)
     switched = _counter(
-        "output_switched_on", "Times that an output was switched on.", (*DEVICE, "output")
+        "output_switched_on", "Number of times that an output was switched on.", (*DEVICE, "output")
     )
     age = _gauge("device_input_age_seconds", "Age of the last reading.", DEVICE)
     for one, name, device in _each(serving):

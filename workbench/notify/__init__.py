@@ -1,1 +1,1 @@
-"""Notices to people about a site's troubles: by webhook, mail and ntfy."""
+"""Notices about a site's troubles, sent to people by webhook, mail and ntfy."""

@@ -1,8 +1,8 @@
-"""The ways to people: a webhook, an ntfy topic, a mail server.
+"""Three ways to send a notice: to a webhook, to an ntfy topic, or by a mail server.
 
-Each raises ChannelError if the notice was not taken. ntfy: publish by headers (docs.ntfy.sh/publish:
-Title, Priority, Tags, Click, Authorization). Mail is sent over TLS only: STARTTLS, or TLS from the
-beginning on port 465 (RFC 8314).
+Each way raises ChannelError if the recipient did not accept the notice. For ntfy, the notice is sent
+with headers (docs.ntfy.sh/publish: Title, Priority, Tags, Click, Authorization). Mail is sent only over
+TLS: with STARTTLS, or with TLS from the beginning on port 465 (RFC 8314).
 """
 
 import smtplib
@@ -24,11 +24,11 @@ PRIORITY: Final = {"critical": "5", "warning": "3"}
 
 
 class ChannelError(Exception):
-    """The notice was not taken. The text says why, without secrets."""
+    """The recipient did not accept the notice. The error's text gives the reason, without secrets."""
 
 
 def send(to: Recipient, notice: NoticeText) -> None:
-    """Send a notice, within some TIMEOUT_S. Raises ChannelError."""
+    """Send a notice. Sending may take a few times TIMEOUT_S. Raises ChannelError."""
     try:
         secret = secret_line("token_file", to.token_file, "token") if to.token_file else ""
     except SecretError as error:
@@ -38,7 +38,7 @@ def send(to: Recipient, notice: NoticeText) -> None:
     elif to.ntfy:
         _post(to.ntfy, notice.text.encode(), _ntfy_headers(notice) | _bearer(secret))
     else:
-        assert to.webhook  # one of the three is there
+        assert to.webhook  # a recipient has exactly one way
         headers = {"Content-Type": "application/json"} | _bearer(secret)
         _post(to.webhook, msgspec.json.encode(notice), headers)
 
@@ -49,7 +49,7 @@ def _bearer(secret: str) -> dict[str, str]:
 
 def _ntfy_headers(notice: NoticeText) -> dict[str, str]:
     tag = "white_check_mark" if notice.event == "over" else "warning"
-    title = Header(notice.title, "utf-8", maxlinelen=10_000).encode()  # RFC 2047, which ntfy reads
+    title = Header(notice.title, "utf-8", maxlinelen=10_000).encode()  # ntfy reads RFC 2047
     click = {"Click": notice.link} if notice.link else {}
     return {"Title": title, "Priority": PRIORITY[notice.severity], "Tags": tag} | click
 
@@ -91,7 +91,7 @@ def _mail(to: Recipient, notice: NoticeText, password: str) -> None:
 
 
 def _server(to: Recipient, context: ssl.SSLContext) -> smtplib.SMTP:
-    assert to.host  # `problems` refuses mail without it
+    assert to.host  # `problems` refuses mail without `host`
     if to.port == SMTPS:
         return smtplib.SMTP_SSL(to.host, to.port, timeout=TIMEOUT_S, context=context)
     server = smtplib.SMTP(to.host, to.port, timeout=TIMEOUT_S)

@@ -1,4 +1,4 @@
-"""A notice as text for people: a headline, the sentences of `explain`, and who must act."""
+"""A notice as text for people: a headline, the sentences of `explain`, and the next step."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -16,7 +16,7 @@ MOST_SENTENCES: Final = 4
 
 
 class NoticeText(Struct, frozen=True):
-    """A notice as sent. `key`: for `rmf-bridge notify FILE --ack`."""
+    """A notice as people receive it. `key` names the trouble for `rmf-bridge notify FILE --ack`."""
 
     event: str
     severity: str
@@ -29,11 +29,12 @@ class NoticeText(Struct, frozen=True):
 def worded(
     notice: Notice, explained: Explanation | None, page: str | None, remedies: Remedies
 ) -> NoticeText:
-    """Word a notice. `explained`: the device's explanation now; None if it is no longer known."""
+    """Write a notice in words. `explained` is the device's present explanation, or None if the device
+    is no longer known."""
     trouble = notice.trouble
-    lines = [f"It has lasted {_lasted(notice.for_s)}."]
+    lines = [f"The trouble has lasted {_lasted(notice.for_s)}."]
     if notice.event == "over":
-        lines = [f"It lasted {_lasted(notice.for_s)}."]
+        lines = [f"The trouble lasted {_lasted(notice.for_s)}."]
     else:
         lines += _explained(explained, trouble.what, remedies)
     if trouble.severity == "critical" and notice.event != "over":
@@ -46,9 +47,10 @@ def worded(
 
 
 def _explained(explained: Explanation | None, code: str, remedies: Remedies) -> Iterator[str]:
-    """Yield the sentences of `explain`, and what to do.
+    """Yield the sentences of `explain`, and the next steps.
 
-    The trouble's own remedy counts more than "nobody has to act", which speaks of robots' requests.
+    If the trouble has its own remedy, leave out the step "nobody has to act", because this step is only
+    about robots' requests.
     """
     known = {code: remedies[code]} if code in remedies else {}
     if explained is not None:

@@ -1,15 +1,17 @@
-"""When people are told of a trouble. Pure, with time as an argument.
+"""Decide when people get a notice of a trouble. All functions are pure, because time is an argument.
 
-NOTIFY-1. A trouble is told once, when it has lasted `after_s`. A trouble that comes and goes lasts,
-   unless it is gone for `after_s`.
-NOTIFY-2. The end of a told trouble is told once, when it has been gone for `over_s`. A trouble that
-   comes back earlier is still the same trouble. The trouble of a device that was not heard since the
-   start is not gone: nothing is known of it.
-NOTIFY-3. In the quiet hours only critical troubles are told. A warning that lasts is told afterwards,
-   and the end of a trouble that nobody was told of is not told.
-NOTIFY-4. A critical trouble is told again each `again_s` until a person acknowledges it or it ends.
-NOTIFY-5. A restart tells nothing twice: the told troubles are kept on disk, and count as told at the
-   start.
+NOTIFY-1. A trouble gets one notice, after the trouble has lasted `after_s`. A trouble that comes and
+   goes counts as present, unless it is gone for `after_s`.
+NOTIFY-2. The end of a trouble gets one notice, after the trouble has been gone for `over_s`. Only a
+   trouble that people know from a notice gets this second notice. A trouble that comes back earlier is
+   still the same trouble. If a device was not heard since the start, its trouble is not gone, because
+   nothing is known about the device.
+NOTIFY-3. In the quiet hours, only critical troubles get a notice. A warning that still lasts gets its
+   notice after the quiet hours. If a trouble ends before its first notice, the end gets no notice.
+NOTIFY-4. A critical trouble gets a notice again every `again_s`. The repeats stop when a person
+   acknowledges the trouble, or when the trouble ends.
+NOTIFY-5. After a restart, no notice is sent twice. The program keeps reported troubles on disk, and
+   counts them as reported at the start.
 """
 
 from collections.abc import Container, Iterable
@@ -23,13 +25,13 @@ from workbench.notify.settings import NotifySettings
 from workbench.notify.troubles import Trouble
 
 MOST: Final = 1000
-"""The most troubles that are remembered; a site has some hundred devices."""
+"""Maximum number of troubles in memory. A site has some hundred devices."""
 Event = Literal["new", "again", "over"]
 
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """A message to people. `for_s`: how long the trouble has lasted (s)."""
+    """A message to people. `for_s` is the time (s) for which the trouble has lasted."""
 
     event: Event
     trouble: Trouble
@@ -38,7 +40,8 @@ class Notice:
 
 @dataclass(frozen=True, slots=True)
 class KnownTrouble:
-    """A trouble since `since`, last seen at `seen_at`. `told_at`: the last notice, None before it."""
+    """A trouble that began at `since` and was last seen at `seen_at`. `told_at` is the time of the last
+    notice, or None if no notice was sent."""
 
     trouble: Trouble
     since: float
@@ -48,7 +51,7 @@ class KnownTrouble:
 
 
 class KeptTrouble(Struct, frozen=True):
-    """A told trouble on disk."""
+    """A trouble on disk that was already reported to people."""
 
     trouble: Trouble
     acknowledged: bool
@@ -56,7 +59,7 @@ class KeptTrouble(Struct, frozen=True):
 
 @dataclass(slots=True)
 class Notices:
-    """The troubles of a site, and what people were told of them."""
+    """The troubles of a site, and the notices that people were already sent."""
 
     settings: NotifySettings
     known: dict[str, KnownTrouble] = field(default_factory=dict)
@@ -64,9 +67,10 @@ class Notices:
     def turn(
         self, present: Iterable[Trouble], heard: Container[tuple[str, str]], now: float, clock: time
     ) -> list[Notice]:
-        """Take the present troubles; return the notices that are due, the most urgent first.
+        """Take the present troubles. Return the notices that are due, the most urgent first.
 
-        `heard`: kind and name of each device heard since the start. `clock`: the local time of day.
+        `heard` has the kind and name of each device heard since the start. `clock` is the local time of
+        day.
         """
         for trouble in present:
             before = self.known.get(trouble.key)
@@ -83,17 +87,17 @@ class Notices:
         )
 
     def kept(self) -> list[KeptTrouble]:
-        """Return the told troubles, for the next start."""
+        """Return the troubles already reported to people, for the next start."""
         told = (one for one in self.known.values() if one.told_at is not None)
         return [KeptTrouble(one.trouble, one.acknowledged) for one in told]
 
     def restore(self, kept: Iterable[KeptTrouble], now: float) -> None:
-        """Begin with the troubles that an earlier run has told."""
+        """Begin with the troubles that an earlier run reported to people."""
         for one in kept:
             self.known[one.trouble.key] = KnownTrouble(one.trouble, now, now, now, one.acknowledged)
 
     def acknowledge(self, key: str) -> bool:
-        """Repeat this trouble no more; return False if there is no such trouble."""
+        """Stop repeating this trouble. Return False if there is no such trouble."""
         found = self.known.get(key)
         if found is not None:
             self.known[key] = replace(found, acknowledged=True)

@@ -43,13 +43,15 @@ Clock = Annotated[
 class QuietHours(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The time of day in which only critical notices are sent."""
 
-    begins: Annotated[Clock, tells("its beginning.")] = msgspec.field(name="from")
-    ends: Annotated[Clock, tells("its end, on the next day if it is earlier.")] = msgspec.field(
-        name="to"
+    begins: Annotated[Clock, tells("the beginning of the quiet hours.")] = msgspec.field(
+        name="from"
     )
+    ends: Annotated[
+        Clock, tells("the end of the quiet hours; an earlier time is on the next day.")
+    ] = msgspec.field(name="to")
 
     def contains(self, at: time) -> bool:
-        """Is it quiet at this time of day?"""
+        """Return whether this time of day is in the quiet hours."""
         begins, ends = time.fromisoformat(self.begins), time.fromisoformat(self.ends)
         if begins <= ends:
             return begins <= at < ends
@@ -57,20 +59,22 @@ class QuietHours(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 
 
 class Recipient(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One way to people: exactly one of `ntfy`, `webhook` and `mail`."""
+    """One recipient, with exactly one of `ntfy`, `webhook` and `mail`."""
 
     ntfy: Annotated[Url | None, tells("the address of an ntfy topic.")] = None
     webhook: Annotated[Url | None, tells("an address that takes a JSON object by POST.")] = None
     mail: Annotated[list[Name], Meta(max_length=20), tells("addresses for mail.")] = []
     least: Annotated[
-        Severity, tells("`critical`: only notices of robots shut in and of silent devices.")
+        Severity, tells("`critical`: only critical notices, such as of a silent device.")
     ] = "warning"
     token_file: Annotated[
         AbsolutePath | None,
-        tells("a file with a bearer token, or with the password of mail, for this user alone."),
+        tells("a file with a bearer token or a mail password, which only this user reads."),
     ] = None
     host: Annotated[Name | None, tells("the mail server.")] = None
-    port: Annotated[int, Meta(ge=1, le=65535), tells("its port; TLS is required.")] = 587
+    port: Annotated[
+        int, Meta(ge=1, le=65535), tells("the mail server's port; TLS is required.")
+    ] = 587
     user: Annotated[Name | None, tells("the user at the mail server.")] = None
     sender: Annotated[Name | None, tells("the address of the sender of mail.")] = msgspec.field(
         name="from", default=None
@@ -85,10 +89,14 @@ class Recipient(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         return f"{way} at {(url or '').split('/')[2]}"
 
     def problems(self) -> Remarks:
-        """Yield a recipient without a way, with several ways, or with half of a mail's settings."""
+        """Yield a problem if the recipient has no way, several ways, or incomplete settings for
+        mail."""
         ways = [bool(self.ntfy), bool(self.webhook), bool(self.mail)]
         if sum(ways) != 1:
-            yield (), "write exactly one of ntfy, webhook and mail; another way is another entry"
+            yield (
+                (),
+                "write exactly one of ntfy, webhook and mail; for another way, add another entry",
+            )
             return
         mails = {"host": self.host, "from": self.sender}
         for key, value in mails.items():
@@ -101,16 +109,18 @@ class Recipient(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class NotifySettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The recipients of notices, and the times at which they receive them."""
+    """The recipients of notices, and the rules for when a notice is sent."""
 
     to: Annotated[list[Recipient], Meta(min_length=1, max_length=20), tells("the recipients.")]
     page: Annotated[Url | None, tells("the page of `rmf-bridge page`, for links.")] = None
-    quiet: Annotated[QuietHours | None, tells("only critical notices are sent then.")] = None
-    after_s: Annotated[Patience, tells("how long a trouble must last before anybody is told.")] = (
+    quiet: Annotated[
+        QuietHours | None, tells("a time of day in which only critical notices are sent.")
+    ] = None
+    after_s: Annotated[Patience, tells("how long a trouble must last before its first notice.")] = (
         30.0
     )
     over_s: Annotated[
-        Patience, tells("how long a trouble must be gone before its end is told.")
+        Patience, tells("how long a trouble must be gone before the notice of its end.")
     ] = 60.0
     waits_s: Annotated[Patience, tells("a robot that waits longer than this is a trouble.")] = 300.0
     stuck_s: Annotated[
@@ -122,10 +132,10 @@ class NotifySettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 
 
 def load(file: Path) -> NotifySettings:
-    """Read the file. Raises SettingsError with every problem found."""
+    """Read the file. Raises SettingsError, which lists every problem found."""
     page = YamlFile(str(file))
     root = compose(page, read(str(file), SORT), SORT)
     found = Values(page).make(NotifySettings, Spot(root, root, "the file"))
     page.check()
-    assert found is not BROKEN  # otherwise `check` raises
+    assert found is not BROKEN  # after any problem, `check` raises
     return found

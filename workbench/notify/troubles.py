@@ -1,4 +1,4 @@
-"""A site's present troubles, from its devices' memory. Pure."""
+"""A site's present troubles, found in the memory of its devices. All functions are pure."""
 
 from collections.abc import Iterator
 from typing import Any, Final
@@ -12,11 +12,11 @@ from bridges.observe.requesters import Moment
 from workbench.notify.settings import NotifySettings, Severity
 
 RAISED: Final = "ALARM_RAISED"
-"""The fault of a daemon whose alarm lets robots stand."""
+"""Fault code of a daemon whose raised alarm stops robots."""
 
 
 class Trouble(Struct, frozen=True):
-    """One trouble of one device. `what`: the same for as long as it is the same trouble."""
+    """One trouble of one device. `what` is a code that stays the same as long as the trouble lasts."""
 
     kind: str
     device: str
@@ -26,12 +26,13 @@ class Trouble(Struct, frozen=True):
 
     @property
     def key(self) -> str:
-        """The trouble's name for `--ack` and on disk."""
+        """The trouble's name, for `--ack` and on disk."""
         return f"{self.kind} {self.device}: {self.what}"
 
 
 def troubles(graph: ObservedGraph[Any], now: Moment, settings: NotifySettings) -> Iterator[Trouble]:
-    """Yield the present troubles. A silent device has only this one: nothing else is known of it."""
+    """Yield the present troubles. A silent device has only the trouble SILENT, because nothing else is
+    known about the device."""
     for one in graph.stated():
         name = printable(one.id)
         if one.is_silent(now):
@@ -52,9 +53,9 @@ def troubles(graph: ObservedGraph[Any], now: Moment, settings: NotifySettings) -
 
 
 def _of_nodes(graph: ObservedGraph[Any], now: Moment) -> Iterator[Trouble]:
-    """Yield the troubles of alarm panels, robots, coordinators, and of our daemons themselves.
+    """Yield the troubles of alarm panels, robots, coordinators and our daemons.
 
-    The silence of a lift's, door's or charger's daemon is already its device's trouble.
+    If the daemon of a lift, door or charger is silent, the device already has that trouble.
     """
     for name, report in graph.nodes.items():
         node, _, subject = name.partition(": ")

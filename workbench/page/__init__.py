@@ -1,1 +1,1 @@
-"""A web page that draws RMF's graph, in a separate process."""
+"""A web page that draws RMF's graph. The page runs in a separate process."""

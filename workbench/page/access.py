@@ -20,10 +20,10 @@ from bridges.system.files import replace
 from bridges.system.user_files import OTHERS, read
 
 COST: Final = (2**14, 8, 1)
-"""Parameters N, r and p of scrypt: 16 MB and about 50 ms for each try."""
+"""Parameters N, r and p of scrypt. Each try takes 16 MB and about 50 ms."""
 MOST_COST: Final = 2**17
 SESSION_S: Final = 12 * 3600.0
-"""Duration (s) of a login: one shift."""
+"""Duration (s) of a login, which is one shift."""
 IDLE_S: Final = 3600.0
 MOST_SESSIONS: Final = 100
 TRIES: Final = 5
@@ -35,7 +35,7 @@ USER: Final = re.compile(r"[A-Za-z0-9._@-]{1,64}")
 
 
 class PasswordError(Exception):
-    """Error: a password file is unusable, or a user or password cannot be added."""
+    """A password file is unusable, or a user or password cannot be added."""
 
 
 def hashed(password: str) -> str:
@@ -47,8 +47,8 @@ def hashed(password: str) -> str:
 
 
 def matches(password: str, stored: str) -> bool:
-    """Does the password match? Raises PasswordError if `stored` does not have the form that `hashed`
-    returns."""
+    """Return whether the password matches. Raises PasswordError if `stored` does not have the form that
+    `hashed` returns."""
     cost, salt, wanted = _parts(stored)
     return hmac.compare_digest(_scrypt(password, salt, *cost), wanted)
 
@@ -71,7 +71,7 @@ def _scrypt(password: str, salt: bytes, n: int, r: int, p: int) -> bytes:
 
 
 def users(file: Path) -> dict[str, str]:
-    """Return user -> hash. Raises PasswordError, with the file and line."""
+    """Return user -> hash. Raises PasswordError, which names the file and line."""
     try:
         content, mode = read(file, LONGEST_FILE)
     except OSError as error:
@@ -93,7 +93,7 @@ def users(file: Path) -> dict[str, str]:
             raise PasswordError(f"{file}:{number}: {error}") from None
         found[user] = stored
     if not found:
-        raise PasswordError(f"{file}: it has no user; add one with rmf-bridge page --add-user NAME")
+        raise PasswordError(f"{file} has no user; add a user with rmf-bridge page --add-user NAME")
     return found
 
 
@@ -116,18 +116,18 @@ def add_user(file: Path, user: str, password: str) -> None:
 
 
 class Tries:
-    """Failed logins by address. If there are too many addresses, the oldest are forgotten."""
+    """Failed logins by address. If there are too many addresses, the oldest address is forgotten."""
 
     def __init__(self) -> None:
         self._failed_at: OrderedDict[str, list[float]] = OrderedDict()
 
     def allowed(self, address: str, now: float) -> bool:
-        """May this address try again?"""
+        """Return whether this address may try again."""
         recent = [at for at in self._failed_at.get(address, ()) if now - at < TRIES_IN_S]
         return len(recent) < TRIES
 
     def failed(self, address: str, now: float) -> None:
-        """Count a failed try of this address."""
+        """Count a failed try from this address."""
         recent = [at for at in self._failed_at.pop(address, ()) if now - at < TRIES_IN_S]
         self._failed_at[address] = [*recent, now]
         while len(self._failed_at) > MOST_ADDRESSES:
@@ -136,7 +136,7 @@ class Tries:
 
 @dataclass(slots=True)
 class LoginSession:
-    """A login of a user. `proof`: the token that a form must send back, against forged forms (CSRF)."""
+    """A user's login. `proof` is a token that each form must send back, against forged forms (CSRF)."""
 
     user: str
     began_at: float
@@ -145,13 +145,13 @@ class LoginSession:
 
 
 class LoginSessions:
-    """Logins, by the secret in each cookie."""
+    """Logins by cookie secret."""
 
     def __init__(self) -> None:
         self._by_secret: OrderedDict[str, LoginSession] = OrderedDict()
 
     def begin(self, user: str, now: float) -> str:
-        """Begin a session and return its secret. A user's earlier session ends."""
+        """Begin a session, and return its secret. A user's earlier session ends."""
         secret = secrets.token_urlsafe(32)
         self._by_secret[secret] = LoginSession(user, now, now, secrets.token_urlsafe(16))
         while len(self._by_secret) > MOST_SESSIONS:
@@ -159,7 +159,7 @@ class LoginSessions:
         return secret
 
     def find(self, secret: str | None, now: float) -> LoginSession | None:
-        """Return the session of this cookie; None if the session is unknown or over."""
+        """Return the session of this cookie. Return None if the session is unknown or over."""
         session = self._by_secret.get(secret or "")
         if session is None or secret is None:
             return None
@@ -170,12 +170,12 @@ class LoginSessions:
         return session
 
     def end(self, secret: str | None) -> None:
-        """End the session of this secret."""
+        """End the session that has this secret."""
         self._by_secret.pop(secret or "", None)
 
 
 class PasswordCheck:
-    """Check of a user's password, with a limit of tries for each address."""
+    """A check of users' passwords, with a limit of tries for each address."""
 
     def __init__(self, known: Mapping[str, str]) -> None:
         self._known = known
@@ -183,8 +183,8 @@ class PasswordCheck:
         self._nobody = hashed(secrets.token_urlsafe(16))
 
     def refuses(self, user: str, password: str, address: str, now: float) -> str:
-        """Return why the login is refused; "" if accepted. The check takes the same time for an unknown
-        user."""
+        """Return the reason to refuse the login. Return "" for an accepted login. The check takes the
+        same time for an unknown user."""
         if not self._tries.allowed(address, now):
             return "too many wrong passwords; wait a minute"
         right = matches(password[:1024], self._known.get(user, self._nobody))

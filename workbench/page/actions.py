@@ -1,9 +1,11 @@
-"""The actions of a logged-in user, and their commands.
+"""The actions of a logged-in user, and the actions' commands.
 
-The page has no rights and no topics of its own. Each action is a command of this program. It runs as
-the page's user, as if this user had typed it in a shell on this machine. A log records each action with
-its user. Names come from the network and may look like options. For this reason an option's value
-follows `=`, and names follow `--`.
+The page has no rights and no topics of its own. Each action is a command of this program. The command
+runs as the page's user, as if this user had typed the command in a shell on this machine. A log records
+each action with the logged-in user.
+
+Names come from the network, and a name may look like an option. Therefore an option's value follows
+`=`, and names follow `--`.
 """
 
 import asyncio
@@ -34,16 +36,16 @@ MOST_KEPT: Final = 100
 LONGEST_FILE: Final = 1_000_000
 RESET: Final = "The daemon clears each latched fault whose cause is gone."
 REPORTS: Final = re.compile(r"^rmf-bridge \S+: ", re.M)
-"""Pattern of the command's name at the beginning of an error message."""
+"""Pattern of the beginning of an error message, which is the command's name."""
 PROGRESS: Final = re.compile(r"^[\d.]+ s  \S+ +\S.*?  ")
-"""Pattern of the time, the step and the device at the beginning of a line of `send`."""
+"""Pattern of the beginning of a line from `send`: the time, the step and the device."""
 
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """A button: its text, the question that asks for confirmation, and the command's words.
+    """A button's text, the question that asks for confirmation, and the words of the command.
 
-    `done`: the sentence that reports success; "" uses the command's last line.
+    `done` is the sentence that reports success. If `done` is "", the command's last line is the report.
     """
 
     text: str
@@ -54,9 +56,10 @@ class Action:
 
 @dataclass(frozen=True, slots=True)
 class Local:
-    """A daemon on this machine that serves the device: its YAML, and the actions of its simulation.
+    """A daemon on this machine that serves the device, with the YAML and the simulation's actions.
 
-    `presses`, `fails`: signals and parts of the simulated plant; empty without a simulation.
+    `presses` and `fails` are signals and parts of the simulated plant. Without a simulation, both are
+    empty.
     """
 
     file: str
@@ -67,8 +70,8 @@ class Local:
 
 @dataclass(frozen=True, slots=True)
 class PastAction:
-    """One past action. `code`: the command's exit code; None if the command took too long. `done`: see
-    Action."""
+    """One past action. `code` is the command's exit code, or None if the command took too long. `done`
+    has the same meaning as in Action."""
 
     wall: float
     user: str
@@ -96,7 +99,7 @@ def _sentence(text: str) -> str:
 
 
 def actions(view: DeviceView, local: Local | None, graph: Sequence[str]) -> list[Action]:
-    """Return this device's actions. `graph`: the options that name the page's graph."""
+    """Return this device's actions. `graph` has the options that name the page's graph."""
     found = [*_on_graph(view, graph)]
     if local is not None:
         words = ("reset", *_runtime(local), "--", local.file)
@@ -135,7 +138,7 @@ def _on_graph(view: DeviceView, graph: Sequence[str]) -> list[Action]:
 
 
 def queue(name: str, robot: str, graph: Sequence[str]) -> Action:
-    """Return the action that asks the coordinator for a charge. `robot`: FLEET/ROBOT."""
+    """Return the action that asks the coordinator for a charge. `robot` is FLEET/ROBOT."""
     words = ("send", "charger", "--queue", f"--robot={robot}", WAITS, *graph, "--", name)
     return Action("Queue a charge", f"Ask for a charge of {printable(robot)}?", words)
 
@@ -150,8 +153,8 @@ def press(local: Local, device: str, signal: str, on: bool) -> Action:
 
 
 def fail(local: Local, device: str, part: str, how: str) -> Action:
-    """Return the action that makes a part of a simulation fail. `how` is the mode; ok mends the
-    part."""
+    """Return the action that makes a part of a simulation fail. `how` is the failure's mode. The mode
+    `ok` mends the part."""
     words = ("fail", f"--device={device}", *_runtime(local), "--", local.file, part, how)
     did = f"In the simulation {part} of {printable(device)} is {how}."
     act = f"Mend {part}" if how == "ok" else f"Let {part} fail"
@@ -163,15 +166,16 @@ def _runtime(local: Local) -> tuple[str, ...]:
 
 
 class Deeds:
-    """Runs actions, and remembers each with its user."""
+    """A runner of actions that remembers each action with its user."""
 
     def __init__(self, folder: Path | None) -> None:
-        """`folder`: the folder for `actions.jsonl`; None writes no file."""
+        """Make a runner. `folder` is the folder for `actions.jsonl`. If `folder` is None, no file is
+        written."""
         self._file = folder / "actions.jsonl" if folder else None
         self.latest: deque[PastAction] = deque(maxlen=MOST_KEPT)
 
     async def do(self, action: Action, user: str) -> PastAction:
-        """Run the action's command. Never raises: `said` of the result holds the error."""
+        """Run the action's command. Never raises, because `said` in the result has the error."""
         code, said = await _run(action.words)
         done = PastAction(time.time(), user, action.text, code, said, action.done)
         self.latest.appendleft(done)
@@ -192,8 +196,8 @@ class Deeds:
 
 
 async def _run(words: Sequence[str]) -> tuple[int | None, str]:
-    """Run a command. Return its exit code (None after the time limit), and the beginning of its
-    output."""
+    """Run a command. Return its exit code, or None after the time limit. Also return the beginning of
+    the output."""
     try:
         child = await asyncio.create_subprocess_exec(
             sys.executable,

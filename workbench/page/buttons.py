@@ -1,4 +1,4 @@
-"""The buttons of a device, for a logged-in user. Each button asks for confirmation before its command
+"""A device's buttons for a logged-in user. Each button asks for confirmation before its command
 runs."""
 
 import itertools
@@ -25,7 +25,7 @@ NO: Final = "No, change nothing"
 
 
 class Buttons:
-    """Shows the buttons, and runs their actions."""
+    """The buttons of a device, and the runner of their actions."""
 
     def __init__(
         self, cards: Cards, here: LocalDaemons, login: Login, deeds: Deeds, graph: Sequence[str]
@@ -37,7 +37,7 @@ class Buttons:
         self._graph = graph
 
     def show(self, key: Key, request: Request, tab: Tab) -> None:
-        """Show the device's buttons and recent actions; show nothing to a user without a login."""
+        """Show the device's buttons and recent actions. Show nothing to a user without a login."""
         if not self._login.user(request):
             return
         with ui.element("section").classes("panel").props('aria-label="Actions"'):
@@ -46,7 +46,7 @@ class Buttons:
             self._lately(tab)
 
     def _lately(self, tab: Tab) -> None:
-        """Show recent actions and their users, the latest first."""
+        """Show recent actions with their users. The latest action comes first."""
         place = part()
 
         def tell() -> None:

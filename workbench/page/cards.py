@@ -1,7 +1,7 @@
-"""The site in browsers: each changed card is drawn once for all browsers.
+"""The site's cards in all browsers. A changed card is drawn once, and all browsers get that drawing.
 
-Each browser gets all changes of a turn as one script, and all browsers get the same script. With an
-update for each card, a browser could not keep up with 300 changes in a second.
+In each turn, all browsers get the same script with all changes. With a script for each card, a browser
+could not keep up with 300 changes in a second.
 """
 
 import json
@@ -17,9 +17,9 @@ from workbench.page.listener import Listener
 from workbench.page.live_site import DeviceView, LiveSite
 
 AGES_S: Final = 1.0
-"""Time (s) between drawings of ages and silences, which change without messages."""
+"""Time (s) between drawings of ages and silences. Ages and silences change without messages."""
 Key = tuple[str, str]
-"""A device's kind, and its name in printable form."""
+"""A device's kind, and the device's name in a printable form."""
 
 
 STATUS: Final = "status"
@@ -33,7 +33,7 @@ def place_of(key: Key) -> str:
 
 
 def script(changed: Mapping[str, str]) -> str:
-    """Return JavaScript that redraws these elements. `changed`: id -> content."""
+    """Return JavaScript that redraws these elements. `changed` is element id -> content."""
     return f"show({json.dumps(changed)})"
 
 
@@ -44,12 +44,12 @@ class Wall(Protocol):
         """Run this script, which shows a change of the site."""
 
     def rebuild(self) -> None:
-        """Draw all cards again, because cards were added or removed."""
+        """Draw all cards again, because a device was added or dropped."""
 
     def answer(self, wrong: int) -> None:
-        """Answer that all messages from before the browser's last question have been sent.
+        """Tell the browser that all messages from before its last question have been sent.
 
-        `wrong`: number of devices that need attention.
+        `wrong` is the number of devices that need attention.
         """
 
 
@@ -98,7 +98,7 @@ class Cards:
         return {place: html for place, html in self._parts.items() if before.get(place) != html}
 
     def parts(self) -> dict[str, str]:
-        """Draw everything except the cards: place -> content."""
+        """Draw everything except the cards. Return place -> content."""
         return {STATUS: self.status(), WRONG: self.attention(), ROBOTS: self.robots()}
 
     def attention(self) -> str:
@@ -107,12 +107,13 @@ class Cards:
         return drawing.attention(wrong, self._remedies)
 
     def status(self) -> str:
-        """Return one line: the number of devices heard, and the number that needs attention."""
+        """Return one line with the number of devices heard, and the number of devices that need
+        attention."""
         told = " · ".join(self._told())
         return f'<p class="status" role="status">{told}</p>'
 
     def robots(self) -> str:
-        """Draw the robots that fleets report."""
+        """Draw the table of robots. Fleet states list these robots."""
         return drawing.robots(self._site.robots(), self._clock())
 
     def _told(self) -> Iterable[str]:
@@ -129,12 +130,12 @@ class Cards:
         for kind in sorted(self._site.crowded):
             yield f"more than {MOST_DEVICES} {kind}s are on the graph: some are not shown"
         if self._listener.lost:
-            yield f"{self._listener.lost} messages came too fast and were lost"
+            yield f"{self._listener.lost} messages came too fast, so the page lost them"
         if self._listener.cut:
             yield f"{self._listener.cut} messages were too long and are shown in part"
 
     def _draw(self, every: Iterable[DeviceView]) -> dict[str, str]:
-        """Draw the changed cards: place -> content."""
+        """Draw the changed cards. Return place -> content."""
         changed, added = {}, False
         for shown in every:
             key = (shown.row.kind, shown.row.name)

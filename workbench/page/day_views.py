@@ -1,5 +1,5 @@
-"""The view of each device's last day and week, from the counts of this machine's recorder; and a CSV
-file of them."""
+"""A view of each device's last day and week, and a CSV file. The numbers are counts of this machine's
+recorder."""
 
 from datetime import date
 from pathlib import Path
@@ -17,14 +17,14 @@ NONE = "<p>This machine's recorder has counted nothing in this time.</p>"
 
 
 class DayViews:
-    """Views of the days that the recorder's folder holds."""
+    """Views of the days in the recorder's folder."""
 
     def __init__(self, folder: Path, login: Login) -> None:
         self._folder = folder
         self._login = login
 
     def install(self) -> None:
-        """Put the views at their addresses."""
+        """Register the views' addresses."""
         ui.page("/days", title="Day and week")(self.show)
         app.get("/days/csv")(self.csv)
 

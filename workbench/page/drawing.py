@@ -1,7 +1,7 @@
 """Draw the site's devices as HTML and SVG: a shaft, a door, a charger, a robot. All functions are pure.
 
-Names come from the network, so every text goes through `html.escape`. Colour alone never carries a
-meaning: each drawing also tells its meaning in words.
+Names come from the network, so every text goes through `html.escape`. A colour alone never has a
+meaning, because each drawing also has words with the same meaning.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,7 +17,8 @@ from workbench.page.live_site import DeviceView, RobotShown, Stands
 
 OLD: Final = ' class="old"'
 NOW: Final = '<span class="now">now</span><span class="was">was</span>'
-"""Word for a fresh state. The browser shows `was` instead when the page's server is silent."""
+"""HTML of the word for a fresh state. If the page's server is silent, the browser shows `was`
+instead."""
 WAS: Final = "was"
 NO_FLOOR: Final = "at no known floor"
 SILENT_DO: Final = (
@@ -27,22 +28,24 @@ STALE_DO: Final = "look at the device, its bus, and the clock of its daemon's ma
 MOST_TOLD: Final = 10
 ROBOT_SILENT_S: Final = 10.0
 HALF: Final[Mapping[int, float]] = {d.LiftMotion.MOTION_UP: -0.5, d.LiftMotion.MOTION_DOWN: 0.5}
-"""Offset of half a floor, in the direction of each motion."""
+"""Motion -> offset of the car, in floors. The offset is half a floor in the direction of the motion."""
 LONGEST: Final = 160
-"""Maximum length (characters) of a text on a card. The list of troubles has LONGEST_FAULT instead."""
+"""Maximum length (characters) of a text on a card. In the list of troubles, LONGEST_FAULT is the
+limit."""
 LONGEST_FAULT: Final = 400
 MOST_FLOORS: Final = 40
-"""Maximum number of landings of a drawn shaft. With more landings, only words tell the car's place."""
+"""Maximum number of landings in a shaft's drawing. With more landings, only words tell the car's
+place."""
 FLOOR_PX, SHAFT_PX, LABEL_PX = 22, 44, 46
 ARROWS: Final = {d.LiftMotion.MOTION_UP: "▲", d.LiftMotion.MOTION_DOWN: "▼"}
 LEAVES: Final = {"open": 0.12, "moving": 0.3, "closed": 0.5}
-"""Share of the doorway that each door leaf covers."""
+"""Door state -> the part of the doorway that each door leaf covers."""
 
 
 def card(view: DeviceView, left: float | None = None) -> str:
-    """Draw one device as a box: name, state and faults.
+    """Draw one device as a box with name, state and faults.
 
-    `left`: where the last drawing showed a lift's car.
+    `left` is the place of a lift's car in the last drawing.
     """
     row = view.row
     name = f"<h3>{_told(row.name)}</h3>"
@@ -99,7 +102,8 @@ def _old(view: DeviceView) -> str:
 
 
 def when(wall: float) -> str:
-    """Return the HTML of a time (s since the epoch). The browser shows the time in its zone."""
+    """Return the HTML of a time (s since the epoch). The browser shows the time in the browser's
+    zone."""
     return f'<time data-at="{wall:.3f}"></time>'
 
 
@@ -135,8 +139,8 @@ def _facts(view: DeviceView, left: float | None) -> Iterable[str]:
 
 
 def had(stands: Stands) -> str:
-    """Format the time in minutes, so that a card does not change every second, such as `at least 12
-    min`."""
+    """Format the time in minutes, such as `at least 12 min`. With seconds, a card would change every
+    second."""
     minutes = int(stands.for_s // 60)
     if stands.at_least:
         return f"at least {minutes} min" if minutes else "since before this page listened"
@@ -148,7 +152,7 @@ def _fact(name: str, value: str) -> str:
 
 
 def _told(text: str, longest: int = LONGEST) -> str:
-    """Format a text as HTML. Cut the text after `longest` characters."""
+    """Format a text as HTML. Drop the text after `longest` characters."""
     return escape(text if len(text) <= longest else f"{text[:longest]}…")
 
 
@@ -166,8 +170,8 @@ def _picture(view: DeviceView, left: float | None) -> str:
 
 
 def car_place(state: Stated | None, left: float | None) -> float | None:
-    """Return the place of a lift's car: 0 is the highest floor, 0.5 is between the two highest floors.
-    None: unknown.
+    """Return the place of a lift's car. 0 is the highest floor, and 0.5 is between the two highest
+    floors. Return None if the place is unknown.
 
     A car between floors is half a floor away from its last place, in the direction of its motion.
     """
@@ -185,7 +189,7 @@ def car_place(state: Stated | None, left: float | None) -> float | None:
 
 
 def _placed(told: str, state: d.LiftState, left: float | None) -> str:
-    """Add the place of a car at no known floor to the description of its state (`told`)."""
+    """Add the place of a car between floors to `told`, the description of its state."""
     place = car_place(state, left)
     if state.current_floor or (place is None and state.motion_state not in HALF):
         return told
@@ -196,9 +200,9 @@ def _placed(told: str, state: d.LiftState, left: float | None) -> str:
 
 
 def shaft(state: d.LiftState, left: float | None = None, *, old: bool = False) -> str:
-    """Draw a lift's shaft: floors with the highest at the top, the car, its door and its direction.
+    """Draw a lift's shaft with the car, its door and its direction. The highest floor is at the top.
 
-    `left`: where the last drawing showed the car.
+    `left` is the car's place in the last drawing.
     """
     floors = floors_of(state)
     if not floors:
@@ -233,8 +237,8 @@ def _car(state: d.LiftState, place: float, left: float | None) -> str:
 
 
 def floors_of(state: d.LiftState) -> list[str]:
-    """Return the landings from the top down; [] if there are too many. RMF lists the landings from the
-    bottom up."""
+    """Return the landings from the top down, because RMF lists the landings from the bottom up. Return
+    [] if there are too many."""
     floors = list(dict.fromkeys(state.available_floors))
     return floors[::-1] if len(floors) <= MOST_FLOORS else []
 
@@ -248,8 +252,8 @@ def _short(text: str) -> str:
 
 
 def _leaves(x: float, y: float, width: float, height: float, door: str) -> str:
-    """Draw a car or doorway with two leaves: apart, together, or halfway. Hatch the leaves if
-    unknown."""
+    """Draw a car or doorway with two leaves. The leaves are apart, together, or halfway. If the door's
+    state is unknown, hatch the leaves."""
     share = LEAVES.get(door)
     frame = _rect("car", x, y, width, height)
     if share is None:
@@ -281,7 +285,7 @@ def _svg(width: float, height: float, said: str, inner: str) -> str:
 
 
 def robots(found: Sequence[RobotShown], now: float) -> str:
-    """Draw a table of the robots in fleet states."""
+    """Draw a table of the robots that fleet states list."""
     if not found:
         return ""
     rows = "".join(_robot(one, now) for one in found)

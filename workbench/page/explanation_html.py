@@ -11,14 +11,16 @@ from workbench.page.tables import table
 
 
 def explanation(found: Explanation) -> str:
-    """Format the sentences, RMF's conditions, the next steps, and the faults with remedies."""
+    """Format the sentences, the fields that RMF checks, the next steps, and the faults with
+    remedies."""
     return "".join(_parts(found))
 
 
 def timeline(svg: str, opens_at: float = 1.0) -> str:
-    """Format a timeline's picture. On a narrow screen the picture scrolls, with the keyboard too.
+    """Format a timeline's picture. On a narrow screen, people scroll the picture by hand or by
+    keyboard.
 
-    `opens_at`: the place shown first, as a share of the picture's width.
+    `opens_at` is the place that the screen shows first, as a fraction of the picture's width.
     """
     where = f'tabindex="0" role="region" aria-label="Timeline" data-open="{opens_at:.4f}"'
     return f'<div class="timeline" {where}>{svg}</div>'
@@ -53,7 +55,7 @@ def _fault(one: FaultTold) -> str:
 
 
 def story(found: Explanation, zone: tzinfo | None = None) -> str:
-    """Format the events, one line each. `zone`: time zone of the events."""
+    """Format the events, one line for each event. `zone` is the time zone of the events."""
     if not found.story:
         return "<p>Nothing was heard about the device.</p>"
     last = found.story[-1]

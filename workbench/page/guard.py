@@ -1,10 +1,11 @@
-"""Guard the page: check each request before the page sees it.
+"""Guard the page. The guard checks each request before the page sees the request.
 
-The guard checks the Host, the Origin and the login. It also limits a request's time and size.
+The guard checks the Host, the Origin and the login. The guard also limits a request's time and size.
 
-Any web site that the same browser has open can reach a page on 127.0.0.1. The site may use a name that
-resolves to 127.0.0.1 (DNS rebinding), or a socket or form of its own origin. For this reason the guard
-accepts only the page's configured names, and only the page's own origin may open the socket or post.
+Without a guard, a web site that is open in the same browser could reach a page on 127.0.0.1. The site
+could use a name that resolves to 127.0.0.1 (DNS rebinding), or its own socket or form. Therefore the
+guard accepts only the page's configured names. Only the page's own origin may open the socket or post a
+form.
 """
 
 import asyncio
@@ -21,7 +22,7 @@ MOST_BODY: Final = 64 * 1024
 BODY_S: Final = 5.0
 """Maximum time (s) for a request to arrive."""
 ANSWER_S: Final = 120.0
-"""Maximum time (s) to send an answer, which is enough for 15 MB at 1 Mbit/s."""
+"""Maximum time (s) to send an answer. This time is enough for 15 MB at 1 Mbit/s."""
 HEADERS: Final = {
     "content-security-policy": "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval';"
     " style-src 'self' 'unsafe-inline'; img-src 'self' data:; font-src 'self' data:;"
@@ -30,13 +31,13 @@ HEADERS: Final = {
     "x-frame-options": "DENY",
     "referrer-policy": "same-origin",
 }
-"""Security headers of every answer. NiceGUI needs inline and evaluated scripts. Everything comes from
-this address."""
+"""Security headers of every answer. NiceGUI needs inline scripts and evaluated scripts. All scripts,
+styles and images come from the page's own address."""
 
 
 @dataclass(frozen=True, slots=True)
 class HttpRefusal:
-    """Reason why the page does not answer a request. `to`: the address of a redirection, if any."""
+    """Reason to refuse a request. `to` is the address of a redirection, if there is one."""
 
     status: int
     why: str
@@ -44,10 +45,10 @@ class HttpRefusal:
 
 
 def refused(scope: Scope, hosts: Collection[str]) -> str:
-    """Return why this request is refused; "" if accepted. `hosts`: names, with or without a port.
+    """Return the reason to refuse this request. Return "" for an accepted request. `hosts` has the
+    page's names, with or without a port.
 
-    A host that is an IP address is accepted, because only a name can be made to resolve to another
-    machine.
+    An IP address as host is accepted, because an attacker can redirect only a name to another machine.
     """
     headers = Headers(scope=scope)
     host = headers.get("host", "").lower()
@@ -79,9 +80,9 @@ def _is_address(host: str) -> bool:
 
 
 class RequestGuard:
-    """Outermost layer of the page.
+    """The outermost layer of the page.
 
-    `gate`: a further check of each request whose Host and Origin are right.
+    `gate` is one more check, for each request whose Host and Origin are right.
     """
 
     def __init__(
@@ -120,7 +121,8 @@ class RequestGuard:
 
 
 async def _whole(receive: Receive) -> tuple[Receive, HttpRefusal | None]:
-    """Read the whole body. Return a `receive` that yields the body, or why the request is refused."""
+    """Read the whole body. Return a `receive` that yields the body, and None. After a refusal, return
+    the reason instead of None."""
     body, more = b"", True
     try:
         async with asyncio.timeout(BODY_S):

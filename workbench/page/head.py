@@ -1,4 +1,4 @@
-"""The head of every view: a title, links to the other views, and the user."""
+"""The head of every view, with a title, links to the other views, and the user."""
 
 from html import escape
 from typing import Final
@@ -10,11 +10,11 @@ from bridges.messages.words import printable
 from workbench.page.login import Login
 
 BLUE: Final = "#005a93"
-"""Colour of buttons. White text is readable on it in both themes."""
+"""Colour of buttons. White text is readable on this colour in both themes."""
 GREEN: Final = "#00674c"
-"""Colour of success. White text is unreadable on the library's own green."""
+"""Colour of success. On the library's own green, white text is unreadable."""
 RED: Final = "#b02a00"
-"""Colour of failure, and of the button that confirms an action."""
+"""Colour of a failure. The button that confirms an action has this colour too."""
 
 
 def head(title: str, login: Login, request: Request) -> None:
@@ -36,5 +36,6 @@ def main(style: str = "") -> ui.element:
 
 
 def part(html: str = "", style: str = "") -> ui.html:
-    """Make a part of a view that is replaced later. `html`: our own markup, with every text escaped."""
+    """Make a part of a view that the page replaces later. `html` is our own markup, in which every text
+    is escaped."""
     return ui.html(html, sanitize=False).classes(style)

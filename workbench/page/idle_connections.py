@@ -9,7 +9,7 @@ such limit."""
 
 
 class Silent:
-    """Connections without a request, each with the time when its silence began."""
+    """Connections without a request, each with the time at which its silence began."""
 
     def __init__(self) -> None:
         self._since: dict[Hashable, float] = {}
@@ -17,7 +17,7 @@ class Silent:
     def too_long(self, there: Iterable[Hashable], now: float) -> list[Hashable]:
         """Return the connections that have been silent for longer than MOST_SILENT_S.
 
-        `there`: all present connections. Other connections are forgotten.
+        `there` has all present connections. All other connections are forgotten.
         """
         self._since = {one: self._since.get(one, now) for one in there}
         return [one for one, since in self._since.items() if now - since > MOST_SILENT_S]

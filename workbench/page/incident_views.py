@@ -1,5 +1,5 @@
-"""The views of recordings: a list of the folder, and one recording with its explanation and
-timeline."""
+"""The views of recordings. One view lists the folder. Another view shows one recording with its
+explanation and timeline."""
 
 import asyncio
 from collections.abc import Iterator
@@ -32,7 +32,7 @@ FILTER: Final = (
 
 
 class IncidentViews:
-    """The recordings of one folder, or a single `recording`."""
+    """The views of one folder's recordings, or of a single `recording`."""
 
     def __init__(self, folder: Path, recording: Path | None, login: Login) -> None:
         self._folder = folder
@@ -41,7 +41,7 @@ class IncidentViews:
         self._one_at_a_time = asyncio.Lock()
 
     def install(self) -> None:
-        """Put the views at their addresses."""
+        """Register the views' addresses."""
         if self._recording is not None:
             ui.page("/", title=self._recording.name)(self.alone)
         ui.page("/incidents", title="Incidents")(self.all)
@@ -60,7 +60,7 @@ class IncidentViews:
         head(found.title if found else name, self._login, request)
         if found is None:
             with main():
-                part("<p>There is no incident of that name.</p>")
+                part("<p>There is no incident with this name.</p>")
             return client.build_response(request, 404)
         await self._view(self._folder / name, client, _about(found) + _download(name))
         return None
@@ -74,7 +74,7 @@ class IncidentViews:
     def download(self, name: str) -> Response:
         """Send the recording's file."""
         if self._file(name) is None:
-            return Response("there is no incident of that name", status_code=404)
+            return Response("there is no incident with this name", status_code=404)
         path = self._folder / name
         return FileResponse(path, filename=name, media_type="application/octet-stream")
 
@@ -96,8 +96,8 @@ class IncidentViews:
         return f'{FILTER}<ul class="incidents">{items}</ul>'
 
     async def _view(self, path: Path, client: Client, link: str = "") -> None:
-        """Show an empty view immediately, and fill it after the recording is read, which may take
-        long."""
+        """Show an empty view immediately, because reading the recording may take long. After the
+        reading, fill the view."""
         with main():
             box = part('<p role="status">The recording is being read …</p>')
         await client.connected()
@@ -131,7 +131,7 @@ def _file_of(one: incidents.File) -> str:
 
 
 def _about(one: incidents.File) -> str:
-    """Return the HTML of an incident's time and file."""
+    """Return the HTML of an incident's time and file name."""
     return f'<p class="about">{when(one.wall)} {_file_of(one)}</p>'
 
 

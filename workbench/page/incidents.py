@@ -1,7 +1,7 @@
-"""List the folder of recordings, and explain one of them. The page never reads another folder.
+"""List the recordings in a folder, and explain a recording. The page never reads another folder.
 
-A recording may come from elsewhere and be hostile, so a separate process reads it (`python -m
-workbench.page.incidents FILE`) with limited memory and time.
+A recording may come from elsewhere and be hostile. Therefore a separate process reads the recording
+(`python -m workbench.page.incidents FILE`), with limited memory and time.
 """
 
 import asyncio
@@ -33,23 +33,27 @@ from workbench.replay.sources import BagError, Notes
 MOST_LISTED: Final = 500
 MOST_REASONS: Final = 20
 MOST_DEVICES: Final = 50
-"""Maximum number of devices shown from one recording. The page tells how many more there are."""
+"""Maximum number of one recording's devices on the page. The page also tells the number of further
+devices."""
 LONGEST_S: Final = 20.0
-"""Maximum time (s) for reading a recording. The page says that the rest is left out."""
+"""Maximum time (s) for reading a recording. After this time, the page says that the rest is left
+out."""
 
 ENDED_S: Final = 60.0
-"""Time (s) after which the page kills the reading process. Only a recording of messages outside RMF
-takes so long."""
+"""Time (s) after which the page kills the reading process. The process takes so long only for a
+recording full of messages outside RMF."""
 MOST_MEMORY: Final = 128 << 20
-"""Maximum memory (bytes) of the reading process. The process and the page share the unit's 256 MB."""
+"""Maximum memory (bytes) of the reading process. The process and the page share 256 MB, the limit of
+the unit."""
 
 
 @dataclass(frozen=True, slots=True)
 class File:
-    """A recording in the folder. `wall`: the time in its name, else the time of its last write (s since
-    the epoch).
+    """A recording in the folder. `wall` is the time in its name, in seconds since the epoch. If the
+    name has no time, `wall` is the time of the last write.
 
-    `device` and `reason` come from the name that our recorder gives a file; "" for other files.
+    `device` and `reason` come from the name that our recorder gives a file. For other files, both are
+    "".
     """
 
     name: str
@@ -60,15 +64,15 @@ class File:
 
     @property
     def title(self) -> str:
-        """Device and reason. A file that a person has named returns the file's name."""
+        """The device and the reason. If a person has named the file, the title is the file's name."""
         return f"{self.device}: {self.reason.replace('-', ' ')}" if self.device else self.name
 
 
 @dataclass(frozen=True, slots=True)
 class ExplainedRecording:
-    """An explained recording: each device's explanation and timeline, and the unreadable parts.
+    """A recording with each device's explanation and timeline, and with a list of the unreadable parts.
 
-    `reasons`: notes of the recorder, each with its time (s) and text.
+    `reasons` are notes of the recorder, each with its time (s) and text.
     """
 
     devices: tuple[tuple[Explanation, Timeline], ...]
@@ -76,8 +80,8 @@ class ExplainedRecording:
     reasons: tuple[tuple[float, str], ...] = ()
 
     def opens_at(self, timeline: Timeline) -> float:
-        """Return where the timeline shows the file's reason, as a share of the timeline's length; 1
-        without a reason."""
+        """Return the place of the file's reason, as a fraction of the timeline's length. Return 1 if
+        there is no reason."""
         length = timeline.to_s - timeline.from_s
         at = max((at for at, _ in self.reasons), default=timeline.to_s)
         return min(1.0, max(0.0, (at - timeline.from_s) / length)) if length else 1.0
@@ -97,12 +101,14 @@ def _files(folder: Path) -> Iterator[File]:
 
 
 def file_in(folder: Path, name: str) -> File | None:
-    """Return the recording of this name; None if the folder has no such recording. Raises OSError."""
+    """Return the recording of this name. Return None if the folder has no such recording. Raises
+    OSError."""
     return next((one for one in _files(folder) if one.name == name), None)
 
 
 async def read_apart(path: Path, zone: str = "") -> ExplainedRecording:
-    """Run `read` in a separate process. `zone`: name of the browser's time zone. Raises BagError."""
+    """Run `read` in a separate process. `zone` is the name of the browser's time zone. Raises
+    BagError."""
     child = await asyncio.create_subprocess_exec(
         sys.executable,
         "-P",
@@ -126,7 +132,8 @@ async def read_apart(path: Path, zone: str = "") -> ExplainedRecording:
 
 
 def main(path: Path, zone: str) -> int:
-    """Read a recording. Write its explanation to standard output, or why it cannot be read."""
+    """Read a recording. Write its explanation to standard output. If the recording cannot be read,
+    write the reason."""
     resource.setrlimit(resource.RLIMIT_DATA, (MOST_MEMORY, MOST_MEMORY))
     try:
         code, told = 0, msgspec.msgpack.encode(read(path, faults.for_explain(), zone_of(zone)))
@@ -139,8 +146,8 @@ def main(path: Path, zone: str) -> int:
 
 
 def read(path: Path, remedies: Remedies, zone: tzinfo | None = None) -> ExplainedRecording:
-    """Read the recording in limited time. `zone`: time zone of the texts. Raises BagError if the file
-    is no recording."""
+    """Read the recording in limited time. `zone` is the time zone of the texts. Raises BagError if the
+    file is no recording."""
     notes, story = Notes(), heard_devices.HeardDevices()
     cut = not _all_of(path, notes, story.take)
     devices = story.devices()
@@ -164,7 +171,8 @@ def read(path: Path, remedies: Remedies, zone: tzinfo | None = None) -> Explaine
 
 
 def _reason(own: Own) -> Iterator[tuple[float, str]]:
-    """Yield the time and text of the recorder's note about its reason; nothing for other notes."""
+    """Yield the time and text of the recorder's note about its reason. Yield nothing for other
+    notes."""
     note = noted(own.topic.rpartition("/")[2], own.text)
     if note is not None and note.kept_for is not None:
         code, text = note.kept_for
@@ -172,13 +180,13 @@ def _reason(own: Own) -> Iterator[tuple[float, str]]:
 
 
 def _marked(timeline: Timeline, reasons: Sequence[tuple[float, str]]) -> Timeline:
-    """Return the timeline with a mark at each reason for the file."""
+    """Return the timeline with a mark at each reason to keep the file."""
     marks = [Mark(at, text, "wrong") for at, text in reasons]
     return replace(timeline, steps=(*timeline.steps, *marks))
 
 
 def _all_of(path: Path, notes: Notes, take: Callable[[Heard | Own], None]) -> bool:
-    """Take the messages of a recording. Return whether the time sufficed for all of them."""
+    """Take the messages of a recording. Return whether the time was enough for all messages."""
     until = time.monotonic() + LONGEST_S
     for heard in all_in(path, notes):
         take(heard)

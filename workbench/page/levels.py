@@ -1,7 +1,7 @@
 """The present inputs and outputs of a daemon on this machine, from the daemon's ring.
 
-The ring is the file of its latest decisions. It has the contacts as the driver decodes them, and the
-core's decisions, but no voltages.
+The ring is a file with the daemon's latest decisions. The ring has the contacts as the driver decodes
+them, and the decisions of the daemon's core, but no voltages.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -13,12 +13,12 @@ from bridges.blackbox.ring import NAME, RingError, Tail
 from bridges.blackbox.value_codec import HOLDS, TYPE, Tree
 
 Rows = Mapping[str, str]
-"""Present values by name."""
+"""Name -> present value."""
 
 
 class Levels:
-    """Follows the ring of one daemon. `sensed`, `driven`: device's name -> its inputs, and its
-    outputs."""
+    """A follower of one daemon's ring. `sensed` is device name -> its inputs. `driven` is device name
+    -> its outputs."""
 
     def __init__(self, folder: Path) -> None:
         self.sensed: dict[str, Rows] = {}
@@ -28,7 +28,7 @@ class Levels:
         self._inode = 0
 
     def look(self) -> None:
-        """Read the new entries. If the ring is unreadable, forget all values."""
+        """Read the new entries. If the ring cannot be read, forget all values."""
         try:
             inode = self._path.stat().st_ino
             if self._tail is None or inode != self._inode:

@@ -1,4 +1,5 @@
-"""The page's node on the graph. It only listens, and it joins again after the graph is lost."""
+"""The page's node on the graph. The node only listens. After the graph is lost, the node joins
+again."""
 
 import logging
 import threading
@@ -18,14 +19,15 @@ from workbench.page.live_site import HEARD, LiveSite
 log = logging.getLogger(__name__)
 
 WAITING: Final = 20_000
-"""Maximum number of waiting messages. Only a flood brings more; these are dropped and counted."""
+"""Maximum number of waiting messages. Only a flood brings more messages. The listener drops and counts
+these messages."""
 LONGEST_TURN_S: Final = 0.05
-"""Maximum time (s) of a turn, because a flood must not keep the browsers waiting."""
+"""Maximum time (s) of a turn. Even during a flood, the browsers must not wait longer."""
 AGAIN_S: Final = 3.0
 
 
 class Listener:
-    """Fills a site from the graph, on a separate thread."""
+    """A thread that fills a site from the graph."""
 
     def __init__(self, site: LiveSite, join: Callable[[], Transport]) -> None:
         self._site = site
@@ -47,14 +49,14 @@ class Listener:
         self._thread.join(timeout=5.0)
 
     def hear(self, heard: Heard) -> None:
-        """Keep a message until the next turn. Called from any thread."""
+        """Keep a message until the next turn. Any thread may call this method."""
         try:
             self._queue.put_nowait(heard)
         except Full:
             self.lost += 1
 
     def turn(self) -> bool:
-        """Take the waiting messages, on the caller's thread. Return whether any were waiting."""
+        """Take the waiting messages, on the caller's thread. Return whether there were any."""
         any_heard = False
         until = time.monotonic() + LONGEST_TURN_S
         while time.monotonic() < until:

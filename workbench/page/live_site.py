@@ -1,7 +1,7 @@
 """The page's memory of RMF's graph: each device's latest state, and its last ten minutes.
 
-All functions are pure: time comes with each message. Anybody on the network may invent names, so
-everything has a limit, and later devices never displace known devices.
+All functions are pure, because time comes with each message. Anybody on the network may invent names.
+Therefore everything has a limit, and a new device never displaces a known device.
 """
 
 import dataclasses
@@ -32,12 +32,12 @@ from workbench.explain.timeline import Timeline
 from workbench.graph.board import Board, BoardRow
 
 KEPT_S: Final = 600.0
-"""Time (s) for which a device's page shows the past."""
+"""Time (s) before now that a device's page shows."""
 STEP_S: Final = 10.0
 """Time (s) by which the timeline moves in each step."""
 MOST_LINES: Final = 100
-"""Maximum number of story lines of one device. Its view shows forty. With six hundred lines for each
-device, a large site takes 150 MB."""
+"""Maximum number of a device's story lines. The device's view shows forty. With six hundred lines for
+each device, a large site would take 150 MB."""
 MOST_ROBOTS: Final = 500
 
 HEARD: Final[tuple[AnyTopic, ...]] = (
@@ -62,7 +62,7 @@ HEARD: Final[tuple[AnyTopic, ...]] = (
 
 @dataclass(frozen=True, slots=True)
 class RobotShown:
-    """A robot according to its fleet's states."""
+    """A robot, as its fleet's states describe the robot."""
 
     fleet: str
     state: d.RobotState
@@ -71,8 +71,8 @@ class RobotShown:
 
 @dataclass(frozen=True, slots=True)
 class Stands:
-    """Time (s) for which a robot has had its charger. `at_least`: the robot got it before the page
-    listened."""
+    """Time (s) for which a robot has had its charger. `at_least` means that the robot got the charger
+    before the page listened."""
 
     for_s: float
     at_least: bool
@@ -80,10 +80,11 @@ class Stands:
 
 @dataclass(frozen=True, slots=True)
 class DeviceView:
-    """A device ready to be drawn: its row from `watch`, and its last state, if any.
+    """A device ready to be drawn, with its row from `watch`, and its last state, if there is one.
 
-    `stands`: how long its robot has had the charger. `heard_wall`: when its last state arrived.
-    `read_wall`: the stamp of that state. Both are seconds since the epoch; 0 means never.
+    - `stands`: how long the device's robot has had the charger.
+    - `heard_wall`: when the device's last state arrived (s since the epoch; 0 means never).
+    - `read_wall`: the stamp of that state (s since the epoch; 0 means never).
     """
 
     row: BoardRow
@@ -94,10 +95,10 @@ class DeviceView:
 
 
 class LiveSite:
-    """Everything heard so far, within limits."""
+    """Everything heard up to now, within limits."""
 
     def __init__(self, graph: Sequence[str] = ()) -> None:
-        """`graph`: the options that name the page's graph, for commands."""
+        """Begin without messages. `graph` has the options that name the page's graph, for commands."""
         self._story = heard_devices.HeardDevices(most_lines=MOST_LINES, graph=graph)
         self._board = Board(self._story)
         self._drawings: dict[Key, Drawing] = {}
@@ -107,7 +108,7 @@ class LiveSite:
 
     @property
     def crowded(self) -> set[Kind]:
-        """Kinds that have dropped devices for lack of room."""
+        """Return the kinds that have dropped devices, because there were too many."""
         return self._story.crowded
 
     def take(self, heard: Heard) -> None:
@@ -133,7 +134,7 @@ class LiveSite:
     def devices(self, now: float, wall: float) -> list[DeviceView]:
         """Return devices, coordinators and scheduled robots.
 
-        `now`: steady clock (s). `wall`: the clock of the stamps (s since the epoch).
+        `now` is the steady clock (s). `wall` is the stamps' clock (s since the epoch).
         """
         every, rows = self._story.stated(), self._board.rows(now, wall)
         shown = {f"{one.kind} {words.printable(one.id)}": one for one in every}
@@ -155,8 +156,8 @@ class LiveSite:
         remedies: Remedies,
         zone: tzinfo | None = None,
     ) -> Explanation | None:
-        """Explain why somebody waits for this device, or what the device does. `zone`: time zone of the
-        texts."""
+        """Explain why a robot waits for this device, or what the device does. `zone` is the time zone
+        of the texts."""
         device = self._found(kind, name)
         if device is None:
             return None
@@ -164,9 +165,9 @@ class LiveSite:
         return self._story.explain(device.kind, device.id, zone, remedies)
 
     def timeline(self, kind: str, name: str, now: float) -> Timeline | None:
-        """Return the last ten minutes of a device; `name` is its printable name.
+        """Return the last ten minutes of a device. `name` is the device's printable name.
 
-        The timeline ends up to STEP_S after `now`, so that the parts already drawn move only once in
+        The timeline ends up to STEP_S after `now`. Thus the parts already drawn move only once in
         STEP_S.
         """
         device = self._found(kind, name)
@@ -233,8 +234,8 @@ class LiveSite:
             self._remember(("door", door.id), replace(heard, message=d.SupervisorHeartbeat(own)))
 
     def _fleet(self, message: d.FleetState, now: Moment) -> None:
-        """Take a fleet's robots. In a full table a new robot replaces the robot that was silent for the
-        longest time, if that silence lasted at least FORGOTTEN_S."""
+        """Take a fleet's robots. If the table is full, a new robot replaces the robot that was silent
+        for the longest time, but only after a silence of FORGOTTEN_S or more."""
         for state in message.robots:
             key = (message.name, state.name)
             if self._robots.pop(key, None) is None and len(self._robots) >= MOST_ROBOTS:
@@ -246,7 +247,7 @@ class LiveSite:
 
 
 def _view(row: BoardRow, device: Device | None) -> DeviceView:
-    """Return the view to draw. A robot's time at its charger ends at the last state heard."""
+    """Return the view to draw. A robot's time at its charger counts up to the last state heard."""
     stands = None
     if isinstance(device, ObservedCharger) and device.last_state and device.robot.value != NOBODY:
         since = device.robot.since

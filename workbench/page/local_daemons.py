@@ -1,7 +1,8 @@
-"""The daemons on this machine that the page's user may see, and the YAML that serves each device.
+"""The daemons on this machine that the page's user may see. Each served device has the YAML that serves
+the device.
 
-The page reads the same files as `rmf-bridge status`. It asks a simulation for the names of its signals
-and parts.
+The page reads the same files as `rmf-bridge status`. The page asks a simulation for the names of its
+signals and parts.
 """
 
 import json
@@ -22,9 +23,9 @@ from workbench.page.levels import Levels, Rows
 
 @dataclass(frozen=True, slots=True)
 class ServedDevice:
-    """A device that a daemon on this machine serves: its YAML, present inputs and outputs.
+    """A device that a daemon on this machine serves, with its YAML, its present inputs and its outputs.
 
-    `contacts`: known signal -> is it asserted?
+    `contacts` is known signal -> whether the signal is asserted.
     """
 
     local: Local
@@ -34,10 +35,11 @@ class ServedDevice:
 
 
 class LocalDaemons:
-    """This machine's daemons when the page last looked. `served`: (kind, name) -> the device."""
+    """This machine's daemons at the page's last look. `served` is (kind, name) -> the device."""
 
     def __init__(self, base: Path | None) -> None:
-        """`base`: the folder of runtime directories; None means the folders of `run` and systemd."""
+        """Begin without daemons. `base` is the folder of runtime directories. None means the folders of
+        `run` and systemd."""
         self.served: Mapping[tuple[str, str], ServedDevice] = {}
         self._base = base
         self._levels: dict[Path, Levels] = {}

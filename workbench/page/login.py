@@ -1,8 +1,9 @@
-"""Identify the user of a request, by the cookie of a login or by the header of a trusted proxy.
+"""Identify the user of a request. The user comes from a login's cookie, or from the header of a trusted
+proxy.
 
-A session's cookie is HttpOnly and SameSite=Strict. It is also Secure if the form came over TLS. Each
-form carries a proof besides the cookie. The header of a reverse proxy counts only if the request comes
-from the proxy's address.
+A session's cookie is HttpOnly and SameSite=Strict. If the form came over TLS, the cookie is also
+Secure. Besides the cookie, each form has a proof. The header of a reverse proxy counts only if the
+request comes from the proxy's address.
 """
 
 import asyncio
@@ -34,10 +35,11 @@ FORM: Final = """<!doctype html><html lang="en"><head><meta charset="utf-8">
 
 
 class Login:
-    """Identifies users. Without a password file and without a proxy, nobody can log in or act."""
+    """An identifier of users. Without a password file and without a proxy, nobody can log in or act."""
 
     def __init__(self, door: PasswordCheck | None, *, proxy: str = "", header: str = "") -> None:
-        """`proxy`: address of the proxy. `header`: the proxy's header that names the user."""
+        """Begin without sessions. `proxy` is the proxy's address. `header` is the proxy's header that
+        names the user."""
         self._door = door
         self._proxy = proxy
         self._header = header
@@ -45,14 +47,14 @@ class Login:
         self._one_at_a_time = asyncio.Lock()
 
     def user(self, request: HTTPConnection) -> str:
-        """Return the user; "" without a login."""
+        """Return the user. Return "" without a login."""
         if self._proxy and request.client and request.client.host == self._proxy:
             return printable(request.headers.get(self._header, ""))[:64]
         session = self._sessions.find(request.cookies.get(COOKIE), time.monotonic())
         return session.user if session else ""
 
     def form(self, request: Request, user: str) -> str:
-        """Return the HTML for a page's head: the user, or a link to the login."""
+        """Return the HTML for a page's head. The HTML shows the user, or a link to the login."""
         session = self._sessions.find(request.cookies.get(COOKIE), time.monotonic())
         if user and session:
             return (
@@ -83,7 +85,7 @@ class Login:
         address = request.client.host if request.client else ""
         if self._door is None:
             return self._page(request, status=403)
-        async with self._one_at_a_time:  # each check takes 16 MB and 50 ms
+        async with self._one_at_a_time:  # one check takes 16 MB and 50 ms
             why = await asyncio.to_thread(
                 self._door.refuses, user, password, address, time.monotonic()
             )
@@ -101,7 +103,7 @@ class Login:
         return answer
 
     async def log_out(self, request: Request) -> Response:
-        """End the session, if the form carries the session's proof."""
+        """End the session, if the form has the session's proof."""
         secret = request.cookies.get(COOKIE)
         session = self._sessions.find(secret, time.monotonic())
         fields = await _fields(request)
@@ -114,7 +116,7 @@ class Login:
 
 
 async def _fields(request: Request) -> dict[str, str]:
-    """Return a form's fields; {} for a form with too many fields."""
+    """Return a form's fields. Return {} for a form with too many fields."""
     try:
         found = parse_qs((await request.body()).decode(errors="replace"), max_num_fields=10)
     except ValueError:
@@ -123,7 +125,7 @@ async def _fields(request: Request) -> dict[str, str]:
 
 
 def _next(request: Request) -> str:
-    """Return the address to show next. It must be a path of this page."""
+    """Return the address to show next. The address must be a path of this page."""
     path = request.query_params.get("next", "/")
     plain = path.startswith("/") and not path.startswith(("//", "/\\")) and path.isprintable()
     return path if plain else "/"

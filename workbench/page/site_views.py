@@ -1,5 +1,5 @@
-"""The views of a live site: the whole site, and one device with its timeline, explanation and
-wiring."""
+"""The views of a live site. One view shows the whole site. Another view shows one device with its
+timeline, explanation and wiring."""
 
 import json
 import time
@@ -40,9 +40,10 @@ SECTIONS: Final = (
 )
 WIDE: Final = "panel wide-part"
 FEW: Final = 8
-"""Maximum number of devices in a section of half width. A larger section takes the whole width."""
+"""Maximum number of devices in a section that takes half the page's width. A larger section takes the
+whole width."""
 LOST: Final = '<p id="lost" role="alert"></p>'
-"""Place where the browser tells that the page's server is silent."""
+"""The element in which the browser tells that the page's server is silent."""
 FILTERS: Final = (
     '<div class="filters"><label>Find a device <input id="find" type="search"></label>'
     '<label><input id="only" type="checkbox"> Only what needs attention</label></div>'
@@ -54,8 +55,8 @@ NOT_HERE: Final = (
 
 
 class SiteWall(Tab):
-    """One browser's view of the site. It has few elements of the library, because a browser visits all
-    of them at each update."""
+    """One browser's view of the site. The view has few elements of the library, because the browser
+    visits every such element at each update."""
 
     def __init__(self, cards: Cards, client: Client) -> None:
         super().__init__(client)
@@ -69,7 +70,7 @@ class SiteWall(Tab):
         self.rebuild()
 
     def change(self, script: str) -> None:
-        """Send a change. A browser that is away gets all cards when it returns."""
+        """Send a change. If a browser is away, it gets all cards when it returns."""
         if not self.is_here:
             self._missed = True
         elif self._missed:
@@ -80,7 +81,7 @@ class SiteWall(Tab):
     def rebuild(self) -> None:
         """Draw all cards, by kind and name."""
         self._missed = not self.is_here
-        self._built += 1  # makes the content differ, because equal content is not sent
+        self._built += 1  # a new number makes the content differ, because equal content is not sent
         html = "".join(self._section(*section) for section in SECTIONS)
         none = "<p>No device is shown.</p>"
         self._box.set_content(
@@ -95,8 +96,8 @@ class SiteWall(Tab):
         return f"<section{many}><h2>{title}</h2>{cards}</section>" if keys else ""
 
     def _slot(self, key: Key) -> str:
-        """Make a card's slot. The link stays outside the redrawn part, so the link keeps the keyboard's
-        focus."""
+        """Make a card's slot. The link is outside the part that is redrawn, so the link keeps the
+        keyboard's focus."""
         card = f'<div id="{place_of(key)}">{self._cards.cards[key]}</div>'
         name, path = escape(key[1]), path_of(*key)
         link = f'<a class="cover" href="{path}" aria-label="{name}"></a>' if key[0] in KINDS else ""
@@ -104,7 +105,7 @@ class SiteWall(Tab):
 
 
 class SiteViews:
-    """Views of the site and of its devices."""
+    """The views of the site and of its devices."""
 
     def __init__(
         self,
@@ -123,7 +124,7 @@ class SiteViews:
         self._remedies = faults.for_explain()
 
     def install(self) -> None:
-        """Put the views at their addresses."""
+        """Register the views' addresses."""
         ui.page("/", title="Site")(self.site)
         for kind in KINDS:
             ui.page(f"/{kind}/{{name:path}}", title="Device")(partial(self.device, kind))
@@ -156,7 +157,7 @@ class SiteViews:
         return client.build_response(request, 404)
 
     def _parts(self, key: Key, request: Request, client: Client) -> None:
-        """Fill the view of a device. At least one message of the device was heard."""
+        """Fill the view of a device. The caller has checked that the device was heard."""
         tab = Tab(client)
         self._join(tab, client)
         drawn: dict[str, Callable[[], str]] = {}

@@ -1,5 +1,4 @@
-"""One browser's tab: its time zone, its question for the latest changes, and the changes of its
-view."""
+"""One browser's tab: its time zone, its question for the latest changes, and its view's changes."""
 
 import json
 import math
@@ -15,23 +14,25 @@ from nicegui.events import GenericEventArguments
 from workbench.page.zone import zone_of
 
 PIECE: Final = re.compile(r"(?=<(?:rect|text|line|path|tr|p|li)\b)|(?<=\n)")
-"""Places at which the HTML of a view is cut into pieces. Only the pieces that have changed are sent to
-the browser."""
+"""Places at which a view's HTML is cut into pieces. The page sends only changed pieces to the
+browser."""
 WHOLE: Final = 1_000_000
-"""A number larger than the pieces of any part."""
+"""A number greater than the number of pieces in any part."""
 
 Edit = tuple[int, int, Sequence[str]]
-"""Number of the first replaced piece, number of the first piece kept after it, and the new pieces."""
+"""An edit: the first replaced piece's number, the number of the first piece kept after it, and the new
+pieces."""
 
 
 def edits(before: Sequence[str], after: Sequence[str]) -> list[Edit]:
-    """Return the edits that turn `before` into `after`, the last edit first."""
+    """Return the edits that turn `before` into `after`. The last edit comes first."""
     found = SequenceMatcher(None, before, after, autojunk=False).get_opcodes()
     return [(i, j, after[m:n]) for what, i, j, m, n in reversed(found) if what != "equal"]
 
 
 class Tab:
-    """The tab of a client. `zone`: the browser's time zone; None until the browser has named it."""
+    """A client's tab. `zone` is the browser's time zone, or None until the browser has named its
+    zone."""
 
     def __init__(self, client: Client) -> None:
         self.zone: tzinfo | None = None
@@ -42,7 +43,7 @@ class Tab:
 
     @property
     def is_here(self) -> bool:
-        """Is the browser connected?"""
+        """Return whether the browser is connected."""
         return self._client.has_socket_connection
 
     def run(self, script: str) -> None:
@@ -50,7 +51,7 @@ class Tab:
         self._client.run_javascript(script)
 
     def show(self, place: str, html: str) -> None:
-        """Send the changes of this part. A browser that was away gets the whole part."""
+        """Send the changes of this part. If the browser was away, send the whole part."""
         if not self.is_here:
             self._sent.clear()
             return
@@ -62,22 +63,22 @@ class Tab:
             self.run(f"patch({json.dumps(place)}, {json.dumps(changed)})")
 
     def change(self, script: str) -> None:
-        """Ignore a change of the site, because a device's view draws itself."""
+        """Ignore a change of the site, because a device's view draws only its device."""
 
     def rebuild(self) -> None:
-        """Ignore that cards were added or removed."""
+        """Do nothing, because a device's view has no cards."""
 
     def answer(self, wrong: int) -> None:
-        """Answer that all messages from before the browser's question have been sent.
+        """Tell the browser that all messages from before its question have been sent.
 
-        `wrong`: number of devices that need attention.
+        `wrong` is the number of devices that need attention.
         """
         asked, self._asked = self._asked, None
         if asked is not None and self.is_here:
             self.run(f"fresh({asked}, {wrong})")
 
     def _ask(self, event: GenericEventArguments) -> None:
-        """Take the question, which carries the browser's steady clock and time zone."""
+        """Take the browser's question, which has the browser's steady clock and time zone."""
         match event.args:
             case [int() | float() as asked, str() as zone] if math.isfinite(asked):
                 self._asked, self.zone = float(asked), zone_of(zone)

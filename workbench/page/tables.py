@@ -13,7 +13,7 @@ NO_RING = "Its daemon keeps no ring, or the page's user may not read it: no live
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str) -> str:
-    """Return an HTML table. Every cell is escaped text."""
+    """Return an HTML table. The text of every cell is escaped."""
     heads = "".join(f'<th scope="col">{escape(text)}</th>' for text in headings)
     body = "".join(
         f"<tr>{''.join(_cell(*pair) for pair in zip(headings, row, strict=True))}</tr>"
@@ -32,10 +32,10 @@ def _cell(heading: str, cell: str) -> str:
 
 
 def wiring(file: str, device: str, contacts: Mapping[str, bool]) -> str:
-    """Return the tables of wires and limits from the device's YAML, like the output of `rmf-bridge
-    check`.
+    """Return the tables of wires and limits from the device's YAML, as `rmf-bridge check` prints them.
 
-    `contacts`: known signal -> is it asserted? The table of wires shows this in a column.
+    `contacts` is known signal -> whether the signal is asserted. The table of wires has a column for
+    this.
     """
     found = _tables(file, _changed_at(file), device)
     if isinstance(found, str):
@@ -45,7 +45,7 @@ def wiring(file: str, device: str, contacts: Mapping[str, bool]) -> str:
 
 
 def _folded(one: Table) -> str:
-    """Format a table. Settings at their defaults are hidden until the reader unfolds them."""
+    """Format a table. Settings with default values are hidden until the reader unfolds the table."""
     if one.headings != SETTINGS:
         return table(one.headings, one.rows, one.title)
     set_, rest = ([row for row in one.rows if bool(row[2]) == own] for own in (True, False))
@@ -88,7 +88,8 @@ def _changed_at(file: str) -> float:
 
 @lru_cache(maxsize=64)
 def _tables(file: str, changed_at: float, device: str) -> list[Table] | str:
-    """Return the tables, or why there are none. A new `changed_at` reads the file again."""
+    """Return the tables. If there are none, return the reason. A new `changed_at` makes this function
+    read the file again."""
     try:
         config = load(Path(file))
     except SettingsError as error:

@@ -1,6 +1,6 @@
 """The page's application: the views' addresses, admission, and the serving process.
 
-Only this module and the views import NiceGUI. A browser's actions reach the graph only through a
+Only this module and the views import NiceGUI. A browser's action reaches the graph only through a
 command (`actions.py`).
 """
 
@@ -45,17 +45,17 @@ log = logging.getLogger(__name__)
 PUMP_S: Final = 0.1
 HERE_S: Final = 1.0
 RECONNECT_S: Final = 30.0
-"""Time (s) after which a browser that was away reloads its view."""
+"""Time (s). If a browser was away for longer, the browser reloads its view."""
 MOST_HISTORY: Final = 100
-"""Maximum number of missed updates that a returning browser gets. After more updates the browser
-reloads its view."""
+"""Maximum number of missed updates that a returning browser gets. After more missed updates, the
+browser reloads its view."""
 MOST_CONNECTIONS: Final = 200
 MOST_BYTES: Final = 64 * 1024
-"""Maximum size (bytes) of a message from a browser. The library's messages have a hundredth of this
-size."""
+"""Maximum size (bytes) of a message from a browser. The library's own messages are a hundred times
+smaller."""
 MOST_BROWSERS: Final = 50
-"""Maximum number of open views. Each view takes up to a megabyte. An unused view is dropped within a
-minute."""
+"""Maximum number of open views. Each view takes up to a megabyte. The page drops an unused view within
+a minute."""
 OF_EVERYBODY: Final = ("/login", "/favicon.ico")
 LIBRARY: Final = "/_nicegui/"
 """Path of the library's own scripts and styles."""
@@ -64,19 +64,20 @@ LOOK_S: Final = 1.0
 QUIET_S: Final = 60.0
 """Minimum time (s) between log lines about browsers that do not read."""
 MOST_WAITING: Final = 50
-"""Maximum number of a browser's unread packets, which come in about five seconds. A browser that reads
-has few unread packets."""
+"""Maximum number of a browser's unread packets. So many packets come in about five seconds. A browser
+that reads has few unread packets."""
 
 
 class Gate:
-    """Admission of up to MOST_BROWSERS browsers. `closed`: admit only logged-in users."""
+    """Admission of up to MOST_BROWSERS browsers. If `closed` is true, only logged-in users are
+    admitted."""
 
     def __init__(self, login: Login, *, closed: bool) -> None:
         self._login = login
         self._closed = closed
 
     def __call__(self, scope: Scope) -> HttpRefusal | None:
-        """Return why a request is refused; None if accepted."""
+        """Return the reason to refuse a request. Return None for an accepted request."""
         path = str(scope["path"])
         if path in OF_EVERYBODY or path.startswith(LIBRARY):
             return None
@@ -96,8 +97,9 @@ def serve(
 ) -> None:
     """Serve until a signal ends the process.
 
-    `opened`: a socket that listens at `args.listen`. `known`: users and their hashes. `graph`: the
-    options that name the page's graph, for its commands.
+    - `opened`: a socket that listens at `args.listen`.
+    - `known`: user -> password hash.
+    - `graph`: the options that name the page's graph, for the page's commands.
     """
     address, _ = args.listen
     shown = f"[{address}]" if ":" in address else address
@@ -107,7 +109,7 @@ def serve(
     )
     ui.add_css(STYLE, shared=True)
     ui.add_head_html(f"<script>{SCRIPT}</script>", shared=True)
-    # Quasar draws a nameless progress bar over the page during each request of a script.
+    # Without this setting, Quasar draws a progress bar without a name during each request of a script.
     app.config.quasar_config["loadingBar"]["skipHijack"] = True
     app.get("/login")(login.show)
     app.post("/login")(login.log_in)
@@ -174,7 +176,7 @@ async def _pump(cards: Cards) -> None:
 
 
 async def _look(here: LocalDaemons) -> None:
-    """Look for this machine's daemons in the background, so that the pump does not wait."""
+    """Look for this machine's daemons in the background, so that `_pump` does not wait."""
     while True:
         with suppress(OSError):
             await asyncio.to_thread(here.look)
@@ -182,7 +184,7 @@ async def _look(here: LocalDaemons) -> None:
 
 
 async def _end_useless() -> None:
-    """Close connections of browsers that do not read or send no request. Runs until the page ends."""
+    """Close connections if the browser does not read, or sends no request. Run until the page ends."""
     silent = Silent()
     ended: set[object] = set()
     told_at = AGES_AGO
@@ -195,7 +197,8 @@ async def _end_useless() -> None:
 
 
 def _unasked(connections: Iterable[Any]) -> Iterator[tuple[Hashable, Any]]:
-    """Yield the connections on which no request waits for its answer, each with its last request."""
+    """Yield the connections on which no request waits for its answer. Each connection comes with its
+    last request."""
     for one in connections:
         last = getattr(one, "cycle", one)
         if last is None or getattr(last, "response_complete", False):
@@ -203,8 +206,10 @@ def _unasked(connections: Iterable[Any]) -> Iterator[tuple[Hashable, Any]]:
 
 
 async def _end_deaf(ended: set[object], told_at: float) -> float:
-    """Disconnect browsers that do not read. `ended`: browsers that are already being disconnected.
-    Return the last log time."""
+    """Disconnect browsers that do not read. Return the time of the last log line.
+
+    `ended` has the browsers that are already being disconnected.
+    """
     sockets = core.sio.eio.sockets.copy()
     ended &= sockets.keys()
     deaf = [one for one in sockets.keys() - ended if sockets[one].queue.qsize() > MOST_WAITING]

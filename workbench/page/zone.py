@@ -8,11 +8,11 @@ LONGEST: Final = 64
 
 
 def zone_of(name: object) -> tzinfo | None:
-    """Return the time zone of this name. None, which means this machine's zone, stands for an unknown
-    name."""
+    """Return the time zone of this name. For an unknown name, return None, which means this machine's
+    zone."""
     if not isinstance(name, str) or len(name) > LONGEST:
         return None
     try:
         return ZoneInfo(name)
-    except (ZoneInfoNotFoundError, ValueError, OSError):  # a name may come from anybody
+    except (ZoneInfoNotFoundError, ValueError, OSError):  # anybody may send any name
         return UTC if name == "UTC" else None

@@ -1,1 +1,1 @@
-"""Read recordings of every format, and replay the decisions in them."""
+"""Read recordings of every format, and replay the recorded decisions."""

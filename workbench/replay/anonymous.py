@@ -1,10 +1,13 @@
-"""Anonymise an incident: each of the site's names becomes `name01`, `name02` …, the same everywhere.
+"""Anonymise an incident. Each of the site's names becomes `name01`, `name02` …, the same name
+everywhere.
 
-Names come from the name fields of RMF's messages, the single words in cores' memories, the devices,
-and the YAML. This module replaces the names in messages, memories, notes and the YAML, also inside
-longer texts. The names' sort order stays, because cores sort by names. The program's own words stay,
-because new words would change the recording: keys and values of the YAML, words of a core, topics.
-Comments of the YAML are removed. The addresses of its buses become `192.0.2.1`.
+Names come from four places: name fields of RMF's messages, single words in cores' memories, the
+devices, and the YAML. This module replaces the names in messages, memories, notes and the YAML, also
+inside longer texts. The new names sort in the same order, because cores sort by names.
+
+The program's own words stay, because new words would change the recording. These words are keys and
+values of the YAML, words of a core, and topics. The YAML's comments are removed. The addresses of the
+YAML's buses become `192.0.2.1`.
 """
 
 import enum
@@ -57,7 +60,8 @@ Swap = Callable[[str], str]
 
 
 def anonymous(incident: Incident) -> Incident:
-    """Return the incident without names. Raises SettingsError if today's rules refuse its YAML."""
+    """Return the incident without names. Raises SettingsError if today's rules refuse the incident's
+    YAML."""
     config = of_head(incident.head)
     content = yaml.safe_load(incident.head.yaml)
     own = {*_subjects(incident), *_own_names(config, content)}
@@ -72,7 +76,8 @@ def anonymous(incident: Incident) -> Incident:
 
 
 def _swap(names: list[str]) -> Swap:
-    """Return a function that replaces names, whole or inside a text, longest first."""
+    """Return a function that replaces names, which may be inside a text. The longest name is replaced
+    first."""
     if not names:
         return lambda text: text
     width = len(str(len(names)))
@@ -136,7 +141,8 @@ def _subjects(incident: Incident) -> Iterator[str]:
 
 
 def _own_names(config: Config, content: dict[str, Any]) -> Iterator[str]:
-    """Yield the YAML's devices and places. For a kind without hardware yield every word of the site."""
+    """Yield the devices and places of the YAML. For a kind without hardware, yield every word that the
+    site chose."""
     kind = kind_called(config.kind)
     yield from content.get("rmf", {}).get("topics", {}).values()
     if isinstance(kind, GraphKind):
@@ -160,7 +166,7 @@ def _words(value: object) -> Iterator[str]:
 
 @cache
 def our_words() -> frozenset[str]:
-    """Return every key and word of the program itself, in a YAML or in a core."""
+    """Return every key and word of the program itself that a YAML or a core may contain."""
     found = {"site", *TOPICS}
     _schema_words(schema(), found)
     for kind in kind_names():
@@ -182,7 +188,7 @@ def _schema_words(part: object, found: set[str]) -> None:
 
 
 def _module_words(module: ModuleType) -> Iterator[str]:
-    """Yield the words in a module's types: literals and values of enumerations."""
+    """Yield the words in a module's types, which are literals and values of enumerations."""
     for kind in vars(module).values():
         if inspect.isclass(kind) and issubclass(kind, enum.Enum):
             yield from (str(member.value) for member in kind)
@@ -258,7 +264,7 @@ def _message(value: Any, swap: Swap) -> Any:
 
 
 def _tree(told: Tree, swap: Swap) -> Tree:
-    """Return the tree with its texts replaced, except the names of types, fields and members."""
+    """Return the tree with its texts replaced. Keep the names of types, fields and members."""
     if isinstance(told, str):
         return swap(told)
     if isinstance(told, list):

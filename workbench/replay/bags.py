@@ -1,11 +1,12 @@
-"""Read RMF's messages from a recording: our own, rosbag2's of any release (MCAP or sqlite3), or a
-daemon's ring itself.
+"""Read RMF's messages from a recording: our own file, a file of any release of rosbag2 (MCAP or
+sqlite3), or a daemon's ring.
 
-A recording is read as a stream, in limited memory. Topics and types that are not RMF's are skipped and
-counted. The readable part of a damaged recording is yielded, then the damage is noted.
+This module reads a recording as a stream, in limited memory. Topics and types outside RMF are skipped
+and counted. In a damaged recording, the readable part comes first, and then the damage is noted.
 
-In our own files `log_time` is from a clock that never steps, and `publish_time` is from the wall clock.
-Other recordings have one clock. If that clock steps back, `at` continues from its last value.
+In our own files, `log_time` is from a clock that never steps, and `publish_time` is from the wall
+clock. Other recordings have only one clock. If that clock steps back, `at` continues from its last
+value.
 """
 
 import logging
@@ -30,17 +31,18 @@ log = logging.getLogger(__name__)
 
 NS: Final = 1e-9
 STEPPED_NS: Final = 10**9
-"""Minimum step back (ns) that counts as a clock set back. A smaller step is disorder in the
-recording."""
+"""Minimum step back (ns) of a clock that was set back. A smaller step only means that the recording is
+out of order."""
 LONGEST_MESSAGE: Final = 8 << 20
 
 
 Keep = Callable[[str, bytes, float], bool]
-"""Function that tells whether to decode a sample: topic, sample, and the time of recording (s)."""
+"""A function that tells whether to decode a sample. The arguments are the topic, the sample, and the
+time of recording (s)."""
 
 
 def heard_in(path: Path, notes: Notes | None = None, keep: Keep | None = None) -> Iterator[Heard]:
-    """Yield all messages of RMF in a recording; the arguments are those of `all_in`."""
+    """Yield all messages of RMF in a recording. The arguments are the same as those of `all_in`."""
     return (one for one in all_in(path, notes, keep) if isinstance(one, Heard))
 
 
@@ -49,9 +51,9 @@ def all_in(
 ) -> Iterator[Heard | Own]:
     """Yield RMF's messages and our recorder's texts, in the order of recording.
 
-    `path`: an MCAP file, a `.db3` file, a directory of rosbag2, or a ring. Skipped messages and damage
-    go to `notes`; without `notes`, damage is logged. Samples that `keep` refuses stay undecoded, which
-    saves nine tenths of the time. Raises BagError if `path` is no recording.
+    `path` is an MCAP file, a `.db3` file, a directory of rosbag2, or a ring. Skipped messages and
+    damage go to `notes`. Without `notes`, the damage is logged. Samples that `keep` refuses stay
+    undecoded, which saves nine tenths of the time. Raises BagError if `path` is no recording.
     """
     noted = Notes() if notes is None else notes
     clock = _Clock()
@@ -73,7 +75,7 @@ def all_in(
 
 
 class _Clock:
-    """Clock that never runs backwards (ns)."""
+    """A clock that never runs backwards (ns)."""
 
     def __init__(self) -> None:
         self._shift = 0
@@ -93,8 +95,8 @@ def _raw(path: Path, noted: Notes) -> Iterator[Raw]:
 
 
 def _parts(path: Path) -> list[Path]:
-    """Return the files of a recording in order; or the directory itself, if a library reads it as a
-    whole."""
+    """Return the files of a recording in order. If a library reads the recording as a whole, return the
+    directory."""
     try:
         if not path.is_dir():
             return [path]
@@ -112,13 +114,13 @@ def _parts(path: Path) -> list[Path]:
 
 
 def continuous(files: list[Path]) -> list[Path]:
-    """Return our recorder's files that follow each other without overlap; if there are none, return all
-    files."""
+    """Return our recorder's files that follow each other without overlap. If there are no such files,
+    return all files."""
     return [file for file in files if f"_{CONTINUOUS}_" in file.name] or files
 
 
 def _number(path: Path) -> tuple[int, str]:
-    """Return the number that rosbag2 gives a file, so that name_2 comes before name_10."""
+    """Return the number that rosbag2 gives a file. With numbers, name_2 comes before name_10."""
     number = path.stem.rpartition("_")[2]
     return int(number) if number.isdecimal() and len(number) < 7 else 0, path.name
 
@@ -158,7 +160,7 @@ def _of_ring(path: Path) -> Iterator[Raw]:
 
 
 def _beginning(path: Path) -> bytes:
-    """Read the first bytes. Raises BagError if the file is unreadable or not a regular file."""
+    """Read the first bytes. Raises BagError if the file cannot be read, or is no regular file."""
     try:
         return user_files.read(path, 15).content
     except OSError as error:

@@ -1,4 +1,5 @@
-"""Open recordings for a replay: a file of our recorder, a directory of such files, or a ring itself."""
+"""Open a recording for a replay. A recording may be our recorder's file, a directory of such files, or
+a ring."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,8 +15,8 @@ from workbench.replay.sources import BagError, Notes
 def opened(path: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
     """Return a daemon's run, and the entries of this run.
 
-    For a directory, return the first run. Its entries come from all files, in the order of file names.
-    Raises BagError.
+    For a directory, return the first run. The run's entries come from all files, in the order of file
+    names. Raises BagError.
     """
     if path.is_dir():
         return _of_all(sorted(path.glob("*.mcap")), path, notes)
@@ -37,8 +38,8 @@ def opened(path: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
 
 
 def _of_all(files: list[Path], folder: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
-    """Return the run of the first file's daemon, and its entries. Continuous files are preferred, if
-    there are any."""
+    """Return the run of the first file's daemon, and the run's entries. If there are continuous files,
+    use only those files."""
     if not files:
         raise BagError(f"{folder} holds no recording: it has no .mcap file")
     files = continuous(files)

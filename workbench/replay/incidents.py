@@ -1,4 +1,4 @@
-"""Read our recorder's files for a replay: a daemon's run and its entries."""
+"""Read our recorder's files for a replay. A file has a daemon's run and the run's entries."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,7 +18,7 @@ NONE = "{} has no entries of an rmf-bridge daemon, and only such entries can be 
 
 
 def head_of(path: Path) -> Head:
-    """Return the daemon's run that the file recorded. Raises BagError."""
+    """Return the daemon's run in this file. Raises BagError."""
     try:
         for record in records(path):
             if isinstance(record, Metadata) and record.name == HEAD:
@@ -41,7 +41,7 @@ def entries_in(path: Path, notes: Notes) -> Iterator[AnyEntry]:
 
 
 def notes_in(path: Path) -> list[Note]:
-    """Return the recorder's reasons for keeping the file."""
+    """Return the recorder's reasons to keep the file."""
     try:
         return [msgspec.json.decode(told, type=Note) for told in _texts(path, NOTES, Notes())]
     except (msgspec.MsgspecError, RecursionError):

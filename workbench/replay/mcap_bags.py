@@ -1,4 +1,4 @@
-"""Read RMF's messages from an MCAP file of our recorder or of rosbag2."""
+"""Read RMF's messages from an MCAP file. The writer is our recorder or rosbag2."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -37,8 +37,12 @@ def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
 
 
 class _Declared:
-    """The declarations of a file so far. `ours`: did our recorder write the file? `sources`: channel ->
-    source. `senders`: channel -> publisher."""
+    """The declarations in a file up to the present position.
+
+    - `ours`: whether our recorder wrote the file.
+    - `sources`: channel -> source.
+    - `senders`: channel -> publisher.
+    """
 
     def __init__(self) -> None:
         self.ours = False
@@ -47,7 +51,7 @@ class _Declared:
         self._types: dict[int, tuple[str, list[Release]]] = {}
 
     def is_ours(self, found: Source) -> bool:
-        """Is this a topic for our recorder's own texts?"""
+        """Return whether this is a topic for our recorder's own texts."""
         return self.ours and found.topic.startswith(OWN_TOPICS)
 
     def take(self, record: McapRecord) -> None:

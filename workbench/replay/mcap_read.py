@@ -1,8 +1,8 @@
 """Read the records of any writer's MCAP file, in limited memory. The file's size limits the time.
 
-Everything in the file is checked before it is used: a length may be false, a chunk may unpack to
-gigabytes, the end may be missing. The reader ignores the index, so the index may be missing. Format:
-https://mcap.dev/spec (version 0).
+The reader checks everything in the file before use. A length may be false, a chunk may unpack to
+gigabytes, and the end may be missing. The reader ignores the index, so the index may be missing.
+Format: https://mcap.dev/spec (version 0).
 """
 
 import io
@@ -24,16 +24,19 @@ LONGEST_RECORD: Final = 64 << 20
 8 MB."""
 MOST_UNPACKED: Final = 200
 FIRST_UNPACKED: Final = 2 << 20
-"""Limits of the unpacked size (bytes) of a file: MOST_UNPACKED times the file's size, plus
-FIRST_UNPACKED."""
+"""MOST_UNPACKED and FIRST_UNPACKED limit a file's unpacked size (bytes). The limit is MOST_UNPACKED
+times the file's size, plus FIRST_UNPACKED."""
 MOST_DECLARED: Final = 10_000
 """Maximum number of schemas and channels in a file."""
 FRAME: Final = 9
 """Size (bytes) of a record's head: its opcode (1 byte) and its length (8 bytes)."""
 
 MESSAGE: Final = struct.Struct("<HIQQ")
-"""Head of a message: channel, sequence, log time and publish time (ns). This code decodes it, faster
-than the library, because messages are the most frequent records."""
+"""The head of a message: channel, sequence, log time and publish time (ns).
+
+Messages are the most frequent records. Therefore this code decodes the head itself, which is faster
+than the library.
+"""
 READ: Final[dict[int, Callable[[ReadDataStream], McapRecord]]] = {
     Opcode.HEADER: Header.read,
     Opcode.SCHEMA: Schema.read,
@@ -48,18 +51,18 @@ INVALID: Final = (
     zstandard.ZstdError,
     RuntimeError,
 )
-"""Exceptions that parsing arbitrary bytes as a record may raise."""
+"""Exceptions that may come from parsing arbitrary bytes as a record."""
 LAST: Final = (Opcode.DATA_END, Opcode.FOOTER)
 
 
 class Damaged(ValueError):
-    """Error: the file cannot be read further. The text gives the reason."""
+    """The file cannot be read further. The error's text gives the reason."""
 
 
 def records(path: Path) -> Iterator[McapRecord]:
     """Yield every header, schema, channel, message and metadata record, in the file's order.
 
-    Raises Damaged where the file cannot be read further, and OSError.
+    Raises OSError. Raises Damaged at the place after which the file cannot be read.
     """
     size = path.stat().st_size
     with path.open("rb") as source:
@@ -69,7 +72,7 @@ def records(path: Path) -> Iterator[McapRecord]:
 
 
 class _Allowances:
-    """Number of bytes that a file may still unpack, and of channels that it may still declare."""
+    """The limits that are left for a file: bytes to unpack, and channels and schemas to declare."""
 
     def __init__(self, size: int) -> None:
         self._unpacked = FIRST_UNPACKED + MOST_UNPACKED * size

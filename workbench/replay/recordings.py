@@ -1,4 +1,4 @@
-"""The part that all commands on a recording share: the span to read, refusals, and thinning out."""
+"""Functions that all commands on a recording share: the span to read, refusals, and thinning out."""
 
 import argparse
 import os
@@ -19,11 +19,11 @@ from workbench.replay.sources import BagError, Notes
 
 CLOCK = re.compile(r"(?:(\d{4}-\d\d-\d\d)[ T])?(\d\d?):(\d\d)(?::(\d\d(?:\.\d+)?))?")
 SAME_S = 2.4
-"""Time (s) between samples that differ only in numbers. It is shorter than the 3 s after which a daemon
-counts as silent."""
+"""Time (s) between samples that differ only in numbers. A daemon counts as silent after 3 s, so this
+time is shorter."""
 STAMPED = 12
-"""Number of bytes before a DiagnosticArray's status: CDR's head and the stamp (OMG DDSI-RTPS 10.2;
-Header)."""
+"""Number of bytes before a DiagnosticArray's status, which are CDR's head and the stamp (OMG DDSI-RTPS
+10.2; Header)."""
 MOST_TOLD = 512
 FIRST_OF_OTHERS = 300
 COORDINATOR = b"charger_coordinator"
@@ -31,15 +31,15 @@ COORDINATOR = b"charger_coordinator"
 
 @dataclass(frozen=True, slots=True)
 class TypedTime:
-    """A time as typed: seconds from the beginning, or a local time of a day. Day None is the
-    recording's first day."""
+    """A time as the user typed it: seconds from the beginning, or a local time of a day. If the day is
+    None, the recording's first day is meant."""
 
     after_s: float | None = None
     day: str | None = None
     of_day_s: float = 0.0
 
     def wall(self, began: float) -> float:
-        """Return the time (s since the epoch). `began`: the recording's beginning (s since the
+        """Return the time (s since the epoch). `began` is the recording's beginning (s since the
         epoch)."""
         if self.after_s is not None:
             return began + self.after_s
@@ -50,8 +50,8 @@ class TypedTime:
 
 @dataclass(slots=True)
 class RecordingSpan:
-    """The part of a recording to read. `begins_at`: when the recording began, on `Heard.at`'s clock
-    (s)."""
+    """The part of a recording to read. `begins_at` is the recording's beginning (s) on `Heard.at`'s
+    clock."""
 
     from_: TypedTime | None
     to: TypedTime | None
@@ -59,7 +59,8 @@ class RecordingSpan:
 
 
 def unreadable(command: str, error: BagError) -> int:
-    """Print why the recording cannot be read; return the exit code, 66 for every command."""
+    """Print the reason why the recording cannot be read. Return the exit code, which is 66 for every
+    command."""
     complain(command, error)
     return os.EX_NOINPUT
 
@@ -99,11 +100,11 @@ def _plus(text: str) -> float:
 
 
 class Sieve:
-    """Choose the samples to decode, for one device or for all devices (name "").
+    """A filter that chooses the samples to decode, for one device or, with name "", for all devices.
 
-    Diagnostics come each second and seldom change. If only numbers (ages, counts) differ from the
-    node's last sample, the sieve takes one sample every SAME_S. It also takes the first samples of
-    other devices, because explanations list the other devices' names.
+    Diagnostics come each second and seldom change. A sample may differ from the node's last sample only
+    in numbers, such as ages and counts. The sieve takes only one such sample every SAME_S. The sieve
+    also takes the first samples of other devices, because explanations list the other devices' names.
     """
 
     def __init__(self, name: str) -> None:
@@ -112,7 +113,7 @@ class Sieve:
         self._told: OrderedDict[bytes, float] = OrderedDict()
 
     def keep(self, topic: str, sample: bytes, at: float) -> bool:
-        """Should this sample be decoded?"""
+        """Return whether to decode this sample."""
         if topic.startswith(OWN_TOPICS) and topic.removeprefix(OWN_TOPICS) not in noted.TOPICS:
             return False
         if self._name not in sample and not self._is_common(topic, sample):
@@ -121,8 +122,8 @@ class Sieve:
         return topic != topics.DIAGNOSTICS.name or self._is_news(sample, at)
 
     def _is_common(self, topic: str, sample: bytes) -> bool:
-        """Does the topic concern all devices? A heartbeat that does not list a door means that nobody
-        holds the door."""
+        """Return whether the topic concerns all devices. The heartbeat does, because a door that is
+        missing in the heartbeat is not held."""
         return topic == topics.DOOR_SUPERVISOR_HEARTBEAT.name or COORDINATOR in sample
 
     def _is_news(self, sample: bytes, at: float) -> bool:
@@ -139,9 +140,10 @@ class Sieve:
 def told_between(
     path: Path, span: RecordingSpan, command: str, device: str
 ) -> Iterator[Heard | Own]:
-    """Yield messages and our recorder's texts about the device ("": all devices), as `between` does.
+    """Yield messages and our recorder's texts about the device, as `between` does. "" stands for all
+    devices.
 
-    Messages that differ little from second to second are thinned out (`Sieve`).
+    The `Sieve` thins out messages that differ little from second to second.
     """
     return between(path, span, command, Sieve(device).keep)
 
@@ -150,7 +152,7 @@ def between(
     path: Path, span: RecordingSpan, command: str, keep: Keep | None = None
 ) -> Iterator[Heard | Own]:
     """Yield a recording from its beginning to the end of the span. Earlier states are included, because
-    they still hold in the span.
+    an earlier state may still hold in the span.
 
     Damage is printed on standard error. Raises BagError.
     """

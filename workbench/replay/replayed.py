@@ -1,9 +1,9 @@
-"""Replay a recording: today's core decides on the recorded events, and each decision is compared with
-the recorded decision.
+"""Replay a recording. Today's core decides on the recorded events. Each decision is compared with the
+recorded decision.
 
 A core is a pure function of its memory, an event, the time and its limits. A recording has the initial
-memory and every event. For this reason a decision differs, even by a bit, only if the core or its
-limits have changed.
+memory and every event. Therefore a decision differs, even by a bit, only if the core or its limits have
+changed.
 """
 
 import struct
@@ -38,17 +38,17 @@ AnyDecision = Decision[Any, Any, Any]
 Parts = tuple[str, Tree, Tree]
 """A part of a decision that differs: the part's name, its recorded value, and today's value."""
 CONTEXT: Final = 6
-"""Number of events that are reported before a difference."""
+"""Number of events that the report shows before a difference."""
 PARTS: Final = ("outputs", "news", "refused")
-"""Parts of a decision that are visible from outside. If other limits are tried, only these parts are
-compared."""
+"""Parts of a decision that are visible outside the core. If a replay tries other limits, only these
+parts are compared."""
 LASTING: Final = ("outputs", "news", "faults")
 """Parts of a decision that stay until a later decision changes them."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReplayedCore:
-    """The core of one subject, with the subject's limits. `types`: the result of `typed.types_of`."""
+    """The core of one subject, with the subject's limits. `types` is the result of `typed.types_of`."""
 
     decide: Callable[[Any, Any, float], Any]
     published: Callable[[Any, Any], Any]
@@ -57,9 +57,11 @@ class ReplayedCore:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A decision that differs. `wall`: its time (s since the epoch). `what`: the part that differs.
+    """A decision that differs.
 
-    `before`: the last events up to this decision, each with its time, in words.
+    - `wall`: the time of the decision (s since the epoch).
+    - `what`: the part that differs.
+    - `before`: the last events up to this decision, each with its time, in words.
     """
 
     subject: str
@@ -75,8 +77,9 @@ class Course:
     """Progress of a replay.
 
     - `decisions`: number of decisions compared.
-    - `unusable`: number of entries of subjects that cannot be replayed.
-    - `subjects`: the subjects that can be replayed. `others`: the subjects that the settings lack.
+    - `unusable`: number of entries that belong to subjects without a replay.
+    - `subjects`: the subjects that can be replayed.
+    - `others`: the subjects that the settings lack.
     - `began`, `ended`: times (s since the epoch).
     """
 
@@ -97,7 +100,7 @@ class Course:
 
 
 def of_head(head: Head) -> Config:
-    """Return a daemon's settings. Raises SettingsError if today's rules refuse them."""
+    """Return a daemon's settings. Raises SettingsError if today's rules refuse these settings."""
     texts.give(head.texts)
     return understood(head.file, head.yaml)
 
@@ -111,7 +114,7 @@ class ReplayedCores:
         self._made: dict[str, ReplayedCore | None] = {}
 
     def of(self, subject: str) -> ReplayedCore | None:
-        """Return a subject's core; None if the settings have no such device."""
+        """Return a subject's core. Return None if the settings have no such device."""
         if subject not in self._made:
             self._made[subject] = self._make(subject)
         return self._made[subject]
@@ -127,7 +130,7 @@ class ReplayedCores:
             return None
         debounce = config.debounce(subject)
         limits = kind.limits(config.devices[subject], debounce)
-        if kind.section:  # a fleet's limits hold RMF's files, whose texts the recording has
+        if kind.section:  # the recording has RMF's files, which set a fleet's limits
             limits = limits_of(config, subject, debounce)
         return ReplayedCore(_with(kind.decide, limits), kind.published, types_of(kind.decide))
 
@@ -137,7 +140,7 @@ def _with(decide: Callable[..., Any], limits: Any) -> Callable[[Any, Any, float]
 
 
 class _Subject:
-    """One subject. Its decisions are repeated, beginning with its recorded memory."""
+    """One subject. The replay repeats the subject's decisions, beginning with the recorded memory."""
 
     def __init__(self, core: ReplayedCore, known: Known) -> None:
         self._core = core
@@ -152,12 +155,12 @@ class _Subject:
 
     @property
     def has_decided(self) -> bool:
-        """Has the subject made a decision, whose reading can be repeated and whose report can be
-        published?"""
+        """Return whether the subject has made a decision. Only then can a reading be repeated, or a
+        report be published."""
         return self._report is not None
 
     def memory(self) -> Tree:
-        """Present memory, as recordings store it."""
+        """The present memory, in the form of recordings."""
         return tree(self._memory)
 
     def published(self) -> None:
@@ -231,7 +234,7 @@ def _differing(recorded: dict[str, Tree], decision: AnyDecision) -> list[Parts]:
 
 
 class Replay:
-    """The replay of a recording. `course`: its progress."""
+    """The replay of a recording. `course` is the progress."""
 
     def __init__(self, entries: Iterable[AnyEntry], cores: ReplayedCores) -> None:
         self.course = Course()
@@ -253,7 +256,7 @@ class Replay:
         """Yield the effects of other limits.
 
         An effect is a time at which outputs, state or refusal begin to differ, or differ in a new way.
-        If they match the recording again, today's value is None.
+        When they match the recording again, today's value is None.
         """
         shown: dict[tuple[str, str], tuple[Tree, Tree]] = {}
         for entry in self._entries:
@@ -274,8 +277,8 @@ class Replay:
         return Difference(_name(entry), at + offset_s, *found, words)
 
     def _played(self, entry: AnyEntry, *, strict: bool) -> Iterator[tuple[float, list[Parts]]]:
-        """Yield the time and the differences of each decision in an entry. `strict`: compare memories
-        too."""
+        """Yield the time and the differences of each decision in an entry. With `strict`, compare
+        memories too."""
         if isinstance(entry, Known):
             yield from self._known(entry, strict=strict)
         elif isinstance(entry, SubjectForgotten):
@@ -315,7 +318,7 @@ class Replay:
 
 
 def apart(was: Tree, now: Tree) -> tuple[Tree, Tree]:
-    """Return those elements of two lists of the same length that differ. Return other values whole."""
+    """Return the elements in which two lists of the same length differ. Return other values whole."""
     if not (isinstance(was, list) and isinstance(now, list) and len(was) == len(now)):
         return was, now
     pairs = [pair for pair in zip(was, now, strict=True) if pair[0] != pair[1]]

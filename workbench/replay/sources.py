@@ -1,4 +1,4 @@
-"""The topics of a recording: recognise RMF's topics, and decode their samples."""
+"""The topics of a recording. This module recognises RMF's topics, and decodes their samples."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -18,17 +18,17 @@ TOPICS: Final = frozenset(topic.name for topic in topics.every())
 
 
 class BagError(Exception):
-    """Error: the path holds no readable recording. The text gives the remedy."""
+    """The path has no readable recording. The error's text gives the remedy."""
 
 
 class NotReplayable(BagError):
-    """Error: the recording is readable, but no decision in it can be replayed."""
+    """The recording is readable, but no decision in the recording can be replayed."""
 
 
 @dataclass(slots=True)
 class Notes:
-    """Notes about missing parts. `skipped`: reason -> number of messages. `damage`: why the end is
-    missing; "" if it is not."""
+    """Notes about missing parts. `skipped` is reason -> number of messages. `damage` tells why the end
+    is missing, or is ""."""
 
     skipped: Counter[str] = field(default_factory=Counter)
     damage: str = ""
@@ -40,9 +40,12 @@ class Notes:
 
 
 class Raw(NamedTuple):
-    """A recorded message, undecoded. `at`: ns on the recorder's clock. `wall`: ns on the wall clock.
+    """A recorded message, undecoded.
 
-    `decode`: None for our own recorder's texts. `sender`: the publisher that our recorder has noted.
+    - `at`: time (ns) on the recorder's clock.
+    - `wall`: time (ns) on the wall clock.
+    - `decode`: None for our own recorder's texts.
+    - `sender`: the publisher that our recorder has noted.
     """
 
     at: int
@@ -54,7 +57,7 @@ class Raw(NamedTuple):
 
 
 class Source(NamedTuple):
-    """A recorded topic. `decode`: None if the topic cannot be used; `why` gives the reason."""
+    """A recorded topic. If the topic cannot be used, `decode` is None, and `why` gives the reason."""
 
     topic: str
     decode: Callable[[bytes], Message] | None
@@ -62,7 +65,7 @@ class Source(NamedTuple):
 
 
 def source(topic: str, type_name: str, releases: list[Release]) -> Source:
-    """Return the source for a topic of this type. `releases`: the type's possible releases."""
+    """Return the source for a topic of this type. `releases` lists the type's possible releases."""
     topic = topic.removeprefix("/")
     short = topic[:LONGEST_NAME]
     message_type = MESSAGES.get(type_name)
@@ -74,9 +77,10 @@ def source(topic: str, type_name: str, releases: list[Release]) -> Source:
 
 
 def releases(type_name: str, definition: str, digest: str = "") -> list[Release]:
-    """Return a message's possible releases: the recorded release, else all releases that have the type.
+    """Return a message's possible releases. If the release is recorded, return only this release.
+    Otherwise return all releases that have the type.
 
-    `definition`: the type's text, or "". `digest`: the type's RIHS01 hash, or "".
+    `definition` is the type's text, or "". `digest` is the type's RIHS01 hash, or "".
     """
     message_type = MESSAGES.get(type_name)
     if message_type is None:
@@ -89,7 +93,8 @@ def releases(type_name: str, definition: str, digest: str = "") -> list[Release]
 
 
 def _decoded(message_type: type[Message], sample: bytes, releases: Iterable[Release]) -> Message:
-    """Decode with the first release that fits. Raises the last release's CdrError."""
+    """Decode with the first release that fits. If no release fits, raises the last release's
+    CdrError."""
     error = cdr.CdrError("no release")
     for release in releases:
         try:

@@ -11,7 +11,7 @@ from workbench.replay.sources import BagError, Notes, Raw, releases, source
 
 
 def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
-    """Yield a recording's RMF messages, undecoded. `path`: a `.db3` file, or its directory.
+    """Yield a recording's RMF messages, undecoded. `path` is a `.db3` file, or the file's directory.
 
     If damage ends the messages, the damage goes to `notes`. Raises BagError if the recording cannot be
     opened.
@@ -31,7 +31,7 @@ def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
                     yield Raw(at, at, topic.topic, bytes(sample), topic.decode)
     except BagError:
         raise
-    except Exception as error:  # arbitrary bytes can make the library raise anything
+    except Exception as error:  # arbitrary bytes can make the library raise any exception
         if not began:
             raise BagError(
                 f"{path} cannot be read: {error}; try sqlite3 .recover on the .db3 file"

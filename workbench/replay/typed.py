@@ -1,4 +1,4 @@
-"""Check recorded values against a core's own type annotations. The check is needed because
+"""Check recorded values against a core's own type annotations. This check is necessary, because
 `value_codec.value` accepts any type of value with any content in its fields."""
 
 import math
@@ -51,7 +51,7 @@ def _fits(found: Any, hint: Any) -> bool:
 
 
 def _parts(found: Any, args: tuple[Any, ...]) -> Iterator[tuple[Any, Any]]:
-    """Yield a value's parts with their types. `args`: the arguments of the value's type."""
+    """Yield a value's parts with their types. `args` are the arguments of the value's type."""
     kind: Any = type(found)
     if fields := _fields(kind, args):
         yield from ((getattr(found, name), hint) for name, hint in fields.items())
@@ -65,7 +65,7 @@ def _parts(found: Any, args: tuple[Any, ...]) -> Iterator[tuple[Any, Any]]:
 
 @cache
 def _fields(kind: Hashable, args: tuple[Any, ...]) -> Mapping[str, Any]:
-    """Return the fields of a struct or named tuple with their types; {} for other types."""
+    """Return the fields of a struct or named tuple with their types. Return {} for other types."""
     if not hasattr(kind, "__struct_fields__") and not hasattr(kind, "_fields"):
         return {}
     own = dict(zip(getattr(kind, "__parameters__", ()), args, strict=False))
@@ -73,7 +73,7 @@ def _fields(kind: Hashable, args: tuple[Any, ...]) -> Mapping[str, Any]:
 
 
 def _closed(hint: Any, own: Mapping[Any, Any]) -> Any:
-    """Return a type whose type variables are replaced by the owner's arguments."""
+    """Return a type in which the owner's arguments replace the type variables."""
     if isinstance(hint, TypeVar):
         return own.get(hint, Any)
     open_ = getattr(hint, "__parameters__", ()) if get_origin(hint) else ()

@@ -1,11 +1,11 @@
-"""RMF's supervisors and fleet adapters as rules, so that `judge` and the tests can play them.
+"""RMF's supervisors and fleet adapters as rules, so that `judge` and the tests can play RMF's part.
 
-The rules come from rmf_ros2 9dedd0f (2026-05). Quirks are included: no timeouts, no retries, a lift's
-mode ignored.
+The rules come from rmf_ros2 9dedd0f (2026-05). RMF's weaknesses are included: RMF has no timeouts and
+no retries, and ignores a lift's mode.
 
-There is no I/O and no clock. Each party hears a message, or its caller ticks it at `wake_at`; the party
-returns the messages to publish. `now` is RMF's clock in seconds (since the epoch, where stamps matter).
-A restarted party is a new object.
+The module has no I/O and no clock. Each party hears a message, or the caller ticks the party at
+`wake_at`. The party returns the messages to publish. `now` is RMF's clock in seconds. If stamps matter,
+`now` counts since the epoch. A restarted party is a new object.
 """
 
 from abc import ABC, abstractmethod
@@ -23,7 +23,7 @@ NEVER: Final = float("inf")
 
 
 class Party(ABC):
-    """A node on RMF's side. Some nodes have no timer."""
+    """A node on RMF's side. A node without a timer never ticks."""
 
     subscribes: Sequence[AnyTopic]
 
@@ -36,7 +36,7 @@ class Party(ABC):
         return []
 
     def wake_at(self) -> float:
-        """Time of the next timer (s); inf without a timer."""
+        """Time (s) of the next timer, or inf without a timer."""
         return NEVER
 
 
@@ -46,7 +46,7 @@ def door_request(door: str, requester: str, mode: d.DoorModeValue, now: float) -
 
 
 def has_session(heartbeat: d.SupervisorHeartbeat, requester: str, door: str) -> bool:
-    """Does the heartbeat list this requester for this door? (SupervisorHasSession.cpp)"""
+    """Return whether the heartbeat lists this requester for this door (SupervisorHasSession.cpp)."""
     return any(
         sessions.door_name == door and session.requester_id == requester
         for sessions in heartbeat.all_sessions

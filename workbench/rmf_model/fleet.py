@@ -1,22 +1,23 @@
 """A fleet adapter and its robots, for charging only.
 
-Read in rmf_ros2 9dedd0f (TaskManager.cpp, tasks/ChargeBattery.cpp, phases/WaitForCharge.cpp,
-FleetUpdateHandle.cpp), and seen with Jazzy's adapter:
+The rules come from rmf_ros2 9dedd0f (TaskManager.cpp, tasks/ChargeBattery.cpp,
+phases/WaitForCharge.cpp, FleetUpdateHandle.cpp), and from tests with Jazzy's adapter:
 1. ChargeBattery goes to the robot's dedicated waypoint and waits there for its battery. An assignment
    with a new waypoint or mode restarts a running ChargeBattery, and moves no other robot. A waypoint
    missing in the graph crashes the adapter.
 2. ChargeBattery is a task in two cases. RMF's planner plans the task, or RMF finds the battery too low
    for the way to the dedicated waypoint (the automatic retreat). A robot at that waypoint never
-   retreats; with Jazzy no robot below the recharge threshold does. The task ends at recharge_soc.
+   retreats. With Jazzy, no robot below the recharge threshold retreats. The task ends at recharge_soc.
    With `finishing_request: charge` the fleet's robots run ChargeBattery after their tasks. This
    ChargeBattery is no task, and lasts until the next task, even with a full battery. With `nothing`
    a robot stays. With `park` a robot drives to a parking spot. Jazzy's adapter (branch jazzy,
-   7eef65a) knows no parking spots: the robot goes to its dedicated waypoint, and again at each
-   assignment.
+   7eef65a) knows no parking spots. There the robot goes to its dedicated waypoint, and goes there
+   again at each assignment.
 3. A robot without a task shows the mode IDLE and no task id, even while it charges. Only
-   WaitForCharge sets CHARGING, and nothing resets CHARGING: every later task shows CHARGING too.
-4. An EasyFullControl adapter forgets the assignments in a restart. It takes the retained assignment,
-   and a moment later replaces the assignment by the charger of its file.
+   WaitForCharge sets CHARGING, and nothing resets CHARGING. Therefore every later task shows CHARGING
+   too.
+4. An EasyFullControl adapter forgets the assignments in a restart. First the adapter takes the
+   retained assignment. A moment later, the adapter replaces the assignment by the charger in its file.
 """
 
 from collections.abc import Mapping, Sequence
@@ -39,18 +40,21 @@ Doing = Literal["", "work", "charge", "idle charge", "idle park"]
 
 
 class AdapterCrashed(Exception):
-    """Error: RMF's fleet adapter crashed on an assignment to an unknown waypoint."""
+    """RMF's fleet adapter crashed, because an assignment named an unknown waypoint."""
 
 
 @dataclass
 class FleetRobot:
     """A robot of a fleet.
 
-    - `place`: the waypoint at which the robot stands; "" on the road. `goes_to`: its destination.
-    - `dedicated`, `waits`: its charging assignment (the waypoint, and whether it waits there).
-    - `doing`: its task, or its activity without a task. `task_id`: "" without a task.
+    - `place`: the waypoint at which the robot stands; "" on the road.
+    - `goes_to`: the robot's destination.
+    - `dedicated`: the waypoint of the robot's charging assignment.
+    - `waits`: whether the assignment makes the robot wait there.
+    - `doing`: the robot's task, or the robot's activity without a task.
+    - `task_id`: the id of the task; "" without a task.
     - `mode`: the last mode that a phase set.
-    - `stuck`: the robot cannot drive.
+    - `stuck`: whether the robot cannot drive.
     """
 
     name: str
@@ -68,12 +72,12 @@ class FleetRobot:
 
     @property
     def charges(self) -> bool:
-        """Does the robot's ChargeBattery run, as a task or without a task?"""
+        """Return whether the robot's ChargeBattery runs, as a task or without a task."""
         return self.doing in ("charge", "idle charge")
 
 
 class FleetAdapter(Party):
-    """Publishes FleetState at 1 Hz and hears ChargingAssignments."""
+    """A fleet adapter that publishes FleetState at 1 Hz and hears ChargingAssignments."""
 
     subscribes: Sequence[AnyTopic] = (CHARGING_ASSIGNMENTS,)
 
@@ -88,8 +92,9 @@ class FleetAdapter(Party):
     ) -> None:
         """Begin with `robots` at their parking spots.
 
-        `drive_s`: time (s) of every drive. `finishing`: the fleet's `finishing_request`. `jazzy`:
-        follow Jazzy's rules where they differ.
+        - `drive_s`: time (s) of every drive.
+        - `finishing`: the fleet's `finishing_request`.
+        - `jazzy`: whether Jazzy's rules apply where Jazzy differs.
         """
         self.name = name
         self.graph = graph
@@ -117,14 +122,13 @@ class FleetAdapter(Party):
         self._rest(self.robots[who], now)
 
     def starts_again(self, now: float) -> None:
-        """Restart the adapter after a kill. Each robot then has the charger that the adapter's file
-        names."""
+        """Restart the adapter after a kill. Each robot then has the charger in the adapter's file."""
         for robot in self.robots.values():
             robot.dedicated, robot.waits, robot.mode = self._spots[robot.name], False, IDLE
             self._rest(robot, now)
 
     def strays(self, who: str, place: str, now: float) -> None:
-        """Drive the robot to a place that does not belong to its present task."""
+        """Drive the robot to a place outside its present task."""
         self._go(self.robots[who], place, now)
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
@@ -152,7 +156,7 @@ class FleetAdapter(Party):
         return [(FLEET_STATES, d.FleetState(self.name, states))]
 
     def wake_at(self) -> float:
-        """Time of the next state or arrival (s)."""
+        """Time (s) of the next state or arrival."""
         ways = [robot.arrives_at for robot in self.robots.values() if robot.goes_to]
         return min([self._told_at + EVERY_S, *ways])
 
@@ -174,8 +178,8 @@ class FleetAdapter(Party):
             self._go(robot, robot.dedicated if self.jazzy else self._spots[robot.name], now)
 
     def _retreat(self, robot: FleetRobot, now: float) -> None:
-        """Retreat by the rules of consider_retreating_to_charger: not during a task, nor at the
-        dedicated waypoint."""
+        """Retreat by the rules of consider_retreating_to_charger. A robot with a task, or a robot at
+        its dedicated waypoint, does not retreat."""
         low = robot.battery_percent < RETREAT_PERCENT
         if self.jazzy and robot.battery_percent <= TOO_LATE_PERCENT:
             return

@@ -1,7 +1,9 @@
-"""The phases of a robot's task that concern us: RequestLift, EndLiftSession, DoorOpen, DoorClose.
+"""The phases of a robot's task that send messages to us: RequestLift, EndLiftSession, DoorOpen,
+DoorClose.
 
 Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/phases/. No phase gives up. Three
-phases are left out because they send nothing to us: the lift watchdog, localisation, holding points.
+other phases are left out, because they send nothing to us: the lift watchdog, localisation, and holding
+points.
 """
 
 from typing import Final
@@ -16,10 +18,10 @@ REPEAT_S: Final = 1.0
 
 
 class RequestLift(Phase):
-    """Wait for a LiftState with our floor, DOOR_OPEN and our session. Modes are ignored.
+    """Wait for a LiftState with our floor, DOOR_OPEN and our session. RMF ignores modes.
 
-    After a destination is set, the phase's 1 s timer publishes nothing, because the context repeats the
-    request at each LiftState.
+    The phase has a 1 s timer, which publishes nothing after a destination is set. From then on, the
+    context repeats the request at each LiftState.
     """
 
     claims_lift = True
@@ -36,8 +38,8 @@ class RequestLift(Phase):
         return robot.set_lift_destination(self.wanted, now)
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
-        """After the lift has come, request as a robot inside the car (RequestLift.cpp:322-326,
-        _finish)."""
+        """Take a message. After the lift has come, send the request of a robot inside the car
+        (RequestLift.cpp:322-326, _finish)."""
         match message:
             case d.LiftState(
                 lift_name=self.wanted.lift,
@@ -64,7 +66,7 @@ class EndLiftSession(Phase):
         return robot.release_lift()
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
-        """End the phase at the session's end (EndLiftSession.cpp, _init_obs)."""
+        """Take a message. End the phase when the session has ended (EndLiftSession.cpp, _init_obs)."""
         if isinstance(message, d.LiftState) and message.lift_name == self.lift:
             self.done = message.session_id != robot.requester_id
         return []
@@ -73,7 +75,8 @@ class EndLiftSession(Phase):
 class DoorOpen(Phase):
     """Send OPEN at the start and every second, until the door is OPEN *and* the heartbeat lists us.
 
-    Of the messages after the start, only the latest state (of any door) and the latest heartbeat count.
+    The messages before the start do not count. After the start, only the latest heartbeat and the
+    latest state count, and the state may be of any door.
     """
 
     def __init__(self, door: str) -> None:
@@ -87,7 +90,7 @@ class DoorOpen(Phase):
         return self.tick(robot, now)
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
-        """Check the door and the heartbeat (DoorOpen.cpp, _update_status)."""
+        """Take a message. Check the door and the heartbeat (DoorOpen.cpp, _update_status)."""
         match message:
             case d.DoorState():
                 self._state = message
@@ -124,7 +127,7 @@ class DoorClose(Phase):
         return self.tick(robot, now)
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
-        """Check the heartbeat (DoorClose.cpp, _update_status)."""
+        """Take a message. Check the heartbeat (DoorClose.cpp, _update_status)."""
         if isinstance(message, d.SupervisorHeartbeat):
             self.done = not has_session(message, robot.requester_id, self.door)
         return []

@@ -1,8 +1,8 @@
-"""A fleet adapter's context of one robot: the actions that all phases share.
+"""A fleet adapter's context of one robot, with the actions that all phases share.
 
 Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/agv/RobotContext.cpp:1281-1324 and
-1600-1800. The phases are in `phases.py`. `jazzy` selects Jazzy's rules where they differ (branch jazzy,
-7eef65a, RobotContext.cpp:1054-1095 and 1329-1419).
+1600-1800. The phases are in `phases.py`. With `jazzy`, Jazzy's rules apply where Jazzy differs (branch
+jazzy, 7eef65a, RobotContext.cpp:1054-1095 and 1329-1419).
 """
 
 from abc import ABC, abstractmethod
@@ -17,7 +17,7 @@ from workbench.rmf_model import NEVER, Party, Said, door_request, has_session
 
 
 class LiftDestination(Struct, frozen=True):
-    """Destination of the lift for the robot. `inside`: may the robot be in the car?"""
+    """The lift's destination for the robot. `inside` tells whether the robot may be in the car."""
 
     lift: str
     floor: str
@@ -27,8 +27,8 @@ class LiftDestination(Struct, frozen=True):
 class Phase(ABC):
     """One step of a robot's task.
 
-    `due_at`: when the phase's wall timer fires. `claims_lift`: the context must not release an idle
-    lift during this phase.
+    `due_at` is the time (s) of the phase's wall timer. If `claims_lift` is true, the context must not
+    release an idle lift during this phase.
     """
 
     done = False
@@ -49,10 +49,11 @@ class Phase(ABC):
 
 
 class RobotContext(Party):
-    """A fleet adapter's RobotContext (`requester_id` is fleet/robot) and its running phase, if any.
+    """A fleet adapter's RobotContext, with its running phase, if there is one. `requester_id` is
+    fleet/robot.
 
-    The caller sets `on_task` (has the robot a task?) and `in_car` (is its position inside the lift?).
-    To cancel a phase, set `robot.phase = None`.
+    The caller sets `on_task` if the robot has a task, and `in_car` if the robot's position is inside
+    the lift. To cancel a phase, set `robot.phase = None`.
     """
 
     subscribes: Sequence[topics.AnyTopic] = (
@@ -74,17 +75,17 @@ class RobotContext(Party):
         self._tasked_at = float("-inf")
 
     def begin(self, phase: Phase, now: float) -> list[Said]:
-        """Start this phase. Drop the last phase, even if it is not done."""
+        """Start this phase. Drop the previous phase, even if it is not finished."""
         self.phase = phase
         return phase.begin(self, now)
 
     @property
     def done(self) -> bool:
-        """Is no phase running?"""
+        """Return whether no phase is running."""
         return self.phase is None or self.phase.done
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
-        """Apply the context's own rules, then the rules of the phase."""
+        """Apply the context's own rules, and then the rules of the phase."""
         said: list[Said] = []
         match message:
             case d.LiftState():
@@ -100,7 +101,7 @@ class RobotContext(Party):
         return [] if self.phase is None or self.done else self.phase.tick(self, now)
 
     def wake_at(self) -> float:
-        """Time of the phase's wall timer (s)."""
+        """Time (s) of the phase's wall timer."""
         return NEVER if self.phase is None or self.done else self.phase.due_at
 
     # ---- lift
@@ -113,12 +114,12 @@ class RobotContext(Party):
         return self._publish_destination(now)
 
     def has_lift_arrived(self, lift: str, floor: str) -> bool:
-        """Has the lift already come for this destination?"""
+        """Return whether the lift has already come for this destination."""
         at = self.destination
         return self.lift_arrived and at is not None and (at.lift, at.floor) == (lift, floor)
 
     def release_lift(self) -> list[Said]:
-        """Forget the lift. END follows a LiftState with our session; Jazzy also sends END
+        """Forget the lift. After the next LiftState with our session, END follows. Jazzy also sends END
         immediately."""
         said = []
         if self.jazzy and self.destination is not None:

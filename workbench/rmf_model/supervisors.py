@@ -1,8 +1,8 @@
 """The rules of rmf_lift_supervisor and rmf_door_supervisor.
 
 Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/lift_supervisor/Node.cpp and door_supervisor/Node.cpp.
-Both supervisors forget everything in a restart. `jazzy` selects Jazzy's rules where they differ (branch
-jazzy, 7eef65a).
+Both supervisors forget everything in a restart. With `jazzy`, Jazzy's rules apply where Jazzy differs
+(branch jazzy, 7eef65a).
 """
 
 from collections.abc import Sequence
@@ -17,10 +17,9 @@ from workbench.rmf_model import Party, Said, door_request
 
 
 class LiftSupervisor(Party):
-    """rmf_lift_supervisor, which remembers the last request of the holder of each lift.
+    """The node rmf_lift_supervisor. For each lift, it remembers the holder's last request.
 
-    Jazzy's supervisor repeats the holder's request at every state. It also sends END for an empty
-    session.
+    Jazzy's supervisor repeats the holder's request at every state, and sends END for an empty session.
     """
 
     subscribes: Sequence[topics.AnyTopic] = (topics.ADAPTER_LIFT_REQUESTS, topics.LIFT_STATES)
@@ -30,7 +29,8 @@ class LiftSupervisor(Party):
         self._jazzy = jazzy
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
-        """Adopt, forward or silently drop adapter requests. Repeat requests at states."""
+        """Take a message. Adopt, forward or silently drop an adapter's request. At a state, repeat the
+        holder's request."""
         match message:
             case d.LiftRequest():
                 return self._requested(message, now)
@@ -83,7 +83,8 @@ def _satisfies(state: d.LiftState, held: d.LiftRequest) -> bool:
 
 
 class DoorSupervisor(Party):
-    """rmf_door_supervisor: each door's sessions, each with the time of its newest open request.
+    """The node rmf_door_supervisor. It remembers each door's sessions, and the time of each session's
+    newest open request.
 
     The supervisor publishes a heartbeat only on an adapter request.
     """
@@ -95,7 +96,7 @@ class DoorSupervisor(Party):
         self.sessions: dict[str, dict[str, d.Time]] = {}
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
-        """Begin and end sessions at adapter requests. Send reminders at states."""
+        """Take a message. An adapter request begins or ends a session. At a state, send a reminder."""
         match message:
             case d.DoorRequest(requested_mode=d.DoorMode(d.DoorModeValue.MODE_OPEN)):
                 return self._opened(message, now)

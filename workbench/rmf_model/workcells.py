@@ -1,10 +1,11 @@
-"""RMF's phases at a workcell: DispenseItem and IngestItem, which follow the same rules.
+"""RMF's phases at a workcell: DispenseItem and IngestItem. Both phases follow the same rules.
 
 Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/phases/: DispenseItem.cpp and
-IngestItem.cpp (`_init_obs`, `_get_status`), Utils.cpp (`is_newer`: an equal stamp counts as newer). The
-phase repeats its request each second, without a stamp, until the phase ends. Nothing cancels the phase,
-and the phase has no time limit. tasks/Delivery.cpp uses the task's id as the guid, so two requests of
-one task have the same guid.
+IngestItem.cpp (`_init_obs`, `_get_status`), Utils.cpp (`is_newer`: an equal stamp counts as newer).
+
+The phase repeats its request each second, without a stamp, until the phase ends. Nothing cancels the
+phase, and the phase has no time limit. tasks/Delivery.cpp uses the task's id as the guid, so two
+requests of one task have the same guid.
 """
 
 from typing import Final, Literal
@@ -25,7 +26,7 @@ INGESTOR: Final[tuple[AnyTopic, ...]] = (topics.INGESTOR_STATES, topics.INGESTOR
 
 
 class WorkcellPhase(Party):
-    """One phase. `outcome`: "" until the phase ends. `why`: the message that ended the phase."""
+    """One phase. `outcome` is "" until the phase ends. `why` is the message that ended the phase."""
 
     def __init__(self, request: WorkcellRequest, now: float) -> None:
         self.request = request
@@ -41,8 +42,8 @@ class WorkcellPhase(Party):
         self._last = 0.0
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
-        """Judge the latest result and the latest state, each if it has come (rxcpp's
-        combine_latest)."""
+        """Judge the latest result and the latest state. Leave out a message that has not yet come
+        (rxcpp's combine_latest)."""
         if isinstance(message, WorkcellResult):
             self._result = message
         if isinstance(message, WorkcellState):
@@ -60,7 +61,7 @@ class WorkcellPhase(Party):
         return [(self._topic, self.request)]
 
     def wake_at(self) -> float:
-        """Time of the next request (s)."""
+        """Time (s) of the next request."""
         return NEVER if self.outcome else self._next_at
 
     def _judge_result(self) -> None:
@@ -78,8 +79,8 @@ class WorkcellPhase(Party):
                 self.outcome, self.why = "failed", "a result FAILED"
 
     def _judge_state(self) -> None:
-        """Judge the latest state, which may still turn a failure into a completion, as in
-        `_get_status`."""
+        """Judge the latest state. As in `_get_status`, the state may still turn a failure into a
+        completion."""
         state, guid = self._state, self.request.request_guid
         if state is None or state.guid != self.request.target_guid:
             return

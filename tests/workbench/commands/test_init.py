@@ -133,7 +133,7 @@ def test_a_missing_folder_is_reported_before_any_question_is_asked(
 @pytest.mark.parametrize(
     ("words", "answer"),
     [
-        ("--kind door", "no terminal to ask on: give --name, or --yes for 'Door1'"),
+        ("--kind door", "there is no terminal for questions: give --name, or --yes for 'Door1'"),
         ("--kind door --floors L1 --yes", "--floors does not apply to a door on modbus"),
         ("--kind lift --wiring http --yes", "a lift is not wired by http: gpio, modbus, rs485"),
         ("--kind lift --floors L1 --yes", "a lift has at least two floors, each name once, not L1"),

@@ -261,9 +261,9 @@ def test_a_graph_without_any_state_is_said_to_be_empty() -> None:
         [
             "no lift is heard on lift_states;"
             " nothing is heard by dds in domain 7, on this machine alone;"
-            " is it in another domain (--domain-id), on another transport (--transport),"
-            " on another machine (without --localhost)?"
-            " rmf-bridge status shows a daemon's, on its own machine"
+            " is the device in another domain (--domain-id), on another transport (--transport),"
+            " or on another machine (without --localhost)?"
+            " rmf-bridge status on the daemon's machine shows both"
         ],
         Failed("gave up after 10 s"),
     )
@@ -500,7 +500,7 @@ def test_a_request_for_any_charger_is_done_when_one_of_them_shows_the_robot() ->
 def test_a_robot_that_waits_is_said_to_wait_and_how_to_withdraw_it() -> None:
     waits = tell(QUEUE, every_second(OTHERS), timeout_s=5.0)
     text = (
-        "no charger serves fleet/robot yet: it waits in the charger coordinator's queue"
+        "no charger serves fleet/robot yet: the robot waits in the charger coordinator's queue"
         " (see `rmf-bridge watch --localhost`), or the request was refused (see the coordinator's log);"
         " to withdraw the request: rmf-bridge send charger any --queue --cancel r1 --localhost"
     )

@@ -152,7 +152,7 @@ def test_a_remedy_counts_more_than_that_nobody_has_to_act() -> None:
     remedies = {"OUTCOME_UNKNOWN": ("nobody knows", "look at the robot")}
     text = worded(Notice("new", trouble, 30.0), idle, None, remedies).text
     assert text.splitlines() == [
-        "It has lasted 30 s.",
+        "The trouble has lasted 30 s.",
         "It is idle.",
         "OUTCOME_UNKNOWN: nobody knows. look at the robot",
     ]

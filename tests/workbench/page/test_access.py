@@ -51,7 +51,7 @@ def test_an_impossible_user_or_a_short_password_is_not_added(
 @pytest.mark.parametrize(
     ("text", "mode", "why"),
     [
-        ("", 0o600, "it has no user"),
+        ("", 0o600, "has no user"),
         ("ann:secret\n", 0o600, ":1: not a hash"),
         ("# people\nann\n", 0o600, ":2: not a hash"),
         ("", 0o644, "open to other users"),

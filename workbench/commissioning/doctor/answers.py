@@ -1,8 +1,11 @@
-"""Find devices on a file's buses: read each device of the file once, then scan a limited range for
-other devices.
+"""Find devices on a file's buses.
 
-Nothing is written. Drivers are read but never opened, because opening claims outputs and may switch
-them off. The doctor removes the modules' watchdogs from the settings, so no driver arms a watchdog.
+The doctor first reads each device of the file once. Then the doctor scans a limited range of addresses
+for other devices.
+
+The doctor writes nothing. The doctor reads through drivers but never opens a driver, because opening
+claims outputs and may switch the outputs off. The doctor removes the modules' watchdogs from the
+settings, so no driver arms a watchdog.
 """
 
 import re
@@ -26,7 +29,8 @@ ANSWERS_S: Final = 0.5
 """Maximum time (s) for a device on MQTT to answer a question."""
 TOPICS_SHOWN: Final = 40
 UNITS_MOST: Final = {"modbus": 247, "can": 127}
-"""Highest unit or node number (Modbus over Serial Line V1.02, 2.2; CiA 301)."""
+"""Highest unit number on Modbus, and highest node number on CAN (Modbus over Serial Line V1.02, 2.2;
+CiA 301)."""
 SOME: Final = 16
 LOOK_AT: Final = {
     "modbus": 'supply and cable; docs/how-to/wire.md, "RS-485"',
@@ -36,19 +40,23 @@ LOOK_AT: Final = {
 }
 TEXTS: Final = "docs/how-to/troubleshoot.md"
 NO_PATH: Final = (10, 11)
-"""Exception codes of a gateway whose unit is silent (Modbus Application Protocol V1.1b3, section 7)."""
+"""Exception codes of a gateway when the unit behind the gateway is silent (Modbus Application Protocol
+V1.1b3, section 7)."""
 DEVICE_TYPE: Final = (0x1000, 0, 4)
-"""Index, subindex and size (bytes) of the device type, which every CANopen node has (CiA 301,
-7.5.2.1)."""
+"""Index, subindex and size (bytes) of the object "device type". Every CANopen node has this object (CiA
+301, 7.5.2.1)."""
 
 
 def answers(config: Config, bus_name: str, whole: bool) -> Iterator[Finding]:
-    """Examine a bus, but not GPIO. `whole`: scan every unit or node, not only 1 to 16."""
+    """Examine any bus except GPIO. With `whole`, scan every unit or node. Otherwise scan only 1 to
+    16."""
     subject, kind = f"bus {bus_name}", config.bus_types[bus_name]
     try:
         bus = _opened(config, bus_name)
     except HalError as error:
-        yield wrong(subject, str(error), "no device on it can be served", LOOK_AT.get(kind, TEXTS))
+        yield wrong(
+            subject, str(error), "no device on this bus can be served", LOOK_AT.get(kind, TEXTS)
+        )
         return
     try:
         yield from readings(config, bus_name, bus, subject)
@@ -62,14 +70,15 @@ def _opened(config: Config, bus_name: str) -> Bus:
 
 
 def unarmed(settings: msgspec.Struct) -> msgspec.Struct:
-    """Return a bus's settings without the modules' watchdogs, because a reading would arm them."""
+    """Return a bus's settings without the modules' watchdogs. With watchdogs, a reading would arm
+    them."""
     if getattr(settings, "module_watchdog", None) is None:
         return settings
     return msgspec.structs.replace(settings, module_watchdog=None)
 
 
 def readings(config: Config, bus_name: str, bus: Any, subject: str) -> Iterator[Finding]:
-    """Yield the answer of each device on this bus, decoded by its driver."""
+    """Yield the answer of each device on this bus, as the device's driver decodes the answer."""
     reads = {name: _reading(config, bus_name, name, bus) for name in config.devices_at(bus_name)}
     _listened(bus)
     for name, read in reads.items():
@@ -88,7 +97,8 @@ def readings(config: Config, bus_name: str, bus: Any, subject: str) -> Iterator[
 
 
 def _reading(config: Config, bus_name: str, name: str, bus: Any) -> Callable[[], Any]:
-    """Return how to read a device: by its driver; by this bus's contacts alone if it has two buses."""
+    """Return a function that reads a device. The function reads through the device's driver. If the
+    device has two buses, the function reads only this bus's contacts."""
     if config.other_buses(name):
         return Points(config.wires_on(bus_name, name), bus).read
     read: Callable[[], Any] = config.driver_type(name).create(name, config.devices[name], bus).read
@@ -96,7 +106,8 @@ def _reading(config: Config, bus_name: str, name: str, bus: Any) -> Callable[[],
 
 
 def _read(read: Callable[[], Any], bus: Bus) -> Any:
-    """Read. Try several times, because a sleeping line answers late. Raises DriverError."""
+    """Read the device. Try several times, because a device on a sleeping line answers late. Raises
+    DriverError."""
     for _ in range(TRIES - 1):
         bus.insist()
         try:
@@ -108,7 +119,8 @@ def _read(read: Callable[[], Any], bus: Bus) -> Any:
 
 
 def _listened(bus: Any, listen_s: float = HEARD_S) -> None:
-    """Receive for `listen_s` (s) on CAN and MQTT. The readings show faults of the bus."""
+    """Receive for `listen_s` (s) on CAN and MQTT. Ignore faults of the bus, because the readings show
+    the same faults."""
     if not hasattr(bus, "wait"):
         return
     try:
@@ -165,8 +177,8 @@ def _can(config: Config, bus_name: str, bus: Any, whole: bool) -> Iterator[Findi
 
 
 def _mqtt(config: Config, bus_name: str, bus: Any, whole: bool) -> Iterator[Finding]:
-    """List the topics of the broker, only with `--scan`, because our user may not be allowed to read
-    them."""
+    """List the broker's topics, but only with `--scan`, because our user may not be allowed to read the
+    topics."""
     if not whole:
         return
     subject, ours = f"bus {bus_name}", set(bus.topics())
@@ -219,7 +231,7 @@ def _scanned(
 
 
 def numbers(config: Config, bus_name: str, what: str) -> Iterator[int]:
-    """Return the units or nodes that the file names on this bus."""
+    """Return the numbers of the units or nodes that the file names on this bus."""
     for name in config.devices_at(bus_name):
         settings, driver = config.devices[name], config.driver_type(name)
         claimed = [place for place, _ in driver.claims(settings)]

@@ -1,5 +1,5 @@
-"""Examine the kernel's CAN interfaces (SocketCAN): present, up, at the right bitrate, and able to
-recover."""
+"""Examine the kernel's CAN interfaces (SocketCAN). An interface must be present, up, at the right
+bitrate, and able to recover."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -11,14 +11,15 @@ from workbench.commissioning.doctor.machine import Machine
 
 CAN: Final = "can"
 ARPHRD_CAN: Final = "280"
-"""Number of a CAN interface's type (linux/if_arp.h)."""
+"""The kernel's number for the interface type CAN (linux/if_arp.h)."""
 IFF_UP: Final = 1
 DEAF: Final = "no station on this bus is heard"
 HOW: Final = 'docs/how-to/wire.md, "CAN": sudo ip link set {} up type can bitrate {} restart-ms 100'
 
 
 def interface(machine: Machine, name: str, bitrate: int | None) -> Iterator[Finding]:
-    """Examine `can`. `bitrate`: bit/s of the stations; None if each site chooses its bitrate."""
+    """Examine `can`. `bitrate` is the stations' bitrate (bit/s), or None if each site chooses its
+    bitrate."""
     rate = str(bitrate or "250000")
     folder = f"/sys/class/net/{name}"
     if not machine.at(folder).is_dir():
@@ -53,7 +54,7 @@ class _Timing(msgspec.Struct, frozen=True):
 
 
 class Controller(msgspec.Struct, frozen=True):
-    """State of a CAN controller, from `ip -details`."""
+    """State of a CAN controller, as `ip -details` prints it."""
 
     state: str = "?"
     bittiming: _Timing = _Timing()
@@ -100,7 +101,7 @@ def _controller(name: str, told: Controller, bitrate: int | None) -> Iterator[Fi
     elif state not in ("ERROR-ACTIVE", "?"):
         yield warning(CAN, f"{name} is {state.lower()}", "the controller counts many errors", check)
     if not told.restart_ms:
-        means = "after a bus-off nothing is heard until the interface is set down and up"
+        means = "after a bus-off the interface hears nothing until somebody sets it down and up"
         yield warning(CAN, f"{name} has no restart-ms", means, how)
 
 

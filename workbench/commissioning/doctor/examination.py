@@ -24,15 +24,17 @@ if TYPE_CHECKING:
     from bridges.settings.building_map import BuildingMap
 
 XNERGY_BITRATE: Final = 250_000
-"""Default bitrate (bit/s) of the maker's receivers on CANopen (`drivers/charger/canopen.py`)."""
+"""Default bitrate (bit/s) of Xnergy's receivers on CANopen (`drivers/charger/canopen.py`)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """Choices of the command line. `kill_test`: device and output; None without the test.
+    """Choices of the command line.
 
-    `whole_scan`: scan every unit or node of a bus. `listen_s`: time (s) to listen to RMF's graph; 0: do
-    not join. `line`: the command line, with the options of that graph.
+    - `kill_test`: device and output of the kill test; None without the test.
+    - `whole_scan`: whether the doctor scans every unit or node of a bus.
+    - `listen_s`: time (s) to listen to RMF's graph. With 0, the doctor does not join the graph.
+    - `line`: the command line, with the options of that graph.
     """
 
     runtime_dir: str | None = None
@@ -47,7 +49,7 @@ class Options:
 def examined(
     config: Config, building: "BuildingMap | None", machine: Machine, options: Options
 ) -> Iterator[Finding]:
-    """Yield every finding as soon as it is made."""
+    """Yield each finding as soon as the doctor knows the finding."""
     file, who = config.path.absolute(), user(machine, config.path.stem)
     yield from _file(config, building)
     yield from users(machine, who)
@@ -77,7 +79,7 @@ def examined(
 
 
 def _file(config: Config, building: "BuildingMap | None") -> Iterator[Finding]:
-    """Examine `file`: report the result of `check`, in short."""
+    """Examine `file`. The finding summarises the output of `check`."""
     yield ok("file", f"{config.path} is a valid file of a {config.kind}")
     for problem in config.warnings:
         yield note("file", str(problem), "legal, and worth a look", "rmf-bridge check FILE")
@@ -160,12 +162,12 @@ def _killed(
     assert step is not None  # the command has already refused an unknown step
 
     def still_driven() -> bool | None:
-        """Is one of the device's GPIO lines still an output?"""
+        """Return whether one of the device's GPIO lines is still an output."""
         bus = config.bus_of(device)
         if config.bus_types[bus] != "gpio":
             return None
         chip = gpio.header(machine, config.buses[bus].chip)
-        assert chip is not None  # without a chip no output could have been switched on
+        assert chip is not None  # without a chip, no output could have been switched on
         outputs = [wire for wire in config.wires(device) if wire.direction == "out"]
         return any(line(machine, chip, _bcm(wire.point)).output for wire in outputs)
 

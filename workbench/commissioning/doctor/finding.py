@@ -6,8 +6,8 @@ from typing import Final, Literal
 import msgspec
 
 Level = Literal["ok", "note", "unknown", "warning", "wrong"]
-"""Severity of a finding. `note`: worth knowing, without a need to act. `unknown`: this machine cannot
-show the fact."""
+"""Severity of a finding. With `note`, the reader need not act. With `unknown`, this machine cannot show
+the fact."""
 WELL, WARNINGS, WRONG = 0, 1, 2
 EXIT_CODE: Final = {
     "ok": WELL,
@@ -44,15 +44,15 @@ def unknown(subject: str, found: str, means: str = "", do: str = "") -> Finding:
 
 
 def warning(subject: str, found: str, means: str, do: str) -> Finding:
-    """Make a finding about something that works now, but may fail later."""
+    """Make a finding about a fact that does no harm now, but may do harm later."""
     return Finding(subject, "warning", found, means, do)
 
 
 def wrong(subject: str, found: str, means: str, do: str) -> Finding:
-    """Make a finding about something that cannot work."""
+    """Make a finding about a fact that prevents a working bridge."""
     return Finding(subject, "wrong", found, means, do)
 
 
 def exit_code(findings: Iterable[Finding]) -> int:
-    """Return 0 if all is well, 1 for warnings and unknown facts, 2 if something is wrong."""
+    """Return 0 if all is well, 1 for warnings and unknown facts, and 2 if something is wrong."""
     return max((EXIT_CODE[one.level] for one in findings), default=WELL)

@@ -1,5 +1,7 @@
-"""The form for an afternoon with real hardware (docs/how-to/hardware.md). `doctor` fills in the machine
-and the findings; a person fills in the other cells."""
+"""The form for an afternoon with real hardware (docs/how-to/hardware.md).
+
+`doctor` fills in the cells for the machine and the findings. A person fills in the other cells.
+"""
 
 import platform
 import time
@@ -18,8 +20,8 @@ ALL: Final = frozenset({"gpio", "modbus", "http", "can"})
 
 
 class FormStep(msgspec.Struct, frozen=True):
-    """One step of docs/how-to/hardware.md. `buses`: the buses that need the step. `seen`: the result
-    that a person should see."""
+    """One step of docs/how-to/hardware.md. `buses` lists the buses that need the step. `seen` is the
+    result that a person should see."""
 
     number: str
     buses: frozenset[str]

@@ -1,5 +1,8 @@
-"""Examine the 40-pin header: its chip, the holders of its lines, and its outputs at boot and after a
-daemon's death."""
+"""Examine the 40-pin header.
+
+The examination finds the header's chip and the programs that hold its lines. The examination also tells
+the levels of the outputs at boot and after a daemon's death.
+"""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -22,7 +25,7 @@ BOARDS: Final = {
     "pinctrl-bcm2711": "a Raspberry Pi 4",
     "pinctrl-rp1": "a Raspberry Pi 5",
 }
-"""Labels that Raspberry Pi's kernels give to the header's chip."""
+"""Chip label -> model of the board. Raspberry Pi's kernels give these labels to the header's chip."""
 HEADER_LABEL: Final = "pinctrl-"
 CONFIGS: Final = ("/boot/firmware/config.txt", "/boot/config.txt")
 PERSIST: Final = (
@@ -34,7 +37,8 @@ KILL_TEST: Final = "rmf-bridge doctor FILE --kill-test shows it with one output"
 
 
 def gpio(machine: Machine, chip: int | None, who: User) -> Iterator[Finding]:
-    """Examine `gpio`: may the daemon use the header's chip? `chip`: the number in the YAML, if any."""
+    """Examine `gpio`, and tell whether the daemon may use the header's chip. `chip` is the number in
+    the YAML, if there is one."""
     if not machine.installed("lgpio"):
         do = "sudo apt install python3-lgpio, or in the clone .venv/bin/pip install '.[gpio]'"
         yield wrong(GPIO, "this Python has no lgpio", "no pin can be claimed", do)
@@ -53,13 +57,14 @@ def gpio(machine: Machine, chip: int | None, who: User) -> Iterator[Finding]:
             GPIO,
             f"the YAML names gpiochip{chip}, whose label is {found.label}",
             f"the header's label begins with {HEADER_LABEL}: this may be another chip",
-            "delete chip:, and the header is found by its label",
+            "delete chip:, and the daemon finds the header by its label",
         )
     yield _permission(machine, found, who)
 
 
 def header(machine: Machine, chip: int | None) -> Chip | None:
-    """Return the daemon's chip: the chip that the YAML names, else the chip with the header's label."""
+    """Return the chip that the YAML names. If the YAML names no chip, return the chip with the header's
+    label."""
     for one in chips(machine):
         if one.number == chip or (chip is None and one.label.startswith(HEADER_LABEL)):
             return one
@@ -91,7 +96,7 @@ def _permission(machine: Machine, chip: Chip, who: User) -> Finding:
 
 
 def lines(machine: Machine, chip: Chip, wires: Iterable[Wire]) -> Iterator[Finding]:
-    """Find other programs that hold these pins. Call only while no daemon runs."""
+    """Find other programs that hold these pins. A caller must make sure that no daemon runs."""
     free = True
     for wire in wires:
         try:
@@ -137,8 +142,8 @@ def _safe_line(wire: Wire) -> str:
 
 
 def _firmware(machine: Machine) -> dict[int, bool]:
-    """Return BCM number -> level that config.txt drives with lines such as `gpio=18=op,dl`; True is
-    high."""
+    """Return BCM number -> level at boot (True is high). Lines of config.txt such as `gpio=18=op,dl`
+    set the level."""
     levels: dict[int, bool] = {}
     for text in filter(None, map(machine.text, CONFIGS)):
         for pins, options in re.findall(r"^\s*gpio=([0-9,-]+)=(\S+)", text, re.MULTILINE):
@@ -159,7 +164,8 @@ def _pins(text: str) -> Iterator[int]:
 
 
 def death(machine: Machine) -> Iterator[Finding]:
-    """Examine `gpio after a death`: does the kernel still drive an output after its holder died?"""
+    """Examine `gpio after a death`, and tell whether the kernel still drives an output after the
+    output's holder died."""
     said = next(filter(None, map(machine.text, PERSIST)), "")
     strict = any(
         re.search(r"^\s*dtparam=.*\bstrict_gpiod\b", machine.text(path) or "", re.MULTILINE)

@@ -1,8 +1,7 @@
-"""Judge the points of docs/how-to/harden.md by the facts that this machine shows. The doctor only
-reads.
+"""Compare this machine with the points of docs/how-to/harden.md. The doctor only reads.
 
-Each subject is a heading of that page. A fact that this machine cannot show is a finding `unknown`,
-neither good nor bad.
+Each subject is a heading of that page. If this machine cannot show a fact, the finding is `unknown`,
+which is neither good nor bad.
 """
 
 import re
@@ -32,9 +31,11 @@ OTHERS_WRITE: Final = stat.S_IWGRP | stat.S_IWOTH
 OTHERS_READ: Final = stat.S_IRWXG | stat.S_IRWXO
 READABLE: Final = ("ca", "certificate", "ca_file", "certificate_file")
 LISTENS: Final = {"tcp": "0A", "udp": "07"}
-"""Protocol -> number in /proc/net of an open socket without peer (include/net/tcp_states.h)."""
+"""Protocol -> a socket state in /proc/net, as a hexadecimal number. A socket in this state is open and
+has no peer (include/net/tcp_states.h)."""
 LOOPBACK: Final = re.compile("(0{16}FFFF0000)?[0-9A-F]{6}7F|0{24}01000000")
-"""Pattern of 127.x.x.x and ::1 in /proc/net on x86 and arm: each word begins with its last byte."""
+"""Pattern of 127.x.x.x and ::1 in /proc/net. On x86 and arm, /proc/net prints the four bytes of each
+word in reverse order."""
 
 
 def hardening(config: Config, machine: Machine) -> Iterator[Finding]:
@@ -54,7 +55,7 @@ def hardening(config: Config, machine: Machine) -> Iterator[Finding]:
 
 
 def _service(machine: Machine, name: str) -> dict[str, str] | None:
-    """Return the properties of the file's service; None if systemd does not know the service."""
+    """Return the properties of the file's service. Return None if systemd does not know the service."""
     unit = f"rmf-bridge@{name}.service"
     shown = machine.printed("systemctl", "show", unit, "-p", "LoadState,User,Environment") or ""
     found = dict(line.split("=", 1) for line in shown.splitlines() if "=" in line)
@@ -200,7 +201,7 @@ def _root(mounts: str | None) -> Finding:
 
 
 def _files(config: Config, machine: Machine) -> Iterator[Finding]:
-    """Judge the modes of the YAML and its folder, and of each file that the YAML names."""
+    """Examine the modes of the YAML, of the YAML's folder, and of each file that the YAML names."""
     file = config.path.absolute()
     secrets, readable = (
         list(dict.fromkeys(Path(use.what) for use in named_files(config, keys)))

@@ -15,7 +15,8 @@ FREE_LEAST: Final = 50 << 20
 
 
 def clock(machine: Machine) -> Iterator[Finding]:
-    """Examine `clock`: RMF compares the stamps of states with its own clock."""
+    """Examine `clock`. The clock must be right, because RMF compares the stamps of states with RMF's
+    own clock."""
     found = "the clock is not synchronised"
     means = "states carry wrong stamps, and RMF may take states for old; durations are right"
     do = "timedatectl timesync-status; is the time server reached? A Pi has no clock of its own"
@@ -31,7 +32,8 @@ def clock(machine: Machine) -> Iterator[Finding]:
 
 
 def watchdog(machine: Machine) -> Iterator[Finding]:
-    """Examine `watchdog`: does a watchdog restart this machine when its kernel or systemd hangs?"""
+    """Examine `watchdog`, and tell whether a watchdog restarts this machine when the kernel or systemd
+    hangs."""
     subject = "watchdog"
     means = "when the kernel hangs, relays stay as they are until somebody cuts the supply"
     if not machine.folder("/dev", "watchdog*"):
@@ -56,7 +58,7 @@ def watchdog(machine: Machine) -> Iterator[Finding]:
 
 
 def directories(machine: Machine, places: Directories, who: User) -> Iterator[Finding]:
-    """Examine `disk`: can the daemon write its files?"""
+    """Examine `disk`, and tell whether the daemon can write its files."""
     for folder in places.folders:
         found = existing(machine.at(folder))
         yield disk(str(folder), os.statvfs(found))
@@ -70,7 +72,10 @@ def directories(machine: Machine, places: Directories, who: User) -> Iterator[Fi
 
 
 def disk(what: str, found: os.statvfs_result) -> Finding:
-    """Examine the free space. A disk in memory may be small without a warning."""
+    """Examine the free space of a disk. Warn if less than FREE_LEAST is free.
+
+    A disk may be small because it is in memory. Then the limit is a twentieth of the disk.
+    """
     means = "the device is served nevertheless, but status, log and the record of outputs get lost"
     if found.f_flag & os.ST_RDONLY:
         do = "an overlay or tmpfs for this directory; after errors of an SD card: replace it"
@@ -88,7 +93,7 @@ def disk(what: str, found: os.statvfs_result) -> Finding:
 
 
 def existing(folder: Path) -> Path:
-    """Return the directory, or its nearest existing parent."""
+    """Return the directory, or the nearest parent directory that exists."""
     return next(place for place in (folder, *folder.parents) if _is_there(place))
 
 

@@ -1,9 +1,11 @@
-"""The kill test: does an output go off when its holding process is killed?
+"""The kill test shows whether an output goes off when the process that holds the output is killed.
 
 Another process (`victim.py`) switches one output on as the daemon would, with the daemon's lock, record
-and guard. The test kills this process with -9. Then the guard must switch the output off and verify it,
-as systemd's ExecStopPost does after a service dies. On GPIO the test first looks whether the line is
-still an output; only then does the guard act.
+and guard. The test kills this process with -9. Then the guard must switch the output off and verify
+that the output is off. The guard does the same as systemd's ExecStopPost after a service dies.
+
+On GPIO, the test first checks whether the line is still an output. Only after this check may the guard
+act.
 """
 
 import os
@@ -24,14 +26,14 @@ from workbench.commissioning.walk.core import WalkStep
 KILL_TEST: Final = "kill test"
 STARTS_S: Final = 15.0
 SEEN_S: Final = 1.0
-"""Time (s) for which a relay is on before the kill, long enough for a person to see."""
+"""Time (s) for which a relay is on before the kill. A person needs this time to see the relay."""
 OFF_WITHIN_S: Final = 15.0
 """Maximum time (s) until the output is off. `outputs-off` takes up to 5 s, and may run twice."""
 LOOK_S: Final = 0.02
 CUT: Final = "cut the relays' supply; then rmf-bridge outputs-off FILE"
 
 StillDriven = Callable[[], bool | None]
-"""Function that tells whether the kernel still drives the line; None if unknown."""
+"""A function that tells whether the kernel still drives the line, or None if this is unknown."""
 
 
 def kill_test(
@@ -42,7 +44,7 @@ def kill_test(
     runtime_dir: str | None,
     kept: StillDriven,
 ) -> Iterator[Finding]:
-    """Run the kill test. No daemon may serve the file meanwhile."""
+    """Run the kill test. No daemon may serve the file during the test."""
     name = f"{device} {step.name}"
     victim = _started(file, device, step.name, runtime_dir)
     try:
@@ -103,8 +105,8 @@ def _started(
 
 
 def _line(victim: "subprocess.Popen[bytes]", within_s: float) -> str:
-    """Return the victim's next line; "" if no line comes within `within_s` (s), or the victim has
-    ended."""
+    """Return the victim's next line. Return "" if no line comes within `within_s` (s), or if the victim
+    has ended."""
     assert victim.stdout
     if not select.select([victim.stdout], [], [], within_s)[0]:
         return ""
@@ -116,8 +118,8 @@ def _ended_early(victim: "subprocess.Popen[bytes]") -> str:
 
 
 def _ended(victim: "subprocess.Popen[bytes]") -> None:
-    """Close the victim's input, and wait until the victim has ended. A living victim then switches
-    off."""
+    """Close the victim's input, and wait until the victim has ended. A victim that still lives switches
+    the output off before the victim ends."""
     assert victim.stdin
     assert victim.stdout
     victim.stdin.close()
@@ -126,8 +128,8 @@ def _ended(victim: "subprocess.Popen[bytes]") -> None:
 
 
 def _off_after(places: Directories, file: Path, died_at: float) -> float | None:
-    """Return the time (s) until `outputs-off` removed the record; None if it did not. It removes the
-    record after it has verified that all is off."""
+    """Return the time (s) until `outputs-off` removed the record. Return None if the record is still
+    there. `outputs-off` removes the record after a check that all outputs are off."""
     pause = threading.Event()
     while (after_s := time.monotonic() - died_at) < OFF_WITHIN_S:
         if not Records(places, file).unreleased():

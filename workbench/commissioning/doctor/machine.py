@@ -1,7 +1,7 @@
-"""This machine as the doctor sees it: its files, its commands' output, its devices' answers.
+"""The doctor's only access to this machine: files, commands' output, and device files' answers.
 
-The doctor reaches the machine only through this module. In tests `root` is the directory of a made-up
-machine: scripts in its `usr/bin` are the commands, and `ioctl` answers in place of its devices.
+In tests, `root` is the directory of a simulated machine. Scripts in `usr/bin` below `root` are the
+commands, and the test's `ioctl` answers for the device files.
 """
 
 import fcntl
@@ -18,7 +18,7 @@ COMMAND_S: Final = 3.0
 PLACES: Final = ("usr/sbin", "usr/bin", "sbin", "bin")
 TEXT_MAX: Final = 1 << 20
 TIMEX_MAX: Final = 512
-"""Size (bytes) greater than any kernel's struct timex. A struct of zeroes only reads the clock's
+"""A size (bytes) greater than any kernel's struct timex. A struct full of zeroes only reads the clock's
 state."""
 TIME_ERROR: Final = 5
 
@@ -36,7 +36,8 @@ def _installed(package: str) -> bool:
 
 
 def _synchronised() -> bool | None:
-    """Return whether the kernel's clock is synchronised, from adjtimex(2); None if unknown."""
+    """Ask adjtimex(2) whether the kernel's clock is synchronised. Return None if the answer is
+    unknown."""
     import ctypes
 
     state: int = ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(TIMEX_MAX))
@@ -47,9 +48,10 @@ def _synchronised() -> bool | None:
 class Machine:
     """The doctor's access to the machine.
 
-    `ioctl(device, request, argument)` returns the kernel's reply, or raises OSError.
-    `installed(package)`: can this Python import the package? `synchronised()`: is the clock
-    synchronised? None if unknown. `uid` and `gids` belong to this process.
+    - `ioctl(device, request, argument)` returns the kernel's reply, or raises OSError.
+    - `installed(package)` tells whether this Python can import the package.
+    - `synchronised()` tells whether the clock is synchronised, or None if unknown.
+    - `uid` and `gids` belong to this process.
     """
 
     root: Path = Path("/")
@@ -60,15 +62,16 @@ class Machine:
     gids: frozenset[int] = field(default_factory=lambda: frozenset({os.getegid(), *os.getgroups()}))
 
     def at(self, path: str | Path) -> Path:
-        """Return where an absolute path lies below `root`."""
+        """Return the path below `root` that stands for an absolute path."""
         return self.root / str(path).lstrip("/")
 
     def named(self, found: Path) -> str:
-        """Return the absolute path that the machine's own programs use for a place below `root`."""
+        """Return the absolute path that stands for a path below `root`. The machine's own programs use
+        the absolute path."""
         return f"/{found.relative_to(self.root)}"
 
     def text(self, path: str | Path) -> str | None:
-        """Return a file's stripped text; None if unreadable."""
+        """Return a file's stripped text. Return None if the file cannot be read."""
         try:
             with self.at(path).open("rb") as source:
                 return source.read(TEXT_MAX).decode(errors="replace").strip(" \t\r\n\0")
@@ -76,17 +79,18 @@ class Machine:
             return None
 
     def folder(self, path: str, pattern: str = "*") -> list[Path]:
-        """Return a directory's entries, sorted; empty without such a directory."""
+        """Return a directory's entries, sorted. Return [] if the directory does not exist."""
         return sorted(self.at(path).glob(pattern))
 
     def target(self, path: str) -> str:
-        """Follow a symbolic link such as /dev/serial/by-id/…; return any other path as it is."""
+        """Return the target of a symbolic link such as /dev/serial/by-id/…. Return any other path
+        unchanged."""
         found = self.at(path).resolve()
         root = self.root.resolve()
         return f"/{found.relative_to(root)}" if found.is_relative_to(root) else path
 
     def printed(self, *words: str) -> str | None:
-        """Return a command's output; None if the command is missing or fails."""
+        """Return a command's output. Return None if the command is missing or fails."""
         path = os.pathsep.join(str(self.root / place) for place in PLACES)
         command = shutil.which(words[0], path=path)
         if command is None:

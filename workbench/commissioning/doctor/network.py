@@ -1,6 +1,6 @@
 """Examine RMF's graph from this machine: interface, domain, nodes, and message versions.
 
-The doctor joins the graph as `watch` does, for some seconds, and only listens.
+The doctor joins the graph for some seconds, as `watch` does, and only listens.
 """
 
 import importlib.metadata
@@ -35,7 +35,8 @@ SENDERS: Final = {
     "adapter_door_requests": "RMF's fleet adapters",
     "fleet_states": "RMF's fleet adapters",
 }
-"""Topics on which requests depend, with their publishers. Other topics may be silent."""
+"""Topic -> its publishers in RMF. Requests to devices depend on these topics. Other topics may be
+silent."""
 LIBRARIES: Final = {"dds": "cyclonedds", "zenoh": "eclipse-zenoh"}
 
 
@@ -43,8 +44,9 @@ LIBRARIES: Final = {"dds": "cyclonedds", "zenoh": "eclipse-zenoh"}
 class GraphLook:
     """Settings for examining the graph.
 
-    `listen_s`: time (s) to listen. `serving`: is our own daemon on the graph? None if unknown. `watch`:
-    the command that shows this graph.
+    - `listen_s`: time (s) to listen.
+    - `serving`: whether our own daemon is on the graph; None if unknown.
+    - `watch`: the command that shows this graph.
     """
 
     localhost: bool
@@ -55,7 +57,7 @@ class GraphLook:
 
     @property
     def alone(self) -> str:
-        """Remedy for a silent graph."""
+        """The remedy if no other node is heard on the graph."""
         return (
             f"docs/how-to/ros.md: domain, multicast, interfaces; {self.watch} shows what is heard"
         )
@@ -196,7 +198,7 @@ def _installed() -> Iterator[Finding]:
 
 @contextmanager
 def overheard() -> Iterator[list[str]]:
-    """Yield a list that collects the transports' warnings and errors during the block."""
+    """Yield a list. During the block, the list collects the warnings and errors that transports log."""
     said: list[str] = []
     ears = logging.Handler(logging.WARNING)
     ears.emit = lambda record: said.append(record.getMessage())  # type: ignore[method-assign]
@@ -214,4 +216,4 @@ def overheard() -> Iterator[list[str]]:
 
 
 def _ignore(message: object) -> None:
-    """Discard a message, because only senders are counted."""
+    """Discard a message, because the doctor only counts senders."""

@@ -15,7 +15,7 @@ DEAF: Final = "nobody on this line is heard"
 
 
 def port(machine: Machine, path: str, who: User, *, served: bool) -> Iterator[Finding]:
-    """Examine `serial port`. `served`: a running daemon of this file has the port open."""
+    """Examine `serial port`. With `served`, a running daemon of this file has the port open."""
     if not machine.at(path).exists():
         seen = ", ".join(machine.named(one) for one in machine.folder(BY_ID))
         do = (
@@ -52,7 +52,7 @@ def _permission(machine: Machine, path: str, device: str, who: User) -> Finding:
 
 
 def _stable(machine: Machine, path: str, device: str) -> Iterator[Finding]:
-    """Warn of a path that may mean another adapter after the next boot."""
+    """Warn if the path may name another adapter after the next boot."""
     if not re.match(r"/dev/tty(USB|ACM)", path):
         return
     same = [machine.named(one) for one in machine.folder(BY_ID)]

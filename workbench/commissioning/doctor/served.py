@@ -1,6 +1,7 @@
-"""Find a running daemon of this file. Read its status instead of opening its buses.
+"""Find a running daemon of this file, and read the daemon's status. The doctor then leaves the daemon's
+buses closed.
 
-A gateway may accept only one client, and two masters on one line spoil each other's frames.
+A gateway may accept only one client, and two masters on one line corrupt each other's frames.
 """
 
 from collections.abc import Iterator
@@ -22,10 +23,11 @@ NOT_ASKED: Final = "its buses are not read here, because a controller has only o
 
 @dataclass(frozen=True, slots=True)
 class ServingDaemon:
-    """State of the daemon. `busy`: why the doctor must not open its buses; "" if allowed.
+    """State of the file's daemon.
 
-    `serving`: does a daemon serve this file? None if unknown. `simulated`: the daemon runs on fake
-    hardware and on the loopback interface.
+    - `busy`: the reason why the doctor must not open the daemon's buses; "" if the doctor may.
+    - `serving`: whether a daemon serves this file; None if unknown.
+    - `simulated`: whether the daemon runs on fake hardware and on the loopback interface.
     """
 
     findings: list[Finding] = field(default_factory=list)
@@ -35,8 +37,8 @@ class ServingDaemon:
 
 
 def served(places: Directories, file: Path, wall: float) -> ServingDaemon:
-    """Examine `daemon`. `wall`: present time (s since the epoch), for the age of the daemon's
-    status."""
+    """Examine `daemon`. `wall` is the present time (s since the epoch), which gives the age of the
+    daemon's status."""
     try:
         held_by = holder.look(places)
     except PermissionError as error:
@@ -98,7 +100,8 @@ def _told(one: DaemonStatus) -> Iterator[Finding]:
 
 
 def _listeners(status: Status) -> Iterator[Finding]:
-    """Check that some node listens to the states. Other topics often have no listener."""
+    """Check that at least one node listens to the daemon's states. Other topics often have no
+    listener."""
     for topic, nodes in status.get("heard_by", {}).items():
         if nodes:
             yield ok(DAEMON, f"{topic}: heard by {nodes} node{'s' if nodes > 1 else ''}")

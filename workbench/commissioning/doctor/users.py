@@ -1,7 +1,8 @@
 """Find the daemon's user, and this user's access to devices.
 
-If the unit is installed, the user is the service's user, with the groups of the service's drop-ins.
-Otherwise it is the present user. Users and groups are read from /etc/passwd and /etc/group.
+If the unit is installed, the user is the service's user, with the groups from the service's drop-ins.
+Otherwise the user is the present user. The doctor reads users and groups from /etc/passwd and
+/etc/group.
 """
 
 import os
@@ -20,7 +21,7 @@ UNIT: Final = "rmf-bridge@.service"
 
 @dataclass(frozen=True, slots=True)
 class User:
-    """The user who opens the devices. `service`: does systemd's unit start the daemon?"""
+    """The user who opens the devices. `service` tells whether systemd's unit starts the daemon."""
 
     name: str
     uid: int
@@ -28,7 +29,7 @@ class User:
     service: bool
 
     def may(self, found: os.stat_result) -> bool:
-        """May this user read and write the file, according to the file's mode? Access lists are
+        """Return whether the file's mode lets this user read and write the file. Access lists are
         ignored."""
         if self.uid == 0:
             return True
@@ -42,7 +43,7 @@ class User:
 
 
 def has_unit(machine: Machine) -> bool:
-    """Is the unit of rmf-bridges installed?"""
+    """Return whether the unit of rmf-bridges is installed."""
     return any(machine.at(f"{place}/{UNIT}").exists() for place in UNITS)
 
 
@@ -58,7 +59,7 @@ def user(machine: Machine, service: str) -> User:
 
 
 def users(machine: Machine, who: User) -> Iterator[Finding]:
-    """Examine `user`: do the unit's user and the groups for devices exist?"""
+    """Examine `user`, and tell whether the unit's user and the groups for devices exist."""
     subject = "user"
     if not who.service:
         yield note(
@@ -96,7 +97,7 @@ def join(who: User, group: str) -> str:
 
 
 def group_of(machine: Machine, gid: int) -> str:
-    """Return a group's name, or its number if the group has no name."""
+    """Return a group's name. Return the group's number if the group has no name."""
     return next((n for n, (found, _) in _groups(machine).items() if found == gid), str(gid))
 
 

@@ -1,7 +1,9 @@
-"""The process that the kill test kills. It switches one output on as the daemon would, and prints `on`.
+"""The process that the kill test kills. The process switches one output on as the daemon would, and
+prints `on`.
 
-The command is `python -m workbench.commissioning.doctor.victim FILE DEVICE STEP RUNTIME_DIR`. If the
-parent dies, the process's input ends. The process then switches off and ends, at the latest after ON_S.
+The command is `python -m workbench.commissioning.doctor.victim FILE DEVICE STEP RUNTIME_DIR`. When the
+parent dies, the process's standard input ends. Then the process switches the output off, and ends. The
+output is on for at most ON_S.
 """
 
 import select
@@ -22,7 +24,7 @@ ON_S: Final = 5.0
 
 
 def main(file: Path, device: str, step: str, runtime_dir: str | None) -> int:
-    """Run the victim. Return 0 if the output is verified off."""
+    """Run the victim. Return 0 if a reading verified that the output is off."""
     signals.End()
     try:
         config = load(file)
@@ -57,13 +59,14 @@ def _held(
 
 
 def step_called(config: Config, device: str, name: str | None) -> WalkStep | None:
-    """Return the output of this name, or the first output if there is no name; None if unknown."""
+    """Return the step of this name, or the first step if `name` is None. Return None if the name is
+    unknown."""
     return next((step for step in steps(config, device) if name in (None, step.name)), None)
 
 
 def _on_for_a_while(driver: Driver[Any, Any], bus: Bus, step: WalkStep | None) -> bool:
-    """Switch on for ON_S; then switch off, if the process still lives. Return whether the output is
-    verified off."""
+    """Switch the output on for ON_S. Then switch the output off, if the process still lives. Return
+    whether a reading verified that the output is off."""
     assert step is not None  # without a step there is no kill test
     try:
         driver.open()

@@ -1,4 +1,5 @@
-"""Draft a commented YAML for `rmf-bridge init`. All functions are pure: answers in, text out.
+"""Draft a commented YAML for `rmf-bridge init`. All functions are pure: their input is answers, and
+their output is text.
 
 `points.py` gives each signal a pin or an address.
 """
@@ -18,7 +19,7 @@ from workbench.commissioning.init.points import FreePoints, points_for
 from workbench.commissioning.reference import meaning
 
 DRIVERS: Final = {"http": "http", "can": "canopen", "gateway": "register"}
-"""Wiring -> driver. A wiring that is not listed uses `dry_contact`."""
+"""Wiring -> driver. Any other wiring uses the driver `dry_contact`."""
 WIRINGS: Final = {
     "lift": ("gpio", "modbus", "rs485", "gateway"),
     "door": ("modbus", "rs485", "gpio", "http", "gateway"),
@@ -67,7 +68,7 @@ CHARGER_HTTP: Final = """\
 CHARGER_CANOPEN: Final = """\
     node: 10                         # the receiver's node id
     heartbeat_timeout_s: 0.5         # a heartbeat comes each 0.1 s
-    on_death: stop                   # a charge under way when the daemon ends: stop, or keep"""
+    on_death: stop                   # at the daemon's end: stop or keep a running charge"""
 
 
 def draft(answers: DraftAnswers) -> str:
@@ -98,15 +99,15 @@ def draft(answers: DraftAnswers) -> str:
 
 
 def _bus(wiring: str, address: str) -> str:
-    """Return the bus as a key of BUSES. A gateway whose address is a device file is on a serial
-    line."""
+    """Return the bus as a key of BUSES. If a gateway's address is a device file, the gateway is on a
+    serial line."""
     if wiring != "gateway":
         return wiring
     return "rs485" if address.startswith("/") else "modbus"
 
 
 def _lift(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
-    """Yield the lines below the name of a lift, on contacts or on a gateway."""
+    """Yield the lines below the name of a lift. The lift is on contacts or on a gateway."""
     floors = [quoted(floor) for floor in answers.floors]
     if len(floors) < 2 or len(set(floors)) < len(floors):
         raise Impossible(f"a lift has at least two floors, each name once, not {', '.join(floors)}")
@@ -115,7 +116,7 @@ def _lift(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
         return
     calls = [
         f"      {floor}: {{{points.relay()}}}" for floor in floors
-    ]  # floors first, because they need most pins
+    ]  # floors come first, because they need the most pins
     request, hold = points.relay(), points.relay()
     yield f"    floors: [{', '.join(floors)}]        # RMF's names, from below"
     yield "    inputs:"
@@ -145,21 +146,21 @@ def _floor_code(answers: DraftAnswers, floors: list[str], points: FreePoints) ->
     yield "    floor_code:                # lines for the car's floor"
     yield f"      encoding: {answers.encoding}"
     if answers.encoding == "one_hot":
-        yield "      lines:                   # one for each floor; no line on is between floors"
+        yield "      lines:                   # one for each floor; between floors no line is on"
         for floor in floors:
             yield f"        {floor}: {{{points.contact()}}}"
         return
     yield "      bits:                    # least significant first"
     for _ in range(len(floors).bit_length()):
         yield f"        - {{{points.contact()}}}"
-    yield "      # The parity line shows a broken line. A lift without parity: delete it; check warns."
+    yield "      # The parity line shows a broken line. Without a parity line: delete it; check warns."
     yield f"      parity: {{{points.contact()}, total: even}}"
     codes = ", ".join(f"{number}: {floor}" for number, floor in enumerate(floors, start=1))
     yield f"      codes: {{{codes}}}"
 
 
 def _door(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
-    """Yield the lines below the name of a door, on contacts, an HTTP relay or registers."""
+    """Yield the lines below the name of a door. The door is on contacts, an HTTP relay or registers."""
     if answers.wiring == "http":
         yield from SHELLY.splitlines()
         return
@@ -174,25 +175,25 @@ def _door(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
 
 
 def _charger(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
-    """Yield the lines below the name of a charger, on HTTP, CANopen or contacts."""
+    """Yield the lines below the name of a charger. The charger is on HTTP, CANopen or contacts."""
     if answers.wiring in ("http", "can"):
         yield from (CHARGER_HTTP if answers.wiring == "http" else CHARGER_CANOPEN).splitlines()
         return
     yield "    inputs:"
     for signal in ("charging", "ready"):
         yield f"      {signal}: {{{points.contact()}}}   {_said(charger.ChargerInputWiring, signal)}"
-    yield f"      fault: {{{points.loop()}}}   # opens at a fault, as a cut wire does"
+    yield f"      fault: {{{points.loop()}}}   # opens at a fault; a cut wire reads as a fault too"
     yield "    outputs:"
     yield f"      enable: {{{points.relay()}}}   {_said(charger.ChargerOutputWiring, 'enable')}"
 
 
 def _said(struct: type, key: str) -> str:
-    """Return the comment for a key: the first clause of the key's description."""
+    """Return the YAML comment for a key. The comment is the first clause of the key's description."""
     return f"# {re.split('[;:.]', meaning(struct, key))[0]}"
 
 
 def quoted(text: str) -> str:
-    """Quote a text so that YAML reads it as text even if it looks like a number or boolean."""
+    """Quote a text, so that YAML never reads the text as a number or boolean."""
     plain = text[:1].isalpha() and text.replace("_", "a").replace("-", "a").isalnum()
     if plain and text.lower() not in BOOLEANS:
         return text

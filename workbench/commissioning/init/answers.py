@@ -1,4 +1,4 @@
-"""The answers for a draft."""
+"""The user's answers, from which `init` drafts a YAML."""
 
 from collections.abc import Mapping
 from typing import Final, Literal
@@ -19,17 +19,17 @@ OFFERED: Final = ("fire_alarm", "agv_mode", "door_opened", "door_closed", "stopp
 
 
 class Impossible(Exception):
-    """Error: the answers contradict each other. The text gives reason and remedy."""
+    """The answers contradict each other. The error's text gives the reason and the remedy."""
 
 
 class DraftAnswers(msgspec.Struct, frozen=True, kw_only=True):
     """The device to be connected, as the integrator describes it.
 
     - `address`: host, serial port or CAN interface; "" for the usual address.
-    - `floors`: RMF's names, from the lowest floor up.
+    - `floors`: RMF's names of the floors, from the lowest floor up.
     - `signals`: a lift's inputs.
-    - `contacts`: the level of a closed contact on the header: high if wired to 3.3 V, low if wired to
-      ground.
+    - `contacts`: the level of a closed contact on the header. A wire to 3.3 V gives high, and a wire to
+      ground gives low.
     - `relays`: the level that switches relays on.
     - `places`: a gateway's answers, with the names in `gateway.py`.
     """

@@ -1,4 +1,4 @@
-"""Draft the `map:` of a lift's gateway or a door's operator from answers about the device's
+"""Draft the `map:` of a lift's gateway or of a door's operator. The answers describe the device's
 registers."""
 
 from collections.abc import Iterator, Sequence
@@ -7,7 +7,7 @@ from typing import Final
 from workbench.commissioning.init.answers import DraftAnswers, Impossible
 
 ABSENT: Final = "none"
-"""Answer for a value that the device's registers do not have."""
+"""Answer for a value that no register of the device holds."""
 PLACES: Final = {
     "floor_at": ("the floor number", "input register 0"),
     "door_at": ("the door's number", "input register 1"),
@@ -18,7 +18,7 @@ PLACES: Final = {
     "hold_at": ("the command that holds the door open", "holding register 1"),
     "call_at": ("the number of the called floor", "holding register 2"),
 }
-"""Answer -> a value of the device, and the register that is offered by default."""
+"""Name of an answer -> the device's value, and the register that `init` offers by default."""
 DOOR_PLACES: Final = ("door_at", "hold_at")
 OPTIONAL: Final = ("motion_at", "agv_mode_at", "fire_alarm_at", "request_at")
 NUMBERS: Final = {
@@ -26,11 +26,11 @@ NUMBERS: Final = {
     "door_numbers": "closed, moving, open",
     "motion_numbers": "stopped, up, down",
 }
-"""Answer -> the meanings of its numbers, in order."""
+"""Name of an answer -> the meanings of the numbers that the person gives, in order."""
 
 
 def questions() -> dict[str, str]:
-    """Return answer -> its question, in the order of asking."""
+    """Return answer name -> question, in the order in which `init` asks."""
     texts = {}
     for name, (part, _) in PLACES.items():
         texts[name] = f"The place of {part}" + (", or none?" if name in OPTIONAL else "?")
@@ -86,8 +86,8 @@ def _codes(answers: DraftAnswers, name: str, meanings: Sequence[str]) -> str:
 
 
 def _numbers(answers: DraftAnswers, name: str, many: int | None = None) -> list[int]:
-    """Return the answer's numbers. Raises Impossible for other text, or for too few or too many
-    numbers."""
+    """Return the answer's numbers. Raises Impossible for an answer that is no list of numbers, and for
+    too few or too many numbers."""
     told = [part.strip() for part in answers.places[name].split(",")]
     distinct = {int(part) for part in told if part.isascii() and part.isdigit()}
     if len(distinct) < len(told) or (many is not None and len(told) != many):

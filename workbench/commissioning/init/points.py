@@ -1,5 +1,4 @@
-"""Give each signal of a draft the next free pin of the header, or the next free address of the
-module."""
+"""Give each signal of a draft a free pin of the header, or a free address of the module."""
 
 from collections.abc import Iterator
 from itertools import count
@@ -9,7 +8,8 @@ from workbench.commissioning.init.answers import DraftAnswers, Impossible, Level
 
 REST_LOW: Final = (11, 13, 15, 16, 18, 22, 32, 33, 35, 36, 37, 38, 40, 12)
 REST_HIGH: Final = (7, 29, 31, 26, 24)
-"""Positions on J8 that the Pi pulls high, or low, from power-on until the daemon starts.
+"""Positions on J8 with a level that the Pi sets from power-on until the daemon starts. The Pi pulls the
+positions of REST_HIGH high, and the positions of REST_LOW low.
 
 A relay belongs on a pin whose level keeps the relay off. Source: BCM2835 ARM Peripherals, table 6-31
 (BCM0 to 8 high).
@@ -17,21 +17,22 @@ A relay belongs on a pin whose level keeps the relay off. Source: BCM2835 ARM Pe
 
 
 class FreePoints(Protocol):
-    """The next free points. Each method returns the text inside a YAML mapping."""
+    """A source of free points. Each method returns the text inside a YAML mapping."""
 
     def contact(self) -> str:
-        """Take a point for a contact that is closed while its signal is on. A cut wire reads off."""
+        """Take a point for a contact that is closed while its signal is on. With a cut wire, the signal
+        reads off."""
 
     def loop(self) -> str:
-        """Take a point for a contact that is open while its signal is on (an alarm loop). A cut wire
-        reads on."""
+        """Take a point for a contact that is open while its signal is on, such as an alarm loop. With a
+        cut wire, the signal reads on."""
 
     def relay(self) -> str:
-        """Take a point for a relay that acts while energised."""
+        """Take a point for a relay whose energised state is on."""
 
 
 class PinHeader:
-    """The Pi's 40-pin header. Its methods raise Impossible when no pin is left."""
+    """The Pi's 40-pin header. The methods raise Impossible if no pin is left."""
 
     def __init__(self, contacts: Level, relays: Level) -> None:
         self._closed, self._relays = contacts, relays
@@ -41,11 +42,11 @@ class PinHeader:
         self._inputs = list(REST_HIGH if high else REST_LOW)
 
     def contact(self) -> str:
-        """Take the next input pin, pulled to the level of an open contact."""
+        """Take the next input pin. The pin's pull resistor sets the level of an open contact."""
         return f'point: "J8:{self._input()}", active: {self._closed}, pull: {self._pull}'
 
     def loop(self) -> str:
-        """Take the next input pin. The signal is on while the contact is open."""
+        """Take the next input pin. The signal is on if the contact is open."""
         opened = "low" if self._closed == "high" else "high"
         return f'point: "J8:{self._input()}", active: {opened}, pull: {self._pull}'
 
@@ -67,7 +68,7 @@ def _first(pins: list[int]) -> int:
 
 
 class Module:
-    """A Modbus I/O module: contacts are discrete inputs, relays are coils."""
+    """A Modbus I/O module. Its contacts are discrete inputs, and its relays are coils."""
 
     def __init__(self, unit: int) -> None:
         self._unit = unit
@@ -75,11 +76,11 @@ class Module:
         self._coils: Iterator[int] = count()
 
     def contact(self) -> str:
-        """Take the next discrete input; an open contact reads 0."""
+        """Take the next discrete input. An open contact reads 0."""
         return f'point: "unit {self._unit} discrete input {next(self._inputs)}", active: high'
 
     def loop(self) -> str:
-        """Take the next discrete input. The signal is on while the input reads 0."""
+        """Take the next discrete input. The signal is on if the input reads 0."""
         return f'point: "unit {self._unit} discrete input {next(self._inputs)}", active: low'
 
     def relay(self) -> str:
@@ -88,7 +89,7 @@ class Module:
 
 
 def points_for(answers: DraftAnswers) -> FreePoints:
-    """Return the points of this wiring, all free."""
+    """Return the points of this wiring. All points are free."""
     if answers.wiring == "gpio":
         return PinHeader(answers.contacts, answers.relays)
     return Module(answers.unit)

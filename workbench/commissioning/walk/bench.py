@@ -1,5 +1,5 @@
-"""Scan one device for a walk on a separate thread, so that a slow or dead terminal never delays
-switching off."""
+"""Scan one device for a walk. The scan has a separate thread, so that a slow or dead terminal never
+delays switching off."""
 
 import threading
 import time
@@ -28,8 +28,11 @@ SCAN_S: Final = 0.05
 
 @dataclass(slots=True)
 class ContactReading:
-    """One contact's latest reading. `levels`: the levels read on its bus, by point. `seen`: the
-    meanings (on, off) seen so far."""
+    """One contact's latest reading.
+
+    - `levels`: the levels last read on the contact's bus, by point.
+    - `seen`: the meanings (on, off) that readings have shown up to now.
+    """
 
     wire: Wire
     point: str
@@ -40,15 +43,15 @@ class ContactReading:
 
     @property
     def asserted(self) -> bool | None:
-        """Is the signal on? None before the first reading."""
+        """Return whether the signal is on. Return None before the first reading."""
         return None if self.level is None else self.wire.asserted(self.level)
 
 
 class Bench:
-    """A device under test on its tapped bus. `off`: the value that switches all outputs off.
+    """A device under test on its tapped bus. `off` is the value that switches all outputs off.
 
-    Use the bench as a context manager: at the end it switches every output off. `verified_off`: did a
-    reading confirm that?
+    The bench is a context manager. At the end of the block, the bench switches every output off.
+    `verified_off` tells whether a reading confirmed that every output is off.
     """
 
     def __init__(
@@ -80,12 +83,12 @@ class Bench:
         self._thread.join()
 
     def put(self, event: Event) -> None:
-        """Queue the person's action. May be called from any thread."""
+        """Queue the person's action. Any thread may call this method."""
         self._events.append(event)
 
     @property
     def decoded(self) -> str:
-        """Return the inputs in words, as the driver decodes them."""
+        """Return the driver's decoded inputs, in words."""
         return "" if self.memory.sample is None else plain(self.memory.sample)
 
     def _run(self) -> None:
@@ -129,7 +132,7 @@ class Bench:
         return InputsRead(sample)
 
     def _make_safe(self) -> bool:
-        """Switch all outputs off. If there are no outputs to try, do nothing, so that a charge
+        """Switch all outputs off. Do nothing if the walk has no outputs to test, so that a charge
         continues."""
         if not self.steps:
             return True

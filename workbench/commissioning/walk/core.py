@@ -1,9 +1,9 @@
-"""Decide when an output of a walk is on and when its effect counts as seen. All functions are pure:
-time is an argument.
+"""Decide when an output of a walk is on, and when its effect counts as seen. All functions are pure,
+because the present time is an argument.
 
-Only one output is on at a time, for ON_S at most. The output goes off immediately if a reading fails,
-grows old, or shows that the output must not be on. Feedback may follow late, because a car needs time
-to move. Inputs that were on before the output do not count as feedback.
+Only one output is on at a time, for ON_S at most. The output goes off immediately if a reading fails or
+is too old. The output also goes off if a reading shows that the output must not be on. Feedback may
+come late, because a car needs time to move. An input that was on before the output is no feedback.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -13,16 +13,18 @@ from typing import Any, Final
 ON_S: Final = 5.0
 FEEDBACK_S: Final = 120.0
 STALE_S: Final = 1.0
-"""Maximum age (s) of the readings while an output is switched on or stays on."""
+"""Maximum age (s) of readings. With older readings, an output may neither be switched on nor stay
+on."""
 
 
 @dataclass(frozen=True, slots=True)
 class WalkStep:
-    """One output to try. `outputs`: the driver's outputs, with this output on. `expects`: the effect
-    that should be seen.
+    """One output to test.
 
-    `seen(sample)`: is the effect there? None if no input shows it. `hindrance(sample)`: why the output
-    must not be on now; "" if allowed.
+    - `outputs`: the driver's outputs, with this output on.
+    - `expects`: the effect that a person should see.
+    - `seen(sample)`: whether the effect is there; None if no input shows the effect.
+    - `hindrance(sample)`: the reason why the output must not be on now; "" if the output may be on.
     """
 
     name: str
@@ -38,8 +40,8 @@ class WalkMemory:
     """The memory of a walk.
 
     - `on`: the step whose output is on.
-    - `off_at`: when the output goes off (s).
-    - `waits`: the step whose feedback may still come, until `waits_until`.
+    - `off_at`: time (monotonic s) at which the output goes off.
+    - `waits`: the step whose feedback may come until `waits_until`.
     - `results`: step -> the effect seen.
     - `says`: why the last key had no effect, or why an output went off.
     """
@@ -64,21 +66,21 @@ class InputsRead:
 
 @dataclass(frozen=True, slots=True)
 class InputsLost:
-    """Reading or writing failed."""
+    """A bus operation failed: reading the inputs, or writing the outputs."""
 
     why: str
 
 
 @dataclass(frozen=True, slots=True)
 class Switch:
-    """The person toggles this step's output."""
+    """The person switches this step's output on or off."""
 
     step: int
 
 
 @dataclass(frozen=True, slots=True)
 class ByEye:
-    """The person reports that the step's effect was seen, or was not seen."""
+    """The person reports whether the step's effect was seen."""
 
     step: int
     seen: bool
@@ -92,7 +94,7 @@ Event = InputsRead | InputsLost | Switch | ByEye | Tick
 
 
 def decide(memory: WalkMemory, event: Event, now: float, steps: Sequence[WalkStep]) -> WalkMemory:
-    """Return the memory after this event."""
+    """Return the memory after this event. The new memory tells which output is on."""
     match event:
         case InputsRead(sample):
             memory = replace(memory, sample=sample, read_at=now, why_lost="")
@@ -107,7 +109,7 @@ def decide(memory: WalkMemory, event: Event, now: float, steps: Sequence[WalkSte
 
 
 def output_of(memory: WalkMemory, steps: Sequence[WalkStep]) -> Any:
-    """Return the outputs to write; None for all off."""
+    """Return the outputs to write. Return None to switch all outputs off."""
     return None if memory.on is None else steps[memory.on].outputs
 
 
@@ -120,7 +122,7 @@ def _switch(memory: WalkMemory, step: int, now: float, steps: Sequence[WalkStep]
     proves = tried.seen is None or not tried.seen(memory.sample)
     told = "switched on, and nothing was seen"
     if not proves:
-        told = "switched on; the inputs showed the effect before, so they prove nothing"
+        told = "switched on; the inputs showed the effect before, so this proves nothing"
     return replace(
         memory,
         on=step,
@@ -156,7 +158,7 @@ def _hindrance(memory: WalkMemory, now: float, step: WalkStep) -> str:
 
 
 def _feedback(memory: WalkMemory, now: float, steps: Sequence[WalkStep]) -> WalkMemory:
-    """Check the inputs for the feedback that a step waits for."""
+    """Look whether the inputs show the feedback for which a step waits."""
     if memory.waits is None:
         return memory
     step = steps[memory.waits]

@@ -1,4 +1,5 @@
-"""A walk on a terminal, even on a phone: tables redrawn in place, and keys."""
+"""The display of a walk on a terminal, even on a phone. Tables are redrawn in place, and keys give
+commands."""
 
 import os
 import re
@@ -19,7 +20,7 @@ from workbench.commissioning.walk.signed import NOT_TRIED
 
 HELP: Final = "ENTER on/off   n next   p back   y seen   x not seen   q end"
 WIDE: Final = 60
-"""Minimum number of columns for showing the wires too. A phone has about 40 columns."""
+"""Minimum number of columns at which the display also shows the wires. A phone has about 40 columns."""
 HEADINGS: Final = 2
 BOLD, DIM, ALARM, ON = "1", "2", "1;31", "1;33"
 HIDE_CURSOR, SHOW_CURSOR = "\x1b[?25l", "\x1b[?25h"
@@ -27,11 +28,11 @@ UP, DOWN = "\x1b[A", "\x1b[B"
 KEY: Final = re.compile(r"\x1b\[[A-Z]|.", re.S)
 
 Lines = list[tuple[str, str]]
-"""Texts, each with its style (`bridges/system/paint.py`)."""
+"""Lines of text, each with its style (`bridges/system/paint.py`)."""
 
 
 class Screen:
-    """The display and the keys of a walk. `cursor`: the output that ENTER switches."""
+    """The display and the keys of a walk. `cursor` is the output that ENTER switches."""
 
     def __init__(self, device: str, bench: Bench) -> None:
         self._device = device
@@ -48,7 +49,7 @@ class Screen:
         sys.stdout.flush()
 
     def draw(self, now: float) -> None:
-        """Draw the present state. `now`: monotonic time (s)."""
+        """Draw the present state. `now` is the monotonic time (s)."""
         plain = not coloured(sys.stdout)
         page = self.page(now, *shutil.get_terminal_size())
         *above, (last, _) = [(text, "" if plain else style) for text, style in page]
@@ -74,7 +75,7 @@ class Screen:
         return True
 
     def page(self, now: float, columns: int, rows: int) -> Lines:
-        """Return the lines of the display, as many as there is room for."""
+        """Return the lines of the display. Cut the lists to the space of the terminal."""
         memory = self._bench.memory
         age = "not read yet" if memory.read_at is None else f"read {now - memory.read_at:.1f} s ago"
         texts = (
@@ -94,7 +95,8 @@ class Screen:
         return [*title, *inputs, *decoded, *outputs, *(line for part in below for line in part)]
 
     def _selected(self) -> str:
-        """Describe the output at the cursor, and the effect that was seen so far."""
+        """Describe the output at the cursor, and the effect that the person or the inputs have shown up
+        to now."""
         if not self._bench.steps:
             return "no output can be tried here"
         step = self._bench.steps[self._cursor]
@@ -141,7 +143,8 @@ class Room(NamedTuple):
 
 
 def room(rows: int, inputs: int, outputs: int) -> Room:
-    """Divide the rows: first at least three for outputs, then the inputs, then more outputs."""
+    """Divide the rows. The first three rows or more are for outputs. Next come the inputs, and then
+    more outputs."""
     least = min(outputs, 3)
     if inputs + least <= rows:
         return Room(inputs, min(outputs, rows - inputs))
@@ -156,7 +159,7 @@ def _short(result: str) -> str:
 
 
 def _fitted(rows: Sequence[tuple[str, ...]], names: int, columns: int) -> list[str]:
-    """Format the rows as lines. If lines are too long, cut the names in column `names`."""
+    """Format the rows as lines. If a line is too long, shorten the names in column `names`."""
     lines = aligned(rows)
     if (over := max(map(width, lines)) - columns) > 0:
         longest = max(width(row[names]) for row in rows)
@@ -181,8 +184,8 @@ def _row(one: ContactReading, now: float) -> tuple[str, ...]:
 
 @contextmanager
 def keyboard() -> Iterator[int]:
-    """Set the terminal to single keys, yield its file descriptor, and restore the terminal at the
-    end."""
+    """Set the terminal to single keys, and yield the terminal's file descriptor. At the end, restore
+    the terminal."""
     terminal = sys.stdin.fileno()
     before = termios.tcgetattr(terminal)
     tty.setcbreak(terminal)
@@ -193,8 +196,8 @@ def keyboard() -> Iterator[int]:
 
 
 def keys(terminal: int, wait_s: float) -> list[str]:
-    """Return the pressed keys; [] if no key comes within `wait_s` (s); ["q"] if the terminal is
-    gone."""
+    """Return the pressed keys. Return [] if no key comes within `wait_s` (s), and ["q"] if the terminal
+    is gone."""
     if not select.select([terminal], [], [], wait_s)[0]:
         return []
     try:

@@ -1,4 +1,5 @@
-"""The record of a walk, as Markdown and JSON: file, tests, results and signature."""
+"""The record of a walk, as Markdown and JSON. The record has the file, the tests, the results and a
+place for the signature."""
 
 import hashlib
 import json
@@ -27,8 +28,8 @@ def record(
     end: str,
     simulated: bool,
 ) -> dict[str, Any]:
-    """Return the record. `at`: start of the walk. `end`: how the walk ended, or that the walk
-    continues."""
+    """Return the record. `at` is the start of the walk. `end` tells how the walk ended, or that the
+    walk still goes on."""
     return {
         "file": str(file),
         "sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
@@ -59,7 +60,7 @@ def _seen(one: ContactReading) -> str:
 
 
 def markdown(record: dict[str, Any]) -> str:
-    """Format the record for people, with room for a signature at the end."""
+    """Format the record for people. At the end there is space for a signature."""
     practice = " on fake hardware: practice, no commissioning" if record["simulated"] else ""
     lines = [
         f"# Walk of {record['device']}{practice}",
@@ -81,6 +82,6 @@ def markdown(record: dict[str, Any]) -> str:
 
 
 def write(path: Path, record: dict[str, Any]) -> None:
-    """Replace `path`.md and `path`.json. Raises OSError."""
+    """Replace the files `path`.md and `path`.json. Raises OSError."""
     replace(path.with_suffix(".md"), markdown(record).encode())
     replace(path.with_suffix(".json"), json.dumps(record, indent=2).encode())

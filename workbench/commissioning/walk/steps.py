@@ -1,4 +1,4 @@
-"""The outputs that a walk tries for each kind of device, and the feedback that the inputs should
+"""The outputs that a walk tests for each kind of device, and the feedback that the inputs should
 show."""
 
 from collections.abc import Callable, Collection, Iterator
@@ -14,7 +14,7 @@ from bridges.settings.load import Config
 from workbench.commissioning.walk.core import WalkStep
 
 Wired = Collection[str] | None
-"""Names of the output lines; None if the driver has no lines."""
+"""Names of the output lines. None means that the driver has no lines."""
 
 
 def _lift(settings: LiftSettings, wired: Wired) -> Iterator[WalkStep]:
@@ -88,7 +88,7 @@ def _door(settings: object, wired: Wired) -> Iterator[WalkStep]:
 
 def _charger(settings: object, wired: Wired) -> Iterator[WalkStep]:
     if wired is None:
-        return  # a charger without contacts is tried with `rmf-bridge send charger`
+        return  # a person tests a charger without contacts with `rmf-bridge send charger`
 
     def at_fault(sample: ChargerSample) -> str:
         return f"the station shows an error {sample.error_text}".rstrip() if _fault(sample) else ""
@@ -142,7 +142,7 @@ OFF: Final = {
 
 
 def steps(config: Config, device: str) -> list[WalkStep]:
-    """Return every output of a device, in the order of testing."""
+    """Return a step for every output of a device, in the order of testing."""
     wires = config.wires(device)
     wired = {wire.signal for wire in wires if wire.direction == "out"} if wires else None
     return list(KINDS[config.kind](config.devices[device], wired))

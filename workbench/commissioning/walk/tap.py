@@ -1,4 +1,4 @@
-"""A bus with a tap: the driver works as usual, and a person can see the levels that the driver
+"""A bus with a tap. The driver works as usual, and the tap shows a person the levels that the driver
 reads."""
 
 from collections.abc import Mapping
@@ -8,7 +8,7 @@ from drivers.hal.points import Lines, Pull
 
 
 class TappedLines:
-    """Lines that remember the levels read."""
+    """Lines that remember the latest levels read."""
 
     def __init__(self, lines: Lines, levels: dict[str, int]) -> None:
         self.claim = lines.claim
@@ -28,7 +28,8 @@ class TappedLines:
 
 
 class Tap:
-    """Wraps an open bus. `levels`: the last level of each input, by the input's canonical point."""
+    """A wrapper of an open bus. `levels` holds the last level of each input, by the input's canonical
+    point."""
 
     def __init__(self, bus: Any) -> None:
         self.levels: dict[str, int] = {}
@@ -45,5 +46,5 @@ class Tap:
     def lines(
         self, inputs: Mapping[str, Pull | None], outputs: Mapping[str, bool], *of_modbus: Any
     ) -> TappedLines:
-        """Return the lines of one device. The tap remembers their readings."""
+        """Return one device's lines. The tap remembers their readings."""
         return TappedLines(self._bus.lines(inputs, outputs, *of_modbus), self.levels)

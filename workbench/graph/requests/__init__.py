@@ -1,8 +1,8 @@
 """Every request that `send` can make: its message, its fulfilment, and its obstacles.
 
 The messages and conditions are the same as in RMF's fleet adapters (rmf_ros2 9dedd0f). Each kind of
-device has a file; this file has the common part. A request's `obstacles` are a table, most specific
-first; the last obstacle always applies.
+device has a file. This file has the part that all kinds share. A request's `obstacles` are a table, in
+which the most specific obstacle comes first. The last obstacle always applies.
 """
 
 from abc import ABC, abstractmethod
@@ -29,13 +29,14 @@ NEVER_AT: Final = float("-inf")
 class RequestProgress(Struct, frozen=True):
     """The events after the command began. Times are monotonic (s).
 
-    - `listeners`: number of matched subscriptions of the request's topic.
-    - `states`: the states that concern the request, in order. The last came at `stated_at`.
+    - `listeners`: number of matched subscriptions on the request's topic.
+    - `states`: the states that concern the request, in order. The last state came at `stated_at`.
     - `there`: kind and name of every device heard.
-    - `graph`: where we listen, in words for people.
+    - `graph`: the name of our graph, in words for people.
     - `hinted`: the hints printed.
     - `heartbeat`: the door supervisor's latest heartbeat, which came at `heartbeat_at`.
-    - `boarded`: "yes" or "no" from the lift's diagnostics: is a robot inside? "" if not heard.
+    - `boarded`: whether a robot is in the car, "yes" or "no", from the lift's diagnostics; "" if not
+      heard.
     - `refusals`: the chargers' refusals after our first request.
     - `results`: the workcells' results.
     """
@@ -57,7 +58,7 @@ class RequestProgress(Struct, frozen=True):
     results: tuple[words.WorkcellResulted, ...] = ()
 
     def hears(self, heard: Heard, about: Callable[[words.Stated], bool]) -> "RequestProgress":
-        """Take a message. `about(state)`: does the state concern the request?"""
+        """Take a message. `about(state)` tells whether the state concerns the request."""
         message = heard.message
         if isinstance(message, SupervisorHeartbeat):
             return replace(self, heartbeat=message, heartbeat_at=heard.at)
@@ -78,23 +79,23 @@ class RequestProgress(Struct, frozen=True):
         return sorted(name for one, name in self.there if one == kind)
 
     def sends(self, now: float) -> "RequestProgress":
-        """Record that the request is sent now."""
+        """Return the progress after the request is sent now."""
         first = now if self.first_sent_at is None else self.first_sent_at
         return replace(self, first_sent_at=first, last_sent_at=now)
 
     def states_of(self, kind: type[State]) -> list[State]:
-        """Return the states of this type that were heard, in order."""
+        """Return all states of this type that were heard, in order."""
         return [state for state in self.states if isinstance(state, kind)]
 
     def answer(self, kind: type[State]) -> State | None:
-        """Return the last state if it was heard after our first request, else None."""
+        """Return the last state if the state came after our first request. Otherwise return None."""
         sent_at = self.first_sent_at
         if sent_at is None or not self.states or self.stated_at < sent_at:
             return None
         return self.states_of(kind)[-1]
 
     def requesters(self, door: str) -> list[str] | None:
-        """Return the door's holders from a heartbeat after our first request; None before such a
+        """Return the door's holders from a heartbeat after our first request. Return None before such a
         heartbeat."""
         sent_at = self.first_sent_at
         if self.heartbeat is None or sent_at is None or self.heartbeat_at < sent_at:
@@ -103,8 +104,8 @@ class RequestProgress(Struct, frozen=True):
 
 
 WHERE: Final = (
-    "is it in another domain (--domain-id), on another transport (--transport), on another machine"
-    " (without --localhost)? rmf-bridge status shows a daemon's, on its own machine"
+    "is the device in another domain (--domain-id), on another transport (--transport), or on another"
+    " machine (without --localhost)? rmf-bridge status on the daemon's machine shows both"
 )
 
 
@@ -115,13 +116,13 @@ class Fulfilled(Struct, frozen=True):
 
 
 class Failed(Struct, frozen=True):
-    """The request had no effect; `text` says why."""
+    """The request had no effect. `text` gives the reason."""
 
     text: str
 
 
 class Obstacle(NamedTuple):
-    """A possible reason why a request has no effect; `remedy`: the command that helps."""
+    """A possible reason why a request has no effect. `remedy` is the command that helps."""
 
     present: bool
     text: str
@@ -130,10 +131,10 @@ class Obstacle(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Request(ABC):
-    """A request about the device `name`. It goes to the device's daemon if `direct`, else to the
-    supervisor.
+    """A request about the device `name`. With `direct`, the request goes to the device's daemon, and
+    otherwise to the supervisor.
 
-    `answers`: topics to hear besides the states.
+    `answers` lists topics to hear besides the states.
     """
 
     name: str
@@ -149,7 +150,8 @@ class Request(ABC):
 
     @property
     def topic(self) -> AnyTopic:
-        """Topic of the request: the daemon's own topic if `direct`, else the fleet adapters' topic."""
+        """The request's topic. With `direct`, this is the daemon's own topic, and otherwise the fleet
+        adapters' topic."""
         return self.own if self.direct or self.adapter is None else self.adapter
 
     @property
@@ -159,35 +161,36 @@ class Request(ABC):
 
     @abstractmethod
     def message(self, seen: RequestProgress) -> words.Requested | None:
-        """Return the message to send, without a stamp; None if it cannot be made yet."""
+        """Return the message to send, without a stamp. Return None if there is not yet enough
+        information for the message."""
 
     @abstractmethod
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Return the outcome; None while the states show no outcome."""
+        """Return the outcome. Return None as long as the states show no outcome."""
 
     @abstractmethod
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return possible reasons for no effect; the first that is `present` counts."""
+        """Return possible reasons for no effect. The first reason that is `present` counts."""
 
     @property
     def supervisor(self) -> AnyTopic | None:
-        """Topic that only a supervisor publishes; None if the request needs no supervisor."""
+        """A topic that only a supervisor publishes, or None if the request needs no supervisor."""
         return None
 
     def goes_direct(self, seen: RequestProgress, now: float) -> bool:
-        """Has the time come to ask the device's own daemon, because the supervisor does nothing?"""
+        """Return whether to ask the device's own daemon now, because the supervisor does nothing."""
         return False
 
     def about(self, state: words.Stated) -> bool:
-        """Does the state come from this device?"""
+        """Return whether the state comes from this device."""
         return (words.kind(state), words.device(state)) == (self.kind, self.name)
 
     def ready(self, seen: RequestProgress) -> bool:
-        """Has the device been heard?"""
+        """Return whether the device has been heard."""
         return bool(seen.states)
 
     def misnamed(self, seen: RequestProgress) -> str:
-        """Return the other kind of device with this name; "" if no such device was heard."""
+        """Return the other kind of device that has this name. Return "" if no such device was heard."""
         if self.ready(seen):
             return ""
         kinds = sorted(kind for kind, name in seen.there if name == self.name and kind != self.kind)
@@ -211,7 +214,7 @@ class Request(ABC):
         return Obstacle(True, text, f"to ask the {self.kind}'s own daemon: {there}")
 
     def unheard(self, seen: RequestProgress) -> Obstacle:
-        """Explain that the device has not been heard; suggest a similar name."""
+        """Explain that the device has not been heard, and suggest a similar name."""
         topic, names = self.states.name, seen.names(self.kind)
         if not names:
             text = f"no {self.kind} is heard on {topic}; {self._hears(seen)}"
@@ -219,7 +222,8 @@ class Request(ABC):
         return Obstacle(True, f"no '{self.name}' on {topic}; {self._hears(seen)}")
 
     def _hears(self, seen: RequestProgress) -> str:
-        """Name the heard devices of this kind, else all heard devices, else the graph."""
+        """Name the heard devices of this kind. If there are none, name all heard devices, or else the
+        graph."""
         if names := seen.names(self.kind):
             near = "" if self.name in names else nearest(self.name, names)
             return f"{self.kind}s heard: {', '.join(names)}{near}"
@@ -241,7 +245,7 @@ class Request(ABC):
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """Return a text such as `; did you mean 'Lift1'?`; "" when no name is similar."""
+    """Return a text such as `; did you mean 'Lift1'?`. Return "" if no name is similar."""
     folded = {n.lower(): n for n in names}
     near = get_close_matches(name.lower(), folded, n=1, cutoff=0.6)
     return f"; did you mean '{folded[near[0]]}'?" if near else ""

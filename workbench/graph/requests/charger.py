@@ -1,5 +1,5 @@
-"""Assign a charger to a robot, or cancel the assignment, through the charger's daemon or the
-coordinator's queue."""
+"""Assign a charger to a robot, or cancel the assignment. The request goes to the charger's daemon or to
+the coordinator's queue."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class _Charger(Request):
 
 @dataclass(frozen=True, slots=True)
 class RobotCharge(_Charger):
-    """Assign the charger to a robot, under a request id of our own."""
+    """A request that assigns the charger to a robot. The request has an id of our own."""
 
     fleet: str
     robot: str
@@ -39,14 +39,14 @@ class RobotCharge(_Charger):
     answers: ClassVar[tuple[AnyTopic, ...]] = (topics.CHARGER_REFUSALS,)
 
     def message(self, seen: RequestProgress) -> d.ChargerRequest:
-        """Return the request. The id is always the same, so a repeat is no new request."""
+        """Return the request. The request's id is always the same, so a repeat is no new request."""
         charger = "" if self.name == ANY else self.name
         limit = duration(self.start_timeout_s)
         return d.ChargerRequest(charger, self.fleet, self.robot, limit, self.request_id)
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Return Fulfilled after a state with our id shows that the charger serves the robot; Failed
-        after a refusal."""
+        """Return Fulfilled if a state with our id shows that the charger serves the robot. Return
+        Failed after a refusal."""
         answer = seen.answer(d.ChargerState)
         if answer is None or answer.state not in SERVING or answer.request_id != self.request_id:
             return self._refused(seen)
@@ -64,7 +64,7 @@ class RobotCharge(_Charger):
         return Failed(f"{text}; to cancel that request: {self.line.other(*cancel)}")
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the obstacles: an error, or another request."""
+        """Return the obstacles, which are an error of the charger or another request."""
         state = seen.states_of(d.ChargerState)[-1]
         cancel = self.line.other("send", "charger", self.name, "--cancel", state.request_id)
         return (
@@ -85,19 +85,19 @@ def _error(state: d.ChargerState) -> Obstacle:
 
 @dataclass(frozen=True, slots=True)
 class ChargeCancel(_Charger):
-    """Cancel the request to which the charger is assigned."""
+    """A cancel of the request that the charger serves."""
 
     request_id: str
 
     own: ClassVar[AnyTopic] = topics.CHARGER_CANCELS
 
     def message(self, seen: RequestProgress) -> d.ChargerCancel:
-        """Return the cancel of this request id."""
+        """Return the ChargerCancel for this request id."""
         return d.ChargerCancel(self.name, self.request_id)
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Return Fulfilled after the charger shows no id or another id; Failed if the charger never
-        showed our id."""
+        """Return Fulfilled after the charger shows no id or another id. Return Failed if the charger
+        never showed our id."""
         answer = seen.answer(d.ChargerState)
         if answer is None or self._holds(answer):
             return None
@@ -111,7 +111,7 @@ class ChargeCancel(_Charger):
         return state.request_id == self.request_id and state.state not in released
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the obstacle: the charger still serves the request."""
+        """Return the obstacle that the charger still serves the request."""
         text = f"{self.name} still serves request {self.request_id}: see its daemon's log"
         return (Obstacle(True, text),)
 
@@ -121,8 +121,8 @@ COORDINATOR: Final = "charger coordinator"
 
 @dataclass(frozen=True, slots=True)
 class QueuedCharge(RobotCharge):
-    """Request a charger for this robot from the coordinator: the charger `name`, or any charger
-    (ANY)."""
+    """A request to the coordinator for a charger. `name` is the wanted charger, or ANY for any
+    charger."""
 
     own = topics.ADAPTER_CHARGER_REQUESTS
     listener = COORDINATOR
@@ -133,17 +133,18 @@ class QueuedCharge(RobotCharge):
         return f"{self.fleet}/{self.robot}"
 
     def about(self, state: words.Stated) -> bool:
-        """Does a charger show this robot?"""
+        """Return whether a charger's state shows this robot."""
         return isinstance(state, d.ChargerState) and (
             (state.robot_fleet, state.robot_name) == (self.fleet, self.robot)
         )
 
     def ready(self, seen: RequestProgress) -> bool:
-        """Has any charger been heard?"""
+        """Return whether any charger has been heard."""
         return bool(seen.names(self.kind))
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Return Fulfilled after a charger serves the robot; Failed if the coordinator refuses."""
+        """Return Fulfilled after a charger serves the robot. Return Failed if the coordinator
+        refuses."""
         answer = seen.answer(d.ChargerState)
         if answer is None or answer.state not in SERVING:
             return self._refused(seen)
@@ -151,42 +152,42 @@ class QueuedCharge(RobotCharge):
         return Fulfilled(f"{answer.charger_name} is {state} for {self.who}")
 
     def unheard(self, seen: RequestProgress) -> Obstacle:
-        """Explain why no charger shows the robot yet: the robot waits in the queue, or the request was
-        refused."""
+        """Explain why no charger shows the robot yet. The robot may wait in the queue, or the
+        coordinator may have refused the request."""
         if not seen.names(self.kind):
             return super(QueuedCharge, self).unheard(seen)
         cancel = ("send", "charger", ANY, "--queue", "--cancel", self.request_id)
         return Obstacle(
             True,
-            f"no charger serves {self.who} yet: it waits in the {COORDINATOR}'s queue"
+            f"no charger serves {self.who} yet: the robot waits in the {COORDINATOR}'s queue"
             f" (see `{self.line.other('watch')}`), or the request was refused (see the"
             " coordinator's log)",
             f"to withdraw the request: {self.line.other(*cancel)}",
         )
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the obstacles: the charger's error, or a robot without a charger."""
+        """Return the obstacles, which are the charger's error or a robot without a charger."""
         text = f"the {COORDINATOR} has not assigned {self.who} a charger: see its log"
         return _error(seen.states_of(d.ChargerState)[-1]), Obstacle(True, text)
 
 
 @dataclass(frozen=True, slots=True)
 class QueuedCancel(ChargeCancel):
-    """Withdraw a queued request; no state shows whether the request was queued."""
+    """A cancel of a queued request. No state shows whether the request was in the queue."""
 
     own = topics.ADAPTER_CHARGER_CANCELS
     listener = COORDINATOR
 
     def message(self, seen: RequestProgress) -> d.ChargerCancel:
-        """Return the cancel of this request id, for any charger."""
+        """Return the ChargerCancel for this request id, for any charger."""
         return d.ChargerCancel("", self.request_id)
 
     def about(self, state: words.Stated) -> bool:
-        """Is the state about this request? Always no, because no state shows a queued request."""
+        """Return False, because no state shows a queued request."""
         return False
 
     def ready(self, seen: RequestProgress) -> bool:
-        """Has any charger been heard?"""
+        """Return whether any charger has been heard."""
         return bool(seen.names(self.kind))
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | None:

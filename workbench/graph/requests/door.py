@@ -1,4 +1,4 @@
-"""Hold a door open and release it, as DoorOpen.cpp and DoorClose.cpp do."""
+"""Hold a door open, and release the door, as DoorOpen.cpp and DoorClose.cpp do."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,10 +10,11 @@ from workbench.graph.requests import Fulfilled, Obstacle, Request, RequestProgre
 
 @dataclass(frozen=True, slots=True)
 class DoorMove(Request):
-    """Open or close the door.
+    """A request to open or close the door.
 
-    On the adapter topic the request also waits for the supervisor's heartbeat, as a fleet adapter does.
-    The heartbeat must list us while we hold the door, and must no longer list us after the release.
+    On the adapter topic, the request also waits for the supervisor's heartbeat, as a fleet adapter
+    does. The heartbeat must list us while we hold the door. After the release, the heartbeat must no
+    longer list us.
     """
 
     opened: bool
@@ -30,7 +31,7 @@ class DoorMove(Request):
         return d.DoorModeValue.MODE_OPEN if self.opened else d.DoorModeValue.MODE_CLOSED
 
     def message(self, seen: RequestProgress) -> d.DoorRequest:
-        """Return the request for that mode."""
+        """Return the request for `mode`."""
         return d.DoorRequest(
             requester_id=self.requester,
             door_name=self.name,
@@ -38,8 +39,8 @@ class DoorMove(Request):
         )
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | None:
-        """Return Fulfilled after the door shows the mode. On the adapter topic the heartbeat must agree
-        too."""
+        """Return Fulfilled after the door shows the mode. On the adapter topic, the heartbeat must also
+        agree."""
         answer = seen.answer(d.DoorState)
         if answer is None or answer.current_mode.value != self.mode:
             return None
@@ -52,7 +53,7 @@ class DoorMove(Request):
         return requesters is not None and (self.requester in requesters) == self.opened
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the obstacles that the door's mode shows."""
+        """Return the obstacles that the door's present mode shows."""
         mode, name = seen.states_of(d.DoorState)[-1].current_mode.value, self.name
         others = ", ".join(r for r in seen.requesters(name) or [] if r != self.requester)
         return (

@@ -1,4 +1,4 @@
-"""Request a lift, as RequestLift.cpp does, and end a session, as EndLiftSession.cpp does."""
+"""Request a lift, as RequestLift.cpp does. End a session, as EndLiftSession.cpp does."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -12,9 +12,10 @@ from bridges.observe.lift import HAZARDS, request_lift
 from workbench.graph.requests import Failed, Fulfilled, Obstacle, Request, RequestProgress, nearest
 
 OBEYS_WITHIN_S: Final = 5.0
-"""Maximum time (s) for a supervisor to end a session, which takes a few states."""
+"""Maximum time (s) for a supervisor to end a session. The supervisor needs a few states to do so."""
 MOVES_WITHIN_S: Final = 5.0
-"""Time (s) to watch the lift after an operator's release, because a person may stand at the car."""
+"""Time (s) to watch the lift after an operator's release. A person may stand at the car, and must know
+whether the car moves."""
 
 
 class _Lift(Request):
@@ -25,7 +26,7 @@ class _Lift(Request):
 
     @property
     def supervisor(self) -> AnyTopic | None:
-        """The lift's topic, on which only supervisors publish."""
+        """The lift's own topic, on which only supervisors publish."""
         return None if self.direct else self.own
 
     @property
@@ -35,14 +36,16 @@ class _Lift(Request):
 
 @dataclass(frozen=True, slots=True)
 class LiftRide(_Lift):
-    """Request a session, and the car at this floor with its door open, as a fleet adapter does."""
+    """A request for a session, and for the car at this floor with its door open. A fleet adapter sends
+    the same request."""
 
     floor: str
     session: str
     granted_only: bool = False
 
     def message(self, seen: RequestProgress) -> d.LiftRequest:
-        """Return the request, always AGV_MODE with DOOR_OPEN, because fleets send nothing else."""
+        """Return the request. The request always has AGV_MODE and DOOR_OPEN, because fleets send
+        nothing else."""
         return d.LiftRequest(
             lift_name=self.name,
             session_id=self.session,
@@ -52,7 +55,8 @@ class LiftRide(_Lift):
         )
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Return Fulfilled after RequestLift's four fields match; Failed for an unserved floor."""
+        """Return Fulfilled after RequestLift's four fields match. Return Failed if the lift does not
+        serve the floor."""
         states = seen.states_of(d.LiftState)
         served = states[-1].available_floors if states else ()
         if served and self.floor not in served:
@@ -79,8 +83,8 @@ class LiftRide(_Lift):
         return self.granted_only or all(check.met for check in checks)
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the obstacles: another session, a mode, or a floor or door state that was not
-        reached."""
+        """Return the obstacles. An obstacle is another session, a wrong mode, or a floor or door state
+        that was not reached."""
         state = seen.states_of(d.LiftState)[-1]
         name, session, mode = self.name, state.session_id, state.current_mode
         word = words.word(d.LiftMode, mode)
@@ -107,10 +111,11 @@ class LiftRide(_Lift):
 
 @dataclass(frozen=True, slots=True)
 class LiftEnd(_Lift):
-    """End `session`; "": the session of the first LiftState heard.
+    """A request to end `session`. With "", the request ends the session in the first LiftState heard.
 
-    `falls_back`: if the supervisor does not obey within OBEYS_WITHIN_S, ask the lift's own daemon. If a
-    robot may be inside, the operator must first confirm that the car is empty (`car_empty`).
+    With `falls_back`, the request goes to the lift's own daemon if the supervisor does not obey within
+    OBEYS_WITHIN_S. If a robot may be in the car, the operator must first confirm that the car is empty
+    (`car_empty`).
     """
 
     session: str = ""
@@ -157,14 +162,15 @@ class LiftEnd(_Lift):
         return MOVES_WITHIN_S if self.falls_back else 0.0
 
     def goes_direct(self, seen: RequestProgress, now: float) -> bool:
-        """Has the supervisor, if any, had OBEYS_WITHIN_S, and is the car known or confirmed to be
-        empty?"""
+        """Return whether to ask the lift's own daemon now. The supervisor, if there is one, must have
+        had OBEYS_WITHIN_S. The car must be empty, as the lift or the operator says."""
         asked_at = seen.began_at if seen.first_sent_at is None else seen.first_sent_at
         late = now >= asked_at + OBEYS_WITHIN_S
         return self.falls_back and not self.direct and late and self._outside(seen)
 
     def nobody(self, seen: RequestProgress) -> Obstacle:
-        """Explain why the request is refused even without a supervisor: a robot may be in the car."""
+        """Explain why the request is refused even if no supervisor is there. A robot may be in the
+        car."""
         found = super(LiftEnd, self).nobody(seen)
         if self.direct or not self.falls_back or not seen.states:
             return found
@@ -176,7 +182,7 @@ class LiftEnd(_Lift):
         return self.car_empty or seen.boarded == "no"
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the obstacles: the lift still shows the session."""
+        """Return the obstacle that the lift still shows the session."""
         if self.falls_back and not self._outside(seen):
             text = (
                 f"{self.name} still shows the session, and a robot may be in the car: look inside"
@@ -192,9 +198,9 @@ class LiftEnd(_Lift):
 
 
 def aftermath(states: Sequence[d.LiftState]) -> str:
-    """Tell who has the lift now, and whether the car or the door moves.
+    """Tell which requester has the lift now, and whether the car or the door moves.
 
-    `states`: the state that showed the end of the session, and all later states.
+    `states` begins with the state that showed the end of the session.
     """
     last = states[-1]
     who = f"{last.session_id} has it now" if last.session_id else "nobody has it now"

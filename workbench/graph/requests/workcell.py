@@ -14,8 +14,8 @@ DECIDE = "its daemon's machine: rmf-bridge status, then rmf-bridge workcell done
 
 @dataclass(frozen=True, slots=True)
 class Dispensing(Request):
-    """Request `quantity` items of `type_guid` until a result comes; `type_guid` "" requests no
-    items."""
+    """A request for `quantity` items of `type_guid`, until a result comes. With `type_guid` "", the
+    request asks for no items."""
 
     guid: str
     type_guid: str = ""
@@ -31,13 +31,14 @@ class Dispensing(Request):
     part: ClassVar[type[d.DispenserRequestItem | d.IngestorRequestItem]] = d.DispenserRequestItem
 
     def message(self, seen: RequestProgress) -> words.WorkcellRequested:
-        """Return the request. The guid is always the same, so a repeat is no new request."""
+        """Return the request. The request's guid is always the same, so a repeat is no new request."""
         one = self.part(self.type_guid, self.quantity, self.compartment)
         items = (one,) if self.type_guid else ()
         return self.made(d.Time(), self.guid, self.name, self.transporter, items)  # type: ignore[arg-type]
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Return the outcome that a result gives. RMF would also count an unlisted request as done."""
+        """Return the outcome that a result gives. In RMF, a request that the workcell no longer lists
+        would also count as done."""
         for one in seen.results:
             if (one.source_guid, one.request_guid) == (self.name, self.guid):
                 if one.status == d.WorkcellStatus.SUCCESS:
@@ -64,7 +65,7 @@ class Dispensing(Request):
 
 @dataclass(frozen=True, slots=True)
 class Ingesting(Dispensing):
-    """Ask an ingestor to take items, by the rules of `Dispensing`."""
+    """A request to an ingestor to take items. The rules of `Dispensing` apply."""
 
     kind: ClassVar[str] = "ingestor"
     states: ClassVar[AnyTopic] = topics.INGESTOR_STATES

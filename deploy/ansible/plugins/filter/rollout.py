@@ -1,4 +1,4 @@
-"""The rules of the rollout: pure functions of files, texts and `rmf-bridge status --json`."""
+"""The rules of the rollout, as pure functions of files, texts and `rmf-bridge status --json`."""
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path, PurePath
@@ -7,7 +7,7 @@ from typing import Any, Final
 import yaml
 
 DEVICES: Final = frozenset({"lift", "door", "charger", "dispenser", "ingestor"})
-"""Kinds with outputs: each needs the record of a kill test."""
+"""Kinds with outputs. Each device of such a kind needs the record of a kill test."""
 NO_OUTPUTS: Final = frozenset({"alarm", "fleet"})
 SUPERVISORS: Final = frozenset({"lift_supervisor", "door_supervisor", "charger_coordinator"})
 SERVED: Final = DEVICES | NO_OUTPUTS | SUPERVISORS
@@ -15,7 +15,8 @@ ROLES: Final = {"daemon": DEVICES | NO_OUTPUTS, "supervisors": SUPERVISORS, "out
 
 
 def rmf_kind(text: str) -> str:
-    """Return the kind of a YAML; "" for a profile, a map or another file that no service runs."""
+    """Return the kind of a YAML. Return "" for a profile, a map or another file that no service
+    runs."""
     try:
         content = yaml.safe_load(text)
     except yaml.YAMLError:
@@ -25,14 +26,14 @@ def rmf_kind(text: str) -> str:
 
 
 def rmf_files(folder: str, role: str = "") -> list[str]:
-    """Return the YAMLs in this folder whose service this role makes; without a role, each YAML that
-    has a service."""
+    """Return the YAMLs in this folder for which this role makes a service. Without a role, return every
+    YAML that has a service."""
     kinds = ROLES.get(role, SERVED)
     return [str(file) for file in _yamls(folder) if rmf_kind(file.read_text("utf-8")) in kinds]
 
 
 def rmf_beside(folder: str) -> list[str]:
-    """Return the YAMLs in this folder that have no service: profiles and maps."""
+    """Return the YAMLs in this folder that have no service, which are profiles and maps."""
     return [str(file) for file in _yamls(folder) if not rmf_kind(file.read_text("utf-8"))]
 
 
@@ -41,9 +42,10 @@ def _yamls(folder: str) -> list[Path]:
 
 
 def rmf_untested(form: str, file: str) -> str:
-    """Return why this form is no record of a kill test that went well for this YAML; "" if it is.
+    """Return the reason why this form does not record a good kill test for this YAML. Return "" if the
+    form does.
 
-    `form`: the text that `rmf-bridge doctor FILE --kill-test --form FORM` writes.
+    `form` is the text that `rmf-bridge doctor FILE --kill-test --form FORM` writes.
     """
     name = PurePath(file).name
     if not form.strip():
@@ -62,10 +64,10 @@ def rmf_untested(form: str, file: str) -> str:
 def rmf_not_back(
     after: Iterable[Mapping[str, Any]], before: Iterable[Mapping[str, Any]], wanted: Iterable[str]
 ) -> list[str]:
-    """Return why a machine has not come back; empty if every wanted daemon serves.
+    """Return the reasons why a machine has not come back. Return [] if every wanted daemon serves.
 
-    `after`, `before`: what `rmf-bridge status --json` printed. `wanted`: names of services. A fault
-    that a daemon had before does not count, because the change is not its cause.
+    `after` and `before` are the output of `rmf-bridge status --json`. `wanted` has names of services.
+    If a daemon had a fault before, the fault does not count, because the change is not its cause.
     """
     now = {one["name"]: one for one in after}
     levels = {one["name"]: one["level"] for one in before}
@@ -73,7 +75,8 @@ def rmf_not_back(
 
 
 def rmf_untested_file(file: str) -> str:
-    """Return why the form beside this YAML (NAME.md) is no record of a kill test; "" if it is."""
+    """Return the reason why the form beside this YAML (NAME.md) is no record of a kill test. Return ""
+    if the form is such a record."""
     form = Path(file).with_suffix(".md")
     return rmf_untested(form.read_text("utf-8") if form.exists() else "", file)
 
@@ -94,7 +97,7 @@ class FilterModule:
     """The filters that Ansible finds."""
 
     def filters(self) -> dict[str, Callable[..., Any]]:
-        """Return the filters by name."""
+        """Return filter name -> function."""
         return {
             "rmf_files": rmf_files,
             "rmf_beside": rmf_beside,

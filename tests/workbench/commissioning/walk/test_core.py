@@ -134,7 +134,7 @@ def test_what_was_seen_before_it_was_switched_on_proves_nothing() -> None:
     walk.does(Switch(0))
     walk.until(6.0)
     assert walk.history == [(0.1, "off"), (0.5, "hold on"), (5.5, "off")]
-    told = "switched on; the inputs showed the effect before, so they prove nothing"
+    told = "switched on; the inputs showed the effect before, so this proves nothing"
     assert walk.memory.results == {0: told}
     walk.sample = Sample()
     walk.until(7.0)
