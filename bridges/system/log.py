@@ -118,7 +118,7 @@ def _as_json(value: object) -> object:
 
 
 class _OthersOnce(logging.Filter):
-    """A filter that passes each log call of a library only once.
+    """A filter that passes each log call of a library only once, as `library logger=… text=…`.
 
     Without this filter anybody could cause endless lines with bad frames or datagrams. Our own code
     already logs each event once.
@@ -137,7 +137,7 @@ class _OthersOnce(logging.Filter):
         record.exc_info = record.exc_text = None  # no operator needs a library's traceback
         text = record.getMessage()  # may quote untrusted input
         record.args = None
-        record.msg = text if text.isprintable() else text.encode(ESCAPED).decode("ascii")
+        record.msg = pairs("library", logger=record.name, text=text)
         first = place not in self._said
         self._said.add(place)
         return first

@@ -11,7 +11,7 @@ from bridges.kinds.door.signals import DoorOutputs
 from bridges.kinds.lift.signals import LiftOutputs, Side
 from bridges.kinds.shared.decision import OperatorReset
 from bridges.messages.definitions import LiftMode
-from bridges.system.log import Seldom, _Formatter, _Json, pairs, plain
+from bridges.system.log import Seldom, _Formatter, _Json, _OthersOnce, pairs, plain
 
 
 class Asked(Struct, frozen=True):
@@ -112,3 +112,14 @@ def test_as_json_under_systemd_a_text_without_an_event_is_one_line_with_its_prio
     line = _Json(journal=True).format(record)
     assert line.startswith("<3>{")
     assert json.loads(line.removeprefix("<3>"))["text"] == "one\ntwo"
+
+
+def test_a_library_line_has_keys_and_comes_once() -> None:
+    once = _OthersOnce()
+    lines = [
+        logging.LogRecord("paho.mqtt", logging.ERROR, "a.py", line, "bad\x1b %s", ("frame",), None)
+        for line in (1, 1, 2)
+    ]
+    assert [once.filter(line) for line in lines] == [True, False, True]
+    assert lines[0].getMessage() == 'library logger=paho.mqtt text="bad\\x1b frame"'
+    assert json.loads(_Json(journal=False).format(lines[0]))["event"] == "library"

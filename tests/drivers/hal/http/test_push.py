@@ -3,14 +3,18 @@
 A message on the WebSocket wakes the daemon. No failure of the WebSocket makes a reading wrong.
 """
 
+import base64
+import hashlib
 import json
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 import msgspec
 import pytest
+from websockets.sync import client
 from websockets.sync.client import connect
 from websockets.sync.server import ServerConnection, serve
 
@@ -20,7 +24,7 @@ from drivers.lift.http import HttpLiftSettings, create
 from hal_fakes.http import HttpServer
 from hal_fakes.http_lift import FakeHttpLift, build
 from hal_fakes.realtime import RealTime
-from tests.drivers.hal.http.far_end import FarEnd, always, answer, once
+from tests.drivers.hal.http.far_end import Caller, FarEnd, always, answer, once
 from tests.drivers.lift.contract import QUICK
 from tests.drivers.lift.test_http import settings_of
 from tests.waiting import PATIENCE_S, wait_until
@@ -165,6 +169,30 @@ def test_a_server_that_speaks_no_websocket_wakes_nobody_and_is_logged_once(
         wait_until(lambda: far.connections > 1, "it tries again")
     assert wakes.count == 0
     assert len([r for r in caplog.records if "push_lost" in r.message]) == 1
+
+
+def deaf(caller: Caller) -> None:
+    """Accept the WebSocket (RFC 6455, 4.2.2), and answer no ping."""
+    lines = dict(line.split(b": ", 1) for line in caller.request().split(b"\r\n")[1:-2])
+    guid = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
+    accept = base64.b64encode(hashlib.sha1(lines[b"Sec-WebSocket-Key"] + guid).digest())
+    caller.send(
+        b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        b"Sec-WebSocket-Accept: " + accept + b"\r\n\r\n"
+    )
+    caller.request()  # until the daemon hangs up
+
+
+def test_a_server_that_answers_no_ping_is_logged_once_in_our_form(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    soon = partial(client.connect, ping_interval=0.05, ping_timeout=0.05)
+    monkeypatch.setattr(client, "connect", soon)
+    with FarEnd(deaf) as far, listening(far.port):
+        wait_until(lambda: far.connections > 1, "it connects again")
+    reason = "sent 1011 (internal error) keepalive ping timeout; no close frame received"
+    url = f"ws://127.0.0.1:{far.port}/ws"
+    assert [r.getMessage() for r in caplog.records] == [f'push_lost url={url} reason="{reason}"']
 
 
 def test_a_flood_of_messages_is_read_at_a_bounded_pace() -> None:
