@@ -23,7 +23,7 @@ from bridges.messages.definitions import DiagnosticArray
 from bridges.messages.stamps import ClockError, stamp
 from bridges.messages.topics import DIAGNOSTICS
 from bridges.runtime import guard, last_mark, order, record, signals
-from bridges.runtime.diagnostics import diagnosis
+from bridges.runtime.diagnostics import CERTIFICATE_FILES, diagnosis
 from bridges.runtime.guard import Guard
 from bridges.runtime.notify import notify, watchdog_s
 from bridges.runtime.predecessor import Predecessor
@@ -33,6 +33,7 @@ from bridges.runtime.runtime_directory import KEPT, MemoryFile, Once, RuntimeDir
 from bridges.runtime.service import OpenBus, clock_of, named_by, service
 from bridges.runtime.serving import stop
 from bridges.settings.load import Config
+from bridges.settings.tls_files import certificate_files
 from bridges.system.log import pairs
 from bridges.transports.choose import open_transport
 from bridges.transports.transport import Publisher, TransportError
@@ -69,6 +70,7 @@ class Daemon:
         Raises TransportError or HalError if a transport or bus cannot be opened.
         """
         self._config = config
+        self._certificates = certificate_files(config)
         self._runtime = runtime
         self._end = end
         self._simulated = simulated
@@ -243,6 +245,7 @@ class Daemon:
             "file": str(self._config.path.absolute()),
             "kind": self._config.kind,
             **self._about(),
+            CERTIFICATE_FILES: self._certificates,
             "transport": self._transport.speaks,
             "release": self._transport.release.name,
             "domain_id": self._transport.domain_id,

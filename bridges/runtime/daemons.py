@@ -12,6 +12,7 @@ from typing import Any, Final, cast
 import msgspec
 
 from bridges.runtime import holder
+from bridges.runtime.diagnostics import CERTIFICATE_FILES
 from bridges.runtime.record import paths, read
 from bridges.runtime.subject import Status
 from bridges.system import files
@@ -57,6 +58,7 @@ class StatusFile(msgspec.Struct):
 
     devices: dict[str, DeviceStatus] = {}
     faults: list[FaultStatus] = []
+    certificate_files: dict[str, str] = {}
     heard_by: dict[str, int] = {}
     hears: dict[str, int] = {}
 
@@ -87,6 +89,11 @@ class DaemonStatus(msgspec.Struct, kw_only=True):
     def devices(self) -> Mapping[str, Status]:
         """The devices' statuses in the status file."""
         return cast(Mapping[str, Status], self.status.get("devices", {}))
+
+    @property
+    def certificates(self) -> list[tuple[str, str]]:
+        """The certificates that the daemon uses: (key of the YAML, file)."""
+        return [*self.status.get(CERTIFICATE_FILES, {}).items()]
 
     @property
     def level(self) -> int:

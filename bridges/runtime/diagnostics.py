@@ -38,8 +38,11 @@ MOST: Final = 100
 """The maximum number of devices in a message. Somebody on the network may send a supervisor many
 names."""
 CONTACTS: Final = "contacts"
-"""The key of the contacts in the status file. Contacts are not sent, because they would be most of the
-traffic on the graph."""
+CERTIFICATE_FILES: Final = "certificate_files"
+BUSES: Final = "buses"
+NOT_SENT: Final = (CONTACTS, COUNTS, CERTIFICATE_FILES, BUSES)
+"""Keys that stay in the status file and are not sent. Contacts and counts would be most of the traffic
+on the graph, and files are for this machine."""
 
 
 def diagnosis(
@@ -83,7 +86,7 @@ def _pairs(status: Status) -> Iterator[tuple[str, str]]:
     """Yield the status as pairs of key and value. A fault gives its code and detail, and each entry of
     a table gives one pair."""
     for key, value in status.items():
-        if key in (CONTACTS, COUNTS):
+        if key in NOT_SENT:
             continue
         if key == "faults":
             yield from ((fault["code"], fault["detail"]) for fault in value)

@@ -15,6 +15,7 @@ When the loop ends, for any cause, it switches every output off. The devices tha
 
 import logging
 from collections.abc import Collection, Sequence
+from typing import Any
 
 from bridges.kinds.shared.durations import AGES_AGO, NEVER
 from bridges.runtime.clock import Clock
@@ -48,7 +49,7 @@ class Loop:
         self.name = f"bus-{bus_name}"
         self.nodes = nodes
         self.inbox: Inbox[object] = Inbox()
-        self._bus_name = bus_name
+        self.bus_name = bus_name
         self._bus = bus
         self._scan_s = scan_s
         self._clock = clock
@@ -68,6 +69,10 @@ class Loop:
     def finished(self) -> int:
         """The number of finished scans and bus calls. Failed calls count too."""
         return self._scans + self._bus.calls
+
+    def calls(self) -> dict[str, dict[str, Any]]:
+        """Return the counts of the bus's calls by unit, for the status file."""
+        return self._bus.units.status()
 
     @property
     def ready(self) -> bool:
@@ -93,7 +98,7 @@ class Loop:
         for node in self.nodes:
             node.close()
         self._bus.close()
-        log.info(pairs("outputs_off", bus=self._bus_name, verified=all(safe)))
+        log.info(pairs("outputs_off", bus=self.bus_name, verified=all(safe)))
         return all(safe)
 
     def _notice_suspension(self) -> None:
@@ -101,7 +106,7 @@ class Loop:
         idle time."""
         late_s = self._clock.monotonic() - max(self.wake_at, self._ran_at)
         if late_s > SUSPENDED_S:
-            log.warning(pairs("suspended", bus=self._bus_name, for_s=f"{late_s:.1f}"))
+            log.warning(pairs("suspended", bus=self.bus_name, for_s=f"{late_s:.1f}"))
             for node in self.nodes:
                 node.was_suspended(late_s)
 

@@ -26,6 +26,7 @@ from bridges.messages.words import LONGEST_NAME
 from bridges.runtime.clock import Clock, machine_s
 from bridges.runtime.device import AnyNode, Node
 from bridges.runtime.device_memory import DeviceMemories
+from bridges.runtime.diagnostics import BUSES
 from bridges.runtime.fleet_alarm import FleetAlarmNode, node_for
 from bridges.runtime.graph_node import AnyGraphNode, GraphNode
 from bridges.runtime.keeper import MemoryStore
@@ -241,6 +242,7 @@ class Devices:
             "faults": [{"code": f.code, "detail": f.detail} for f in self._outlet.faults],
             "heard_by": self._outlet.heard_by(),
             "hears": {name: end.matched() for name, end in self._hears.items()},
+            BUSES: {loop.bus_name: loop.calls() for loop in self._loops},
         }
         return self._alarm.beside(shown) if self._alarm else shown
 

@@ -8,6 +8,7 @@ devices on its bus at most one timeout per backoff.
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property
 from typing import Any, Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
@@ -16,6 +17,7 @@ from bridges.kinds.shared.fields import DeviceSettings
 from bridges.kinds.shared.remarks import Remark, Remarks
 from bridges.kinds.shared.table import Table
 from drivers.hal.points import HalError, Wire
+from drivers.hal.unit_calls import UnitCalls
 
 __all__ = [
     "AnyBus",
@@ -78,6 +80,11 @@ class Bus:
     """
 
     calls = 0
+
+    @cached_property
+    def units(self) -> UnitCalls:
+        """The calls by unit. A bus whose devices only speak by themselves, or on pins, has none."""
+        return UnitCalls()
 
     def on_edge(self, wake: Callable[[], None]) -> None:
         """Let the bus call `wake`, from any thread, when an input may have changed. A polled bus never

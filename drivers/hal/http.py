@@ -62,6 +62,7 @@ class HttpBus(Bus):
         resolve: Resolve = socket.getaddrinfo,
     ) -> None:
         self._settings = settings
+        self._clock = clock
         self._base = base(settings.api_base)
         self._dialler = Dialler(self._base.host, self._base.port, resolve)
         self._adapter = _adapter(self._dialler, self._base.scheme)
@@ -128,8 +129,10 @@ class HttpBus(Bus):
         instead."""
         backoff.check()
         self._dialler.deadline.start(self._settings.timeout_s)
+        began, failed = self._clock(), True
         try:
             yield
+            failed = False
         except HalError as error:
             backoff.failed(str(error))
             raise
@@ -137,6 +140,8 @@ class HttpBus(Bus):
             self._adapter.close()
             self._dialler.hang_up()
             self.calls += 1
+            where = f"{self._base.host}:{self._base.port}"
+            self.units.ended(where, self._clock() - began, failed=failed)
         backoff.mended()
 
     def _call(

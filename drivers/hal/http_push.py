@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from websockets.sync.client import ClientConnection
 
 log = logging.getLogger(__name__)
-logging.getLogger("websockets.client").setLevel(logging.CRITICAL)  # `push_lost` reports the same failures
+logging.getLogger("websockets.client").setLevel(logging.CRITICAL)  # `push_lost` says the same
 
 
 class Pushes:

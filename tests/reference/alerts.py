@@ -7,6 +7,7 @@ import yaml
 
 from bridges.blackbox.recordings import LEAST_FREE
 from bridges.runtime import faults
+from bridges.system.certificates import DAY_S, SOON_S, URGENT_S
 
 HEAD: Final = """\
 # Alert rules for Prometheus (docs/how-to/monitor.md). `make reference` makes this file from
@@ -103,6 +104,46 @@ def _fixed() -> Iterator[dict[str, Any]]:
         "warning",
         "The disk of the recordings on {{ $labels.instance }} is full: nothing more is recorded.",
         "Copy the recordings away and remove them, or lower `files_mb` in the YAMLs.",
+    )
+    left = "rmf_bridge_certificate_end_timestamp_seconds - time()"
+    file = "{{ $labels.file }} ({{ $labels.daemon }}, {{ $labels.key }}) on {{ $labels.instance }}"
+    renew = "Renew it (docs/how-to/harden.md), and restart the daemon. After the end TLS fails."
+    soon, urgent = SOON_S // DAY_S, URGENT_S // DAY_S
+    yield _rule(
+        "CertificateEndsSoon",
+        f"{left} < {SOON_S}",
+        "1h",
+        "warning",
+        f"The certificate {file} ends within {soon} days, in {{{{ $value | humanizeDuration }}}}.",
+        renew,
+    )
+    yield _rule(
+        "CertificateEnds",
+        f"{left} < {URGENT_S}",
+        "0s",
+        "critical",
+        f"The certificate {file} has ended or ends within {urgent} days.",
+        renew,
+    )
+    yield _rule(
+        "CertificateUnreadable",
+        "rmf_bridge_certificate_unreadable == 1",
+        "5m",
+        "warning",
+        f"The end of the certificate {file} is unknown.",
+        "Run `sudo rmf-bridge doctor FILE` there: it says why. The exporter must be able to read"
+        " the file (group rmf-bridge).",
+    )
+    yield _rule(
+        "UnitFails",
+        "rate(rmf_bridge_daemon_bus_failed_calls_total[5m])"
+        " / rate(rmf_bridge_daemon_bus_calls_total[5m]) > 0.2",
+        "5m",
+        "warning",
+        "More than a fifth of the calls to {{ $labels.unit }} on bus {{ $labels.bus }} of"
+        " {{ $labels.daemon }} fail.",
+        "Look at this unit's wiring, termination and power; the dashboard of the bus shows whether"
+        " its other units fail too.",
     )
     yield _rule(
         "ExporterDown",

@@ -11,7 +11,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -21,6 +21,7 @@ from bridges.observe.requesters import Moment
 from bridges.observe.tally import SiteTally
 from bridges.runtime import daemons
 from bridges.system import directories, log
+from bridges.system.certificates import CertificateReader
 from bridges.system.installed import how_to_install
 from bridges.transports.transport import TransportError
 from workbench.graph.join import (
@@ -58,6 +59,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--runtime-dirs", type=Path, metavar="DIR", help="the folder of this machine's daemons"
     )
+    parser.add_argument(
+        "--certificate",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="another certificate whose end to export, such as that of the web page's proxy",
+    )
     add_graph_arguments(parser)
 
 
@@ -74,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
     except ImportError as error:
         complain("exporter", f"{error}: {how_to_install('page')}")
         return os.EX_UNAVAILABLE
-    site = Site(args.runtime_dirs)
+    site = Site(args.runtime_dirs, args.certificate)
     registry = CollectorRegistry()
     ProcessCollector(registry=registry)
     registry.register(site)
@@ -113,8 +121,9 @@ class Site:
     """A collector for prometheus_client. The collector reads the graph's devices and this machine's
     daemons."""
 
-    def __init__(self, runtime_dirs: Path | None = None) -> None:
+    def __init__(self, runtime_dirs: Path | None = None, certificates: Sequence[str] = ()) -> None:
         self._runtime_dirs = runtime_dirs
+        self._certificates, self._reader = certificates, CertificateReader()
         self._graph, self._tally = PlainGraph(), SiteTally()
         self._lock = threading.Lock()
         self._listens = False
@@ -135,7 +144,9 @@ class Site:
         with self._lock:
             if self._listens:
                 yield from families.of_graph(self._graph, self._tally, now)
-        yield from machine.of_machine(self._daemons(now.wall))
+        found = [*self._daemons(now.wall)]
+        yield from machine.of_machine(found)
+        yield from machine.of_certificates(found, self._certificates, self._reader.end)
         yield from machine.of_recordings(RECORDER)
 
     def _daemons(self, wall: float) -> Iterator[daemons.DaemonStatus]:

@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from collections import deque
+from collections.abc import Iterable
 from contextlib import closing, suppress
 from datetime import datetime
 from pathlib import Path
@@ -18,9 +19,12 @@ from typing import Final
 
 import msgspec
 
+from bridges.kinds.shared.durations import AGES_AGO
 from bridges.messages.words import KINDS, printable
-from bridges.runtime import faults
+from bridges.observe.requesters import Moment
+from bridges.runtime import daemons, faults
 from bridges.system import directories, files, log
+from bridges.system.certificates import CertificateReader
 from bridges.system.log import pairs
 from bridges.transports.transport import TransportError
 from bridges.yaml.problems import SettingsError
@@ -37,7 +41,7 @@ from workbench.notify import channels
 from workbench.notify.messages import NoticeText, worded
 from workbench.notify.notices import KeptTrouble, Notices
 from workbench.notify.settings import NotifySettings, Recipient, load
-from workbench.notify.troubles import troubles
+from workbench.notify.troubles import Trouble, of_certificates, troubles
 
 logger = logging.getLogger(__name__)
 TURN_S: Final = 1.0
@@ -47,6 +51,9 @@ pause."""
 MOST_WAITING: Final = 200
 """Maximum number of notices that wait for an unreachable recipient. The program drops the oldest
 notices, and logs that."""
+CERTIFICATES_EVERY_S: Final = 60.0
+NOTIFY: Final = "notify"
+"""The owner of certificates that only the file of `notify` names."""
 SERVICE_STATE: Final = Path("/var/lib/rmf-bridge-notify")
 """Folder in which `rmf-bridge-notify.service` stores the troubles already reported."""
 
@@ -189,6 +196,29 @@ class Courier:
         return True
 
 
+class Certificates:
+    """The certificates of this machine's daemons, and those of the file of `notify`."""
+
+    def __init__(self, others: Iterable[str]) -> None:
+        self._named = [(NOTIFY, "certificates", file) for file in others]
+        self._reader = CertificateReader()
+        self._present: list[Trouble] = []
+        self._next_at = AGES_AGO
+        self.known: set[tuple[str, str]] = set()
+        """The daemons whose certificates were looked at, as (kind, name)."""
+
+    def troubles(self, now: Moment) -> list[Trouble]:
+        """Return the present troubles. The files are looked at each minute."""
+        if now.at >= self._next_at:
+            self._next_at = now.at + CERTIFICATES_EVERY_S
+            found = [*daemons.daemons(directories.runtimes(), {}, now.wall)]
+            self.known = {("daemon", printable(one.name)) for one in found} | {("daemon", NOTIFY)}
+            named = [(printable(one.name), *pair) for one in found for pair in one.certificates]
+            named += self._named
+            self._present = [*of_certificates(named, self._reader.end, now.wall)]
+        return self._present
+
+
 class Desk:
     """A finder of new notices. Each turn, `Desk` gives the new notices to the couriers, and stores on
     disk which notices people were sent."""
@@ -199,6 +229,7 @@ class Desk:
         self._couriers = couriers
         self._notices = Notices(settings)
         self._remedies = faults.for_explain()
+        self._certificates = Certificates(settings.certificates)
         self._kept = b""
         with suppress(OSError, msgspec.MsgspecError):
             self._kept = files.read(self._told, 1 << 20)
@@ -208,7 +239,8 @@ class Desk:
     def turn(self, site: HeardDevices) -> None:
         """Look at the site once, and give new notices to the couriers."""
         self._take_acknowledgement()
-        present = [*troubles(site, site.now, self._settings)]
+        ended = self._certificates.troubles(site.now)
+        present = [*troubles(site, site.now, self._settings), *ended]
         ids: dict[tuple[str, str], str] = {
             (one.kind, printable(one.id)): one.id for one in site.stated()
         }
@@ -216,6 +248,7 @@ class Desk:
             node, _, subject = name.partition(": ")
             own = subject == "daemon"
             ids["daemon" if own else report.kind, printable(node if own else subject)] = ""
+        ids |= dict.fromkeys(self._certificates.known, "")
         for notice in self._notices.turn(present, ids, site.now.at, datetime.now().time()):
             one = notice.trouble
             device = ids.get((one.kind, one.device))

@@ -1,7 +1,7 @@
 """Metric families about the daemons on this machine. The values come from the daemons' status files."""
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -9,6 +9,8 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 
 from bridges.messages.words import printable
 from bridges.runtime.daemons import DaemonStatus
+from bridges.runtime.diagnostics import BUSES
+from bridges.system.certificates import CertificateEnd
 
 PREFIX: Final = "rmf_bridge_daemon_"
 DAEMON: Final = ("daemon",)
@@ -17,6 +19,13 @@ COUNTS: Final = {
     "scans": "Scans of the device.",
     "failed_scans": "Scans in which a reading or a command failed.",
     "scan_seconds": "Time spent in scans.",
+}
+CERTIFICATE: Final = ("daemon", "key", "file")
+UNIT: Final = ("daemon", "bus", "unit")
+CALLS: Final = {
+    "calls": "Calls to a Modbus unit, a CANopen node, an HTTP controller or a broker.",
+    "failed_calls": "Calls without a reply, or that the unit refused.",
+    "call_seconds": "Time spent in calls.",
 }
 
 
@@ -30,6 +39,27 @@ def of_machine(found: Iterable[DaemonStatus]) -> Iterator[Metric]:
     yield from _daemons(every)
     serving = [one for one in every if one.state == "serving"]
     yield from _devices(serving)
+    yield from _buses(serving)
+
+
+def of_certificates(
+    found: Iterable[DaemonStatus], others: Iterable[str], end: Callable[[str], CertificateEnd]
+) -> Iterator[Metric]:
+    """Yield the ends of the certificates that these daemons use, and of the files `others`.
+
+    Of a file whose end is unknown nothing but `unreadable` is 1.
+    """
+    ends = _certificate(
+        "end_timestamp_seconds", "End of the certificate; of a file's first to end."
+    )
+    unreadable = _certificate("unreadable", "1 if the certificate's end cannot be read.")
+    named = [(printable(one.name), *pair) for one in found for pair in one.certificates]
+    for daemon, key, file in (*named, *(("", "--certificate", each) for each in others)):
+        names, known = (daemon, printable(key), printable(file)), end(file)
+        unreadable.add_metric(names, known.at is None)
+        if known.at is not None:
+            ends.add_metric(names, known.at)
+    yield from (ends, unreadable)
 
 
 def of_recordings(folder: Path) -> Iterator[Metric]:
@@ -97,6 +127,19 @@ def _devices(serving: Iterable[DaemonStatus]) -> Iterator[Metric]:
     yield from (*counters.values(), longest, switched, age)
 
 
+def _buses(serving: Iterable[DaemonStatus]) -> Iterator[Metric]:
+    counters = {key: _counter(f"bus_{key}", text, UNIT) for key, text in CALLS.items()}
+    longest = _gauge("bus_longest_call_seconds", "Longest call in the last second.", UNIT)
+    for one in serving:
+        for bus, units in one.status.get(BUSES, {}).items():
+            for unit, counts in units.items():
+                names = (printable(one.name), printable(bus), printable(unit))
+                for key, family in (*counters.items(), ("longest_call_s", longest)):
+                    if (value := _number(counts.get(key))) is not None:
+                        family.add_metric(names, value)
+    yield from (*counters.values(), longest)
+
+
 def _each(
     serving: Iterable[DaemonStatus],
 ) -> Iterator[tuple[DaemonStatus, str, Mapping[str, Any]]]:
@@ -107,6 +150,10 @@ def _each(
 
 def _number(value: object) -> float | None:
     return float(value) if isinstance(value, int | float) else None
+
+
+def _certificate(name: str, text: str) -> GaugeMetricFamily:
+    return GaugeMetricFamily(f"rmf_bridge_certificate_{name}", text, labels=CERTIFICATE)
 
 
 def _gauge(name: str, text: str, labels: tuple[str, ...]) -> GaugeMetricFamily:

@@ -116,6 +116,11 @@ class NotifySettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     quiet: Annotated[
         QuietHours | None, tells("a time of day in which only critical notices are sent.")
     ] = None
+    certificates: Annotated[
+        list[AbsolutePath],
+        Meta(max_length=20),
+        tells("further certificates of this machine whose end is told, such as the page's."),
+    ] = []
     after_s: Annotated[Patience, tells("how long a trouble must last before its first notice.")] = (
         30.0
     )

@@ -1,6 +1,6 @@
 """A site's present troubles, found in the memory of its devices. All functions are pure."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Final
 
 from msgspec import Struct
@@ -9,6 +9,7 @@ from bridges.messages.words import printable
 from bridges.observe.all_devices import AnyDevice, ObservedGraph
 from bridges.observe.lift import NOBODY, ObservedLift
 from bridges.observe.requesters import Moment
+from bridges.system.certificates import SOON_S, URGENT_S, CertificateEnd, told
 from workbench.notify.settings import NotifySettings, Severity
 
 RAISED: Final = "ALARM_RAISED"
@@ -50,6 +51,27 @@ def troubles(graph: ObservedGraph[Any], now: Moment, settings: NotifySettings) -
             headline = f"a robot waits for {one.kind} {name}"
             yield Trouble(one.kind, name, "WAITING", "warning", headline)
     yield from _of_nodes(graph, now)
+
+
+def of_certificates(
+    named: Iterable[tuple[str, str, str]], end: Callable[[str], CertificateEnd], now: float
+) -> Iterator[Trouble]:
+    """Yield the troubles of these certificates, each (daemon, key, file). `now`: wall time (s).
+
+    A certificate that ends within a week is a trouble of its own, so that people are told again.
+    """
+    for daemon, key, file in named:
+        found = end(file)
+        for what, within_s in (("SOON", SOON_S), ("WEEK", URGENT_S)):
+            if found.at is None and what == "SOON":
+                what = "UNREADABLE"
+            elif found.at is None or found.at - now >= within_s:
+                continue
+            over = found.at is not None and found.at < now
+            severity: Severity = "critical" if over and what == "WEEK" else "warning"
+            headline = told(f"certificate {file} ({daemon}, {key})", found, now)
+            code = f"CERTIFICATE_{what} {key}"
+            yield Trouble("daemon", daemon, code, severity, printable(headline))
 
 
 def _of_nodes(graph: ObservedGraph[Any], now: Moment) -> Iterator[Trouble]:

@@ -129,11 +129,14 @@ class CanOpenNode:
         """Send eight bytes. Return the reply about the same object. Raises TimeoutError or HalError."""
         self._bus.take()  # drops a late reply to the last request
         self._answer, self._stray, self._asked = None, "", request[1:4]
+        began = self._bus.now()
         try:
             self.post(request)
             self._bus.wait(lambda: self._answer is not None, self._timeout_s)
         finally:
             self._asked = None
+            took_s, failed = self._bus.now() - began, not self._answer or self._answer[0] == ABORTED
+            self._bus.units.ended(f"node {self._node}", took_s, failed=failed)
         if self._answer is None:
             self._late_until = self._bus.now() + LATE * self._timeout_s
             raise TimeoutError

@@ -73,7 +73,7 @@ class ModbusBus(Bus):
         self._wire, self._where = _way(settings)
         self._backoff = functools.partial(Backoff, clock, jitter)
         self._link = self._backoff()
-        self._units: dict[tuple[int, bool], Backoff] = {}
+        self._backoffs: dict[tuple[int, bool], Backoff] = {}
         self._turn_at = -math.inf
         self._watchdogs = Watchdogs(self, settings.module_watchdog, clock)
 
@@ -131,7 +131,7 @@ class ModbusBus(Bus):
 
     def insist(self) -> None:
         """Let the next call skip the backoff, so that outputs go off before the daemon ends."""
-        for backoff in (self._link, *self._units.values()):
+        for backoff in (self._link, *self._backoffs.values()):
             backoff.insist()
 
     def close(self) -> None:
@@ -143,7 +143,7 @@ class ModbusBus(Bus):
     ) -> UnitReply:
         """Return the unit's valid answer. With `once` send the request only once. Raises HalError."""
         unit = question.unit
-        backoff = self._units.setdefault((unit, safe), self._backoff())
+        backoff = self._backoffs.setdefault((unit, safe), self._backoff())
         self._link.check()
         not_yet = self._wire.owes(unit) or self.now() < self._turn_at
         backoff.check(not_yet=backoff.probing and not_yet)
@@ -167,9 +167,11 @@ class ModbusBus(Bus):
         without a connection."""
         reason = ""
         for _ in range(tries):
+            began, failed = self.now(), True
             try:
                 self._wire.connect()
                 answer = self._wire.ask(question)
+                failed = answer.exception is not None
             except Unreachable as error:
                 raise self._link.failed(str(error)) from error
             except NoReply as error:
@@ -179,6 +181,7 @@ class ModbusBus(Bus):
                 return answer, ""
             finally:
                 self.calls += 1
+                self.units.ended(f"unit {question.unit}", self.now() - began, failed=failed)
         return None, reason
 
     def _refused(self, backoff: Backoff, unit: int, text: str, code: int) -> HalError:

@@ -29,7 +29,8 @@ each message. This is for a driver that must not miss a message.
 import math
 import random
 import time
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from importlib.util import find_spec
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
@@ -135,11 +136,10 @@ class MqttBus(Bus):
         backoff = self._safe_backoff if safe else self._backoff
         backoff.check()
         try:
-            link = self._connected()
+            with self._call():
+                link = self._connected()
         except HalError as error:
             raise backoff.failed(str(error)) from None
-        finally:
-            self.calls += 1
         for each in (self._backoff, self._safe_backoff):
             each.mended()
         return link
@@ -199,10 +199,8 @@ class MqttBus(Bus):
         """
         data = payload.encode() if isinstance(payload, str) else payload
         link = self.up(safe)
-        try:
+        with self._call():
             link.publish(topic, data, qos, None if safe else expires_s)
-        finally:
-            self.calls += 1
 
     def ask(self, asks: Iterable[Ask]) -> None:
         """Send these messages. Send each message at most once in half a scan, even if many points need
@@ -286,6 +284,18 @@ class MqttBus(Bus):
         if link is not None:
             link.on_end = lambda: None
             link.close()
+
+    @contextmanager
+    def _call(self) -> Iterator[None]:
+        """Count a connection to the broker, or a message that the broker confirms."""
+        began, failed = self.now(), True
+        try:
+            yield
+            failed = False
+        finally:
+            self.calls += 1
+            where = f"{self.settings.host}:{self.settings.port}"
+            self.units.ended(where, self.now() - began, failed=failed)
 
     def _connected(self) -> "Link":
         """Make a connection within `timeout_s`. Raises HalError."""

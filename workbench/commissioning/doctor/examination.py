@@ -13,6 +13,7 @@ from bridges.system.directories import Directories
 from drivers.hal.gpio.header import canonical
 from workbench.commissioning.doctor import can, gpio, health, ports
 from workbench.commissioning.doctor.answers import answers, numbers
+from workbench.commissioning.doctor.certificates import certificates
 from workbench.commissioning.doctor.chips import line
 from workbench.commissioning.doctor.finding import Finding, note, ok, wrong
 from workbench.commissioning.doctor.machine import Machine
@@ -55,6 +56,7 @@ def examined(
     yield from users(machine, who)
     yield from health.clock(machine)
     yield from health.watchdog(machine)
+    yield from certificates(config, machine)
     try:
         places = runtime_directory.find(file, options.runtime_dir)
     except PermissionError as error:

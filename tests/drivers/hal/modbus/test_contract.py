@@ -161,7 +161,7 @@ def test_the_jitter_only_shortens_a_pause(either: Module) -> None:
     either.reply = lambda request: frame(request, b"\x82\x0b")
     clock = Time()
     bus = bus_to(either.port, clock)
-    bus._units[1, False] = type(bus._link)(clock, lambda: 1.0)
+    bus._backoffs[1, False] = type(bus._link)(clock, lambda: 1.0)
     fails(bus, IN0)
     clock.now = 0.39
     fails(bus, IN0)
