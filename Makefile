@@ -173,9 +173,9 @@ test-vm: .venv/ready
 	@ls dist/*+deb13_$(ARCH).deb >/dev/null 2>&1 || $(MAKE) --no-print-directory deb ARCHS=$(ARCH) PYTHONS=3.13
 	@$(BIN)/python -m tests.vm --arch $(ARCH) $(if $(ONLY),--only $(ONLY))
 
-# Tests the packages built last for Debian 12, or builds them if there are none. The Debian is made once, in build/rollout.
+# Tests the packages built last for Debian 12 and 13, or builds them if there are none. Each Debian is made once, in build/rollout.
 test-rollout: .venv/ready
-	@ls dist/*+deb12_amd64.deb >/dev/null 2>&1 || $(MAKE) --no-print-directory deb ARCHS=amd64 PYTHONS=3.11
+	@ls dist/*+deb12_amd64.deb dist/*+deb13_amd64.deb >/dev/null 2>&1 || $(MAKE) --no-print-directory deb ARCHS=amd64 PYTHONS="3.11 3.13"
 	@$(BIN)/python -m tests.rollout
 
 # Mutants live in a copy. After an interruption only the missing results are computed. For a part:

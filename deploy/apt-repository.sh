@@ -1,8 +1,8 @@
 #!/bin/sh
 # apt-repository.sh DEBS OUT KEY: make a signed apt repository in the folder OUT from the packages in the folder DEBS.
 #
-# KEY is the id or fingerprint of a secret key in gpg's keyring (GNUPGHOME). Any web server can serve OUT, or machines read OUT
-# as a folder. The machines need OUT/rmf-bridges.gpg and OUT/rmf-bridges.sources (docs/how-to/roll-out.md).
+# KEY is the id or fingerprint of a secret key in gpg's keyring (GNUPGHOME). OUT can be served by any web server, or be
+# a file system. The machines need OUT/rmf-bridges.gpg and OUT/rmf-bridges.SUITE.sources (docs/how-to/roll-out.md).
 set -eu
 [ $# = 3 ] || { sed -n '2,5s/^# \{0,1\}//p' "$0" >&2; exit 64; }
 debs=$1 out=$2 key=$3
@@ -38,13 +38,15 @@ for suite in $(ls pool); do
   gpg --batch --yes -u "$key" --armor --detach-sign -o "dists/$suite/Release.gpg" "dists/$suite/Release"
 done
 gpg --batch --export "$key" > rmf-bridges.gpg
-cat > rmf-bridges.sources <<SOURCES
+for suite in $(ls pool); do
+  cat > "rmf-bridges.$suite.sources" <<SOURCES
 Types: deb
 URIs: ${URI:-https://packages.example/rmf-bridges}
-Suites: deb13
+Suites: $suite
 Components: main
 Signed-By: /etc/apt/keyrings/rmf-bridges.gpg
 SOURCES
+done
 cd - > /dev/null
 # The old repository stays whole until the new repository is complete.
 [ ! -e "$out" ] || mv "$out" "$new.old"

@@ -4,9 +4,11 @@
 """
 
 import importlib.util
+import json
 import os
 import subprocess
 import sys
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,6 +16,10 @@ import pytest
 import yaml
 
 from bridges.kinds import kind_names
+from bridges.settings.load import load
+from workbench.commissioning.doctor.finding import ok
+from workbench.commissioning.doctor.form import form
+from workbench.commissioning.doctor.machine import Machine
 
 COLLECTION: Final = Path(__file__).parents[2] / "deploy/ansible"
 _spec = importlib.util.spec_from_file_location("rollout", COLLECTION / "plugins/filter/rollout.py")
@@ -22,9 +28,12 @@ assert _spec.loader
 rollout: Any = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(rollout)
 
-FORM: Final = """\
+YAML: Final = b"kind: lift\n"
+FORM: Final = f"""\
 # lift.yaml on Raspberry Pi 4
 2026-11-24 08:10, rmf-bridges 0.1.0, kernel 6.12, Python 3.13.5, buses: gpio
+
+YAML: sha256 {sha256(YAML).hexdigest()}
 
 | subject | | found by `doctor` |
 |---|---|---|
@@ -34,11 +43,38 @@ FORM: Final = """\
 
 
 def test_a_kill_test_that_went_well_is_accepted() -> None:
-    assert rollout.rmf_untested(FORM, "machines/pi-lift1/lift.yaml") == ""
+    assert rollout.rmf_untested(FORM, "machines/pi-lift1/lift.yaml", YAML) == ""
+
+
+def test_a_form_older_than_its_yaml_is_refused() -> None:
+    why = rollout.rmf_untested(FORM, "machines/pi-lift1/lift.yaml", YAML + b"# a new wire\n")
+    assert why == "lift.yaml: the form is about an earlier content of this file"
+
+
+def test_the_doctors_form_is_a_record_of_its_yaml(tmp_path: Path) -> None:
+    shipped = load(COLLECTION.parents[1] / "config/lift_dry_contact.yaml")
+    killed = ok("kill test", "Lift1 door_open was on, and is verified off")
+    made = form(shipped, [killed], Machine(tmp_path))
+    assert rollout.rmf_untested(made, str(shipped.path), shipped.text) == ""
 
 
 @pytest.mark.parametrize(
-    ("form", "why"),
+    ("version", "system", "full"),
+    [
+        ("0.1.0", "debian 12", "0.1.0+deb12"),
+        ("0.1.0+r9.gabc", "raspbian 13", "0.1.0+r9.gabc+deb13"),
+        ("0.1.0", "ubuntu 24.04", "0.1.0+ubuntu24.04"),
+        ("0.1.0+deb13", "debian 13", "0.1.0+deb13"),
+    ],
+)
+def test_each_machine_takes_the_package_of_its_own_system(
+    version: str, system: str, full: str
+) -> None:
+    assert rollout.rmf_full_version(version, system) == full
+
+
+@pytest.mark.parametrize(
+    ("record", "why"),
     [
         ("", "there is no form"),
         (FORM.replace("# lift.yaml", "# door.yaml"), "about another file"),
@@ -55,8 +91,8 @@ def test_a_kill_test_that_went_well_is_accepted() -> None:
         ),
     ],
 )
-def test_another_form_is_refused(form: str, why: str) -> None:
-    assert why in rollout.rmf_untested(form, "machines/pi-lift1/lift.yaml")
+def test_another_form_is_refused(record: str, why: str) -> None:
+    assert why in rollout.rmf_untested(record, "machines/pi-lift1/lift.yaml", YAML)
 
 
 def status(name: str = "lift", state: str = "serving", level: int = 0) -> dict[str, Any]:
@@ -80,7 +116,11 @@ def status(name: str = "lift", state: str = "serving", level: int = 0) -> dict[s
 def test_a_machine_is_back_if_each_wanted_daemon_serves_as_before(
     after: list[Any], before: list[Any], why: list[str]
 ) -> None:
-    assert rollout.rmf_not_back(after, before, ["lift"]) == why
+    assert rollout.rmf_not_back(json.dumps(after), before, ["lift"]) == why
+
+
+def test_a_machine_without_an_answer_is_not_back() -> None:
+    assert rollout.rmf_not_back("", [], ["lift"]) == ["rmf-bridge status gives no answer"]
 
 
 def test_every_kind_has_a_role_and_needs_a_kill_test_if_it_has_outputs() -> None:
@@ -117,6 +157,7 @@ def test_nothing_is_changed_before_the_devices_are_idle_and_the_old_version_is_k
     idle, change = tasks[-2:]
     assert idle["ansible.builtin.command"]["argv"] == ["rmf-bridge", "status", "--idle"]
     assert "failed_when" not in idle  # the rollout ends when the last try fails
+    assert change["block"][0]["ignore_unreachable"]  # else `rescue` would be passed over
     assert [*change["rescue"][-1]] == ["name", "ansible.builtin.fail"]
     assert change["rescue"][-2]["ansible.builtin.include_tasks"] == "put_back.yml"
 

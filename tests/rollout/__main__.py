@@ -4,17 +4,20 @@ root. Exit code 1: a check failed; 69: none ran.
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from hashlib import sha256
 from pathlib import Path
 from typing import Final
 
-from tests.rollout.machines import PORTS, booted, debian, missing
-from tests.rollout.versions import another
+from tests.deb.next_version import next_version
+from tests.rollout.machines import PORTS, SYSTEMS, booted, debian, missing
+from tests.rollout.versions import broken, cut_off
 
 ROOT: Final = Path(__file__).parents[2]
 WORK: Final = ROOT / "build/rollout"
@@ -44,7 +47,8 @@ def main() -> int:
         return os.EX_UNAVAILABLE
     WORK.mkdir(parents=True, exist_ok=True)
     if INSIDE not in os.environ:
-        debian(WORK / "tree")
+        for release, _ in SYSTEMS.values():
+            debian(WORK, release)
         words = ["unshare", "--net", "--mount", sys.executable, "-m", "tests.rollout"]
         return subprocess.run(words, env=os.environ | {INSIDE: "1"}).returncode
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # the containers are shut down then too
@@ -63,26 +67,34 @@ def sh(*words: object, check: bool = True) -> subprocess.CompletedProcess[str]:
     return done
 
 
-def repository() -> tuple[str, str, str]:
-    """Make the repository; return the versions: old, newer, and one that cannot start."""
-    packages = sorted((ROOT / "dist").glob("*+deb12_amd64.deb"))
-    old = packages[0].name.split("_")[1]
-    good, bad = old.replace("+deb12", ".1+deb12"), old.replace("+deb12", ".2+deb12")
-    debs = WORK / "debs"
-    if not (debs / f"rmf-bridges_{bad}_amd64.deb").exists():
+VERSIONS: Final = {".1": None, ".2": broken, ".3": cut_off}
+"""Versions after the built one: one that serves, and two that fail."""
+
+
+def repository() -> str:
+    """Make the repository; return the version of the built packages, without the system's name."""
+    packages = [
+        deb
+        for _, name in SYSTEMS.values()
+        for deb in sorted((ROOT / "dist").glob(f"*+{name}_amd64.deb"))
+    ]
+    built = {deb.name.split("_")[1].rpartition("+")[0] for deb in packages}
+    (old,) = built or {"none"}
+    debs, made = WORK / "debs", WORK / "debs/made"
+    if not made.exists() or made.read_text() != old:
         sh("rm", "-rf", debs)
         debs.mkdir()
         for each in packages:
             sh("cp", each, debs)
-            another(each, debs, old, good, broken=False)
-            another(each, debs, old, bad, broken=True)
+            for more, change in VERSIONS.items():
+                new = each.name.split("_")[1].replace(f"{old}+", f"{old}{more}+")
+                next_version(each, debs, new, change)
+        made.write_text(old)
     sh("rm", "-rf", WORK / "gpg", WORK / "apt")
     (WORK / "gpg").mkdir(mode=0o700)
     sh("gpg", "--batch", "--passphrase", "", "--quick-gen-key", "test@localhost", "ed25519", "sign")
     sh(ROOT / "deploy/apt-repository.sh", debs, WORK / "apt", "test@localhost")
-    sources = WORK / "apt/rmf-bridges.sources"
-    sources.write_text(sources.read_text().replace("deb13", "deb12"))
-    return old, good, bad
+    return old
 
 
 def door(name: str, api_base: str) -> str:
@@ -125,8 +137,15 @@ def relays() -> Iterator[dict[str, str]]:
             "    rmf_bridges_serves_tries: 5\n    rmf_bridges_idle_tries: 2\n"
             "    rmf_bridges_idle_pause_s: 1\n"
             f"recorders: {{hosts: {{{FIRST}: }}}}\nexporters: {{hosts: {{{SECOND}: }}}}\n"
+            f"pages: {{hosts: {{{FIRST}: }}}}\n"
         )
         yield bases
+
+
+def renew(yaml: Path) -> None:
+    """Let the form name the present content of its YAML, as after another kill test."""
+    form, new = yaml.with_suffix(".md"), sha256(yaml.read_bytes()).hexdigest()
+    form.write_text(re.sub("sha256 [0-9a-f]{64}", f"sha256 {new}", form.read_text()))
 
 
 class Rollouts:
@@ -134,16 +153,18 @@ class Rollouts:
 
     def __init__(self) -> None:
         self.failed = 0
-        self.old, self.good, self.bad = repository()
+        self.old = repository()
+        self.good, self.bad, self.lost = (f"{self.old}{more}" for more in VERSIONS)
 
     def run(self) -> int:
         """Run all; return 1 if a check failed."""
         sh(BIN / "ansible-galaxy", "collection", "install", "--force", "-p", WORK / "collections",
            ROOT / "deploy/ansible")  # fmt: skip
-        with relays() as bases, booted(WORK, WORK / "tree", WORK / "apt"):
+        with relays() as bases, booted(WORK, WORK / "apt"):
             self._reachable()
             for step in (self._kill_tests, self._names, self._install, self._in_use, self._broken):
                 step(bases)
+            self._cut_off()
             self._new_file_refused(bases)
             self._upgrade(bases)
         print(f"{self.failed} failed; the logs are in {WORK}")
@@ -218,6 +239,10 @@ class Rollouts:
         yaml = WORK / f"site/machines/{FIRST}/door1.yaml"
         kept = yaml.read_text()
         yaml.write_text(kept.replace("scan_s: 1", "scan_s: 0.9"))
+        done = self._roll("old-form", self.bad)
+        old = "door1.yaml: the form is about an earlier content" in self.said
+        self._expect("a form older than its YAML stops it", done != 0, old)
+        renew(yaml)
         done = self._roll("broken", self.bad)
         self._expect(
             "a version that cannot start stops it", done != 0, "did not come back" in self.said
@@ -229,6 +254,26 @@ class Rollouts:
         self._expect("the second machine was never asked", f"[{SECOND}]" not in self._changed())
         self._expect("every daemon serves again", *self._serving())
         yaml.write_text(kept)
+        renew(yaml)
+
+    def _cut_off(self) -> None:
+        """Nobody reaches the first machine in the middle of its change: for a while, or for too
+        long."""
+        self._on(FIRST, "echo 90 > /run/cut-off-for")
+        done = self._roll("cut-off", self.lost, "-e", "rmf_bridges_reached_again_s=300")
+        lost = "did not come back" in self.said and "cannot be reached" in self.said
+        self._expect("a machine that cannot be reached stops it", done != 0, lost)
+        self._expect("it is put back when it answers again", self._versions() == [self.old] * 2)
+        self._expect("every daemon serves again", *self._serving())
+        done = self._roll("unknown", self.lost, "-e", "rmf_bridges_reached_again_s=5")
+        self._expect("else its state is unknown", done != 0, f"state unknown: {FIRST}" in self.said)
+        self._expect("the second machine was never asked", f"[{SECOND}]" not in self._changed())
+        self._reachable()
+        done = self._play("put-back", "put_back", "--limit", FIRST)
+        self._expect(
+            "the named command puts it back", done == 0, self._versions() == [self.old] * 2
+        )
+        self._expect("every daemon serves again", *self._serving())
 
     def _new_file_refused(self, bases: dict[str, str]) -> None:
         """A file that no daemon can serve comes with a good version: both are put back."""
@@ -237,6 +282,7 @@ class Rollouts:
         (folder / "door3.yaml").write_text(new)
         form = (folder / "door1.md").read_text().replace("door1.yaml", "door3.yaml")
         (folder / "door3.md").write_text(form)
+        renew(folder / "door3.yaml")
         done = self._roll("dead-device", self.good)
         self._expect("a dead device stops it", done != 0, "door3: a fault that" in self.said)
         self._expect("its outputs are named", "door3: NOT VERIFIED OFF" in self.said)
@@ -252,20 +298,32 @@ class Rollouts:
     def _upgrade(self, bases: dict[str, str]) -> None:
         yaml = WORK / f"site/machines/{FIRST}/door1.yaml"
         yaml.write_text(yaml.read_text().replace("scan_s: 1", "scan_s: 0.9"))
+        renew(yaml)
+        taken = f"rmf_bridges_exporter_options='--no-graph --listen 127.0.0.1:{PORTS[FIRST]}'"
+        done = self._roll("exporter", self.good, "-e", taken)
+        died = "rmf-bridge-exporter.service: activating" in self.said
+        self._expect("an exporter that does not stay up stops it", done != 0, died)
+        versions = [self.good, self.old]
+        self._expect("its machine is put back, the first serves", self._versions() == versions)
+        self._expect("the old exporter runs again", self._runs(SECOND, "exporter"))
         done = self._roll("upgrade", self.good)
         self._expect("an upgrade", done == 0, self._versions() == [self.good] * 2)
         there = self._on(FIRST, "cat /etc/rmf-bridges/door1.yaml")
         self._expect("the new file is there", "scan_s: 0.9" in there)
         self._expect("every daemon serves", *self._serving())
+        self._expect("page and recorder run", self._runs(FIRST, "page", "recorder"))
+        self._expect("the page answers", "<title>" in sh("curl", "-s", "127.0.0.1:8080").stdout)
         pids = self._pids()
         done = self._roll("again", self.good)
         self._expect("a second time restarts nothing", done == 0, self._pids() == pids)
 
     def _roll(self, name: str, version: str, *more: str) -> int:
+        return self._play(name, "rollout", "-e", f"rmf_bridges_version={version}", *more)
+
+    def _play(self, name: str, playbook: str, *more: str) -> int:
         began = time.monotonic()
         done = sh(BIN / "ansible-playbook", "-i", WORK / "site/inventory.yml",
-                  "rmf_bridges.site.rollout", "-e", f"rmf_bridges_version={version}", *more,
-                  check=False)  # fmt: skip
+                  f"rmf_bridges.site.{playbook}", *more, check=False)  # fmt: skip
         self.said = done.stdout + done.stderr
         (WORK / f"{name}.log").write_text(self.said)
         print(
@@ -273,6 +331,10 @@ class Rollouts:
             flush=True,
         )
         return done.returncode
+
+    def _runs(self, machine: str, *units: str) -> bool:
+        ask = " ".join(f"rmf-bridge-{unit}" for unit in units)
+        return self._on(machine, f"systemctl is-active {ask}") == "active\n" * len(units)
 
     def _changed(self) -> str:
         return self.said.partition("Change one machine after the other")[2]
@@ -287,7 +349,7 @@ class Rollouts:
 
     def _reachable(self) -> None:
         for machine in PORTS:
-            deadline = time.monotonic() + 60
+            deadline = time.monotonic() + 180
             while self._on(machine, "systemctl is-system-running --wait") != "running\n":
                 if time.monotonic() > deadline:
                     raise RuntimeError(f"{machine} does not boot: {WORK / machine}.log")
@@ -295,7 +357,9 @@ class Rollouts:
 
     def _versions(self) -> list[str]:
         ask = "dpkg-query -W -f '${db:Status-Abbrev}${Version}' rmf-bridges"
-        return [self._on(machine, ask).removeprefix("ii ") for machine in PORTS]
+        told = [self._on(machine, ask).removeprefix("ii ") for machine in PORTS]
+        systems = (name for _, name in SYSTEMS.values())
+        return [one.removesuffix(f"+{name}") for one, name in zip(told, systems, strict=True)]
 
     def _pids(self) -> list[str]:
         return [self._on(each, "systemctl show -p MainPID 'rmf-bridge@*'") for each in PORTS]

@@ -1,4 +1,4 @@
-"""Two machines in containers: Debian 12 with systemd as process 1, reached by ssh on 127.0.0.1."""
+"""Two machines in containers: Debian 12 and 13 with systemd as process 1, reached by ssh."""
 
 import shutil
 import subprocess
@@ -19,6 +19,8 @@ PROGRAMS: Final = {
     "systemd-nspawn": "systemd-container",
 }
 PORTS: Final = {"pi-door1": 2201, "pi-door2": 2202}
+SYSTEMS: Final = {"pi-door1": ("bookworm", "deb12"), "pi-door2": ("trixie", "deb13")}
+"""Machine -> the release of Debian, and its name in the versions of the packages."""
 CGROUPS: Final = Path("/sys/fs/cgroup")
 
 
@@ -27,30 +29,32 @@ def missing() -> list[str]:
     return sorted({deb for program, deb in PROGRAMS.items() if not shutil.which(program)})
 
 
-def debian(tree: Path) -> None:
-    """Make the tree of the machines, once."""
+def debian(trees: Path, release: str) -> None:
+    """Make the tree of the machines with this release of Debian, once."""
+    tree = trees / release
     if tree.exists():
         return
-    fresh = tree.with_name("tree.new")
+    fresh = tree.with_name(f"{release}.new")
     shutil.rmtree(fresh, ignore_errors=True)
     left_out = (f"--dpkgopt=path-exclude=/usr/share/{each}/*" for each in ("doc", "man", "locale"))
     include = f"--include={','.join(PACKAGES)}"
     no_more = '--aptopt=Apt::Install-Recommends "false"'
-    words = ["mmdebstrap", "--variant=apt", include, no_more, *left_out, "bookworm", str(fresh)]
+    words = ["mmdebstrap", "--variant=apt", include, no_more, *left_out, release, str(fresh)]
     subprocess.run(words, check=True)
     fresh.rename(tree)
 
 
 @contextmanager
-def booted(folder: Path, tree: Path, repository: Path) -> Iterator[None]:
+def booted(folder: Path, repository: Path) -> Iterator[None]:
     """Boot the machines. What they write is lost at the end of the block."""
     key = folder / "key"
     key.unlink(missing_ok=True)
     subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", key], check=True)
-    (tree / "root/.ssh").mkdir(mode=0o700, exist_ok=True)
     with ExitStack() as stack:
         for name, port in PORTS.items():
             (folder / f"{name}.conf").write_text(f"Port {port}\nListenAddress 127.0.0.1\n")
+            tree = folder / SYSTEMS[name][0]
+            (tree / "root/.ssh").mkdir(mode=0o700, exist_ok=True)
             stack.enter_context(_machine(name, folder, tree, repository))
         yield
 

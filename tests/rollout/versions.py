@@ -1,52 +1,31 @@
-"""Makes further versions of built packages: one that serves, and one whose daemons cannot start."""
+"""Versions that fail: one whose daemons cannot start, and one that cuts the machine off."""
 
-import shutil
-import subprocess
-import tarfile
 from pathlib import Path
 from typing import Final
 
+from tests.deb.next_version import bridges_in
+
 BROKEN: Final = 'raise SystemExit("this version cannot start")\n'
 """The program `run` of the broken version. `check` still works, so that the package installs."""
+CUT_OFF: Final = """
+systemctl stop ssh.service
+systemd-run --on-active=$(cat /run/cut-off-for) systemctl start ssh.service
+pkill sshd
+"""
+"""The end of a postinst after which nobody reaches the machine for a while."""
 
 
-def another(package: Path, out: Path, old: str, new: str, broken: bool) -> None:
-    """Build this package again in the folder `out` with the version `new`."""
-    tree = out / "tree"
-    subprocess.run(["dpkg-deb", "--raw-extract", str(package), str(tree)], check=True)
-    for file in (tree / "DEBIAN").iterdir():
-        file.write_text(file.read_text().replace(old, new))
-    name = package.name.split("_")[0]
-    if name == "rmf-bridges":
-        if broken:
-            _break(tree / "usr/lib/rmf-bridges/tree.tar.xz", out / "unpacked")
-    else:
-        (tree / "usr/lib" / name / old).rename(tree / "usr/lib" / name / new)
-    deb = out / package.name.replace(old, new)
-    words = ["dpkg-deb", "--root-owner-group", "-Znone", "--build", str(tree), str(deb)]
-    subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
-    shutil.rmtree(tree)
+def broken(tree: Path) -> None:
+    """Let no daemon start."""
+    with bridges_in(tree) as bridges:
+        command = bridges / "commands/run.py"
+        text = command.read_text()
+        start = text.index("def run(")
+        body = text.index("\n    ", start) + 1
+        command.write_text(text[:body] + "    " + BROKEN + text[body:])
 
 
-def _break(archive: Path, folder: Path) -> None:
-    with tarfile.open(archive) as packed:
-        packed.extractall(folder, filter="tar")
-    (command,) = folder.glob("lib/python*/site-packages/bridges/commands/run.py")
-    text = command.read_text()
-    start = text.index("def run(")
-    body = text.index("\n    ", start) + 1
-    command.write_text(text[:body] + "    " + BROKEN + text[body:])
-    words = [
-        "tar",
-        "-C",
-        str(folder),
-        "--owner=0",
-        "--group=0",
-        "-cf",
-        str(archive),
-        "-I",
-        "xz -0",
-        ".",
-    ]
-    subprocess.run(words, check=True)
-    shutil.rmtree(folder)
+def cut_off(tree: Path) -> None:
+    """End every connection by ssh while the package is installed."""
+    script = tree / "DEBIAN/postinst"
+    script.write_text(script.read_text() + CUT_OFF)

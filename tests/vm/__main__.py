@@ -6,9 +6,7 @@ The exit code is 1 if a check failed, and 69 if no check ran.
 import argparse
 import os
 import shutil
-import subprocess
 import sys
-import tarfile
 import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -16,6 +14,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+from tests.deb.next_version import bridges_in, next_version
 from tests.vm.image import Unusable, image, needed
 from tests.vm.machine import ARCHS, Machine, accelerated
 from tests.vm.order import ALSO, CUT, CUT_OFF, NOT_ON, PARTS, REBOOT, WHOLE
@@ -82,47 +81,21 @@ def _packages(arch: str, folder: Path) -> Path:
     packages = folder / "packages"
     shutil.rmtree(packages, ignore_errors=True)
     (packages / NEXT).mkdir(parents=True)
+    needed({"dpkg-deb": "dpkg"})
     for each in found:
         os.link(each, packages / each.name)
         if not each.name.startswith("rmf-bridges-page_"):
-            _as_next(each, packages / NEXT)
+            next_version(each, packages / NEXT, f"{each.stem.split('_')[1]}.1", _with_a_new_module)
     return packages
 
 
-def _as_next(package: Path, folder: Path) -> None:
-    """Make the same package with the next version, for the upgrade. Raises Unusable."""
-    needed({"dpkg-deb": "dpkg"})
-    tree = folder / "tree"
-    subprocess.run(["dpkg-deb", "--raw-extract", str(package), str(tree)], check=True)
-    name, version, _ = package.name.split("_")
-    for file in (tree / "DEBIAN").iterdir():
-        file.write_text(file.read_text().replace(version, f"{version}.1"))
-    if name == "rmf-bridges":
-        _with_a_new_module(tree / "usr/lib/rmf-bridges/tree.tar.xz", folder / "unpacked")
-    else:
-        place = tree / "usr/lib" / name / version
-        place.rename(f"{place}.1")
-    words = ["dpkg-deb", "--root-owner-group", "-Znone", "--build", str(tree), str(folder)]
-    subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
-    shutil.rmtree(tree)
-
-
-def _with_a_new_module(archive: Path, folder: Path) -> None:
-    """Pack the same tree again, with an `outputs-off` that needs a module. The version before lacks
-    that module."""
-    with tarfile.open(archive) as packed:
-        packed.extractall(folder, filter="tar")
-    (package,) = folder.glob("lib/python*/site-packages/bridges")
-    (package / "added.py").touch()
-    command = package / "commands/outputs_off.py"
-    command.write_text(
-        command.read_text().replace("import os\n", "import os\nimport bridges.added\n")
-    )
-    subprocess.run(
-        ["tar", "-C", folder, "--owner=0", "--group=0", "-cf", archive, "-I", "xz -0", "."],
-        check=True,
-    )
-    shutil.rmtree(folder)
+def _with_a_new_module(tree: Path) -> None:
+    """Let `outputs-off` need a module that the version before lacks."""
+    with bridges_in(tree) as package:
+        (package / "added.py").touch()
+        command = package / "commands/outputs_off.py"
+        text = command.read_text().replace("import os\n", "import os\nimport bridges.added\n")
+        command.write_text(text)
 
 
 def _run(machine: Machine, steps: Iterable[str], log: Path) -> int:

@@ -6,6 +6,7 @@
 import platform
 import time
 from collections.abc import Iterable
+from hashlib import sha256
 from typing import Final
 
 import msgspec
@@ -79,6 +80,8 @@ def form(config: Config, found: Iterable[Finding], machine: Machine) -> str:
         f"# {config.path.name} on {model}",
         f"{time.strftime('%Y-%m-%d %H:%M')}, rmf-bridges {__version__}, kernel {platform.release()},"
         f" Python {platform.python_version()}, buses: {', '.join(sorted(buses)) or 'none'}",
+        "",
+        f"YAML: sha256 {sha256(config.text).hexdigest()}",
         "",
         "| subject | | found by `doctor` |",
         "|---|---|---|",

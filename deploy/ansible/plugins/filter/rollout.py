@@ -1,6 +1,9 @@
 """The rules of the rollout, as pure functions of files, texts and `rmf-bridge status --json`."""
 
+import json
+import re
 from collections.abc import Callable, Iterable, Mapping
+from hashlib import sha256
 from pathlib import Path, PurePath
 from typing import Any, Final
 
@@ -11,6 +14,7 @@ DEVICES: Final = frozenset({"lift", "door", "charger", "dispenser", "ingestor"})
 NO_OUTPUTS: Final = frozenset({"alarm", "fleet"})
 SUPERVISORS: Final = frozenset({"lift_supervisor", "door_supervisor", "charger_coordinator"})
 SERVED: Final = DEVICES | NO_OUTPUTS | SUPERVISORS
+NAMED: Final = re.compile(r"\+(deb|ubuntu)[0-9.]+$")
 ROLES: Final = {"daemon": DEVICES | NO_OUTPUTS, "supervisors": SUPERVISORS, "outputs": DEVICES}
 
 
@@ -41,17 +45,19 @@ def _yamls(folder: str) -> list[Path]:
     return sorted(Path(folder).glob("*.yaml"))
 
 
-def rmf_untested(form: str, file: str) -> str:
-    """Return the reason why this form does not record a good kill test for this YAML. Return "" if the
-    form does.
+def rmf_untested(form: str, file: str, content: bytes) -> str:
+    """Return why this form is no record of a kill test that went well for this YAML; "" if it is.
 
-    `form` is the text that `rmf-bridge doctor FILE --kill-test --form FORM` writes.
+    `form`: the text that `rmf-bridge doctor FILE --kill-test --form FORM` writes. `content`: the YAML's
+    bytes, which the form names by their hash.
     """
     name = PurePath(file).name
     if not form.strip():
         return f"{name}: there is no form"
     if not form.startswith(f"# {name} on "):
         return f"{name}: the form is about another file: {form.splitlines()[0]}"
+    if f"YAML: sha256 {sha256(content).hexdigest()}" not in form.splitlines():
+        return f"{name}: the form is about an earlier content of this file"
     rows = [row.split("|") for row in form.splitlines() if row.startswith("| kill test |")]
     levels = [row[2].strip() for row in rows]
     if "wrong" in levels:
@@ -62,14 +68,18 @@ def rmf_untested(form: str, file: str) -> str:
 
 
 def rmf_not_back(
-    after: Iterable[Mapping[str, Any]], before: Iterable[Mapping[str, Any]], wanted: Iterable[str]
+    after: str, before: Iterable[Mapping[str, Any]], wanted: Iterable[str]
 ) -> list[str]:
     """Return the reasons why a machine has not come back. Return [] if every wanted daemon serves.
 
-    `after` and `before` are the output of `rmf-bridge status --json`. `wanted` has names of services.
-    If a daemon had a fault before, the fault does not count, because the change is not its cause.
+    `after`: the output of `rmf-bridge status --json`. `before`: its content before the change.
+    `wanted`: names of services. A fault that a daemon had before does not count, because the change is
+    not its cause.
     """
-    now = {one["name"]: one for one in after}
+    try:
+        now = {one["name"]: one for one in json.loads(after)}
+    except ValueError:
+        return ["rmf-bridge status gives no answer"]
     levels = {one["name"]: one["level"] for one in before}
     return [why for name in sorted(set(wanted)) if (why := _why(name, now.get(name), levels))]
 
@@ -78,7 +88,18 @@ def rmf_untested_file(file: str) -> str:
     """Return the reason why the form beside this YAML (NAME.md) is no record of a kill test. Return ""
     if the form is such a record."""
     form = Path(file).with_suffix(".md")
-    return rmf_untested(form.read_text("utf-8") if form.exists() else "", file)
+    text = form.read_text("utf-8") if form.exists() else ""
+    return rmf_untested(text, file, Path(file).read_bytes())
+
+
+def rmf_full_version(version: str, system: str) -> str:
+    """Return a machine's version of the packages: `0.1.0` on `debian 13` is `0.1.0+deb13`.
+
+    `system`: ID and VERSION_ID of /etc/os-release. A version that names its system stays as it is.
+    """
+    name, _, number = system.strip().partition(" ")
+    known = {"debian": "deb", "raspbian": "deb"}
+    return version if NAMED.search(version) else f"{version}+{known.get(name, name)}{number}"
 
 
 def _why(name: str, now: Mapping[str, Any] | None, levels: Mapping[str, int]) -> str:
@@ -102,5 +123,6 @@ class FilterModule:
             "rmf_files": rmf_files,
             "rmf_beside": rmf_beside,
             "rmf_untested_file": rmf_untested_file,
+            "rmf_full_version": rmf_full_version,
             "rmf_not_back": rmf_not_back,
         }
