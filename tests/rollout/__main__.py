@@ -261,7 +261,7 @@ class Rollouts:
         long."""
         self._on(FIRST, "echo 90 > /run/cut-off-for")
         done = self._roll("cut-off", self.lost, "-e", "rmf_bridges_reached_again_s=300")
-        lost = "did not come back" in self.said and "cannot be reached" in self.said
+        lost = "did not come back" in self.said and "could not be reached any more" in self.said
         self._expect("a machine that cannot be reached stops it", done != 0, lost)
         self._expect("it is put back when it answers again", self._versions() == [self.old] * 2)
         self._expect("every daemon serves again", *self._serving())

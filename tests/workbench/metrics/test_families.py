@@ -14,9 +14,10 @@ from bridges.messages import definitions as d
 from bridges.messages.words import KINDS, Kind
 from bridges.observe.requesters import Moment
 from bridges.runtime.daemons import DaemonStatus
+from bridges.system.certificates import CertificateEnd
 from tests.observe.story import CHARGER, LIFT, OPEN, RED, WALL, Story
 from workbench.metrics.families import LONGEST, of_graph
-from workbench.metrics.machine import of_machine, of_recordings
+from workbench.metrics.machine import of_certificates, of_machine, of_recordings
 
 
 class Once(Collector):
@@ -157,6 +158,41 @@ def test_a_daemons_counts_come_from_its_status_and_a_dead_daemon_is_down() -> No
         'rmf_bridge_daemon_device_scan_seconds_total{daemon="lift",device="Lift1"}': 0.5,
         'rmf_bridge_daemon_output_switched_on_total{daemon="lift",device="Lift1",output="call"}': 3.0,
         'rmf_bridge_daemon_device_input_age_seconds{daemon="lift",device="Lift1"}': 0.1,
+    }
+
+
+def test_the_calls_of_each_unit_are_series_and_an_odd_status_is_none() -> None:
+    silent = {"calls": 9, "failed_calls": 4, "call_seconds": 1.5, "longest_call_s": 0.3}
+    status = {"buses": {"io": {"unit 1": silent, "unit 2": {"calls": "many"}}}}
+    found = samples(of_machine([DaemonStatus(name="lift", state="serving", by="", status=status)]))
+    unit = '{bus="io",daemon="lift",unit="unit 1"}'
+    assert {name: value for name, value in found.items() if "_bus_" in name} == {
+        f"rmf_bridge_daemon_bus_calls_total{unit}": 9.0,
+        f"rmf_bridge_daemon_bus_failed_calls_total{unit}": 4.0,
+        f"rmf_bridge_daemon_bus_call_seconds_total{unit}": 1.5,
+        f"rmf_bridge_daemon_bus_longest_call_seconds{unit}": 0.3,
+    }
+
+
+def test_certificates_are_series_by_key_and_an_unknown_end_is_only_unreadable() -> None:
+    files = {"rmf.zenoh.tls.ca": "/ca.pem", "buses.io.ca_file": "/gone.pem"}
+    one = DaemonStatus(name="lift", state="died", by="", status={"certificate_files": files})
+    ends = {"/ca.pem": CertificateEnd(1e9), "/page.pem": CertificateEnd(2e9)}
+    gone = CertificateEnd(None, "No such file or directory")
+    found = samples(of_certificates([one], ["/page.pem"], lambda file: ends.get(file, gone)))
+
+    def labels(daemon: str, file: str, key: str) -> str:
+        return f'{{daemon="{daemon}",file="{file}",key="{key}"}}'
+
+    ca = labels("lift", "/ca.pem", "rmf.zenoh.tls.ca")
+    page = labels("", "/page.pem", "--certificate")
+    other = labels("lift", "/gone.pem", "buses.io.ca_file")
+    assert found == {
+        f"rmf_bridge_certificate_end_timestamp_seconds{ca}": 1e9,
+        f"rmf_bridge_certificate_end_timestamp_seconds{page}": 2e9,
+        f"rmf_bridge_certificate_unreadable{ca}": 0.0,
+        f"rmf_bridge_certificate_unreadable{page}": 0.0,
+        f"rmf_bridge_certificate_unreadable{other}": 1.0,
     }
 
 

@@ -13,6 +13,7 @@ import pytest
 
 from hal_fakes.wire import runs_here
 from tests.runtime.site import Module, command, daemon, environment
+from tests.system.test_certificates import certificate
 from tests.waiting import PATIENCE_S, wait_until
 from tests.workbench.notify.sink import Sink
 
@@ -86,3 +87,16 @@ def test_a_killed_daemon_is_told_repeated_until_acknowledged_and_over_when_it_is
         wait_until(lambda: got("over"), "its return is told")
         assert [json.loads(body)["event"] for _, body in sink.got] == ["over"]
     module.close()
+
+
+@pytest.mark.long(8)
+def test_the_end_of_a_certificate_is_told(sink: Sink, tmp_path: Path, domain: int) -> None:
+    file, ended = tmp_path / "to.yaml", certificate(tmp_path / "page.pem", -3.5)
+    more = f"certificates: [{ended}]\n"
+    file.write_text(more + FILE.format(url=sink.url).replace("after_s: 3", "after_s: 0.5"))
+    with notify(file, tmp_path / "state", domain):
+        wait_until(lambda: sink.got, "the end is told")
+    told = [json.loads(body) for _, body in sink.got]
+    assert {one["severity"] for one in told[:1]} == {"critical"}
+    title = f"certificate {ended} (notify, certificates) ended 3 days ago, on "
+    assert told[0]["title"].startswith(title)

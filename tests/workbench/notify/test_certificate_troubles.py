@@ -1,0 +1,45 @@
+"""Troubles of certificates: which, how severe, and in which words."""
+
+import pytest
+
+from bridges.system.certificates import DAY_S, CertificateEnd
+from workbench.notify.troubles import of_certificates
+
+NOW = 1_800_000_000.0
+ENDS, GONE = "/e/lift.pem", "No such file or directory"
+
+
+@pytest.mark.parametrize(
+    ("end", "wanted"),
+    [
+        (CertificateEnd(NOW + 31 * DAY_S), []),
+        (
+            CertificateEnd(NOW + 12.5 * DAY_S),
+            [("SOON", "warning", "ends in 12 days, on 2027-01-27")],
+        ),
+        (
+            CertificateEnd(NOW + 6.5 * DAY_S),
+            [
+                ("SOON", "warning", "ends in 6 days, on 2027-01-21"),
+                ("WEEK", "warning", "ends in 6 days, on 2027-01-21"),
+            ],
+        ),
+        (
+            CertificateEnd(NOW - 2.5 * DAY_S),
+            [
+                ("SOON", "warning", "ended 2 days ago, on 2027-01-12"),
+                ("WEEK", "critical", "ended 2 days ago, on 2027-01-12"),
+            ],
+        ),
+        (CertificateEnd(None, GONE), [("UNREADABLE", "warning", f"cannot be read: {GONE}")]),
+    ],
+)
+def test_an_end_is_told_a_month_and_a_week_before_it_and_is_critical_afterwards(
+    end: CertificateEnd, wanted: list[tuple[str, str, str]]
+) -> None:
+    key = "rmf.zenoh.tls.certificate"
+    found = of_certificates([("lift", key, ENDS)], lambda _: end, NOW)
+    assert [(one.what, one.severity, one.headline) for one in found] == [
+        (f"CERTIFICATE_{what} {key}", severity, f"certificate {ENDS} (lift, {key}) {text}")
+        for what, severity, text in wanted
+    ]
