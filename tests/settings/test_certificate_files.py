@@ -1,9 +1,9 @@
-"""The files for TLS that a YAML names."""
+"""The certificates that a YAML names."""
 
 from pathlib import Path
 
+from bridges.settings.certificate_files import certificate_files
 from bridges.settings.load import understood
-from bridges.settings.tls_files import CERTIFICATES, SECRETS, tls_files
 
 ROOT = Path(__file__).parents[2]
 RMF = """rmf:
@@ -14,7 +14,7 @@ RMF = """rmf:
 """
 
 
-def test_certificates_and_secrets_of_graph_and_buses_are_found_with_their_keys() -> None:
+def test_certificates_of_graph_and_buses_are_found_with_their_keys() -> None:
     text = (ROOT / "config/door_mqtt.yaml").read_text()
     head, _, rest = text.partition("rmf:\n")
     _, _, rest = rest.partition("\nbuses:")
@@ -25,15 +25,11 @@ def test_certificates_and_secrets_of_graph_and_buses_are_found_with_their_keys()
     )
     config = understood(Path("/e/door.yaml"), body.encode())
     (bus,) = config.buses
-    assert tls_files(config, CERTIFICATES) == {
+    assert certificate_files(config) == {
         "rmf.zenoh.tls.ca": "/e/ca.pem",
         "rmf.zenoh.tls.certificate": "/e/lift.pem",
         f"buses.{bus}.tls.ca_file": "/e/b.pem",
         f"buses.{bus}.tls.certificate_file": "/e/c.pem",
-    }
-    assert tls_files(config, SECRETS) == {
-        "rmf.zenoh.tls.private_key": "/e/lift.key",
-        f"buses.{bus}.tls.key_file": "/e/c.key",
     }
 
 
@@ -41,4 +37,4 @@ def test_the_ca_of_a_controller_on_https_is_found() -> None:
     text = (ROOT / "config/door_http.yaml").read_text().replace("192.168.1.70", "https://relay")
     text = text.replace("type: http\n", "type: http\n    ca_file: /e/ca.pem\n", 1)
     config = understood(Path("/e/door.yaml"), text.encode())
-    assert [*tls_files(config, CERTIFICATES).values()] == ["/e/ca.pem"]
+    assert [*certificate_files(config).values()] == ["/e/ca.pem"]
