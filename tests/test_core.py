@@ -29,7 +29,7 @@ INSIDE = {
     " driver_type http_call json_fields numbers on_points tables unsafe",
     "drivers.hal": "can gpio http modbus"
     " backoff deadline every hosts http_address http_json http_login http_settings points rivals"
-    " serial_port",
+    " serial_port unit_calls",
 }
 CORE = [f"{package}.{name}" for package, listed in INSIDE.items() for name in listed.split()]
 """Modules and whole folders of the core. A driver in these folders is an extra if it knows only the bus
