@@ -130,11 +130,13 @@ def _devices(serving: Iterable[DaemonStatus]) -> Iterator[Metric]:
 def _buses(serving: Iterable[DaemonStatus]) -> Iterator[Metric]:
     counters = {key: _counter(f"bus_{key}", text, UNIT) for key, text in CALLS.items()}
     longest = _gauge("bus_longest_call_seconds", "Longest call in the last second.", UNIT)
+    families: list[tuple[str, CounterMetricFamily | GaugeMetricFamily]]
+    families = [*counters.items(), ("longest_call_s", longest)]
     for one in serving:
         for bus, units in one.status.get(BUSES, {}).items():
             for unit, counts in units.items():
                 names = (printable(one.name), printable(bus), printable(unit))
-                for key, family in (*counters.items(), ("longest_call_s", longest)):
+                for key, family in families:
                     if (value := _number(counts.get(key))) is not None:
                         family.add_metric(names, value)
     yield from (*counters.values(), longest)
