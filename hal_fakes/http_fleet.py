@@ -15,7 +15,7 @@ import msgspec
 
 from bridges.kinds.fleet.signals import Pose
 from bridges.settings.config import Config
-from drivers.fleet.api import PLACE, FleetApi
+from drivers.fleet.api import PLACE, FleetApi, PathFields
 from drivers.fleet.http import HttpRobotSettings
 from drivers.http_call import Call
 from drivers.json_fields import found
@@ -95,12 +95,23 @@ class FakeFleetRobot:
             ("moving", seen.moving),
             ("charging", seen.charging),
             ("ready", not seen.manual),
+            ("paused", seen.paused),
         ):
             if flag := getattr(fields, name):
                 put(said, flag.field, value_of(flag, is_so))
+        if path := fields.path:
+            put(said, path.list, [self._place(at, path) for at in seen.path])
         if self._api.robots:
             put(said, self._api.robots.name, self.robot)
         return said
+
+    def _place(self, place: Pose, fields: PathFields) -> dict[str, object]:
+        at, item = self._api.units.written(place), dict[str, object]()
+        put(item, fields.x, at.x)
+        put(item, fields.y, at.y)
+        if fields.map:
+            put(item, fields.map, self._maps.get(at.map, at.map))
+        return item
 
     def _obey(self, where: tuple[str, ...], given: dict[str, object], now: float) -> bytes:
         doing = {"navigate": "go", "dock": "go", "actions": "act"}.get(where[0], where[0])

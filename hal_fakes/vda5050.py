@@ -60,6 +60,7 @@ class FakeVdaRobot:
         self._client: paho.Client | None = None
         self._hears = False
         self._lock = threading.Lock()
+        self._sent, self._nodes = 0, list[Json]()
         self._noise = random.Random(name)
 
     def join(self, port: int) -> None:
@@ -121,7 +122,7 @@ class FakeVdaRobot:
 
     def _obey(self, order: Json) -> None:
         """Take an order, or refuse it."""
-        if order["orderId"] == self._order.get("orderId"):
+        if order["orderId"] == self._order.get("orderId") or order["nodes"] == self._nodes:
             return
         self._errors = []
         seen = cast(RobotSeen, self.plant.reading())
@@ -176,6 +177,8 @@ class FakeVdaRobot:
                 self._node = str(given["lastNodeId"])
                 at = Pose(str(given["mapId"]), x, y, theta)
                 self._drive("localize", self.settings.level_of(at))
+            case "startPause" | "stopPause" as kind:
+                self._drive("pause" if kind == "startPause" else "resume", None)
             case "stateRequest":
                 self._last = {}
             case _:
@@ -200,6 +203,8 @@ class FakeVdaRobot:
     def _state(self, seen: RobotSeen) -> Json:
         nodes = cast(list[Json], self._order.get("nodes", []))
         left = [n for n in nodes if cast(int, n["sequenceId"]) > self._number]
+        if seen.mission and self._done:
+            left = self._mission(seen)
         keys = ("nodeId", "sequenceId", "released")
         actions = [_shown(a) for a in self._actions.values()]
         instant = [_shown(a) for a in self._instant.values()]
@@ -210,13 +215,16 @@ class FakeVdaRobot:
                 {"errorType": "driveError", "errorLevel": "FATAL", "errorDescription": seen.fault}
             )
         return {
-            "orderId": self._order.get("orderId", ""),
+            "orderId": f"mission-{seen.mission}"
+            if seen.mission
+            else self._order.get("orderId", ""),
             "orderUpdateId": 0,
             "lastNodeId": self._node,
             "lastNodeSequenceId": self._number,
-            "nodeStates": [] if self._done else [{k: n[k] for k in keys} for n in left],
+            "nodeStates": [{k: n[k] for k in keys} for n in left if seen.mission or not self._done],
             "edgeStates": [],
             "driving": seen.moving,
+            "paused": seen.paused,
             self._says.place: self._place(seen),
             "actionStates": actions if modern else [*actions, *instant],
             **({"instantActionStates": instant} if modern else {}),
@@ -228,6 +236,22 @@ class FakeVdaRobot:
             "errors": errors,
             "safetyState": {self._says.stop: "NONE", "fieldViolation": False},
         }
+
+    def _mission(self, seen: RobotSeen) -> list[Json]:
+        """Return the nodes left of the mission; its own manager sends a new one as an order."""
+        if seen.mission != self._sent:
+            self._sent, self._nodes = seen.mission, []
+            for number, at in enumerate(seen.path, 1):
+                place = {"x": at.x, "y": at.y, "mapId": self._map(at)}
+                node: Json = {
+                    "nodeId": f"node-{number}",
+                    "sequenceId": 2 * number,
+                    "released": True,
+                }
+                self._nodes.append({**node, "nodePosition": place})
+            order: Json = {"orderId": f"mission-{seen.mission}", "orderUpdateId": 0}
+            self._publish("order", {**order, "nodes": self._nodes, "edges": []})
+        return self._nodes[len(self._nodes) - len(seen.path) :] if seen.path else []
 
     def _map(self, at: Pose) -> str:
         """Return the robot's own name of the map."""

@@ -119,8 +119,9 @@ def service(
     if kind.section:
         from bridges.runtime.fleet.service import FleetDevices
 
+        robots = DeviceMemories(kept, new=True) if kept is not None else None
         return FleetDevices(
-            config, kind, transport, open_bus, named, clock, unsafe, writer, rmf=rmf
+            config, kind, transport, open_bus, named, clock, unsafe, writer, robots, rmf=rmf
         )
     memories = None
     if kind.keeping is not None and kept is not None:

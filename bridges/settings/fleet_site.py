@@ -83,8 +83,10 @@ class FleetSite(Struct, frozen=True):
 
 def limits_of(config: Config, robot: str, debounce: Mapping[str, float]) -> RobotLimits:
     """Return the limits of a robot's core, with the facts about its site. Raises SettingsError."""
+    assert isinstance(config.section, FleetFiles)
     limits = RobotLimits.of(config.devices[robot], debounce)
-    return replace(limits, site=read_site(config).of(robot))
+    light = config.section.control == "traffic_light"
+    return replace(limits, site=read_site(config).of(robot), light=light)
 
 
 def read_site(config: Config) -> FleetSite:
@@ -174,7 +176,11 @@ class _Comparing:
         """Compare the robots of both files, and their chargers with the graph."""
         theirs = {name: (path, robot) for path, name, robot in fleet.robots()}
         ours = self._config.devices
-        for name in ours:
+        section = self._config.section
+        assert isinstance(section, FleetFiles)
+        for name, robot in ours.items():
+            if lacks := robot.lacks(section.control):
+                self._ours(("robots", name), lacks)
             if name not in theirs:
                 text = f"{Path(fleet.file).name} has an {unknown('robot', name, theirs)}"
                 self._ours(("robots", name), text)

@@ -32,9 +32,20 @@ from drivers.json_fields import Field, JsonFlag
 PLACE: Final = re.compile(r"\$([a-z_]+)((?:\.[A-Za-z0-9_]+)*)")
 GOAL: Final = ("map", "x", "y", "yaw", "goal", "dock", "speed_limit")
 KNOWN: Final = ("robot", "id", "running", *GOAL, "activity", "description")
-Part = Literal["position", "map", "battery", "completed", "status"]
+Part = Literal["position", "map", "battery", "completed", "path", "status"]
 Json = object
 LENGTHS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+
+
+class PathFields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The places that the robot drives to, in turn, as its manager has planned them."""
+
+    list: Annotated[Field, tells("the field with the list of places; null or [] for no path.")]
+    x: Annotated[Field, tells("the x coordinate in each item.")] = "x"
+    y: Annotated[Field, tells("the y coordinate in each item.")] = "y"
+    map: Annotated[
+        Field | None, tells("the name of the map in each item; when absent, the robot's map.")
+    ] = None
 
 
 class RobotFields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -59,6 +70,10 @@ class RobotFields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     fault: Annotated[
         Field | None, tells("the robot's own fault: any text means a fault, null none.")
     ] = None
+    path: Annotated[
+        PathFields | None, tells("the robot's path; `control: traffic_light` needs it.")
+    ] = None
+    paused: Annotated[JsonFlag | None, tells("the robot is paused, and waits for `resume`.")] = None
     time: Annotated[
         Field | None,
         tells("""the time or the counter of the robot's last report, a number that only grows: a manager
@@ -69,7 +84,7 @@ class RobotFields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         """Return the part of a reading that a field belongs to."""
         parts: dict[str, Part] = {"x": "position", "y": "position", "yaw": "position"}
         own: dict[str, Part] = {"map": "map", "battery": "battery", "completed": "completed"}
-        return (parts | own).get(field, "status")
+        return (parts | own | {"path": "path"}).get(field, "status")
 
 
 class AllRobots(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -110,16 +125,24 @@ class FleetApi(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         http.Path, tells("the path that GET reads the robot, or all robots, from.")
     ]
     fields: Annotated[RobotFields, tells("the fields of one robot.")]
-    navigate: Annotated[Call, tells("sends the robot to a goal.")]
-    stop: Annotated[Call, tells("stops the robot.")]
+    navigate: Annotated[
+        Call | None, tells("sends the robot to a goal; `control: full` needs it.")
+    ] = None
+    stop: Annotated[Call | None, tells("stops the robot; `control: full` needs it.")] = None
+    pause: Annotated[Call | None, tells("pauses the robot; `control: traffic_light` needs it.")] = (
+        None
+    )
+    resume: Annotated[
+        Call | None, tells("lets a paused robot go on; `control: traffic_light` needs it.")
+    ] = None
     robots: Annotated[
         AllRobots | None,
         tells("if `state_path` answers for all robots: their place in the answer."),
     ] = None
     paths: Annotated[
         dict[Part, http.Path],
-        tells("""other paths for parts of a reading: `position`, `map`, `battery`, `completed`, or
-        `status` for all others. Each costs a call for each robot."""),
+        tells("""other paths for parts of a reading: `position`, `map`, `battery`, `completed`,
+        `path`, or `status` for all others. Each costs a call for each robot."""),
     ] = {}
     units: Annotated[FleetUnits, tells("the units, if they differ.")] = FleetUnits()
     accepted: Annotated[
@@ -140,11 +163,19 @@ class FleetApi(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     def calls(self) -> Iterator[tuple[tuple[str, ...], Call]]:
         """Yield each command with its path in the YAML."""
-        for name in ("navigate", "stop", "dock", "localize"):
+        for name in ("navigate", "stop", "dock", "localize", "pause", "resume"):
             if call := getattr(self, name):
                 yield (name,), call
         for name, call in self.actions.items():
             yield ("actions", name), call
+
+    def lacks(self, control: str) -> str:
+        """Return the missing keys without which RMF cannot control the robots in this way, or ""."""
+        light = {"pause": self.pause, "resume": self.resume, "fields: path": self.fields.path}
+        full = {"navigate": self.navigate, "stop": self.stop}
+        needed = light if control == "traffic_light" else full
+        missing = ", ".join(key for key, there in needed.items() if there is None)
+        return f"control: {control} needs {missing} in the interface" if missing else ""
 
     def problems(self) -> Remarks:
         """Yield placeholders without a value, and abilities without their fields."""

@@ -6,7 +6,7 @@ take an old one for a new one, even after a restart of the daemon.
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Final, Protocol
+from typing import Annotated, Final, Protocol, cast
 from weakref import WeakKeyDictionary
 
 import msgspec
@@ -17,7 +17,7 @@ from bridges.kinds.shared.fields import Name, tells
 from bridges.kinds.shared.remarks import Remarks
 from drivers import DriverError, json_fields
 from drivers.driver_type import DriverType
-from drivers.fleet.api import FleetApi, body_with, path_with, values
+from drivers.fleet.api import FleetApi, PathFields, body_with, path_with, values
 from drivers.hal import HalError, http
 from drivers.http_call import Call
 from drivers.profiles import Profile
@@ -36,6 +36,13 @@ class HttpRobotSettings(FleetRobotSettings, frozen=True, kw_only=True, forbid_un
         """Yield a missing or unknown interface."""
         yield from super().problems()
         yield from PROFILE.problems(self.profile, self.api)
+
+    def lacks(self, control: str) -> str:
+        """Return the calls and fields that this control needs, and this robot's death."""
+        api, dies = self.interface(), self.on_death
+        if dies != "finish" and getattr(api, dies) is None:
+            return f"on_death: {dies} needs {dies} in the interface"
+        return api.lacks(control)
 
     def interface(self) -> FleetApi:
         """Return the interface."""
@@ -145,9 +152,29 @@ class HttpRobot:
             fault=json_fields.text(answer("fault"), fields.fault) if fields.fault else "",
             taken_out="" if flag("ready") in (None, True) else "its manager calls it not ready",
             said_at=number("time") if fields.time else None,
+            path=self._path(answer("path"), level) if fields.path else None,
+            paused=flag("paused"),
             refused=self._refused,
             unanswered=self._unanswered,
         )
+
+    def _path(self, answer: Answer, level: str) -> tuple[Pose, ...]:
+        """Read the places to which the manager sends the robot. `level`: the robot's map."""
+        place = self._api.fields.path
+        assert place is not None
+        items = json_fields.needed(answer, place.list)
+        if not isinstance(items or [], list):
+            raise json_fields.wrong(place.list, items, "a list of places")
+        return tuple(self._place(item, place, level) for item in cast(list[object], items or []))
+
+    def _place(self, item: object, place: PathFields, level: str) -> Pose:
+        if not isinstance(item, dict):
+            raise json_fields.wrong(place.list, item, "a place")
+        x, y = (json_fields.number(item, field, 1.0) for field in (place.x, place.y))
+        if x is None or y is None:
+            raise DriverError(f"a place of '{place.list}' has no '{place.x}' or '{place.y}'")
+        on = json_fields.name(item, place.map) if place.map else level
+        return self._settings.level_of(self._api.units.read(Pose(on, x, y)))
 
     def _answer(self, path: str) -> Answer:
         if self._api.robots and path == self._api.state_path:
@@ -163,7 +190,8 @@ class HttpRobot:
             return
         call = self._call(command)
         if call is None:
-            self._done(command, f"there is no call for the action '{command.activity}'")
+            what = f"action '{command.activity}'" if command.doing == "act" else command.doing
+            self._done(command, f"there is no call for the {what}")
             return
         try:
             refused = self._send(call, command)
@@ -185,8 +213,8 @@ class HttpRobot:
                 return self._api.dock or self._api.navigate
             case "localize":
                 return self._api.localize or _NOTHING
-            case "stop":
-                return self._api.stop
+            case "stop" | "pause" | "resume" as doing:
+                return cast(Call | None, getattr(self._api, doing))
         return self._api.navigate
 
     def _send(self, call: Call, command: RobotCommand) -> str:
@@ -197,7 +225,7 @@ class HttpRobot:
         path = path_with(call.path, given)
         body = None if call.body is None else body_with(call.body, given)
         if self._api.accepted is None:
-            self._bus.send(path, call.method, body, safe=command.doing == "stop")
+            self._bus.send(path, call.method, body, safe=command.doing in ("stop", "pause"))
             return ""
         answer = self._bus.ask(path, call.method, body)
         if json_fields.flag(answer, self._api.accepted):
@@ -206,9 +234,10 @@ class HttpRobot:
         return f"{command.doing} is refused" + (f": {why}" if why else "")
 
     def make_safe(self) -> None:
-        """Stop the robot with `on_death: stop`; else do nothing, because it finishes its last goal."""
-        if self._settings.on_death == "stop":
-            self._send(self._api.stop, RobotCommand(0, "stop"))
+        """Stop or pause the robot, as `on_death` says; else do nothing: it finishes its last goal."""
+        dies = self._settings.on_death
+        if dies != "finish" and (call := self._call(RobotCommand(0, dies))):
+            self._send(call, RobotCommand(0, dies))
 
     def close(self) -> None:
         """Do nothing: the driver holds no resource."""
@@ -229,6 +258,7 @@ def describe(settings: HttpRobotSettings, bus_settings: http.HttpSettings) -> li
     fields = msgspec.structs.asdict(api.fields)
     for name, place in fields.items():
         if place is not None:
+            place = getattr(place, "list", place)
             text = place if isinstance(place, str) else json_fields.place_text(place)
             rows.append((name, text))
     rows.append(("on death", settings.on_death))

@@ -1,15 +1,17 @@
 """A robot that speaks VDA 5050 (2.1 or 3.0) over MQTT.
 
-    uagv/v2/MANUFACTURER/SERIAL/state           the robot's state: at each event, and each 30 s at
-    least …/visualization                             its place, more often; some robots lack it
-    …/connection                                ONLINE, OFFLINE or CONNECTIONBROKEN: retained, a
-    last will …/order, …/instantActions                   our messages
+    uagv/v2/MANUFACTURER/SERIAL/state   the robot's state: at each event, and each 30 s at least
+    …/visualization                     its place, more often; some robots lack it
+    …/connection                        ONLINE, OFFLINE or CONNECTIONBROKEN: retained, a last will
+    …/order                             ours, or with `control: traffic_light` its own manager's
+    …/instantActions                    ours
 
 A robot takes a new order only when it has none, so an order that is replaced is cancelled first. The
 robot reports the end of `cancelOrder` when all movement has stopped, and `driving` shows that too.
 """
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import Annotated, Final
 
 import msgspec
@@ -28,11 +30,13 @@ from drivers.fleet.vda_state import (
     number,
     order_actions,
     part,
+    places_left,
     references,
     taken_out,
     text,
     told,
 )
+from drivers.hal import HalError
 from drivers.hal.mqtt import Heard, MqttBus, MqttSettings
 from drivers.hal.timestamps import utc
 from drivers.json_fields import clean
@@ -103,9 +107,9 @@ class VdaRobot:
         self._state: Json = {}
         self._at: Pose | None = None
         self._cancelled = ("", 0)
-        self._decoded: tuple[object, Json] = (None, {})
+        self._decoded: dict[str, tuple[object, Json]] = {}
         self._asked = False
-        for topic in ("state", "visualization", "connection"):
+        for topic in ("state", "visualization", "connection", "order"):
             bus.listen(self._topics[topic])
 
     def open(self) -> None:
@@ -115,9 +119,7 @@ class VdaRobot:
         """Read the robot's last state. Raises DriverError without a state of a connected robot."""
         self._connected()
         heard = self._live_state()
-        if heard.payload is not self._decoded[0]:
-            self._decoded = heard.payload, self._object("state", heard.payload)
-        state = self._decoded[1]
+        state = self._object("state", heard.payload)
         driving = flag(state, "driving")
         at = self._place(state, heard.at or 0.0, driving)
         power = part(state, self._says.power)
@@ -131,6 +133,8 @@ class VdaRobot:
             fault=self._fault(state),
             taken_out=taken_out(state),
             refused=self._refused(state),
+            path=self._path(state),
+            paused=flag(state, "paused") if "paused" in state else None,
         )
 
     def write(self, outputs: RobotOutputs) -> None:
@@ -140,6 +144,9 @@ class VdaRobot:
             return
         if command.doing == "stop":
             self._cancel(command.attempt)
+        elif command.doing in ("pause", "resume"):
+            kind = "startPause" if command.doing == "pause" else "stopPause"
+            self._instant(kind, f"{command.doing}-{command.id}-{command.attempt}-{utc()}", {})
         elif command.doing == "localize":
             self._localize(command)
         elif not self._active():
@@ -154,9 +161,10 @@ class VdaRobot:
         return text(self._state, "orderId").partition("-")[0]
 
     def make_safe(self) -> None:
-        """Stop the robot with `on_death: stop`; else do nothing, because it finishes its order."""
-        if self._settings.on_death == "stop":
-            self._instant("cancelOrder", "on-death", {})
+        """Stop or pause the robot, as `on_death` says; else do nothing: it finishes its order."""
+        kinds = {"stop": "cancelOrder", "pause": "startPause"}
+        if kind := kinds.get(self._settings.on_death):
+            self._instant(kind, f"on-death-{utc()}", {})
 
     def close(self) -> None:
         """Do nothing: the bus ends the connection."""
@@ -179,6 +187,14 @@ class VdaRobot:
         return self._bus.fresh(self._topics["state"], self._settings.state_s)
 
     def _object(self, what: str, payload: bytes) -> Json:
+        """Return the JSON object of a message, which is decoded once. Raises DriverError."""
+        before, found = self._decoded.get(what, (None, {}))
+        if payload is not before:
+            found = self._decode(what, payload)
+            self._decoded[what] = payload, found
+        return found
+
+    def _decode(self, what: str, payload: bytes) -> Json:
         try:
             found = msgspec.json.decode(payload)
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
@@ -205,6 +221,19 @@ class VdaRobot:
             raise DriverError(f"the robot drives, and its place is {age_s:.0f} s old")
         numbers = (number(place, key) for key in ("x", "y", "theta"))
         return Pose(text(place, "mapId"), *numbers)
+
+    def _path(self, state: Json) -> tuple[Pose, ...] | None:
+        """Return the places to which another sender's order sends the robot; None if unknown."""
+        if text(state, "orderId").partition("-")[0] == str(self._sent[0]):
+            return None
+        heard = None
+        with suppress(HalError):  # the broker may let us only send orders
+            heard = self._bus.heard(self._topics["order"])
+        places = places_left(state, self._object("order", heard.payload) if heard else {})
+        if places is None:
+            return None
+        found = (Pose(text(at, "mapId"), number(at, "x"), number(at, "y")) for at in places)
+        return tuple(map(self._settings.level_of, found))
 
     def _completed(self, state: Json) -> str:
         """Return the order that the robot has carried out; "" while it has one."""

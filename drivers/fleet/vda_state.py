@@ -7,6 +7,8 @@ from drivers import DriverError
 from drivers.fleet.vda_messages import Json
 from drivers.json_fields import clean
 
+INSTANT: Final = ("cancel-", "place-", "state-", "on-death", "pause-", "resume-")
+"""The beginnings of the ids of our instant actions."""
 AUTOMATIC: Final = ("AUTOMATIC", "SEMIAUTOMATIC")
 
 
@@ -19,17 +21,15 @@ def taken_out(state: Json) -> str:
 def order_actions(state: Json) -> Iterator[Json]:
     """Yield the states of the order's actions. Those of instant actions stay for ever in 2.1, so an
     action that is not an order's is left out by its id."""
-    found = state.get("actionStates")
-    for one in found if isinstance(found, list) else ():
-        ours = str(one.get("actionId", "")) if isinstance(one, dict) else ""
-        if ours and not ours.startswith(("cancel-", "place-", "state-", "on-death")):
+    for one in listed(state, "actionStates"):
+        ours = str(one.get("actionId", ""))
+        if ours and not ours.startswith(INSTANT):
             yield one
 
 
 def errors(state: Json) -> Iterator[Json]:
     """Yield the robot's errors."""
-    found = state.get("errors")
-    yield from (one for one in found if isinstance(one, dict)) if isinstance(found, list) else ()
+    return iter(listed(state, "errors"))
 
 
 def told(error: Json) -> str:
@@ -40,9 +40,24 @@ def told(error: Json) -> str:
 
 def references(error: Json) -> list[str]:
     """Return the orders, actions and nodes that an error is about."""
-    found = error.get("errorReferences")
-    listed = found if isinstance(found, list) else []
-    return [str(one.get("referenceValue")) for one in listed if isinstance(one, dict)]
+    return [str(one.get("referenceValue")) for one in listed(error, "errorReferences")]
+
+
+def listed(state: Json, field: str) -> list[Json]:
+    """Return the objects of a list; [] if there is no list."""
+    found = state.get(field)
+    return [one for one in found if isinstance(one, dict)] if isinstance(found, list) else []
+
+
+def places_left(state: Json, order: Json) -> list[Json] | None:
+    """Return the places of the nodes that are left of the robot's order, with those that its manager
+    only plans; None if neither the state tells them nor this order."""
+    same = order.get("orderId") == state.get("orderId")
+    known = {n.get("sequenceId"): n.get("nodePosition") for n in listed(order, "nodes") if same}
+    nodes = listed(state, "nodeStates")
+    found = (node.get("nodePosition") or known.get(node.get("sequenceId")) for node in nodes)
+    places = [place for place in found if isinstance(place, dict)]
+    return places if len(places) == len(nodes) else None
 
 
 def part(state: Json, field: str) -> Json:

@@ -9,21 +9,30 @@ Failing parts:
 | wheels    | does not move   | a fifth the speed | stops halfway        | stops halfway        |
 | localiser | keeps its place | keeps its place   | is on an unknown map | is far off the graph |
 | battery   | stays as it is  | stays as it is    | reports 250 %        | reports -3 %         |
+| pause     | is not obeyed, in each mode                                                         |
 
-A robot that stands in a lift rides: the car calls at its floors in turn, each for RIDE_S.
+With `missions` the robot's own manager sends it about, along a path, and gives a robot that stands
+paused for PATIENCE_S another path. A robot that stands in a lift rides: the car calls at its floors in
+turn, each for RIDE_S.
 """
 
+import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from itertools import pairwise
 from typing import Final
 
 import msgspec
 from msgspec.structs import replace
 
+from bridges.kinds.fleet.places import RobotSite
+from bridges.kinds.fleet.settings import FleetFiles
 from bridges.kinds.fleet.signals import Pose
 from bridges.settings.config import Config
 from bridges.settings.fleet_site import read_site
 from hal_fakes.plants.machine import WiredPlant
+from hal_fakes.rmf.ways import Ways
 
 SPEED: Final = 0.7
 TURNS: Final = 1.0
@@ -34,13 +43,19 @@ AT_CHARGER_M: Final = 0.3
 DRAINS: Final = 0.0005
 CHARGES: Final = 0.005
 """Battery for each second, so fast that a person sees it."""
-PARTS: Final = ("wheels", "localiser", "battery")
+PARTS: Final = ("wheels", "localiser", "battery", "pause")
 BUTTONS: Final = ("fault", "manual", "lost", "lies")
 NEVER: Final = math.inf
+RESTS_S: Final = 4.0
+"""The pause between two missions."""
+PATIENCE_S: Final = 30.0
+Missions = Callable[[Pose], Sequence[Pose]]
+"""Returns the places of the next mission from this place."""
 
 
 class RobotOrder(msgspec.Struct, frozen=True):
-    """An order to the robot. `doing`: go, stop, act or localize. `at`: the goal, on the robot's map."""
+    """An order to the robot. `doing`: go, stop, act, localize, pause or resume. `at`: the goal, on the
+    robot's map."""
 
     id: str
     doing: str
@@ -49,7 +64,8 @@ class RobotOrder(msgspec.Struct, frozen=True):
 
 
 class RobotSeen(msgspec.Struct, frozen=True):
-    """The robot's report. `completed`: the number of its last completed order; "" before the first."""
+    """The robot's report. `completed`: the number of its last completed order; "" before the first.
+    `path`: the places left of its mission, whose number is `mission`."""
 
     at: Pose
     battery: float
@@ -60,6 +76,9 @@ class RobotSeen(msgspec.Struct, frozen=True):
     fault: str
     manual: bool
     said_at: float
+    path: tuple[Pose, ...] = ()
+    paused: bool = False
+    mission: int = 0
 
 
 class RobotPlant(WiredPlant):
@@ -73,6 +92,7 @@ class RobotPlant(WiredPlant):
         chargers: Sequence[Pose] = (),
         cars: Mapping[str, Sequence[Pose]] = {},
         parts: Sequence[str] = (),
+        missions: Missions | None = None,
     ) -> None:
         super().__init__(name, (), (*PARTS, *parts), BUTTONS)
         self.at = start
@@ -84,6 +104,10 @@ class RobotPlant(WiredPlant):
         self._floor_at = NEVER
         self._act_until = NEVER
         self._last: RobotSeen | None = None
+        self.paused = False
+        self._missions = missions
+        self._mission, self._mission_at = 0, NEVER
+        self._path: list[Pose] = []
 
     def contact(self, signal: str) -> bool:
         """Return False: the robot has no contacts."""
@@ -99,6 +123,10 @@ class RobotPlant(WiredPlant):
         if order.at is not None and not order.at.map:
             order = replace(order, at=replace(order.at, map=self.at.map))
         self.note("relay", order.doing, order.id)
+        self._settled = False
+        if order.doing in ("pause", "resume"):
+            self.paused = order.doing == "pause" and "pause" not in self.failures
+            return
         self._act_until = now + ACTS_S if order.doing == "act" else NEVER
         self._order = order
         if order.doing == "stop":
@@ -109,7 +137,6 @@ class RobotPlant(WiredPlant):
         elif self.pressed["lies"]:
             self._completed = order.id
         self._wait_in_car()
-        self._settled = False
 
     def run(self) -> None:
         """Move to the present moment."""
@@ -124,12 +151,27 @@ class RobotPlant(WiredPlant):
             self._end(self._order)
         if self.now >= self._floor_at:
             self._next_floor()
+        self._follow()
+
+    def _follow(self) -> None:
+        """Drive to the next place of the mission, or begin the next mission."""
+        if self._missions and self._mission_at == NEVER:
+            self._mission_at = self.now + RESTS_S
+        if self._path and self._legs():
+            self._mission_at = self.now + PATIENCE_S
+        elif self._missions and self.now >= self._mission_at:
+            self._order = None
+            self._path, self._mission = [*self._missions(self.at)], self._mission + 1
+            self._mission_at = self.now + (PATIENCE_S if self._path else RESTS_S)
+        if self._path and self._order is None:
+            self._order = RobotOrder(f"mission-{self._mission}", "go", self._path[0])
 
     def event_at(self) -> float:
         """Return the time of arrival, of the end of an action, or of the car's next floor."""
         legs = self._legs()
         arrives_at = (self._ran_at or self.now) + sum(legs) + 1e-6 if legs else NEVER
-        return min(arrives_at, self._act_until, self._floor_at)
+        mission_at = NEVER if legs else self._mission_at
+        return min(arrives_at, self._act_until, self._floor_at, mission_at)
 
     def reading(self) -> RobotSeen:
         """Return the robot's report, as its failures make it."""
@@ -153,6 +195,9 @@ class RobotPlant(WiredPlant):
             fault="wheel motor too hot" if self.pressed["fault"] else "",
             manual=self.pressed["manual"],
             said_at=self.now,
+            path=tuple(self._path),
+            paused=self.paused,
+            mission=self._mission,
         )
         return self._last
 
@@ -160,8 +205,8 @@ class RobotPlant(WiredPlant):
         """Return the seconds left to turn, drive and turn; empty for a robot that stands."""
         order = self._order
         wheels = self.failures.get("wheels")
-        broken = wheels in ("off", "stuck") or self.pressed["fault"] or self.pressed["manual"]
-        if order is None or order.doing != "go" or order.at is None or broken:
+        broken = wheels in ("off", "stuck") or any(self.pressed[b] for b in ("fault", "manual"))
+        if order is None or order.doing != "go" or order.at is None or broken or self.paused:
             return ()
         if order.at.map != self.at.map:
             return ()  # the car has carried it to another floor
@@ -203,6 +248,10 @@ class RobotPlant(WiredPlant):
 
     def _end(self, order: RobotOrder) -> None:
         self._completed, self._order = order.id, None
+        if self._path and order.at == self._path[0]:
+            del self._path[0]
+            self._mission_at = self.now + RESTS_S
+            self._follow()
         self.note("sensor", "completed", order.id)
 
     def _drain(self, for_s: float) -> None:
@@ -251,5 +300,19 @@ def build(config: Config, name: str, parts: Sequence[str] = ()) -> RobotPlant:
     for vertex in fleet.graph.vertices:
         if vertex.lift:
             cars.setdefault(vertex.lift, []).append(site.on_robots_map(vertex.pose()))
+    missions = None
+    if isinstance(config.section, FleetFiles) and config.section.control == "traffic_light":
+        turn = list(config.devices).index(name)
+        missions = partial(_mission, site, Ways(fleet.graph), itertools.count(turn))
     chargers = [site.on_robots_map(v.pose()) for v in fleet.graph.vertices if v.charger]
-    return RobotPlant(name, site.on_robots_map(start.pose()), chargers, cars, parts)
+    return RobotPlant(name, site.on_robots_map(start.pose()), chargers, cars, parts, missions)
+
+
+def _mission(site: RobotSite, ways: Ways, turn: Iterator[int], at: Pose) -> Sequence[Pose]:
+    """Return the places to the next named waypoint of the robot's floor."""
+    here = ways.nearest(site.on_rmfs_map(at))
+    goals = ways.goals(at.map)
+    way = ways.shortest(here, goals[next(turn) % len(goals)], set())
+    legs = pairwise(ways.graph.vertices[number].pose() for number in way)
+    ahead = (replace(b, yaw=math.atan2(b.y - a.y, b.x - a.x)) for a, b in legs)
+    return [site.on_robots_map(place) for place in ahead]

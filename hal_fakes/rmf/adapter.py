@@ -13,6 +13,13 @@ from bridges.messages.definitions import FleetState
 from bridges.settings.fleet_config import load_fleet
 from bridges.settings.nav_graph import load_graph
 from bridges.yaml.problems import SettingsError
+from hal_fakes.rmf.lights import (
+    Lights,
+    MovingInstruction,
+    TrafficLight,
+    WaitingInstruction,
+    Waypoint,
+)
 from hal_fakes.rmf.patrol import PatrolRobot, Patrols
 
 STEP_S: Final = 0.2
@@ -48,6 +55,7 @@ class FleetConfiguration:
         self.file = load_fleet(config)
         self.graph = load_graph(graph)
         self.transforms: dict[str, Similarity] = {}
+        self.vehicle_traits = self.file.fleet.limits
 
     @staticmethod
     def from_config_files(
@@ -149,6 +157,7 @@ class StandInAdapter:
     def __init__(self, owner: "StandIn") -> None:
         self.fleet: EasyFleet | None = None
         self._owner = owner
+        self._new: list[Callable[[], None]] = []
         self._lock = threading.RLock()
         self._ends = threading.Event()
         self._thread = threading.Thread(target=self._run, name="rmf stand-in", daemon=True)
@@ -159,6 +168,20 @@ class StandInAdapter:
         patrols = Patrols(name, graph, configuration.transforms, self._owner.patrols)
         self.fleet = self._owner.fleet = EasyFleet(patrols, self._lock)
         return self.fleet
+
+    def add_easy_traffic_light(
+        self,
+        handle_callback: Callable[[TrafficLight], None],
+        fleet_name: str,
+        robot_name: str,
+        traits: object,
+        pause_callback: Callable[[], None],
+        resume_callback: Callable[[], None],
+    ) -> None:
+        """Add a traffic light; its handle comes later, on RMF's thread."""
+        lights = self._owner.lights
+        handle = lights.handles[robot_name] = TrafficLight(robot_name, pause_callback, lights)
+        self._new.append(lambda: handle_callback(handle))
 
     def start(self) -> None:
         """Begin to call back."""
@@ -171,7 +194,12 @@ class StandInAdapter:
 
     def _run(self) -> None:
         while not self._ends.wait(STEP_S):
-            assert self.fleet
+            for light in [*self._owner.lights.handles.values()]:
+                light.step()
+            while self._new:
+                self._new.pop(0)()
+            if self.fleet is None:
+                continue
             with self._lock:
                 due = self.fleet.patrols.due(time.monotonic())
                 state = self.fleet.patrols.state(time.time())
@@ -188,6 +216,11 @@ class StandIn:
     def __init__(self, schedule: bool = True, patrols: bool = True) -> None:
         self.schedule, self.patrols = schedule, patrols
         self.fleet: EasyFleet | None = None
+        self.lights = Lights()
+        self.Waypoint = Waypoint
+        self.easy_traffic_light = SimpleNamespace(
+            MovingInstruction=MovingInstruction, WaitingInstruction=WaitingInstruction
+        )
         self.speak: Callable[[FleetState], object] = lambda state: None
         self.Transformation = transformation
         self.Adapter = SimpleNamespace(make=self._make)

@@ -6,17 +6,17 @@ localized there. With a low battery it drives to its charger. It is pure but for
 monotonic seconds.
 """
 
-import heapq
 import math
 from collections.abc import Callable, Iterator, Mapping
 from types import SimpleNamespace
 from typing import Any, Final
 
-from bridges.kinds.fleet.places import NavGraph, RobotSite, Vertex
+from bridges.kinds.fleet.places import NavGraph, RobotSite
 from bridges.kinds.fleet.signals import Pose
 from bridges.kinds.shared.similarity import Similarity
 from bridges.messages.definitions import FleetState, Location, RobotMode, RobotState
 from bridges.messages.stamps import stamp
+from hal_fakes.rmf.ways import Ways
 
 LOW: Final = 0.2
 FULL: Final = 0.9
@@ -64,10 +64,7 @@ class PatrolRobot:
         self.commissioned = True
         self.path: list[int] = []
         self.holds: set[int] = set()
-        self.vertex = min(
-            (i for i, v in enumerate(site.graph.vertices) if v.level == at.map),
-            key=lambda i: math.dist((at.x, at.y), _xy(site.graph.vertices[i])),
-        )
+        self.vertex = Ways(site.graph).nearest(at)
         self.execution: Execution | None = None
         self.activity: object = None
         self.updates = 0
@@ -102,10 +99,9 @@ class Patrols:
         self.graph, self.transforms = graph, transforms
         self.robots: list[PatrolRobot] = []
         self._fleet, self._alone = fleet, alone
-        named = [(i, v) for i, v in enumerate(graph.vertices) if v.name and not v.lift]
-        self._chargers = [i for i, v in named if v.charger]
-        self._goals = [i for i, v in named if not v.charger] or self._chargers
-        self._edges = _edges(graph)
+        self._ways = Ways(graph)
+        self._goals = self._ways.goals()
+        self._chargers = [i for i, v in enumerate(graph.vertices) if v.charger and not v.lift]
         self._tell_at = -math.inf
 
     def send(self, robot: PatrolRobot, waypoint: str) -> bool:
@@ -206,36 +202,5 @@ class Patrols:
 
     def _way(self, start: int, goal: int, avoided: set[int]) -> list[int]:
         """Return the shortest way over free vertices, or else over all; [] if there is none."""
-        found = self._shortest(start, goal, avoided - {start, goal})
-        return found or self._shortest(start, goal, set())
-
-    def _shortest(self, start: int, goal: int, avoided: set[int]) -> list[int]:
-        queue: list[tuple[float, int, list[int]]] = [(0.0, start, [start])]
-        seen = set(avoided)
-        while queue:
-            far, at, way = heapq.heappop(queue)
-            if at == goal:
-                return way
-            if at in seen:
-                continue
-            seen.add(at)
-            for after, length in self._edges.get(at, ()):
-                heapq.heappush(queue, (far + length, after, [*way, after]))
-        return []
-
-
-def _edges(graph: NavGraph) -> dict[int, list[tuple[int, float]]]:
-    """Return the lanes, and the rides between the floors of a lift."""
-    found: dict[int, list[tuple[int, float]]] = {}
-    for lane in graph.lanes:
-        ends = graph.vertices[lane.start], graph.vertices[lane.end]
-        found.setdefault(lane.start, []).append((lane.end, math.dist(_xy(ends[0]), _xy(ends[1]))))
-    for i, one in enumerate(graph.vertices):
-        for j, other in enumerate(graph.vertices):
-            if one.lift and one.lift == other.lift and one.level != other.level:
-                found.setdefault(i, []).append((j, 20.0))
-    return found
-
-
-def _xy(vertex: Vertex) -> tuple[float, float]:
-    return vertex.x, vertex.y
+        found = self._ways.shortest(start, goal, avoided - {start, goal})
+        return found or self._ways.shortest(start, goal, set())

@@ -1,6 +1,6 @@
 """Fleets: RMF's adapter gives goals, and each robot is driven to them through its maker's interface."""
 
-from bridges.kinds.fleet import core, memory, messages, report, signals
+from bridges.kinds.fleet import core, keep, light, memory, messages, report, signals
 from bridges.kinds.fleet.memory import RobotLimits, RobotMemory
 from bridges.kinds.fleet.report import RobotReport
 from bridges.kinds.fleet.settings import FleetFiles, FleetRobotSettings
@@ -30,14 +30,18 @@ KIND: Kind[
     decide=core.decide,
     state_message=messages.state_message,
     summary=messages.summary,
+    keeping=keep.KEEPING,
 )
 
 RECORDED: Recorded = {
+    "fleet.light.LightQuestion": light.LightQuestion,
+    "fleet.memory.LightMemory": memory.LightMemory,
     "fleet.memory.Pad": memory.Pad,
     "fleet.memory.RobotMemory": memory.RobotMemory,
     "fleet.report.RobotReport": report.RobotReport,
     "fleet.signals.Act": signals.Act,
     "fleet.signals.Goal": signals.Goal,
+    "fleet.signals.LightAnswer": signals.LightAnswer,
     "fleet.signals.Localize": signals.Localize,
     "fleet.signals.Navigate": signals.Navigate,
     "fleet.signals.PadHeard": signals.PadHeard,

@@ -9,8 +9,8 @@ FLEET-2. A command counts as done by the place: the robot is within `arrived_m` 
    has not carried it out, and its word is a fault.
 FLEET-3. A command is sent again when the robot stands for `obeys_s` without being done, ever more
    seldom. An action is sent again only if its manager refused it: an action must not be done twice.
-FLEET-4. A robot that was stopped is believed only when it stands; until then the stop is sent again
-   each `stops_s`. A new order replaces a stop.
+FLEET-4. A robot that was stopped or paused is believed only when it stands; until then the command is
+   sent again each `stops_s`. A new order replaces a stop.
 FLEET-5. RMF gets a place only with a fresh reading. A robot without one for `stale_after_s` is
    silent.
 FLEET-6. On a map that the graph lacks, RMF gets no place. Off the graph it does, and the distance
@@ -25,12 +25,14 @@ FLEET-10. A robot gets no new task while it reports a fault, takes no orders, is
    over.
 FLEET-11. An activity that RMF has given up is stopped.
 FLEET-12. An operator's reset begins the attempts anew.
+`light.py` has the rules of a robot that RMF can only pause.
 """
 
 from collections.abc import Iterator
 
 from msgspec.structs import replace
 
+from bridges.kinds.fleet import light
 from bridges.kinds.fleet.memory import Pad, RobotLimits, RobotMemory, silent_at
 from bridges.kinds.fleet.report import RobotReport, charges, report
 from bridges.kinds.fleet.sensing import faces, off_goal_m, stands, take
@@ -38,6 +40,7 @@ from bridges.kinds.fleet.signals import (
     Act,
     Event,
     Goal,
+    LightAnswer,
     Localize,
     Navigate,
     PadHeard,
@@ -64,7 +67,11 @@ def initial(limits: RobotLimits, now: float) -> RobotMemory:
 def decide(memory: RobotMemory, event: Event, now: float, limits: RobotLimits) -> FleetDecision:
     """Decide one scan. `now`: monotonic s, never earlier than in the last scan. Never raises."""
     memory = _hear(memory, event, now, limits)
+    if limits.light:
+        memory = light.follow(memory, now, limits)
     memory = _advance(memory, now, limits)
+    if limits.light:
+        memory = light.steer(memory, now, limits)
     wakes = (at for at in _wakes(memory, limits) if at > now)
     return Decision(
         memory=memory,
@@ -82,7 +89,12 @@ def _hear(memory: RobotMemory, event: Event, now: float, limits: RobotLimits) ->
             return replace(memory, fresh=False, unread=reason)
         case PadHeard(charger=charger):
             return replace(memory, pads={**memory.pads, charger: Pad(event, now)})
+        case LightAnswer():
+            return light.hear(memory, event)
         case OperatorReset():
+            paused = limits.light and memory.reading is not None and memory.reading.paused is True
+            held = replace(memory.light, held=memory.light.held or paused)
+            memory = replace(memory, light=held)
             return replace(_again(memory, now), tries=1) if memory.command else memory
         case Navigate() | Localize() | Act() | Stop():
             return _order(memory, event, now, limits)
@@ -123,12 +135,17 @@ def _advance(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotMemor
     command = memory.command
     if command is None or not memory.fresh:
         return memory
-    if command.doing == "stop":
-        if stands(memory, now):
+    if command.doing in ("stop", "pause"):
+        assert memory.reading is not None
+        if stands(memory, now) and not (
+            command.doing == "pause" and memory.reading.paused is False
+        ):
             return replace(memory, command=None)
         return _again(memory, now) if now >= memory.asked_at + limits.t.stops_s else memory
+    if command.doing == "resume" and light.resumed(memory, now, limits):
+        return replace(memory, command=None, light=replace(memory.light, held=False))
     memory = _arrival(memory, command, now, limits)
-    if _is_done(memory, command, now, limits):
+    if command.doing != "resume" and _is_done(memory, command, now, limits):
         return replace(memory, command=None, finished=command.id, arrived_at=None)
     return _again(memory, now) if now >= _again_at(memory, command, now, limits) else memory
 

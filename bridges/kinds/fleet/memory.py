@@ -6,15 +6,17 @@ import msgspec
 
 from bridges.kinds.fleet.places import RobotSite
 from bridges.kinds.fleet.settings import FleetRobotSettings, RobotDurations
-from bridges.kinds.fleet.signals import PadHeard, Pose, RobotCommand, RobotSample
+from bridges.kinds.fleet.signals import LightAnswer, PadHeard, Pose, RobotCommand, RobotSample
 from bridges.kinds.shared.durations import AGES_AGO
 
 
 class RobotLimits(msgspec.Struct, frozen=True):
-    """The settings that the core needs. `t`: durations and distances."""
+    """The settings that the core needs. `t`: durations and distances. `light`: RMF can only pause the
+    robot."""
 
     t: RobotDurations = RobotDurations()
     site: RobotSite = RobotSite()
+    light: bool = False
 
     @classmethod
     def of(cls, settings: FleetRobotSettings, debounce: Mapping[str, float]) -> "RobotLimits":
@@ -27,6 +29,25 @@ class Pad(msgspec.Struct, frozen=True):
 
     state: PadHeard
     at: float
+
+
+class LightMemory(msgspec.Struct, frozen=True):
+    """The path of a robot that RMF can only pause. RMF knows the path by the same number.
+
+    `told`: the path as its manager last told it. `path`: the checkpoints on RMF's map, from the place
+    where the robot was; () without a path. `passed`: the last checkpoint that it has reached.
+    `answer`: RMF's last answer about this path. `granted`: the checkpoint to which RMF lets the robot
+    drive. `held`: we have paused it. `orders`: the number of pauses and resumes.
+    """
+
+    told: tuple[Pose, ...] = ()
+    path: tuple[Pose, ...] = ()
+    number: int = 0
+    passed: int = 0
+    answer: LightAnswer | None = None
+    granted: int = 0
+    held: bool = False
+    orders: int = 0
 
 
 class RobotMemory(msgspec.Struct, frozen=True):
@@ -42,7 +63,8 @@ class RobotMemory(msgspec.Struct, frozen=True):
     `tries`: its attempts since its begin or since an operator's reset.
     `arrived_at`: since when a docking robot has been at its dock. `finished`: the number of the last
     command that was carried out; 0 for none. `charges_at`: the last charger that the robot was sent to.
-    `pads`: charger -> its last state that names this robot.
+    `pads`: charger -> its last state that names this robot. `light`: for a robot that RMF can only
+    pause.
     """
 
     reading: RobotSample | None = None
@@ -62,6 +84,7 @@ class RobotMemory(msgspec.Struct, frozen=True):
     finished: int = 0
     charges_at: str = ""
     pads: Mapping[str, Pad] = {}
+    light: LightMemory = LightMemory()
     started_at: float = AGES_AGO
 
 

@@ -32,11 +32,15 @@ def accept(message: ChargerState, settings: FleetRobotSettings) -> PadHeard:
 def state_message(
     name: str, settings: FleetRobotSettings, report: RobotReport, stamp: Time
 ) -> FleetState:
-    """Return the robot's state in RMF's form. RMF's adapter publishes its own; this one is for people
-    and records."""
-    at = report.at
+    """Return the robot's state in RMF's form. RMF's adapter publishes the states of robots that it
+    controls, but none of a robot behind its traffic light (EasyTrafficLight.cpp makes the message and
+    drops it)."""
+    at = report.light.here if report.light else report.at
     place = Location(t=stamp, x=at.x, y=at.y, yaw=at.yaw, level_name=at.map) if at else Location()
-    mode = RobotModeValue.MODE_MOVING if report.activity else RobotModeValue.MODE_IDLE
+    moves = report.light.stands == "moving" if report.light else report.activity
+    mode = RobotModeValue.MODE_MOVING if moves else RobotModeValue.MODE_IDLE
+    if report.light and report.light.held:
+        mode = RobotModeValue.MODE_PAUSED
     robot = RobotState(
         name=name,
         mode=RobotMode(mode=mode),

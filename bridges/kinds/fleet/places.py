@@ -65,7 +65,7 @@ class NavGraph(Struct, frozen=True):
         for lane in self.lanes:
             a, b = self.vertices[lane.start], self.vertices[lane.end]
             if a.level == b.level == at.map:
-                yield _from_line(complex(a.x, a.y), complex(b.x, b.y), complex(at.x, at.y))
+                yield off_line_m(a, b, at)
         yield from (_apart(v, at) for v in self.vertices if v.level == at.map)
 
 
@@ -73,8 +73,10 @@ def _apart(vertex: Vertex, at: Pose) -> float:
     return math.hypot(vertex.x - at.x, vertex.y - at.y)
 
 
-def _from_line(start: complex, end: complex, at: complex) -> float:
-    along = end - start
+def off_line_m(a: Pose | Vertex, b: Pose | Vertex, place: Pose) -> float:
+    """Return the distance of a place from the line between two others on its map (m)."""
+    start, at = complex(a.x, a.y), complex(place.x, place.y)
+    along = complex(b.x, b.y) - start
     if not along:
         return abs(at - start)
     share = ((at - start) * along.conjugate()).real / abs(along) ** 2

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import msgspec
 
+from bridges.kinds.fleet.light import LightQuestion, question
 from bridges.kinds.fleet.memory import RobotLimits, RobotMemory, silent_at
 from bridges.kinds.fleet.sensing import off_goal_m, on_other_map, stands
 from bridges.kinds.fleet.signals import Pose
@@ -22,7 +23,7 @@ class RobotReport(msgspec.Struct, frozen=True):
     """The levels for RMF's adapter. `at`: a place of a fresh reading, on the robot's map; None if RMF
     must get no place. `battery`: a fraction of 1. `activity`: the number of the command under way; 0
     without one. `finished`: the number of the last command that was carried out. `fit`: may the robot
-    get new tasks?
+    get new tasks? `light`: for a robot that RMF can only pause.
 
     `where`: the nearest waypoint, for people. `doing`: the command, for people.
     """
@@ -36,10 +37,12 @@ class RobotReport(msgspec.Struct, frozen=True):
     doing: str = ""
     read_at: float | None = None
     faults: tuple[Fault, ...] = ()
+    light: LightQuestion | None = None
 
     def news(self) -> object:
         """Return the report without its age."""
-        return self.at, self.battery, self.activity, self.finished, self.fit, self.faults
+        levels = self.at, self.battery, self.activity, self.finished, self.fit
+        return *levels, self.faults, self.light
 
 
 def report(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotReport:
@@ -53,9 +56,10 @@ def report(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotReport:
         finished=memory.finished,
         fit=reading is not None and not any(fault.code in UNFIT for fault in found),
         where=_where(memory, limits),
-        doing=_doing(memory),
+        doing=_light(memory, limits) if limits.light else _doing(memory),
         read_at=memory.read_at,
         faults=found,
+        light=question(memory, now, limits) if limits.light else None,
     )
 
 
@@ -88,6 +92,19 @@ def _doing(memory: RobotMemory) -> str:
     return f"{command.doing} to {at.map} {to}{again}"
 
 
+def _light(memory: RobotMemory, limits: RobotLimits) -> str:
+    light = memory.light
+    paused = "paused by us" if light.held else ""
+    if not light.path:
+        return paused or "nothing"
+    to = light.path[-1]
+    near = limits.site.graph.nearest(to, NEAR_M)
+    name = near.name if near else f"{to.x:.1f}, {to.y:.1f}"
+    says = light.answer.says if light.answer else "no answer"
+    way = f"path to {to.map} {name}, at checkpoint {light.passed} of {len(light.path) - 1}"
+    return f"{way}, RMF's light: {says}" + (f", {paused}" if paused else "")
+
+
 def charges(memory: RobotMemory, charger: str, now: float) -> bool | None:
     """Does the robot charge, by its own word or that of the charger? None if neither has ever told."""
     pad = memory.pads.get(charger)
@@ -112,6 +129,19 @@ def faults(memory: RobotMemory, now: float, limits: RobotLimits) -> Iterator[Fau
     yield from _of_place(memory, limits)
     yield from _of_charge(memory, now, limits)
     yield from _of_command(memory, now, limits)
+    if limits.light:
+        yield from _of_light(memory, now)
+
+
+def _of_light(memory: RobotMemory, now: float) -> Iterator[Fault]:
+    light, reading = memory.light, memory.reading
+    assert reading is not None
+    if reading.paused and not light.held:
+        yield Fault("ROBOT_PAUSED_BY_OTHERS", "it is paused, and we have not paused it")
+    if light.answer is not None and light.answer.says == "error":
+        yield Fault("ROBOT_PASSED_LIGHT", f"RMF had not let it pass checkpoint {light.passed}")
+    if not light.path and not reading.path and not stands(memory, now) and memory.fresh:
+        yield Fault("ROBOT_WITHOUT_PATH", "it drives, and its manager tells no path")
 
 
 def _of_place(memory: RobotMemory, limits: RobotLimits) -> Iterator[Fault]:
@@ -157,5 +187,5 @@ def _of_command(memory: RobotMemory, now: float, limits: RobotLimits) -> Iterato
         yield Fault("ROBOT_NOT_CHARGING", f"docked at {command.goal.dock} without a charge")
     if memory.tries > limits.t.attempts:
         yield Fault("ROBOT_NOT_OBEYING", f"{limits.t.attempts} attempts in vain: {command.doing}")
-    elif command.doing == "stop" and memory.tries > 1 and not stands(memory, now):
-        yield Fault("ROBOT_NOT_STOPPING", "it drives on after a stop")
+    elif command.doing in ("stop", "pause") and memory.tries > 1 and not stands(memory, now):
+        yield Fault("ROBOT_NOT_STOPPING", f"it drives on after a {command.doing}")

@@ -18,7 +18,7 @@ FilePath = Annotated[str, Meta(min_length=1, max_length=4096, pattern=r"^[^\x00-
 
 
 class FleetFiles(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """RMF's own two files about the fleet. RMF has full control of its robots."""
+    """RMF's own two files about the fleet, and its power over the robots."""
 
     config: Annotated[
         FilePath,
@@ -26,6 +26,11 @@ class FleetFiles(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         from this file's folder."""),
     ]
     graph: Annotated[FilePath, tells("the fleet's navigation graph, made by RMF's traffic editor.")]
+    control: Annotated[
+        Literal["full", "traffic_light"],
+        tells("""`full`: RMF sends the robots to their goals. `traffic_light`: their own manager sends
+        them, and RMF only lets them pause and go on."""),
+    ] = "full"
     server_uri: Annotated[
         Name | None,
         tells("the api-server of rmf-web (`ws://host:8000/_internal`), if there is one."),
@@ -64,6 +69,11 @@ class RobotDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
         tells("""the greatest turn away from its goal's direction at which a robot counts as arrived, if
         the robot does not report completed commands."""),
     ] = 20.0
+    pauses_m: Annotated[
+        Distance,
+        tells("""with `control: traffic_light`: the longest way of a robot from the order to pause until
+        it stands, with the network's delay."""),
+    ] = 1.0
     off_graph_m: Annotated[
         Distance,
         tells("the distance from every lane of the graph beyond which a robot is off the graph."),
@@ -84,9 +94,10 @@ class FleetRobotSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unkno
         RobotDurations, tells("the durations and distances that differ from their defaults.")
     ] = RobotDurations()
     on_death: Annotated[
-        Literal["finish", "stop"],
+        Literal["finish", "stop", "pause"],
         tells("""`finish`: when the daemon ends, a robot drives on to its last goal, as RMF has planned
-        and as robots with any fleet adapter do. `stop`: the robot is stopped, wherever it is."""),
+        and as robots with any fleet adapter do. `stop`, `pause`: the robot is stopped or paused,
+        wherever it is."""),
     ] = "finish"
 
     def level_of(self, at: Pose) -> Pose:
@@ -101,6 +112,10 @@ class FleetRobotSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unkno
         at = command.goal.at
         at = replace(at, map=self.maps.get(at.map, at.map))
         return replace(command, goal=replace(command.goal, at=at))
+
+    def lacks(self, control: str) -> str:
+        """Return why RMF cannot control this robot in this way; "" if it can."""
+        return ""
 
     def stale_after(self) -> float:
         """Return `stale_after_s` of the limits."""

@@ -60,6 +60,22 @@ class Stop(msgspec.Struct, frozen=True):
     of: int
 
 
+Says = Literal["continue", "wait", "pause", "resume", "stay", "error"]
+
+
+class LightAnswer(msgspec.Struct, frozen=True):
+    """An answer of RMF's traffic light about this path and checkpoint.
+
+    `continue`, `wait`: the moving robot may pass its next checkpoint, or must wait there. `pause`: it
+    must stand at once. `resume`, `stay`: the standing robot may go on, or must stay. `error`: the
+    robot is where RMF has not let it go. Source: EasyTrafficLight.hpp of open-rmf/rmf_ros2.
+    """
+
+    path: int
+    checkpoint: int
+    says: Says
+
+
 class PadHeard(msgspec.Struct, frozen=True):
     """A charger's state names this robot. `error`: its error text; "" without an error."""
 
@@ -75,7 +91,8 @@ class RobotSample(msgspec.Struct, frozen=True):
     completed; "" for none. `fault`: the robot's own fault. `taken_out`: the reason why it takes no
     orders (manual mode, teaching). `said_at`: the robot's own time or counter of this reading.
     `refused`: the manager's refusal of the last command. `unanswered`: the last command was an
-    action, and nobody knows whether it has begun.
+    action, and nobody knows whether it has begun. `path`: the places that its own manager sends it to,
+    in turn. `paused`: it waits for a resume.
     """
 
     at: Pose
@@ -88,9 +105,11 @@ class RobotSample(msgspec.Struct, frozen=True):
     said_at: float | None = None
     refused: str = ""
     unanswered: bool = False
+    path: tuple[Pose, ...] | None = None
+    paused: bool | None = None
 
 
-Doing = Literal["navigate", "dock", "localize", "act", "stop"]
+Doing = Literal["navigate", "dock", "localize", "act", "stop", "pause", "resume"]
 
 
 class RobotCommand(msgspec.Struct, frozen=True):
@@ -114,7 +133,7 @@ class RobotOutputs(msgspec.Struct, frozen=True):
     command: RobotCommand | None = None
 
 
-Order = Navigate | Localize | Act | Stop
+Order = Navigate | Localize | Act | Stop | LightAnswer
 
 Event = Union[  # noqa: UP007
     Sampled[RobotSample], IoFailed, RivalSeen, OperatorReset, Attended, Order, PadHeard

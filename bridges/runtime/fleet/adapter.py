@@ -1,7 +1,7 @@
 """RMF's own fleet adapter, `rmf_adapter`. Only this module imports `rmf_adapter`.
 
 Debian's package is ros-jazzy-rmf-fleet-adapter-python. RMF's adapter does the tasks, the traffic and
-the negotiation. It calls our callbacks on its own threads, and `robot.py` turns each call into an
+the negotiation. It calls our callbacks on its own threads, and `robot.py` and `light.py` turn each call into an
 order.
 
 The source for its interface: open-rmf/rmf_ros2, branch jazzy, rmf_fleet_adapter_python/src/adapter.cpp,
@@ -18,6 +18,7 @@ from typing import Any, Final
 
 from bridges.kinds.fleet.places import EVERY_LEVEL
 from bridges.kinds.fleet.report import RobotReport
+from bridges.runtime.fleet.light import RmfLight
 from bridges.runtime.fleet.robot import Put, RmfRobot
 from bridges.settings.fleet_site import FleetSite
 from bridges.transports.transport import TransportError
@@ -30,6 +31,7 @@ def installed() -> ModuleType:
     try:
         import rmf_adapter
         import rmf_adapter.easy_full_control
+        import rmf_adapter.easy_traffic_light
     except ImportError as error:
         how = "sudo apt install ros-jazzy-rmf-fleet-adapter-python, and rmf: {ros_setup: …/setup.bash}"
         raise TransportError(f"kind: fleet needs RMF's fleet adapter ({error}): {how}") from None
@@ -37,24 +39,31 @@ def installed() -> ModuleType:
     return found
 
 
-class FullControl:
-    """RMF's adapter for one fleet, with `EasyFullControl`. `orders(robot, order)` receives RMF's
-    orders.
+class FleetAdapter:
+    """RMF's adapter for one fleet, with `EasyFullControl`, or with an `EasyTrafficLight` for each robot.
+    `orders(robot, order)` receives RMF's orders and answers.
 
     For each robot, only one thread calls `update`. `failed`: for each robot, the reason why RMF did not
     take it, or "".
     """
 
     def __init__(
-        self, rmf: Any, site: FleetSite, uri: str | None, orders: Put, numbers: Iterator[int]
+        self,
+        rmf: Any,
+        site: FleetSite,
+        uri: str | None,
+        orders: Put,
+        numbers: Iterator[int],
+        *,
+        light: bool = False,
     ) -> None:
         self.failed: dict[str, str] = {}
         self.name = f"{site.fleet.fleet.name}_fleet_adapter"
         self._rmf, self._site, self._uri = rmf, site, uri
-        self._orders, self._numbers = orders, numbers
+        self._orders, self._numbers, self._light = orders, numbers, light
         self._fleet: Any = None
         self._configuration: Any = None
-        self._robots: dict[str, RmfRobot] = {}
+        self._robots: dict[str, RmfRobot | RmfLight] = {}
         rmf.init_rclcpp()
 
     def connect(self) -> bool:
@@ -78,8 +87,9 @@ class FullControl:
         if self._adapter is None:
             return False
         self._configuration = configuration
-        fleet = self._adapter.add_easy_fleet(configuration)
-        self._adapter.start()
+        light, adapter = self._light, self._adapter
+        fleet = adapter if light else adapter.add_easy_fleet(configuration)
+        adapter.start()
         self._fleet = fleet
         return True
 
@@ -87,9 +97,9 @@ class FullControl:
         """Pass a robot's report to RMF: first the robot's place, and then the end of its command."""
         if self._fleet is None:
             return
-        robot = self._robots.setdefault(
-            name, RmfRobot(name, self._rmf, self._orders, self._numbers)
-        )
+        if name not in self._robots:
+            self._robots[name] = self._robot(name)
+        robot = self._robots[name]
         try:
             if robot.handle is None:
                 self.failed[name] = robot.add(self._fleet, self._configuration, report)
@@ -97,6 +107,11 @@ class FullControl:
                 robot.update(report)
         except RuntimeError as error:  # an exception of C++
             self.failed[name] = str(error)
+
+    def _robot(self, name: str) -> RmfRobot | RmfLight:
+        if self._light:
+            return RmfLight(name, self._rmf, self._orders, self._site.fleet.fleet.name)
+        return RmfRobot(name, self._rmf, self._orders, self._numbers)
 
     def close(self) -> None:
         """Leave RMF's graph."""

@@ -4,8 +4,9 @@ topics."""
 import itertools
 import logging
 import os
-from collections.abc import Collection
-from typing import Any, Final
+from collections.abc import Callable, Collection
+from contextlib import suppress
+from typing import Any, Final, cast
 
 from bridges.kinds.fleet.report import RobotReport
 from bridges.kinds.fleet.settings import FleetFiles
@@ -13,11 +14,13 @@ from bridges.kinds.fleet.signals import Order
 from bridges.kinds.shared.decision import Fault
 from bridges.kinds.shared.durations import AGES_AGO
 from bridges.kinds.shared.kind import AnyDeviceKind
-from bridges.messages.definitions import ChargerState, FleetState, Message
+from bridges.messages.definitions import ChargerState, FleetState, Message, RobotState
+from bridges.messages.stamps import ClockError
 from bridges.messages.topics import CHARGER_STATES, FLEET_STATES, Topic
-from bridges.runtime.clock import Clock
+from bridges.runtime.clock import TELL_EVERY_S, Clock
 from bridges.runtime.device import AnyNode, Node
-from bridges.runtime.fleet.adapter import FullControl, installed
+from bridges.runtime.device_memory import DeviceMemories
+from bridges.runtime.fleet.adapter import FleetAdapter, installed
 from bridges.runtime.fleet.robot import AGAIN_S
 from bridges.runtime.inbox import Inbox
 from bridges.runtime.outlet import Named
@@ -37,12 +40,21 @@ LOOK_S: Final = 0.5
 
 
 class RobotNode(Node[Any, Any, Any, Any, Any, Any, RobotReport]):
-    """The node of one robot. The robot's report goes to RMF's adapter."""
+    """The node of one robot. The robot's report goes to RMF's adapter. `told`: the last states of the
+    fleet's robots, if RMF's adapter publishes none. `tell()` publishes them."""
 
-    adapter: FullControl
+    adapter: FleetAdapter
+    told: dict[str, RobotState]
+    tell: Callable[[], None] | None = None
 
     def _send(self, report: RobotReport) -> bool:
         self.adapter.update(self.name, report)
+        if self.tell is not None and report.read_at is not None:
+            with suppress(ClockError):
+                at = self._clock.stamp(report.read_at)
+                state = self._kind.state_message(self.name, self._settings, report, at)
+                self.told[self.name] = cast(FleetState, state).robots[0]
+            self.tell()
         return True
 
 
@@ -51,7 +63,7 @@ class Joining:
 
     name = "rmf-adapter"
 
-    def __init__(self, adapter: FullControl, clock: Clock) -> None:
+    def __init__(self, adapter: FleetAdapter, clock: Clock) -> None:
         self.inbox: Inbox[object] = Inbox()
         self.joined = False
         self.wake_at = AGES_AGO
@@ -97,6 +109,7 @@ class FleetDevices(Devices):
         clock: Clock,
         unsafe: Collection[str] = (),
         writer: NoWriter = NOBODY,
+        memories: DeviceMemories | None = None,
         *,
         rmf: Any,
     ) -> None:
@@ -108,14 +121,28 @@ class FleetDevices(Devices):
         assert isinstance(config.section, FleetFiles)
         self._site = read_site(config)
         self._stands_in = rmf is not None
+        self._light = config.section.control == "traffic_light"
+        self._told: dict[str, RobotState] = {}
+        self._tell_at = AGES_AGO
         numbers = itertools.count(int(transport.wall()))
         uri = config.section.server_uri
         rmf = installed() if rmf is None else rmf
         os.environ["ROS_DOMAIN_ID"] = str(transport.domain_id)  # RMF's adapter makes its own node
         if config.rmf.network == "localhost":
             os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-        self._adapter = FullControl(rmf, self._site, uri, self._order, numbers)
-        super().__init__(config, kind, transport, open_bus, named, clock, unsafe, writer)
+        put, light = self._order, self._light
+        self._adapter = FleetAdapter(rmf, self._site, uri, put, numbers, light=light)
+        super().__init__(
+            config,
+            kind,
+            transport,
+            open_bus,
+            named,
+            clock,
+            unsafe,
+            writer,
+            memories=memories if light else None,
+        )
         if self._stands_in:
             rmf.speak = self._speak
         self._joining = Joining(self._adapter, clock)
@@ -150,7 +177,7 @@ class FleetDevices(Devices):
         return {**found, "faults": [*found["faults"], *told], "rmf_adapter": rmf}
 
     def _topics(self) -> list[Topic[Message]]:
-        return [FLEET_STATES] if self._stands_in else []
+        return [FLEET_STATES] if self._stands_in or self._light else []
 
     def _node(self, name: str, bus: Bus) -> AnyNode:
         device = self._config.devices[name]
@@ -158,9 +185,21 @@ class FleetDevices(Devices):
         limits = limits_of(self._config, name, driver_type.debounce(device))
         driver = driver_type.create(name, device, bus)
         out, clock, writer = self._outlet, self._clock, self._writer
-        node = RobotNode(name, self._kind, device, limits, driver, out.publish, clock, writer)
-        node.adapter = self._adapter
+        kept = self._memories
+        node = RobotNode(
+            name, self._kind, device, limits, driver, out.publish, clock, writer, memories=kept
+        )
+        node.adapter, node.told = self._adapter, self._told
+        node.tell = self._tell if self._light else None
         return node
+
+    def _tell(self) -> None:
+        """Publish the states of all robots each second."""
+        now = self._clock.monotonic()
+        if now >= self._tell_at:
+            self._tell_at = now + TELL_EVERY_S
+            robots = tuple(self._told.copy().values())
+            self._outlet.publish(FLEET_STATES, FleetState(self._site.fleet.fleet.name, robots))
 
     def _order(self, robot: str, order: Order) -> None:
         """Put an order of RMF into the inbox of the robot's bus. Any thread may call this method."""

@@ -1,0 +1,31 @@
+"""The memory on disk of one robot: have we paused it? A robot without this memory is not resumed."""
+
+from typing import Final
+
+import msgspec
+
+from bridges.kinds.fleet.memory import LightMemory, RobotMemory
+from bridges.kinds.shared import keep
+from bridges.kinds.shared.kind import Keeping
+
+VERSION: Final = 1
+
+
+class KeptRobot(keep.Kept, frozen=True, forbid_unknown_fields=True):
+    """The part of RobotMemory that is kept."""
+
+    held: bool
+
+
+def restore(kept: bytes, now: float) -> RobotMemory:
+    """Decode the memory. Raises ValueError for other bytes."""
+    found = keep.read(kept, KeptRobot, VERSION, "the memory of a robot")
+    return RobotMemory(light=LightMemory(held=found.held), started_at=now)
+
+
+KEEPING: Final = Keeping[RobotMemory](
+    part=lambda memory: memory.light.held,
+    persist=lambda memory: msgspec.json.encode(KeptRobot(VERSION, memory.light.held)),
+    restore=restore,
+    lost=lambda reason: RobotMemory(),
+)
