@@ -80,9 +80,9 @@ def _told(
 ) -> LightMemory:
     """Take the path that the manager tells."""
     ahead = _ahead([limits.site.on_rmfs_map(at) for at in told], here, limits.t.arrived_m)
-    rest = light.path[light.passed + 1 :][-len(ahead) :] if ahead else ()
-    is_rest = len(rest) == len(ahead) and all(map(_is_same, rest, ahead))
-    if is_rest and light.path and not anew:
+    rest = light.path[light.passed + 1 :][-len(ahead) :]
+    is_rest = bool(ahead) and len(rest) == len(ahead) and all(map(_is_same, rest, ahead))
+    if is_rest and not anew:
         return replace(light, told=told)
     path, number = (here, *ahead) if ahead else (), light.number + 1
     return replace(light, told=told, path=path, number=number, passed=0, answer=None, granted=0)

@@ -93,8 +93,9 @@ def _doing(memory: RobotMemory) -> str:
 
 
 def _light(memory: RobotMemory, limits: RobotLimits) -> str:
-    light = memory.light
-    paused = "paused by us" if light.held else ""
+    light, command = memory.light, memory.command
+    told = command is not None and command.doing == "pause"
+    paused = ("told to pause" if told else "paused by us") if light.held else ""
     if not light.path:
         return paused or "nothing"
     to = light.path[-1]
@@ -139,7 +140,7 @@ def _of_light(memory: RobotMemory, now: float) -> Iterator[Fault]:
     if reading.paused and not light.held:
         yield Fault("ROBOT_PAUSED_BY_OTHERS", "it is paused, and we have not paused it")
     if light.answer is not None and light.answer.says == "error":
-        yield Fault("ROBOT_PASSED_LIGHT", f"RMF had not let it pass checkpoint {light.passed}")
+        yield Fault("ROBOT_PASSED_LIGHT", "it is where RMF has not let it go")
     if not light.path and not reading.path and not stands(memory, now) and memory.fresh:
         yield Fault("ROBOT_WITHOUT_PATH", "it drives, and its manager tells no path")
 

@@ -1,8 +1,8 @@
 """RMF's own fleet adapter, `rmf_adapter`. Only this module imports `rmf_adapter`.
 
 Debian's package is ros-jazzy-rmf-fleet-adapter-python. RMF's adapter does the tasks, the traffic and
-the negotiation. It calls our callbacks on its own threads, and `robot.py` and `light.py` turn each call into an
-order.
+the negotiation. It calls our callbacks on its own threads, and `robot.py` and `light.py` turn each call
+into an order.
 
 The source for its interface: open-rmf/rmf_ros2, branch jazzy, rmf_fleet_adapter_python/src/adapter.cpp,
 and EasyFullControl.cpp of rmf_fleet_adapter.

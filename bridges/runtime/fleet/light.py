@@ -18,8 +18,10 @@ from bridges.kinds.fleet.signals import LightAnswer, Pose, Says
 from bridges.runtime.fleet.robot import AGAIN_S, Put
 
 ASKS_S: Final = 0.5
-"""The pause (s) between two questions about unchanged progress, and after a new path."""
+"""The pause (s) between two questions about unchanged progress."""
 NO_LIGHT: Final = "RMF's schedule has given it no traffic light yet"
+TAKES_S: Final = 3.0
+"""The time (s) that RMF may need to take a path. Until then it answers with an error."""
 ANSWERS: Final[Mapping[str, Says]] = {
     "ContinueAtNextCheckpoint": "continue",
     "WaitAtNextCheckpoint": "wait",
@@ -41,7 +43,7 @@ class RmfLight:
         self._asked_for_at: float | None = None
         self._path = 0
         self._asked: object = None
-        self._ask_at = 0.0
+        self._ask_at = self._taken_at = 0.0
         self._said: LightAnswer | None = None
 
     def add(self, adapter: Any, configuration: Any, report: RobotReport) -> str:
@@ -68,10 +70,12 @@ class RmfLight:
             self._path = 0
             self.handle.update_idle_location(asks.here.map, _vector(asks.here))
         elif asks.number != self._path:  # RMF takes a path later, on a thread of its own
-            self._path, self._said = asks.number, None
+            self._path, self._said, self._taken_at = asks.number, None, now + TAKES_S
             self.handle.follow_new_path([self._waypoint(at) for at in asks.path])
         else:
-            self._tell(LightAnswer(asks.number, asks.checkpoint, ANSWERS[self._ask(asks).name]))
+            says = ANSWERS[self._ask(asks).name]
+            if says != "error" or now >= self._taken_at:
+                self._tell(LightAnswer(asks.number, asks.checkpoint, says))
 
     def _ask(self, asks: LightQuestion) -> Any:
         if asks.stands == "at":

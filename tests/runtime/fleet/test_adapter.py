@@ -16,7 +16,7 @@ from bridges.kinds.fleet.report import RobotReport
 from bridges.kinds.fleet.signals import Act, Localize, Navigate, Order, Pose, Stop
 from bridges.kinds.shared.decision import Fault
 from bridges.runtime.fleet import robot as rmf_robot
-from bridges.runtime.fleet.adapter import FullControl, installed
+from bridges.runtime.fleet.adapter import FleetAdapter, installed
 from bridges.settings.fleet_site import FleetSite, read_site
 from bridges.settings.load import load
 from bridges.transports.transport import TransportError
@@ -40,7 +40,7 @@ def place(waypoint: str) -> Pose:
 class Joined:
     """An adapter that has joined its RMF. `orders` has the orders that RMF has given."""
 
-    adapter: FullControl
+    adapter: FleetAdapter
     orders: list[Order] = field(default_factory=list)
     threads: set[threading.Thread] = field(default_factory=set)
 
@@ -56,7 +56,7 @@ class Joined:
 def joined(rmf: Any) -> Joined:
     made = Joined.__new__(Joined)
     numbers = itertools.count(7)
-    adapter = FullControl(rmf, SITE, None, lambda robot, order: made.put(robot, order), numbers)
+    adapter = FleetAdapter(rmf, SITE, None, lambda robot, order: made.put(robot, order), numbers)
     made.__init__(adapter)  # type: ignore[misc]
     wait_until(adapter.connect, "RMF's schedule node")
     return made
@@ -120,7 +120,7 @@ class TestOnTheStandIn(AdapterContract):
 
     def test_without_a_schedule_node_it_tries_again(self) -> None:
         rmf = StandIn(schedule=False)
-        adapter = FullControl(rmf, SITE, None, lambda robot, order: None, itertools.count())
+        adapter = FleetAdapter(rmf, SITE, None, lambda robot, order: None, itertools.count())
         assert not adapter.connect()
         adapter.update("AMR01", RobotReport(at=place("wait_1"), **FIT))
         adapter.close()
