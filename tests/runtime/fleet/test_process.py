@@ -105,6 +105,33 @@ def test_robots_patrol_and_a_robot_with_a_fault_is_taken_out_until_it_is_over(
     assert fleet.running.end(15) == 0
 
 
+@pytest.mark.skipif(not NO_ROS, reason="with RMF's own adapter RMF's schedule decides")
+@pytest.mark.long(20)
+def test_robots_go_on_only_at_rmfs_light_and_one_that_does_not_pause_is_said(
+    domain: int, tmp_path: Path
+) -> None:
+    file = site("robots_traffic_light.yaml", tmp_path)
+    options = ("--simulate", "--domain-id", str(domain))
+    with daemon(file, tmp_path / "run", *options) as running:
+        fleet = Fleet(running, tmp_path / "run")
+        transport = join("rmf", domain)
+        transport.subscribe(FLEET_STATES, fleet.states.append)
+        running.wait_for("doing pause")
+        modes = {"MODE_PAUSED": 3, "MODE_MOVING": 2}
+        for mode in modes.values():
+            wait_until(
+                lambda: any(r.mode.mode == mode for s in fleet.states for r in s.robots),  # noqa: B023
+                "RMF's graph hears a paused robot, and then a moving one",
+            )
+        assert fleet.states[-1].name == "tiny"
+        running.wait_for("doing resume")
+        for name in ("AMR01", "AMR02", "AMR03"):
+            fleet.tells(f"fail {name} pause stuck")
+        running.wait_for("code=ROBOT_NOT_STOPPING")
+        transport.close()
+        assert running.end(15) == 0
+
+
 def told(file: Path, *options: str) -> tuple[int, str]:
     run = command("run", file, *options, "--runtime-dir", file.parent / "run")
     done = subprocess.run(run, env=environment(), capture_output=True, text=True)
