@@ -129,8 +129,10 @@ class ObservedGraph(Generic[D]):
     ) -> Iterator[tuple[D, list[News]]]:
         for status in message.status:
             if of_node(status):
+                late = self.began is not None and moment.at - self.began.at > SILENT_S
+                seen = status.name in self.nodes or late
                 if node := report(self.nodes, MOST_DAEMONS, status, moment):
-                    deque(node.take(moment, status), 0)
+                    deque(node.take(Moment(moment.at, moment.wall, seen), status), 0)
             elif (key := about(status)) in self.known:
                 yield self.known[key], self.known[key].diagnose(moment, status)
 

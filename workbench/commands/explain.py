@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Final
 
 from bridges.messages import topics
-from bridges.messages.words import KINDS, Kind
+from bridges.messages.words import KINDS
 from bridges.runtime import faults
 from bridges.transports.transport import TransportError
-from workbench.explain.explanation import Explanation
+from workbench.explain.explanation import Explained, Explanation
 from workbench.explain.heard_devices import HeardDevices
 from workbench.explain.text import SCREEN_LINES, lines
 from workbench.graph.board import SECONDS
@@ -49,7 +49,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "device", nargs="?", metavar="DEVICE", help="the device's name; default: every device"
     )
-    parser.add_argument("--live", metavar="DEVICE", help="listen to the graph instead of a FILE")
+    parser.add_argument(
+        "--live",
+        metavar="DEVICE",
+        help="listen to the graph instead of a FILE; DEVICE may be a robot of our fleet's daemon",
+    )
     parser.add_argument(
         "--for",
         dest="for_s",
@@ -97,9 +101,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _recorded(args: argparse.Namespace) -> int:
-    site = HeardDevices(args.device or "", args.session)
+    wanted = "" if "/" in (args.device or "/") else args.device  # a robot waits for other devices
+    site = HeardDevices(wanted, args.session)
     span = RecordingSpan(args.from_, args.to)
-    for heard in told_between(args.file, span, "explain", args.device or ""):
+    for heard in told_between(args.file, span, "explain", wanted):
         site.take(heard)
     site.story_from(span.begins_at)
     if args.from_ or args.to:
@@ -114,7 +119,7 @@ def _recorded(args: argparse.Namespace) -> int:
     return _one(site, args)
 
 
-def _all(site: HeardDevices, devices: list[tuple[Kind, str]], *, as_json: bool) -> int:
+def _all(site: HeardDevices, devices: list[tuple[Explained, str]], *, as_json: bool) -> int:
     """Print a line for each device, or print all devices as JSON."""
     told = [site.explain(kind, name, None, faults.for_explain()) for kind, name in devices]
     if as_json:
@@ -129,14 +134,14 @@ def _all(site: HeardDevices, devices: list[tuple[Kind, str]], *, as_json: bool) 
 def _one(site: HeardDevices, args: argparse.Namespace) -> int:
     """Print the explanation of the named device. Without a name, explain the only device."""
     name = args.device or args.live or site.devices()[0][1]
-    kinds = [args.kind] if args.kind else site.kinds(name) or ["lift"]
+    kinds: list[Explained] = [args.kind] if args.kind else site.kinds(name) or ["lift"]
     if len(kinds) > 1:
         several = " and a ".join(kinds)
         complain("explain", f"'{name}' is a {several}: choose with --kind")
         return 2
     found = site.explain(kinds[0], name, None, faults.for_explain())
     _tell(found, as_json=args.json)
-    return 0 if (kinds[0], name) in site.devices() else 1
+    return 0 if site.robot(name) or (kinds[0], name) in site.devices() else 1
 
 
 def _tell(found: Explanation, *, as_json: bool) -> None:
@@ -156,7 +161,7 @@ def _live(args: argparse.Namespace) -> int:
     with interruptible(), closing(open_graph(args, "rmf_bridge_explain")) as transport:
         ear = Ear(transport, (*OF_DEVICES, topics.FLEET_STATES))
         past = Ear(transport, (topics.ADAPTER_LIFT_REQUESTS,))
-        site = HeardDevices(args.live, args.session, graph=command_line(args).options)
+        site = HeardDevices("", args.session, graph=command_line(args).options)
         if args.follow:
             _follow(ear, past, site, args)
         _listen(ear, past, site, args.for_s)
@@ -181,7 +186,7 @@ def _follow(ear: Ear, past: Ear, site: HeardDevices, args: argparse.Namespace) -
     told: object = None
     _listen(ear, past, site, args.for_s)
     while True:
-        kinds: list[Kind] = [args.kind] if args.kind else site.kinds(args.live) or ["lift"]
+        kinds: list[Explained] = [args.kind] if args.kind else site.kinds(args.live) or ["lift"]
         found = site.explain(kinds[0], args.live, None, faults.for_explain())
         news = [SECONDS.sub("", text) for text in found.now], found.next
         if news != told:

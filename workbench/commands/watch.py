@@ -95,7 +95,7 @@ def show_once(ear: Ear, seconds: float, out: TextIO, *, as_json: bool = False) -
             board.take(heard)
     rows = board.rows(time.monotonic(), time.time())
     if not rows:
-        complain("watch", "no lift, door or charger state heard: check the domain and network")
+        complain("watch", "no lift, door, charger or robot heard: check the domain and network")
         return 1
     columns = columns_of(out)
     lines = [line for line, _ in fitting(rows, columns)] if columns else table(rows)

@@ -6,11 +6,10 @@ from difflib import get_close_matches
 from typing import Final
 
 from bridges.blackbox.triggers import DIED, FAULT, REFUSED, WAITING
-from bridges.messages.words import Kind
 from bridges.observe.limits import CLOCKS_DIFFER_S
 from bridges.observe.requesters import DeviceRequester, Moment
 from workbench.explain.device import Device
-from workbench.explain.explanation import CheckedField, FaultTold, NextStep, Who
+from workbench.explain.explanation import CheckedField, Explained, FaultTold, NextStep, Who
 from workbench.explain.phrases import TimePhrases, lasted, listed
 from workbench.explain.rows import label
 
@@ -91,7 +90,7 @@ class OthersHeard:
       because a recording does not name nodes.
     """
 
-    names: Mapping[Kind, tuple[str, ...]]
+    names: Mapping[Explained, tuple[str, ...]]
     messages: int
     spoke: Mapping[str, Moment] = field(default_factory=dict)
     remedies: Remedies = field(default_factory=dict)
@@ -111,7 +110,7 @@ class OthersHeard:
 def unheard(device: Device, around: OthersHeard) -> Answer:
     """Answer for a device whose states were never heard."""
     answer = Answer(since=device.began.at, because=SILENCES)
-    others = around.names.get(device.kind, ())
+    others = (*around.names.get(device.kind, ()), *around.names.get("robot", ()))
     if not around.messages:
         nodes = sorted(
             {label(one) for senders in (around.senders or {}).values() for one in senders}

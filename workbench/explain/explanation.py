@@ -8,6 +8,7 @@ from typing import Literal
 
 from bridges.messages.words import Kind
 
+Explained = Kind | Literal["robot"]
 Who = Literal[
     "nobody",
     "the robot",
@@ -72,7 +73,7 @@ class FaultTold:
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """The explanation of one device, at the last message.
+    """The explanation of one device or robot, at the last message.
 
     - `now`: sentences, the most important first.
     - `asks`: the requester who waits for `fields`.
@@ -81,7 +82,7 @@ class Explanation:
     - `before`: a summary of the earlier events.
     """
 
-    kind: Kind
+    kind: Explained
     device: str
     heard: str
     now: tuple[str, ...]

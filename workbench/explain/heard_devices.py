@@ -22,13 +22,14 @@ from bridges.observe.all_devices import Key, ObservedGraph
 from bridges.observe.diagnosis import COORDINATOR
 from bridges.observe.limits import FLAPS, MOST_DEVICES
 from bridges.observe.requesters import Moment
+from bridges.observe.robots import ObservedRobot, robots, waits
 from workbench.explain import answer as common
-from workbench.explain import charger, door, first_causes, known_defects, lift, workcell
+from workbench.explain import charger, door, first_causes, known_defects, lift, robot, workcell
 from workbench.explain.answer import Answer, FileReason, Remedies
 from workbench.explain.charger_facts import ChargerFacts
 from workbench.explain.device import MOST_LINES, Device
 from workbench.explain.door_facts import DoorFacts
-from workbench.explain.explanation import Explanation, NextStep, StoryLine
+from workbench.explain.explanation import Explained, Explanation, NextStep, StoryLine
 from workbench.explain.lift_facts import LiftFacts
 from workbench.explain.noted import noted
 from workbench.explain.phrases import TimePhrases, lasted, on_graph
@@ -117,19 +118,46 @@ class HeardDevices(ObservedGraph[Device]):
         """Leave all events before this time (s) out of the stories."""
         self._story_from = at
 
-    def devices(self) -> list[Key]:
-        """Return the devices that have published a state, in the order of kinds and names."""
-        return [(kind, one) for kind in KINDS for one in sorted(d.id for d in self.stated(kind))]
+    def devices(self) -> list[tuple[Explained, str]]:
+        """Return the devices that have published a state, in the order of kinds and names, and the
+        robots of our daemons."""
+        found: list[tuple[Explained, str]] = []
+        for kind in KINDS:
+            found += [(kind, one) for one in sorted(d.id for d in self.stated(kind))]
+        return [*found, *(("robot", one.who) for one in robots(self.nodes))]
 
-    def kinds(self, name: str) -> list[Kind]:
+    def kinds(self, name: str) -> list[Explained]:
         """Return the kinds of the devices with this name. States tell the kinds. Without states,
         requests tell the kinds."""
-        found = [kind for kind in KINDS if (kind, name) in self.known]
-        stated = [kind for kind in found if self.known[kind, name].state is not None]
+        found: list[Explained] = [kind for kind in KINDS if (kind, name) in self.known]
+        stated = [kind for kind in found if self.known[kind, name].state is not None]  # type: ignore[index]
+        if self.robot(name):
+            stated.append("robot")
         return stated or found or (["charger"] if name in self._coordinates() else [])
 
+    def robot(self, name: str) -> ObservedRobot | None:
+        """Return the robot of this name, FLEET/ROBOT or ROBOT alone."""
+        every = (one for one in robots(self.nodes) if name in (one.who, one.who.rpartition("/")[2]))
+        return next(every, None)
+
     def explain(
-        self, kind: Kind, name: str, zone: tzinfo | None, remedies: Remedies | None = None
+        self, kind: Explained, name: str, zone: tzinfo | None, remedies: Remedies | None = None
+    ) -> Explanation:
+        """Explain the device or robot at the last message. `zone`: time zone of the texts; None: this
+        machine's zone."""
+        if kind != "robot":
+            return self._explain(kind, name, zone, remedies)
+        one = self.robot(name)
+        assert one is not None
+        clock, wanted = TimePhrases(self.now, zone), dict[str, Explanation]()
+        for device, wait in waits(self.stated(), one.who, self.now):
+            wish = f"{device.kind} {device.name} ({label(wait.wants)}) {clock.since(wait.since)}"
+            wanted[wish] = self._explain(device.kind, device.id, zone, remedies)
+        began = self.began or self.now
+        return robot.explanation(one, wanted, clock, remedies or {}, began)
+
+    def _explain(
+        self, kind: Kind, name: str, zone: tzinfo | None, remedies: Remedies | None
     ) -> Explanation:
         """Explain the device at the last message. `zone` is the time zone of the texts, or None for
         this machine's zone."""
@@ -185,10 +213,11 @@ class HeardDevices(ObservedGraph[Device]):
     def _around(
         self, spoke: Mapping[str, Moment], reason: FileReason | None, remedies: Remedies
     ) -> common.OthersHeard:
-        names = {
+        names: dict[Explained, tuple[str, ...]] = {
             kind: (*self._others[kind], *(label(one.id) for one in self.stated(kind)))
             for kind in KINDS
         }
+        names["robot"] = tuple(one.who for one in robots(self.nodes))
         return common.OthersHeard(names, self.messages, spoke, remedies, reason, self.senders)
 
     def _answer(self, device: Device, clock: TimePhrases, around: common.OthersHeard) -> Answer:

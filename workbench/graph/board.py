@@ -21,6 +21,7 @@ from bridges.observe.all_devices import AnyDevice, ObservedGraph, PlainGraph
 from bridges.observe.diagnosis import COORDINATOR, PANEL, PASSIVE, SIMULATED, Diagnosis
 from bridges.observe.door import ObservedDoor
 from bridges.observe.limits import SILENT_S
+from bridges.observe.robots import ObservedRobot, robots, waits
 from bridges.system.columns import aligned, clipped, hanging, width
 from bridges.system.paint import repainted
 
@@ -39,7 +40,8 @@ Device = tuple[str, str]
 class BoardRow(Struct, frozen=True):
     """One device, an alarm, the charger coordinator, or a robot with its assigned place.
 
-    - `waiting`: the waiting robots, or the thing that the holder waits for.
+    - `held_by`: the holder, or the assigned charging place of a robot.
+    - `waiting`: the waiting robots, or the thing that the holder or the robot waits for.
     - `age`: the reading's age, in words.
     - `mark`: the reason why the row may be wrong.
     - `simulated`: whether the device has no hardware.
@@ -118,7 +120,7 @@ class Board:
         the stamps' clock."""
         every = [one for kind in words.KINDS for one in sorted(self._graph.stated(kind), key=_name)]
         devices = self.rows_of(every, now, wall)
-        return [*devices, *self._alarms(now), *self._coordinators(now), *self._robots()]
+        return [*devices, *self._alarms(now), *self._coordinators(now), *self._robots(now)]
 
     def _device(self, one: AnyDevice, now: float, wall: float) -> BoardRow:
         found = _said(one, now)
@@ -181,9 +183,30 @@ class Board:
                 faults=_faults([diagnosis]),
             )
 
-    def _robots(self) -> Iterator[BoardRow]:
+    def _robots(self, now: float) -> Iterator[BoardRow]:
+        """Yield a row for each robot of our daemons, and each other robot with an assigned place."""
+        found = {one.who: one for one in robots(self._graph.nodes)}
+        yield from (self._robot(one, now) for one in found.values())
         for who, place in sorted(self._places.items()):
-            yield BoardRow("robot", who, words.printable(place))
+            if who not in found:
+                yield BoardRow("robot", who, words.printable(place))
+
+    def _robot(self, one: ObservedRobot, now: float) -> BoardRow:
+        said, silent_s = one.said, now - one.said.last.at
+        asks = waits(self._graph.stated(), one.who, self._graph.now)
+        return BoardRow(
+            "robot",
+            one.who,
+            words.printable(
+                f"at {said.value('at')}, {said.value('doing')}, {said.value('battery')}"
+            ),
+            held_by=self._places.get(one.who, "-"),
+            waiting=words.printable(", ".join(f"{d.kind} {d.id}: {w.wants}" for d, w in asks)),
+            age=_seconds(said.value("input_age_s"), silent_s),
+            mark="" if said.is_current(now) else f"SILENT {silent_s:.0f} s",
+            simulated=self._simulated(said, now),
+            faults=_faults([said]),
+        )
 
     def _daemon(self, diagnosis: Diagnosis, now: float) -> Diagnosis | None:
         daemon = self._graph.nodes.get(f"{diagnosis.name.partition(': ')[0]}: daemon")
@@ -233,6 +256,14 @@ def _age(stamped_at: float, wall: float) -> str:
     if age < 60:
         return f"{age:.1f} s"
     return f"{age / 60:.0f} min" if age < 7200 else f"{age / 3600:.0f} h"
+
+
+def _seconds(age_s: str, more_s: float) -> str:
+    """Return the age of a reading that was so old (s, as text) in a report of `more_s` ago."""
+    try:
+        return f"{float(age_s.removesuffix(' s')) + more_s:.1f} s"
+    except ValueError:
+        return "never read"
 
 
 def _mark(device: AnyDevice, now: float) -> str:

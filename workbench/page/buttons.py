@@ -93,9 +93,9 @@ class Buttons:
         local = self._local(key)
         if local and (local.presses or local.fails):
             with ui.element("div").classes("actions"):
-                self._pressing(local, key[1], request)
+                self._pressing(local, self._here.served[key].device, request)
             with ui.element("div").classes("actions"):
-                self._failing(local, key[1], request)
+                self._failing(local, self._here.served[key].device, request)
 
     def _queueing(self, charger: str, request: Request) -> None:
         robot = ui.input("Robot (FLEET/ROBOT)").props("dense")

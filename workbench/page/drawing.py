@@ -66,6 +66,11 @@ def path_of(kind: str, name: str) -> str:
     return f"/{kind}/{quote(name, safe='')}"
 
 
+def linked(kind: str) -> bool:
+    """Has the device or robot a view of its own?"""
+    return kind in (*words.KINDS, "robot")
+
+
 def attention(wrong: Sequence[DeviceView], remedies: Remedies) -> str:
     """List the troubles of the first devices in `wrong`, each with its remedy."""
     items = "".join(_trouble(view, remedies) for view in wrong[:MOST_TOLD])
@@ -79,9 +84,7 @@ def attention(wrong: Sequence[DeviceView], remedies: Remedies) -> str:
 def _trouble(view: DeviceView, remedies: Remedies) -> str:
     row = view.row
     name = _told(row.name)
-    link = (
-        f'<a href="{path_of(row.kind, row.name)}">{name}</a>' if row.kind in words.KINDS else name
-    )
+    link = f'<a href="{path_of(row.kind, row.name)}">{name}</a>' if linked(row.kind) else name
     told = [_old(view)] if row.mark else []
     does = []
     if row.mark and not row.faults:
@@ -131,7 +134,8 @@ def _facts(view: DeviceView, left: float | None) -> Iterable[str]:
         state = _placed(state, view.state, left)
     yield _fact(WAS if row.mark else NOW, state)
     if row.held_by not in ("-", ""):
-        yield _fact("for" if row.kind == "charger" else "held by", row.held_by)
+        named = {"charger": "for", "robot": "assigned"}
+        yield _fact(named.get(row.kind, "held by"), row.held_by)
     if view.stands is not None:
         yield _fact("has it for", had(view.stands))
     if row.waiting:

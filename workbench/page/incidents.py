@@ -150,7 +150,7 @@ def read(path: Path, remedies: Remedies, zone: tzinfo | None = None) -> Explaine
     file is no recording."""
     notes, story = Notes(), heard_devices.HeardDevices()
     cut = not _all_of(path, notes, story.take)
-    devices = story.devices()
+    devices = [(kind, name) for kind, name in story.devices() if kind != "robot"]
     drawings = {key: Drawing(*key) for key in devices[:MOST_DEVICES]}
 
     reasons: list[tuple[float, str]] = []

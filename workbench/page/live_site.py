@@ -19,7 +19,7 @@ from bridges.messages.topics import AnyTopic
 from bridges.messages.words import KINDS, Kind, Requested, Stated
 from bridges.observe.all_devices import Key
 from bridges.observe.charger import NOBODY, ObservedCharger
-from bridges.observe.diagnosis import PANEL, about, kind_in
+from bridges.observe.diagnosis import FLEET, PANEL, about, kind_in
 from bridges.observe.limits import FORGOTTEN_S
 from bridges.observe.requesters import Moment
 from bridges.runtime.diagnostics import MOST
@@ -156,12 +156,14 @@ class LiveSite:
         remedies: Remedies,
         zone: tzinfo | None = None,
     ) -> Explanation | None:
-        """Explain why a robot waits for this device, or what the device does. `zone` is the time zone
-        of the texts."""
+        """Explain why a robot waits for this device, what the device does, or why this robot stands.
+        `zone` is the time zone of the texts."""
         device = self._found(kind, name)
-        if device is None:
+        if device is None and not (kind == "robot" and self._story.robot(name)):
             return None
         self._story.pass_time(now, wall)
+        if device is None:
+            return self._story.explain("robot", name, zone, remedies)
         return self._story.explain(device.kind, device.id, zone, remedies)
 
     def timeline(self, kind: str, name: str, now: float) -> Timeline | None:
@@ -258,4 +260,4 @@ def _view(row: BoardRow, device: Device | None) -> DeviceView:
 
 
 def _is_graph(status: d.DiagnosticStatus) -> bool:
-    return kind_in(status).endswith(("supervisor", "coordinator", PANEL))
+    return kind_in(status).endswith(("supervisor", "coordinator", PANEL, FLEET))

@@ -25,10 +25,11 @@ from workbench.page.levels import Levels, Rows
 class ServedDevice:
     """A device that a daemon on this machine serves, with its YAML, its present inputs and its outputs.
 
-    `contacts` is known signal -> whether the signal is asserted.
+    `contacts` is known signal -> whether the signal is asserted. `device` is its name in the YAML.
     """
 
     local: Local
+    device: str
     sensed: Rows
     driven: Rows
     contacts: Mapping[str, bool]
@@ -73,11 +74,13 @@ def _devices(
         )
         served = ServedDevice(
             local,
+            name,
             levels.sensed.get(name, {}),
             levels.driven.get(name, {}),
             status.get(CONTACTS, {}),
         )
-        yield (str(daemon.status.get("kind")), name), served
+        kind, fleet = str(daemon.status.get("kind")), daemon.status.get("fleet")
+        yield (("robot", f"{fleet}/{name}") if fleet else (kind, name)), served
 
 
 def _plant(folder: Path) -> Mapping[str, Mapping[str, list[str]]]:

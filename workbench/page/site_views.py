@@ -20,7 +20,7 @@ from workbench.page import tables
 from workbench.page.actions import Deeds
 from workbench.page.buttons import Buttons
 from workbench.page.cards import AGES_S, ROBOTS, STATUS, WRONG, Cards, Key, Wall, place_of
-from workbench.page.drawing import path_of
+from workbench.page.drawing import linked, path_of
 from workbench.page.explanation_html import explanation, story
 from workbench.page.head import head, main, part
 from workbench.page.live_site import LiveSite
@@ -36,7 +36,7 @@ SECTIONS: Final = (
     ("dispenser", "Dispensers"),
     ("ingestor", "Ingestors"),
     ("coordinator", "Charger coordinators"),
-    ("robot", "Charging schedule"),
+    ("robot", "Robots"),
 )
 WIDE: Final = "panel wide-part"
 FEW: Final = 8
@@ -100,7 +100,7 @@ class SiteWall(Tab):
         keyboard's focus."""
         card = f'<div id="{place_of(key)}">{self._cards.cards[key]}</div>'
         name, path = escape(key[1]), path_of(*key)
-        link = f'<a class="cover" href="{path}" aria-label="{name}"></a>' if key[0] in KINDS else ""
+        link = f'<a class="cover" href="{path}" aria-label="{name}"></a>' if linked(key[0]) else ""
         return f'<div class="slot" data-find="{name.lower()}">{card}{link}</div>'
 
 
@@ -126,7 +126,7 @@ class SiteViews:
     def install(self) -> None:
         """Register the views' addresses."""
         ui.page("/", title="Site")(self.site)
-        for kind in KINDS:
+        for kind in (*KINDS, "robot"):
             ui.page(f"/{kind}/{{name:path}}", title="Device")(partial(self.device, kind))
 
     def site(self, request: Request, client: Client) -> None:
@@ -218,4 +218,4 @@ class SiteViews:
         served = self._here.served.get(key)
         if served is None or not served.local.file:
             return f"<p>{NOT_HERE}</p>"
-        return tables.wiring(served.local.file, key[1], served.contacts)
+        return tables.wiring(served.local.file, served.device, served.contacts)

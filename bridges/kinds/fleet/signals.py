@@ -8,7 +8,15 @@ from typing import Literal, Union
 
 import msgspec
 
-from bridges.kinds.shared.decision import Attended, IoFailed, OperatorReset, RivalSeen, Sampled
+from bridges.kinds.shared.decision import (
+    Attended,
+    IoFailed,
+    MemoryKept,
+    MemoryNotKept,
+    OperatorReset,
+    RivalSeen,
+    Sampled,
+)
 
 
 class Pose(msgspec.Struct, frozen=True):
@@ -136,5 +144,13 @@ class RobotOutputs(msgspec.Struct, frozen=True):
 Order = Navigate | Localize | Act | Stop | LightAnswer
 
 Event = Union[  # noqa: UP007
-    Sampled[RobotSample], IoFailed, RivalSeen, OperatorReset, Attended, Order, PadHeard
+    Sampled[RobotSample],
+    IoFailed,
+    RivalSeen,
+    OperatorReset,
+    Attended,
+    MemoryKept,
+    MemoryNotKept,
+    Order,
+    PadHeard,
 ]

@@ -168,13 +168,14 @@ class FleetDevices(Devices):
         """Return the status of the service, with the state of RMF's adapter."""
         found = super().status()
         failed = self._adapter.failed.copy().items()
-        faults = [Fault("RMF_TAKES_NO_ROBOT", f"{name}: {why}") for name, why in failed if why]
+        missing = [Fault("RMF_TAKES_NO_ROBOT", f"{name}: {why}") for name, why in failed if why]
         if not self._joining.joined:
-            faults.append(Fault("RMF_NOT_JOINED", NO_SCHEDULE))
-        told = [{"code": fault.code, "detail": fault.detail} for fault in faults]
+            missing.append(Fault("RMF_NOT_JOINED", NO_SCHEDULE))
+        told = [{"code": fault.code, "detail": fault.detail} for fault in missing]
         joined = "stand-in of RMF" if self._stands_in else "joined"
         rmf = joined if self._joining.joined else "not joined"
-        return {**found, "faults": [*found["faults"], *told], "rmf_adapter": rmf}
+        faults = [*found["faults"], *told]
+        return {**found, "faults": faults, "rmf_adapter": rmf, "fleet": self._site.fleet.fleet.name}
 
     def _topics(self) -> list[Topic[Message]]:
         return [FLEET_STATES] if self._stands_in or self._light else []
