@@ -86,7 +86,9 @@ def _answer(
         do = remedies.get(code, ("", f"mend {code}"))[1]
         found.say(f"{who} {STANDS[code]}: {detail}.", "a person", do)
     for wish, device in waits.items():
-        found.say(f"{who} waits for {wish}. {device.now[0]}")
+        if who not in device.now[0]:
+            found.say(f"{who} waits for {wish}.")
+        found.now += device.now
         found.next += device.next
     if robot.daemon and "RMF_NOT_JOINED" in robot.daemon.faults:
         detail, _ = robot.daemon.faults["RMF_NOT_JOINED"]

@@ -10,6 +10,7 @@ from collections.abc import Callable, Container, Iterable, Mapping
 from html import escape
 from typing import Final, Protocol
 
+from bridges.messages.words import printable
 from bridges.observe.limits import MOST_DEVICES, SILENT_S
 from bridges.runtime import faults
 from workbench.page import drawing
@@ -113,8 +114,15 @@ class Cards:
         return f'<p class="status" role="status">{told}</p>'
 
     def robots(self) -> str:
-        """Draw the table of robots. Fleet states list these robots."""
-        return drawing.robots(self._site.robots(), self._clock())
+        """Draw the robots that fleets report and that have no card of their own."""
+        own = {
+            name
+            for (kind, name), one in self.shown.items()
+            if kind == "robot" and one.row.age != "-"
+        }
+        every = self._site.robots()
+        others = [one for one in every if printable(f"{one.fleet}/{one.state.name}") not in own]
+        return drawing.robots(others, self._clock())
 
     def _told(self) -> Iterable[str]:
         yield f"{len(self.shown)} shown"

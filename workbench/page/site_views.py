@@ -170,15 +170,17 @@ class SiteViews:
         place("card", lambda: self._card(key))
         with ui.element("section").classes("panel why"):
             place("why", lambda: self._why(key, tab.zone))
-            with ui.element("details"):
-                part("What happened").props("tag=summary")
-                place("story", lambda: self._story(key, tab.zone))
+            if key[0] in KINDS:
+                with ui.element("details"):
+                    part("What happened").props("tag=summary")
+                    place("story", lambda: self._story(key, tab.zone))
         self._buttons.show(key, request, tab)
-        with ui.element("section").classes(WIDE):
-            part("<h2>Last ten minutes</h2>")
-            with ui.element("div").classes("timeline") as scrolls:
-                scrolls.props('tabindex=0 role=region aria-label="Timeline"')
-                place("timeline", lambda: self._timeline(key, tab.zone))
+        if key[0] in KINDS:
+            with ui.element("section").classes(WIDE):
+                part("<h2>Last ten minutes</h2>")
+                with ui.element("div").classes("timeline") as scrolls:
+                    scrolls.props('tabindex=0 role=region aria-label="Timeline"')
+                    place("timeline", lambda: self._timeline(key, tab.zone))
         with ui.element("details").classes(f"{WIDE} wiring"):
             part("<h2>Wiring and limits</h2>").props("tag=summary")
             with ui.element("div").classes("columns"):
