@@ -20,7 +20,7 @@ from drivers.hal import Bus, BusType, HalError
 from drivers.hal.backoff import Backoff
 from drivers.hal.deadline import Dialler, Resolve, tls_socket
 from drivers.hal.http_address import Base, Path, base
-from drivers.hal.http_json import excerpt, json_object
+from drivers.hal.http_json import WrongAnswer, excerpt, json_object
 from drivers.hal.http_login import Signer
 from drivers.hal.http_settings import HttpSettings, Method, needs, warnings, where
 
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from drivers.hal.http_push import Pushes
 
 BODY_MAX = 64 * 1024
+WRONG_MAX = 256
+"""The greatest number of paths with a wrong answer that are remembered."""
 HEADERS = {
     "Accept": "application/json",
     "Accept-Encoding": "identity",
@@ -67,6 +69,7 @@ class HttpBus(Bus):
         self._dialler = Dialler(self._base.host, self._base.port, resolve)
         self._adapter = _adapter(self._dialler, self._base.scheme)
         self._backoff, self._safe_backoff = (Backoff(clock, lambda: 0.0) for _ in range(2))
+        self._wrong: dict[str, Backoff] = {}
         self._signer = Signer(settings.login) if settings.login else None
         self._pushes: Pushes | None = None
 
@@ -91,7 +94,7 @@ class HttpBus(Bus):
         `method` and `body` are for a controller that is not read by GET.
         """
         url = self._base.url(path)
-        with self._attempt(self._backoff):
+        with self._attempt(self._backoff, path):
             return json_object(url, *self._call(method, url, body, reads=True))
 
     def send(
@@ -103,20 +106,20 @@ class HttpBus(Bus):
         switches an output off. So the command does not wait for the backoff of a failed reading.
         """
         url = self._base.url(path)
-        with self._attempt(self._safe_backoff if safe else self._backoff):
+        with self._attempt(self._safe_backoff if safe else self._backoff, path):
             self._call(method, url, body)
 
     def ask(self, path: str, method: Method = "POST", body: str | None = None) -> dict[str, object]:
         """Send a command as `send` does. Return the JSON object of its answer, which must have status
         200."""
         url = self._base.url(path)
-        with self._attempt(self._backoff):
+        with self._attempt(self._backoff, path):
             return json_object(url, *self._call(method, url, body, reads=True))
 
     def insist(self) -> None:
         """Let the next call skip the backoff."""
-        self._backoff.insist()
-        self._safe_backoff.insist()
+        for backoff in (self._backoff, self._safe_backoff, *self._wrong.values()):
+            backoff.insist()
 
     def close(self) -> None:
         """End the WebSocket, if there is one. No other connection stays open between calls."""
@@ -124,15 +127,24 @@ class HttpBus(Bus):
             self._pushes.close()
 
     @contextmanager
-    def _attempt(self, backoff: Backoff) -> Iterator[None]:
-        """Run one attempt. During the backoff after a failure, raise the failure's text again
-        instead."""
+    def _attempt(self, backoff: Backoff, path: str) -> Iterator[None]:
+        """Run one attempt. During the backoff after a failure, raise the failure's text again instead.
+        A wrong answer delays only its own path, because the other paths may be other devices."""
         backoff.check()
+        wrong = self._wrong.get(path)
+        if wrong is not None and backoff is self._backoff:
+            wrong.check()
         self._dialler.deadline.start(self._settings.timeout_s)
         began, failed = self._clock(), True
         try:
             yield
             failed = False
+        except WrongAnswer as error:
+            if wrong is None and len(self._wrong) >= WRONG_MAX:
+                del self._wrong[next(iter(self._wrong))]
+            self._wrong.setdefault(path, Backoff(self._clock, lambda: 0.0)).failed(str(error))
+            backoff.mended()
+            raise
         except HalError as error:
             backoff.failed(str(error))
             raise
@@ -143,6 +155,7 @@ class HttpBus(Bus):
             where = f"{self._base.host}:{self._base.port}"
             self.units.ended(where, self._clock() - began, failed=failed)
         backoff.mended()
+        self._wrong.pop(path, None)
 
     def _call(
         self, method: str, url: str, sent: str | None = None, reads: bool = False
@@ -172,7 +185,7 @@ class HttpBus(Bus):
         except Exception as error:  # a server's bytes can make the libraries raise any exception
             raise self._explained(url, error) from error
         if len(body) > BODY_MAX:
-            raise HalError(
+            raise WrongAnswer(
                 f"{url} answered more than {BODY_MAX // 1024} KiB: is it the right path?"
             )
         return answer.headers.get("Content-Type", ""), body
@@ -269,7 +282,7 @@ def _check_status(url: str, reads: bool, status: int) -> None:
     if status == 200 or (not reads and 200 <= status < 300):
         return
     hint = _HINTS.get(status // 100, "200 is expected")
-    raise HalError(f"{url} answered status {status}: {hint}")
+    raise WrongAnswer(f"{url} answered status {status}: {hint}")
 
 
 def _capped(raw: "BaseHTTPResponse") -> bytes:

@@ -11,18 +11,22 @@ def excerpt(text: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in text[:80])
 
 
+class WrongAnswer(HalError):
+    """The server has answered, but not as this call needs it. Its other calls may well be right."""
+
+
 def json_object(url: str, content_type: str, body: bytes) -> dict[str, object]:
-    """Decode the answer's JSON object. Raises HalError if the answer is not a JSON object."""
+    """Decode the answer's JSON object. Raises WrongAnswer if the answer is not a JSON object."""
     sort = content_type.partition(";")[0].strip().lower()
     if sort != "application/json" and not sort.endswith("+json"):
         what = excerpt(sort) or "no content type"
-        raise HalError(f"{url} answered {what} instead of JSON: is api_base the API's address?")
+        raise WrongAnswer(f"{url} answered {what} instead of JSON: is api_base the API's address?")
     try:
         found = strict_json(body.decode())
     except ValueError as error:
-        raise HalError(f"{url} answered invalid JSON: {excerpt(str(error))}") from None
+        raise WrongAnswer(f"{url} answered invalid JSON: {excerpt(str(error))}") from None
     if not isinstance(found, dict):
-        raise HalError(f"{url} answered JSON that is not an object: {excerpt(repr(found))}")
+        raise WrongAnswer(f"{url} answered JSON that is not an object: {excerpt(repr(found))}")
     return found
 
 

@@ -542,6 +542,42 @@ def test_after_a_failure_calls_fail_at_once_until_it_is_time_again() -> None:
         bus.close()
 
 
+def test_a_wrong_answer_delays_only_its_own_path() -> None:
+    now = [0.0]
+    wrong = answer(b'{"x": NaN}')
+    with FarEnd(always(wrong)) as far:
+        bus = bus_to(far.port, clock=lambda: now[0])
+        for _ in range(2):
+            with pytest.raises(HalError, match="NaN is not JSON"):
+                bus.get_json("/robots/1")
+        assert far.connections == 1, "the second call fails at once"
+        far.conversations = [always(answer())]
+        assert bus.get_json("/robots/2") == {"state": 0}
+        with pytest.raises(HalError, match="/robots/1 answered invalid JSON: NaN"):
+            bus.get_json("/robots/1")
+        now[0] += 0.5
+        assert bus.get_json("/robots/1") == {"state": 0}
+        bus.close()
+
+
+def test_a_refused_command_delays_no_reading_and_few_paths_are_remembered(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("drivers.hal.http.WRONG_MAX", 2)
+    with FarEnd(always(answer(status="500 No"))) as far:
+        bus = bus_to(far.port, clock=lambda: 0.0)
+        for number in (1, 2, 3, 3, 2):
+            with pytest.raises(HalError, match="answered status 500"):
+                bus.send(f"/go?id={number}")
+        assert far.connections == 3
+        with pytest.raises(HalError, match="answered status 500"):
+            bus.send("/go?id=1")
+        assert far.connections == 4
+        far.conversations = [always(answer())]
+        assert bus.get_json("/state") == {"state": 0}
+        bus.close()
+
+
 def test_a_call_that_insists_is_not_held_back_by_the_pause_after_a_failure() -> None:
     with FarEnd(once(b"?"), always(answer())) as far:
         bus = bus_to(far.port, clock=lambda: 0.0)
