@@ -5,13 +5,16 @@ before the adapter starts. The files' texts are stored with the daemon's claims,
 be decided again.
 """
 
+import math
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
 from msgspec import Struct
 from msgspec.structs import replace
+from yaml import SequenceNode
 
 from bridges.kinds.fleet.memory import RobotLimits
 from bridges.kinds.fleet.places import EVERY_LEVEL, NavGraph, RobotSite
@@ -108,6 +111,21 @@ def read_site(config: Config) -> FleetSite:
     return FleetSite(fleet, graph, transforms, tuple(fleet.references()), *map(str, files))
 
 
+def _numbers(fleet: FleetFile) -> Iterator[tuple[tuple[str, ...], float]]:
+    """Yield the robots' sizes and limits, with their paths."""
+    root = below(fleet.root, "rmf_fleet")
+    for path in NEEDED:
+        section = root and below(root.value, path[0])
+        entry = section and below(section.value, path[1])
+        nodes = entry.value.value if entry and isinstance(entry.value, SequenceNode) else ()
+        for node in nodes or ([entry.value] if entry else []):
+            with suppress(ValueError):
+                yield (
+                    ("rmf_fleet", *path),
+                    float(node.value.replace(".nan", "nan").replace(".inf", "inf")),
+                )
+
+
 def _file(config: Config, path: str) -> Path:
     return _folder(str(config.path.parent)) / path
 
@@ -146,6 +164,11 @@ class _Comparing:
             if not entry or not below(entry.value, key):
                 text = f"needs {section}: {key}, without which RMF's adapter does not start"
                 self.problems.append(fleet.problem(("rmf_fleet", section), text))
+        for path, number in _numbers(fleet):
+            least = number > 0 if path[1] in ("limits", "profile") else number >= 0
+            if not (least and number < math.inf):  # true for NaN too
+                text = "is no size of a robot: RMF's planner would fail"
+                self.problems.append(fleet.problem(path, text))
         asked = fleet.fleet.finishing_request
         if asked is not None and asked not in FINISHING:
             text = unknown("finishing_request", asked, FINISHING)
@@ -181,6 +204,13 @@ class _Comparing:
         for name, robot in ours.items():
             if lacks := robot.lacks(section.control):
                 self._ours(("robots", name), lacks)
+            for level in robot.maps.keys() - set(graph.levels()):
+                text = unknown("level", level, graph.levels())
+                self._ours(("robots", name, "maps", level), text)
+            for action in set(fleet.fleet.actions) - set(robot.known_actions()):
+                where = Path(fleet.file).name
+                text = f"{where} has the action '{action}': write how it begins below actions:"
+                self._ours(("robots", name), text)
             if name not in theirs:
                 text = f"{Path(fleet.file).name} has an {unknown('robot', name, theirs)}"
                 self._ours(("robots", name), text)
@@ -191,9 +221,7 @@ class _Comparing:
                 self.problems.append(fleet.problem(path, text))
             inner, charger = robot.waypoint()
             vertex = graph.called(charger) if charger else None
-            known = [v.name for v in graph.vertices if v.charger] or [
-                v.name for v in graph.vertices if v.name
-            ]
+            known = [v.name for v in graph.vertices if v.name]
             if charger is None:
                 text = f"'{name}' has no charger: RMF's adapter does not add the robot"
                 self.problems.append(fleet.problem(path, text))

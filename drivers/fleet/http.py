@@ -5,7 +5,7 @@ A command's number (`$id`) never repeats, so a manager that reports completed co
 take an old one for a new one, even after a restart of the daemon.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Annotated, Final, Protocol, cast
 from weakref import WeakKeyDictionary
 
@@ -43,6 +43,10 @@ class HttpRobotSettings(FleetRobotSettings, frozen=True, kw_only=True, forbid_un
         if dies != "finish" and getattr(api, dies) is None:
             return f"on_death: {dies} needs {dies} in the interface"
         return api.lacks(control)
+
+    def known_actions(self) -> Collection[str]:
+        """Return the actions of the interface."""
+        return self.interface().actions
 
     def interface(self) -> FleetApi:
         """Return the interface."""

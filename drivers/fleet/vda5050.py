@@ -10,7 +10,7 @@ A robot takes a new order only when it has none, so an order that is replaced is
 robot reports the end of `cancelOrder` when all movement has stopped, and `driving` shows that too.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from typing import Annotated, Final
 
@@ -85,6 +85,10 @@ class VdaRobotSettings(FleetRobotSettings, frozen=True, kw_only=True, forbid_unk
         version = DIALECTS[self.version].topics
         serial = self.known_as or robot
         return f"{self.interface}/{version}/{self.manufacturer}/{serial}/{name}"
+
+    def known_actions(self) -> Collection[str]:
+        """Return the actions in the YAML."""
+        return self.actions
 
     def problems(self) -> Remarks:
         """Yield contradictions between fields."""

@@ -74,8 +74,9 @@ def test_the_shipped_files_are_one_site(write: Write) -> None:
         (
             (CONFIG, "AMR01: {charger: wait_1}", "AMR01: {charger: wait_9}"),
             [
-                "fleet_tiny.yaml:27:13: the graph has no waypoint 'wait_9': known here: charger_a,"
-                " dock_b"
+                "fleet_tiny.yaml:27:13: the graph has no waypoint 'wait_9': did you mean 'wait_3'?"
+                " known here: charger_a, dock_b, wait_1, wait_2, wait_3, pharmacy, lift_lobby, lift1_L1,"
+                " lift1_L2, ward, ward_store"
             ],
         ),
         (
@@ -113,6 +114,41 @@ def test_the_shipped_files_are_one_site(write: Write) -> None:
             [
                 "fleet_tiny.yaml:32:1: no pairs for L2: RMF cannot place a robot on that level",
                 "fleet_tiny.yaml:36:3: unknown level 'L3': known here: L1, L2",
+            ],
+        ),
+        *(
+            (
+                (CONFIG, "linear: [0.5, 0.75]", f"linear: [0.5, {number}]"),
+                ["fleet_tiny.yaml:9:5: is no size of a robot: RMF's planner would fail"],
+            )
+            for number in (".nan", ".inf", "0", "-0.75")
+        ),
+        (
+            (CONFIG, "tool_system: {power: 0.0}", "tool_system: {power: -1}"),
+            ["fleet_tiny.yaml:16:17: is no size of a robot: RMF's planner would fail"],
+        ),
+        (
+            (OURS, "AMR02: {profile: rmf-demos}", "AMR02: {profile: rmf-demos, maps: {L9: a}}"),
+            ["robots_http.yaml:24:38: unknown level 'L9': known here: L1, L2"],
+        ),
+        (
+            (
+                CONFIG,
+                "finishing_request: charge",
+                "actions: [clean, sweep]\n  finishing_request: park",
+            ),
+            [
+                f"robots_http.yaml:{line}:3: fleet_tiny.yaml has the action 'sweep': write how it"
+                " begins below actions:"
+                for line in (23, 24, 25)
+            ],
+        ),
+        (
+            (OURS, "fleet:\n", "fleet:\n  control: traffic_light\n"),
+            [
+                f"robots_http.yaml:{line}:3: control: traffic_light needs pause, resume, fields: path"
+                " in the interface"
+                for line in (24, 25, 26)
             ],
         ),
         (

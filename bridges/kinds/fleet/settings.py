@@ -1,5 +1,6 @@
 """The part of a fleet's YAML that does not depend on the way to its robots."""
 
+from collections.abc import Collection
 from typing import Annotated, Literal
 
 import msgspec
@@ -116,6 +117,10 @@ class FleetRobotSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unkno
     def lacks(self, control: str) -> str:
         """Return why RMF cannot control this robot in this way; "" if it can."""
         return ""
+
+    def known_actions(self) -> Collection[str]:
+        """Return the names of RMF's actions that the robot can carry out."""
+        return ()
 
     def stale_after(self) -> float:
         """Return `stale_after_s` of the limits."""

@@ -32,6 +32,7 @@ class RmfRobot:
         self._lock = threading.Lock()
         self._given_up_at: float | None = None
         self._fit = True
+        self._commissioned: Any = None
         self._issues: dict[str, Any] = {}
         self._again_at = 0.0
 
@@ -86,12 +87,14 @@ class RmfRobot:
         if fit == self._fit:
             return
         self._fit = fit
-        commission = more.commission()
-        commission.accept_dispatched_tasks = commission.accept_direct_tasks = fit
-        commission.perform_idle_behavior = fit
-        more.set_commission(commission)
-        if not fit:
-            more.reassign_dispatched_tasks()
+        if fit:  # somebody else may have decommissioned it before
+            more.set_commission(self._commissioned)
+            return
+        self._commissioned, none = more.commission(), more.commission()
+        none.accept_dispatched_tasks = none.accept_direct_tasks = False
+        none.perform_idle_behavior = False
+        more.set_commission(none)
+        more.reassign_dispatched_tasks()
 
     def _issue(self, more: Any, faults: Mapping[str, str]) -> None:
         for code in self._issues.keys() - faults.keys():

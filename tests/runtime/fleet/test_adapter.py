@@ -162,6 +162,18 @@ class TestOnTheStandIn(AdapterContract):
         robot = self.handle(stand_in).robot
         assert (robot.updates, robot.commissioned) == (0, False)
 
+    @pytest.mark.parametrize("commissioned", [True, False])
+    def test_a_robot_that_is_fit_again_is_commissioned_as_before(
+        self, stand_in: StandIn, rmf: Joined, commissioned: bool
+    ) -> None:
+        rmf.says()
+        robot = self.handle(stand_in).robot
+        robot.commissioned = commissioned  # by a person, in RMF
+        rmf.says(fit=False)
+        assert not robot.commissioned
+        rmf.says()
+        assert robot.commissioned == commissioned
+
     def test_a_stop_of_the_present_activity_is_an_order_and_of_another_none(
         self, stand_in: StandIn, rmf: Joined
     ) -> None:
