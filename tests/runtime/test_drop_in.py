@@ -63,6 +63,7 @@ SHIPPED = {
     "lift_supervisor": GRAPH,
     "lift_two_buses": GPIO,
     "robots_http": NET,
+    "robots_traffic_light": NET,
     "robots_vda5050": NET,
 }
 

@@ -75,8 +75,8 @@ def test_the_shipped_files_are_one_site(write: Write) -> None:
             (CONFIG, "AMR01: {charger: wait_1}", "AMR01: {charger: wait_9}"),
             [
                 "fleet_tiny.yaml:27:13: the graph has no waypoint 'wait_9': did you mean 'wait_3'?"
-                " known here: charger_a, dock_b, wait_1, wait_2, wait_3, pharmacy, lift_lobby, lift1_L1,"
-                " lift1_L2, ward, ward_store"
+                " known here: charger_a, dock_b, wait_1, wait_2, wait_3, pharmacy, lift_lobby,"
+                " lift1_L1, lift1_L2, ward, ward_store"
             ],
         ),
         (

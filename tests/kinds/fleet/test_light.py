@@ -143,6 +143,8 @@ def test_it_is_paused_at_once_if_rmf_says_so() -> None:  # FLEET-LIGHT-2
     assert story.commands[-1][1] == "pause 3, attempt 1"
     story.see(moving=False, paused=True)
     assert asked(story) == (1, 0, "after")
+    says(story, "stay", 0).see(60.0)
+    assert story.memory.command is None, "it waits for RMF's word"
 
 
 def test_a_silent_robot_is_paused() -> None:  # FLEET-LIGHT-2
