@@ -28,7 +28,8 @@ from hal_fakes.fake import Outside
 from hal_fakes.json_answers import put
 from hal_fakes.mosquitto import Mosquitto
 from hal_fakes.plants.plant import FailureMode, Plant
-from hal_fakes.vda5050 import FakeVdaRobot, VdaSite
+from hal_fakes.vda5050 import FakeVdaRobot
+from hal_fakes.vda_site import VdaSite
 from hal_fakes.wiring import PlantWiring
 
 PARTS: Final = ("server", "unit")

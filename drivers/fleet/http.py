@@ -19,7 +19,7 @@ from drivers import DriverError, json_fields
 from drivers.driver_type import DriverType
 from drivers.fleet.api import FleetApi, PathFields, body_with, path_with, values
 from drivers.hal import HalError, http
-from drivers.http_call import Call
+from drivers.http_call import Call, described
 from drivers.profiles import Profile
 
 PROFILE: Final = Profile("fleet_http", "api", FleetApi)
@@ -139,7 +139,7 @@ class HttpRobot:
 
         def flag(field: str) -> bool | None:
             place = getattr(fields, field)
-            return None if place is None else json_fields.flag(answer(field), place)
+            return json_fields.flag_if(answer(field) if place else {}, place)
 
         if fields.name and (said := json_fields.name(answer("name"), fields.name)) != self._robot:
             raise DriverError(f"the manager answers for '{said}' and was asked for '{self._robot}'")
@@ -258,7 +258,7 @@ def describe(settings: HttpRobotSettings, bus_settings: http.HttpSettings) -> li
     rows = [("interface", base.url(""))]
     rows += [("state", f"GET {api.state_path} every {bus_settings.scan_s:g} s: {whose}")]
     rows += [(part, f"GET {path}") for part, path in api.paths.items()]
-    rows += [(" ".join(where), _described(call)) for where, call in api.calls()]
+    rows += [(" ".join(where), described(call, base)) for where, call in api.calls()]
     fields = msgspec.structs.asdict(api.fields)
     for name, place in fields.items():
         if place is not None:
@@ -267,10 +267,6 @@ def describe(settings: HttpRobotSettings, bus_settings: http.HttpSettings) -> li
             rows.append((name, text))
     rows.append(("on death", settings.on_death))
     return rows
-
-
-def _described(call: Call) -> str:
-    return f"{call.method} {call.path}{f' {call.body}' if call.body else ''}"
 
 
 def warnings(settings: HttpRobotSettings) -> Remarks:

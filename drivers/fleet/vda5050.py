@@ -27,6 +27,7 @@ from drivers.fleet.vda_messages import DIALECTS, Json, Version, action, order
 from drivers.fleet.vda_state import (
     errors,
     flag,
+    has_order,
     number,
     order_actions,
     part,
@@ -50,7 +51,6 @@ TopicPart = Annotated[
         extra={"pattern": "one part of a topic, without / # +"},
     ),
 ]
-ENDED: Final = ("FINISHED", "FAILED")
 
 
 class VdaActionSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -153,16 +153,16 @@ class VdaRobot:
             self._instant(kind, f"{command.doing}-{command.id}-{command.attempt}-{utc()}", {})
         elif command.doing == "localize":
             self._localize(command)
-        elif not self._active():
+        elif not has_order(self._state):
             self._order(command)
         elif self._ours() != str(command.id):
             self._cancel(command.attempt)
             return
         self._sent, self._acts = (command.id, command.attempt), command.doing == "act"
 
-    def _ours(self) -> str:
+    def _ours(self, state: Json | None = None) -> str:
         """Return the number of our command that the robot's order is for."""
-        return text(self._state, "orderId").partition("-")[0]
+        return text(self._state if state is None else state, "orderId").partition("-")[0]
 
     def make_safe(self) -> None:
         """Stop or pause the robot, as `on_death` says; else do nothing: it finishes its order."""
@@ -228,7 +228,7 @@ class VdaRobot:
 
     def _path(self, state: Json) -> tuple[Pose, ...] | None:
         """Return the places to which another sender's order sends the robot; None if unknown."""
-        if text(state, "orderId").partition("-")[0] == str(self._sent[0]):
+        if self._ours(state) == str(self._sent[0]):
             return None
         heard = None
         with suppress(HalError):  # the broker may let us only send orders
@@ -243,14 +243,8 @@ class VdaRobot:
         """Return the order that the robot has carried out; "" while it has one."""
         found = [one.get("actionStatus") == "FINISHED" for one in order_actions(state)]
         done = all(found) and (bool(found) or not self._acts)
-        ours = text(state, "orderId").partition("-")[0]
-        return ours if done and not self._active(state) else ""
-
-    def _active(self, state: Json | None = None) -> bool:
-        """Has the robot an order? Nodes, edges and unfinished actions are left of it."""
-        state = self._state if state is None else state
-        left = state.get("nodeStates") or state.get("edgeStates")
-        return bool(left) or any(a.get("actionStatus") not in ENDED for a in order_actions(state))
+        ours = self._ours(state)
+        return ours if done and not has_order(state) else ""
 
     def _fault(self, state: Json) -> str:
         stop = part(state, "safetyState").get(self._says.stop, "NONE")
@@ -265,7 +259,7 @@ class VdaRobot:
         ours = str(self._sent[0])
         about = (e for e in errors(state) if ours in {r.partition("-")[0] for r in references(e)})
         found = [told(error) for error in about]
-        if text(state, "orderId").partition("-")[0] == ours:
+        if self._ours(state) == ours:
             failed = (a for a in order_actions(state) if a.get("actionStatus") == "FAILED")
             found += [f"the action {clean(str(a.get('actionType')))} has failed" for a in failed]
         return "; ".join(found)
@@ -273,7 +267,7 @@ class VdaRobot:
     def _cancel(self, attempt: int) -> None:
         """Cancel the robot's order, once for each attempt."""
         cancelled = (text(self._state, "orderId"), attempt)
-        if not self._active() or cancelled == self._cancelled:
+        if not has_order(self._state) or cancelled == self._cancelled:
             return
         self._instant("cancelOrder", f"cancel-{cancelled[0]}-{attempt}", {})
         self._cancelled = cancelled

@@ -9,6 +9,7 @@ from drivers.json_fields import clean
 
 INSTANT: Final = ("cancel-", "place-", "state-", "on-death", "pause-", "resume-")
 """The beginnings of the ids of our instant actions."""
+ENDED: Final = ("FINISHED", "FAILED")
 AUTOMATIC: Final = ("AUTOMATIC", "SEMIAUTOMATIC")
 
 
@@ -25,6 +26,12 @@ def order_actions(state: Json) -> Iterator[Json]:
         ours = str(one.get("actionId", ""))
         if ours and not ours.startswith(INSTANT):
             yield one
+
+
+def has_order(state: Json) -> bool:
+    """Has the robot an order? Nodes, edges and unfinished actions are left of it."""
+    left = state.get("nodeStates") or state.get("edgeStates")
+    return bool(left) or any(a.get("actionStatus") not in ENDED for a in order_actions(state))
 
 
 def errors(state: Json) -> Iterator[Json]:

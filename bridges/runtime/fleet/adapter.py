@@ -40,7 +40,7 @@ def installed() -> ModuleType:
 
 
 class FleetAdapter:
-    """RMF's adapter for one fleet, with `EasyFullControl`, or with an `EasyTrafficLight` for each robot.
+    """RMF's adapter for one fleet, with `EasyFullControl` or with an `EasyTrafficLight` for each robot.
     `orders(robot, order)` receives RMF's orders and answers.
 
     For each robot, only one thread calls `update`. `failed`: for each robot, the reason why RMF did not

@@ -22,7 +22,8 @@ from hal_fakes.http_fleet import PARTS, FakeFleetRobot
 from hal_fakes.plants import robot as robot_plant
 from hal_fakes.plants.robot import RobotPlant
 from hal_fakes.realtime import RealTime
-from hal_fakes.vda5050 import FakeVdaRobot, VdaSite
+from hal_fakes.vda5050 import FakeVdaRobot
+from hal_fakes.vda_site import VdaSite
 from tests.waiting import wait_until
 
 WAY = (Pose("L1", 40.0, 2.0), Pose("L1", 40.0, 9.0))

@@ -16,7 +16,8 @@ from drivers.hal.mqtt import MqttBus, MqttSettings
 from hal_fakes.plants import robot as robot_plant
 from hal_fakes.plants.robot import RobotPlant
 from hal_fakes.realtime import RealTime
-from hal_fakes.vda5050 import FakeVdaRobot, VdaSite
+from hal_fakes.vda5050 import FakeVdaRobot
+from hal_fakes.vda_site import VdaSite
 from tests.drivers.hal.modbus.module import Time
 from tests.drivers.hal.mqtt.broker import FarDevice
 from tests.waiting import wait_until
