@@ -12,7 +12,7 @@ robot reports the end of `cancelOrder` when all movement has stopped, and `drivi
 
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
-from typing import Annotated, Final
+from typing import Annotated
 
 import msgspec
 from msgspec import Meta
