@@ -16,7 +16,7 @@ from msgspec import Struct
 
 Point = tuple[float, float]
 RADIUS_M: Final = 0.8
-STEP_M: Final = 0.2
+STEP_M: Final = 0.4
 
 
 class MovingInstruction(Enum):
