@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from bridges.kinds.fleet.report import RobotReport
-from bridges.kinds.fleet.signals import Act, Localize, Navigate, Order, Pose, Stop
+from bridges.kinds.fleet.signals import Act, LightAnswer, Localize, Navigate, Order, Pose, Stop
 from bridges.kinds.shared.decision import Fault
 from bridges.runtime.fleet import robot as rmf_robot
 from bridges.runtime.fleet.adapter import FleetAdapter, installed
@@ -206,6 +206,7 @@ class TestOnTheStandIn(AdapterContract):
         for number in range(1, 5):
             wait_until(lambda: len(rmf.orders) > number, "the next order")  # noqa: B023
             last = rmf.orders[-1]
+            assert not isinstance(last, LightAnswer)
             rmf.says(finished=last.id)
         floors = [order.goal.at.map for order in rmf.orders if isinstance(order, Localize)]
         assert floors == ["L2"]

@@ -80,7 +80,7 @@ def lift(at: float) -> list[Heard]:
     ],
 )
 def test_a_robot_without_a_trouble_is_explained_by_its_mission(
-    values: dict[str, str], sentence: str, who: Any
+    values: dict[str, Any], sentence: str, who: Any
 ) -> None:
     found = explained(reported(10.0, **values))
     assert (found.kind, found.device, found.now) == ("robot", "tiny/AMR01", (sentence,))

@@ -1,6 +1,8 @@
 """Robots of our fleet's own daemon on the page: a card, a view that says why one stands, and no empty
 part."""
 
+from typing import cast
+
 import pytest
 from playwright.sync_api import Page
 
@@ -22,7 +24,7 @@ def fleet(graph: Graph, until: Until) -> Until:
     def wait(ready: object, what: str) -> None:
         def said() -> bool:
             fleet.publish(d.FleetState("tiny", robots))
-            graph._diagnostics.publish(reported(0.0, OFF).message)
+            graph._diagnostics.publish(cast(d.DiagnosticArray, reported(0.0, OFF).message))
             return bool(ready())  # type: ignore[operator]
 
         until(said, what)
