@@ -2,6 +2,7 @@
 paths cross, with cores, plants and lights in virtual time."""
 
 import itertools
+import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -184,9 +185,12 @@ class Silent:
 class TestOnRmf(LightContract):
     @pytest.fixture
     def rmf(self, schedule: None) -> Iterator[Lit]:
+        blockade = subprocess.Popen(["ros2", "run", "rmf_traffic_ros2", "rmf_traffic_blockade"])
         made = lit(installed())
         yield made
         made.adapter.close()
+        blockade.terminate()
+        blockade.wait()
 
 
 # ---- two robots whose paths cross
