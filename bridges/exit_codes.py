@@ -26,6 +26,10 @@ SIMULATION: Final = {
     69: "no simulation of this file runs",
     **YAML,
 }
+ORDERED: Final = {
+    4: "the order was refused (the reason is printed)",
+    69: "the daemon does not answer, or this user may not see or signal it",
+}
 SENT: Final = {
     0: "the effect was seen",
     1: "no effect was seen (the reason is printed), or the graph cannot be joined",
@@ -134,15 +138,12 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
         73: "the JUnit file cannot be written",
     },
     "release": SENT,
-    "reset": {
-        0: "the reset was sent",
-        1: "no daemon runs",
-        69: "this user may not see or signal the daemon",
-    },
+    "reset": {0: "every device has taken the reset", 1: "no daemon runs", **ORDERED},
+    "drill": {0: "the drill has begun, or has ended", 1: "no daemon runs", **ORDERED},
     "workcell": {
-        0: "the decision was sent",
+        0: "the decision was obeyed",
         1: "no daemon runs, or nothing is in doubt",
-        69: "this user may not see or signal the daemon",
+        **ORDERED,
     },
     "walk": {
         0: "every output is off",

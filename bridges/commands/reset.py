@@ -5,7 +5,9 @@ import os
 import sys
 from pathlib import Path
 
+from bridges.messages.words import printable
 from bridges.runtime import order
+from bridges.system.directories import Directories
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -15,16 +17,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the reset is sent, 1 if no daemon runs, and 69 if this user may not see or signal the
-    daemon."""
+    """Return 0 if every device took the reset, 1 if no daemon runs, 4 if the reset was refused, and 69
+    if the daemon does not answer or this user may not see or signal it."""
     try:
         places = order.places_of(args.file, args.runtime_dir)
         if places is None:
             return 1
-        code = order.send(args.file, places, None)
-        if code == 0:
-            print("reset sent; for remaining faults see rmf-bridge status, or the log")
+        code = order.give(args.file, places)
+        if code in (0, order.REFUSED):
+            print(_remains(places) or "reset; no fault remains")
         return code
     except PermissionError as error:
         print(error, file=sys.stderr)
         return os.EX_UNAVAILABLE
+
+
+def _remains(places: Directories) -> str:
+    """Return a line for each fault that the reset has not ended; "" if there is none."""
+    status = order.status_of(places) or {}
+    parts = [("", status), *((f"{n}: ", d) for n, d in status.get("devices", {}).items())]
+    found = ((n, fault) for n, part in parts for fault in part.get("faults", ()))
+    return "\n".join(printable(f"remains: {n}{f['code']}: {f['detail']}") for n, f in found)

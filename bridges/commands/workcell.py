@@ -2,7 +2,6 @@
 doubt."""
 
 import argparse
-import json
 import os
 import sys
 from collections.abc import Iterator, Mapping
@@ -10,10 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from bridges.kinds.shared.decision import DecidedByPerson
-from bridges.runtime import holder, order
-from bridges.runtime.holder import STATUS, STATUS_MAX
-from bridges.system import files
-from bridges.system.directories import Directories, opened
+from bridges.runtime import order
 
 IN_DOUBT: Final = ("MEMORY_LOST", "OUTCOME_UNKNOWN")
 
@@ -38,19 +34,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the decision is sent. Return 1 if no daemon runs or nothing is in doubt, and 69 if
-    this user may not see or signal the daemon."""
+    """Return 0 if the decision was obeyed, 1 if no daemon runs or nothing is in doubt, 4 if it was
+    refused, and 69 if the daemon does not answer or this user may not see or signal it."""
     try:
         places = order.places_of(args.file, args.runtime_dir)
         if places is None:
             return 1
-        status = _status(places)
+        status = order.status_of(places)
         if status is None:
             print(f"no daemon of {args.file} has shown its state yet", file=sys.stderr)
             return 1
         doubts = list(_doubts(status, args.device))
         verdict = DecidedByPerson(args.verdict, args.request)
-        if doubts and (code := order.send(args.file, places, verdict, args.device)):
+        given = {"verdict": verdict, "device": args.device}
+        if doubts and (code := order.give(args.file, places, **given)):
             return code
     except PermissionError as error:
         print(error, file=sys.stderr)
@@ -61,18 +58,6 @@ def run(args: argparse.Namespace) -> int:
     print(*doubts, sep="\n")
     print(f"decided: {args.verdict}; rmf-bridge status shows the effect")
     return 0
-
-
-def _status(places: Directories) -> Mapping[str, Any] | None:
-    """Return the status of the running daemon. Return None if the daemon has not written a status
-    yet."""
-    daemon = holder.look(places)
-    try:
-        with opened(places.runtime):
-            status: dict[str, Any] = json.loads(files.read(places.runtime / STATUS, STATUS_MAX))
-    except (FileNotFoundError, NotADirectoryError, ValueError):
-        return None
-    return status if daemon is not None and status.get("pid") == daemon.pid else None
 
 
 def _doubts(status: Mapping[str, Any], device: str) -> Iterator[str]:

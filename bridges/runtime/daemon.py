@@ -19,6 +19,7 @@ import msgspec
 from bridges import VERSION
 from bridges.blackbox.entries import Head
 from bridges.blackbox.ring import Ring
+from bridges.kinds.shared.decision import OperatorReset
 from bridges.messages.definitions import DiagnosticArray
 from bridges.messages.stamps import ClockError, stamp
 from bridges.messages.topics import DIAGNOSTICS
@@ -104,6 +105,7 @@ class Daemon:
             self._guard = Guard(outputs_off) if guard.needed() else None
         self._health_topic = named_by(config, DIAGNOSTICS)
         self._told = 0
+        self._ordered: order.PersonsOrder | None = None
         self._longest_unfed_s = 0.0
         self._diagnostics: Publisher[DiagnosticArray] | None = None
         if config.rmf.diagnostics:
@@ -147,14 +149,13 @@ class Daemon:
         return 0 if safe else 1
 
     def _obey(self) -> None:
-        """Carry out a person's decision in the runtime directory. If no decision is there, reset the
-        faults."""
-        decided = order.take(self._runtime.path, self._config.path)
-        if decided is None:
-            self._service.reset()
+        """Obey a person: carry out the order in the runtime directory. If there is none, reset."""
+        given = self._ordered = order.take(self._runtime.path, self._config.path)
+        if given is None:
+            self._service.obey(OperatorReset())
         else:
-            log.info(pairs("decided", verdict=decided.verdict, device=decided.device))
-            self._service.decided(decided.verdict, decided.device)
+            log.info(pairs("ordered", order=given.event, device=given.device))
+            self._service.obey(given.event, given.device)
 
     def _watch(self) -> None:
         """Tell systemd when the daemon is ready. Feed systemd's watchdog while every loop makes
@@ -237,6 +238,13 @@ class Daemon:
         allowed_s = watchdog_s()
         return {"watchdog_slack_s": round(allowed_s - unfed_s, 3)} if allowed_s else {}
 
+    def _answer(self) -> order.OrderAnswered | None:
+        """Return the answer to the last order; None until every device has taken it."""
+        given, refused = self._ordered, self._service.refusals()
+        if given is None or refused is None:
+            return None
+        return order.OrderAnswered(given.id, dict(refused))
+
     def _tell(self) -> None:
         """Write the status file, and publish diagnostics."""
         service = self._service.status()
@@ -256,7 +264,8 @@ class Daemon:
             "faults": [*service.get("faults", []), *self._apart()],
         }
         devices = self._service.devices()
-        self._runtime.write_status(msgspec.json.encode({**daemon, "devices": devices}))
+        answer = {"order": self._answer(), "devices": devices}
+        self._runtime.write_status(msgspec.json.encode({**daemon, **answer}))
         if self._diagnostics is None:
             return
         try:

@@ -6,6 +6,7 @@ is on disk before a message is published (`keeper.py`).
 
 import logging
 from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
 from typing import Final
 
 from bridges.kinds.shared import alarming, fleet_alarm, kept_alarm
@@ -163,10 +164,14 @@ class FleetAlarmNode(
         """Return this status with the alarm's statement, faults and connections. Any thread may call
         this method."""
         decision, own = self.subjects[ALARM].decision, self.status()
-        assert decision is not None  # a new subject decides at once
+        assert decision is not None  # a subject decides when it is made
+        statement = alarming.statement(decision.report, self._limits.fleets)
+        if (since := decision.report.since) is not None:
+            wall = self._clock.wall() - (self._clock.monotonic() - since)
+            statement["since"] = f"{datetime.fromtimestamp(round(wall), UTC):%Y-%m-%dT%H:%M:%SZ}"
         return {
             **status,
-            ALARM: alarming.statement(decision.report, self._limits.fleets),
+            ALARM: statement,
             **{key: [*own[key], *status[key]] for key in ("faults",)},
             **{key: {**status[key], **own[key]} for key in ("heard_by", "hears")},
             "refused": own["refused"],

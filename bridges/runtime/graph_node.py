@@ -7,11 +7,12 @@ virtual time.
 """
 
 import logging
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Generic
 
-from bridges.kinds.shared.decision import Fault, M, OperatorReset, R, RequestRefused
+from bridges.kinds.shared.decision import Fault, M, OrderedByPerson, R, RequestRefused
 from bridges.kinds.shared.durations import NEVER
 from bridges.kinds.shared.graph_kind import GraphEvent, GraphKind, MaySpeak, Woken
 from bridges.kinds.shared.kind import E, L, S
@@ -93,7 +94,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._answers = RefusalAnswers()
         self._keeper = Keeper(kind, kept, self._publish)
         self._started_at = clock.monotonic()
-        self._reset = False
+        self._orders: deque[OrderedByPerson] = deque()
         self._may = MaySpeak(False, alone=self.alone is None)
         self._hears: dict[str, Subscription] = {}
         self._unsaid: list[tuple[Topic[Message], Message]] = []
@@ -115,9 +116,9 @@ class GraphNode(Generic[S, L, M, E, R]):
                 self._named(topic), hear, others_only=others_only
             )
 
-    def reset(self) -> None:
-        """Clear latched faults on an operator's order. Any thread may call this method."""
-        self._reset = True
+    def obey(self, order: OrderedByPerson) -> None:
+        """Let every subject obey a person's order. Any thread may call this."""
+        self._orders.append(order)
         self.inbox.wake()
 
     @property
@@ -146,9 +147,8 @@ class GraphNode(Generic[S, L, M, E, R]):
         for name, events in self.inbox.take().items():
             for topic, event in events:
                 self._receive(name, topic, event)
-        if self._reset:
-            self._reset = False
-            self._decide_all(OperatorReset())
+        while self._orders:
+            self._decide_all(self._orders.popleft())
         self._wake()
         memories = {name: subject.memory for name, subject in self.subjects.items()}
         now = self._clock.monotonic()

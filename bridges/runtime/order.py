@@ -1,20 +1,31 @@
-"""A person's order to a running daemon: a reset, or a decision about a workcell's requests.
+"""A person's order to a running daemon: a reset, a drill, or a decision about a workcell's requests.
 
-A signal delivers the order. A decision is also a file in the runtime directory, which is written before
-the signal is sent. The file names the daemon's process, so that no later daemon obeys it.
+A file in the runtime directory has the order, and a signal tells the daemon to read the file. The file
+names the daemon's process, so that no later daemon obeys it. A signal without a file is a reset. The
+daemon answers in its status file, when every device has taken the order.
 """
 
+import json
 import logging
 import os
+import secrets
 import sys
+import time
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import msgspec
 
-from bridges.kinds.shared.decision import DecidedByPerson
+from bridges.kinds.shared.decision import (
+    DecidedByPerson,
+    DrillOrdered,
+    OperatorReset,
+    OrderedByPerson,
+)
 from bridges.runtime import holder
+from bridges.runtime.holder import STATUS, STATUS_MAX
 from bridges.runtime.runtime_directory import find
 from bridges.runtime.signals import RESET
 from bridges.system import files
@@ -25,16 +36,39 @@ log = logging.getLogger(__name__)
 
 ORDER: Final = "order.json"
 LONGEST: Final = 65536
+ANSWERS_WITHIN_S: Final = 10.0
+"""The time (s) in which the command waits for the daemon's answer. The daemon writes its status each
+second, and a device on a silent bus takes an order with its next scan."""
+LOOK_EVERY_S: Final = 0.05
+REFUSED: Final = 4
+"""The exit code of a command whose order was refused."""
 
 
 class PersonsOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A person's decision, and the daemon that must obey. `device`: a device's name, or "" for every
-    device."""
+    """An order, its device ("" for every device), and the daemon that must obey. Without `verdict` and
+    `drill_s` (s) the order is a reset. `id` names the order in the daemon's answer."""
 
-    verdict: DecidedByPerson
-    device: str
     pid: int
     started: int
+    id: str
+    device: str = ""
+    verdict: DecidedByPerson | None = None
+    drill_s: float | None = None
+
+    @property
+    def event(self) -> OrderedByPerson:
+        """The event for the cores."""
+        if self.drill_s is not None:
+            return DrillOrdered(self.drill_s)
+        return self.verdict or OperatorReset()
+
+
+class OrderAnswered(msgspec.Struct):
+    """The daemon's answer in its status file. `refused` maps each device that has refused the order to
+    the reason."""
+
+    id: str
+    refused: dict[str, str]
 
 
 def places_of(file: Path, given: str | None) -> Directories | None:
@@ -48,12 +82,10 @@ def places_of(file: Path, given: str | None) -> Directories | None:
     return places
 
 
-def send(file: Path, places: Directories, verdict: DecidedByPerson | None, device: str = "") -> int:
-    """Send an order to the daemon of this file, and return the exit code. `verdict`: the decision, or
-    None for a reset.
-
-    Raises PermissionError if this user may not see or signal the daemon.
-    """
+def give(file: Path, places: Directories, **order: Any) -> int:
+    """Give an order (the fields of `PersonsOrder`) to the daemon of this file, and wait for its answer.
+    Print why it was not obeyed. Return the exit code. Raises PermissionError if this user may not see
+    or signal the daemon."""
     found = holder.look(places)
     if found is None or not found.serves or not found.started:  # another process may have this pid
         why = (
@@ -63,21 +95,45 @@ def send(file: Path, places: Directories, verdict: DecidedByPerson | None, devic
         )
         print(f"no daemon serves {file}: {places.runtime}: {why}", file=sys.stderr)
         return 1
-    if verdict is not None:
-        order = PersonsOrder(verdict, device, found.pid, found.started)
-        with opened(places.runtime):
-            files.replace(places.runtime / ORDER, msgspec.json.encode(order))
+    given = PersonsOrder(found.pid, found.started, secrets.token_hex(8), **order)
+    with opened(places.runtime):
+        files.replace(places.runtime / ORDER, msgspec.json.encode(given))
     try:
         os.kill(found.pid, RESET)
     except ProcessLookupError:
         print(f"the daemon of {file} has just ended", file=sys.stderr)
         return 1
-    return 0
+    return _wait(file, places, given)
+
+
+def _wait(file: Path, places: Directories, given: PersonsOrder) -> int:
+    until = time.monotonic() + ANSWERS_WITHIN_S
+    while time.monotonic() < until:
+        answer = (status_of(places) or {}).get("order") or {}
+        if answer.get("id") == given.id:
+            for name, why in answer["refused"].items():
+                print(f"refused: {name + ': ' if name else ''}{why}", file=sys.stderr)
+            return REFUSED if answer["refused"] else 0
+        time.sleep(LOOK_EVERY_S)
+    late = f"within {ANSWERS_WITHIN_S:g} s: see rmf-bridge status {file}"
+    print(f"sent, but the daemon of {file} has not answered {late}", file=sys.stderr)
+    return os.EX_UNAVAILABLE
+
+
+def status_of(places: Directories) -> Mapping[str, Any] | None:
+    """Return the status of the living daemon; None if it has not written one yet."""
+    daemon = holder.look(places)
+    try:
+        with opened(places.runtime):
+            status: dict[str, Any] = json.loads(files.read(places.runtime / STATUS, STATUS_MAX))
+    except (FileNotFoundError, NotADirectoryError, ValueError):
+        return None
+    return status if daemon is not None and status.get("pid") == daemon.pid else None
 
 
 def take(runtime: Path, file: Path) -> PersonsOrder | None:
-    """Return the decision that waits for this process, and remove it. Return None without a decision.
-    Raises nothing."""
+    """Return the order that waits for this process, and remove it. Return None if there is none. Does
+    not raise."""
     path, ours = runtime / ORDER, holder.ourselves(file, serves=True)
     try:
         with opened(runtime):

@@ -14,7 +14,9 @@ from bridges.kinds.shared.alarming import alarm_topics
 from bridges.kinds.shared.decision import (
     Attended,
     DecidedByPerson,
+    DrillOrdered,
     OperatorReset,
+    OrderedByPerson,
     RequestRefused,
     RivalSeen,
 )
@@ -36,7 +38,7 @@ from bridges.runtime.outlet import Named, Outlet
 from bridges.runtime.predecessor import SafeFirst
 from bridges.runtime.ring_writer import NOBODY, NoWriter
 from bridges.runtime.serving import Rounds, Serving
-from bridges.runtime.subject import Status
+from bridges.runtime.subject import AnySubject, Status
 from bridges.settings.load import Config
 from bridges.system.log import pairs
 from bridges.transports.transport import Subscription, Transport
@@ -49,6 +51,10 @@ log = logging.getLogger(__name__)
 FIRST_S: Final = 0.5
 """The time (s) for which a device's first scan waits for the first reading of the device's other
 bus."""
+
+NOBODY_OBEYS: Final = (
+    "no device of this file obeys this order: a drill needs `alarm`, a decision a workcell"
+)
 
 OpenBus = Callable[[str], Bus]
 
@@ -63,11 +69,12 @@ class Service(Protocol):
     def subscribe(self) -> None:
         """Subscribe to RMF's topics."""
 
-    def reset(self) -> None:
-        """Clear latched faults on an operator's order."""
+    def obey(self, order: OrderedByPerson, device: str = "") -> None:
+        """Pass on a person's order to one device, or to every device ("")."""
 
-    def decided(self, verdict: DecidedByPerson, device: str) -> None:
-        """Pass on a person's decision about one device. `device` is "" for every device."""
+    def refusals(self) -> Mapping[str, str] | None:
+        """Return the devices that have refused the last order, with their reasons; None until every
+        device has taken the order."""
 
     def look(self) -> None:
         """Look for other nodes on the graph. The daemon calls this method each second."""
@@ -130,18 +137,37 @@ def service(
     return Devices(config, kind, transport, open_bus, named, clock, unsafe, writer, alarm, memories)
 
 
+def refusals_of(order: OrderedByPerson, subjects: Sequence[AnySubject]) -> dict[str, str] | None:
+    """Return the subjects that have refused this order, with their reasons; None until every subject
+    has taken it."""
+    taken = {one.name: one.ordered for one in subjects}
+    if any(given is not order for given, _ in taken.values()):
+        return None
+    return {name: why for name, (_, why) in taken.items() if why}
+
+
 class GraphService:
     """The service of a supervisor or coordinator. It has one thread and no bus."""
 
     def __init__(self, node: AnyGraphNode, clock: Clock) -> None:
         self.loops = [Serving(node, clock)]
         self.subscribe = node.subscribe
-        self.reset = node.reset
         self.status = node.status
         self.devices = node.devices
+        self._node = node
+        self._order: OrderedByPerson = OperatorReset()
 
-    def decided(self, verdict: DecidedByPerson, device: str) -> None:
-        """Do nothing, because a kind without hardware has no outcome that a person could decide."""
+    def obey(self, order: OrderedByPerson, device: str = "") -> None:
+        """Pass on a reset. No kind without hardware obeys another order."""
+        self._order = order
+        if isinstance(order, OperatorReset):
+            self._node.obey(order)
+
+    def refusals(self) -> Mapping[str, str] | None:
+        """Return the refusals of the last order; None until every subject has taken it."""
+        if not isinstance(self._order, OperatorReset):
+            return {"": NOBODY_OBEYS}
+        return refusals_of(self._order, list(self._node.subjects.values()))
 
     def look(self) -> None:
         """Do nothing, because the node itself looks for other nodes."""
@@ -179,6 +205,7 @@ class Devices:
         self._outlet = Outlet(transport, named, writer)
         self._outlet.open(self._topics())
         self._hears: dict[str, Subscription] = {}
+        self._ordered: tuple[OrderedByPerson, list[AnySubject]] = (OperatorReset(), [])
         self._attended: bool | None = None
         self._handovers = {
             (device, bus): Handover(bus, config.lasts_s(bus), clock)
@@ -206,19 +233,25 @@ class Devices:
         if self._alarm:
             self._alarm.subscribe()
 
-    def reset(self) -> None:
-        """Put a reset into the inbox of each device, and reset the alarm."""
-        if self._alarm:
-            self._alarm.reset()
-        for device, (_, loop) in self._placed.items():
-            loop.inbox.put(device, OperatorReset())
+    def obey(self, order: OrderedByPerson, device: str = "") -> None:
+        """Pass on an order: a drill to the alarm, a decision to workcells, a reset to all of them."""
+        subjects: list[AnySubject] = []
+        if self._alarm and not isinstance(order, DecidedByPerson):
+            self._alarm.obey(order)
+            subjects += self._alarm.subjects.values()
+        for name, (node, loop) in self._placed.items():
+            decides = self._kind.keeping is not None and device in ("", name)
+            if not isinstance(order, DrillOrdered) and (
+                decides or not isinstance(order, DecidedByPerson)
+            ):
+                loop.inbox.put(name, order)
+                subjects.append(node.subject)
+        self._ordered = order, subjects
 
-    def decided(self, verdict: DecidedByPerson, device: str) -> None:
-        """Put the decision into the inbox of this device. If `device` is "", put it into the inbox of
-        each device."""
-        for name, (_, loop) in self._placed.items():
-            if self._kind.keeping is not None and device in ("", name):
-                loop.inbox.put(name, verdict)
+    def refusals(self) -> Mapping[str, str] | None:
+        """Return the refusals of the last order; None until every device has taken it."""
+        order, subjects = self._ordered
+        return refusals_of(order, subjects) if subjects else {"": NOBODY_OBEYS}
 
     def look(self) -> None:
         """Tell each device when the first node appears that may send requests, and when the last such

@@ -65,7 +65,7 @@ class End:
 
 
 def on_reset(reset: Callable[[], None]) -> None:
-    """Call `reset` when an operator runs `rmf-bridge reset`."""
+    """Call `reset` at the signal that announces a person's order (`bridges/runtime/order.py`)."""
     signal.signal(RESET, lambda number, frame: reset())
 
 

@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar
 
 from msgspec import Struct
 
-from bridges.kinds.shared.decision import Decision, Fault, M, O, R
+from bridges.kinds.shared.decision import Decision, Fault, M, O, OrderedByPerson, R
 from bridges.kinds.shared.durations import NEVER
 from bridges.messages.definitions import Message
 from bridges.messages.topics import Topic
@@ -46,7 +46,8 @@ class SubjectCore(Struct, Generic[M, V, O, R], frozen=True):
 
 
 class Subject(Generic[M, V, O, R]):
-    """One subject of a core, with its memory."""
+    """One subject of a core, with its memory. `ordered`: a person's last order, and the reason if the
+    core refused it. Any thread may read it."""
 
     def __init__(
         self,
@@ -62,6 +63,7 @@ class Subject(Generic[M, V, O, R]):
         self.memory = memory
         self.wake_at = NEVER
         self.decision: Decision[M, O, R] | None = None
+        self.ordered: tuple[object, str] = (None, "")
         self._core = core
         self._whose = {core.word: name}
         self._publish = publish
@@ -78,6 +80,8 @@ class Subject(Generic[M, V, O, R]):
         decision = self._core.decide(before, event, now)
         self._writer.decided(self.name, before, event, now, decision)
         self.memory, self.wake_at, self.decision = decision.memory, decision.wake_at, decision
+        if isinstance(event, OrderedByPerson):
+            self.ordered = event, decision.refused
         for topic, message in decision.publish:
             self._publish(topic, message)
         if decision.refused:
@@ -126,3 +130,7 @@ class Subject(Generic[M, V, O, R]):
             log.warning(pairs("fault", **self._whose, code=fault.code, detail=fault.detail))
         for fault in (before[key] for key in before if key not in faults):
             log.info(pairs("fault_over", **self._whose, code=fault.code, detail=fault.detail))
+
+
+AnySubject = Subject[Any, Any, Any, Any]
+"""A subject whose core's types are unknown."""

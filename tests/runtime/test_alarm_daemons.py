@@ -94,12 +94,18 @@ class Place:
         first tries."""
 
         def is_reset() -> bool:
-            run = self._directory / f"run-{self._name}"
-            words = command("reset", self.file, "--runtime-dir", run)
-            assert subprocess.run(words, capture_output=True).returncode == 0
-            return self.state() in ("reset", "quiet")
+            code, _, said = self.told("reset")
+            assert (code, bool(said)) in ((0, False), (4, True)), (code, said)
+            return code == 0
 
         wait_until(is_reset, f"{self._name} is reset")
+
+    def told(self, name: str, *words: str) -> tuple[int, str, str]:
+        """Run a command about the daemon. Return its exit code, its output and its errors."""
+        run = self._directory / f"run-{self._name}"
+        line = command(name, self.file, "--runtime-dir", run, *words)
+        done = subprocess.run(line, capture_output=True, text=True)
+        return done.returncode, done.stdout, done.stderr
 
 
 @pytest.fixture
@@ -155,5 +161,53 @@ def test_an_alarm_outlives_the_deaths_of_its_daemons_and_ends_with_the_last_rese
     for place in places:
         place.until("quiet")
     wait_until(lambda: heard[-1] == Bool(False), "the robots may drive")
+    adapter.close()
+    assert [place.daemon.end(signal.SIGTERM) for place in places] == [0, 0]
+
+
+def test_a_drill_is_no_alarm_and_ends_though_its_daemon_is_killed(
+    places: tuple[Place, Place], domain: int
+) -> None:
+    panel, door = places
+    adapter = join("adapter", domain)
+    heard: list[Bool] = []
+    adapter.subscribe(FIRE_ALARM_TRIGGER, heard.append)
+    panel.start()
+    door.start()
+    for place in places:
+        place.until("quiet")
+
+    def begins(place: Place, for_s: str) -> None:
+        begun = "the drill has begun, and ends by itself in"
+
+        def is_begun() -> bool:  # not before the quiet start is over
+            code, out, said = place.told("drill", "--for", for_s)
+            assert (code, said) == (0, "") or "no drill yet" in said, said
+            return out.startswith(begun)
+
+        wait_until(is_begun, "a drill")
+
+    begins(panel, "600")
+    wait_until(lambda: heard == [Bool(True)], "the robots stand")
+    panel.until("drill")
+    refused = door.told("drill", "--for", "9")
+    assert refused == (4, "", "refused: alarm: no drill during an alarm: rmf_bridge_panel\n")
+    assert panel.daemon.end(signal.SIGKILL) == -signal.SIGKILL
+    panel.start()
+    wait_until(lambda: heard[-1] == Bool(False), "the robots drive again")
+    panel.until("quiet")
+    begins(panel, "600")
+    panel.burns(True)
+    panel.until("alarm")
+    code, out, said = panel.told("reset")
+    assert (code, said) == (4, "refused: alarm: the alarm is not over: fire of Panel\n")
+    assert "remains: Panel: ALARM_SOURCE_ACTIVE: fire" in out
+    panel.burns(False)
+    panel.reset()
+    wait_until(lambda: heard[-1] == Bool(False), "the reset ends the alarm, and no drill is left")
+    panel.until("quiet")
+    begins(door, "1")
+    wait_until(lambda: heard[-2:] == [Bool(True), Bool(False)], "a drill of one second ends")
+    door.until("quiet")
     adapter.close()
     assert [place.daemon.end(signal.SIGTERM) for place in places] == [0, 0]

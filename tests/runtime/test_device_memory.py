@@ -68,7 +68,8 @@ def test_an_order_is_obeyed_by_the_process_that_it_names_and_by_no_other(
     tmp_path.chmod(0o700)
     ours = holder.ourselves(tmp_path / "x.yaml", serves=True)
     verdict = DecidedByPerson("again", "guid")
-    given = order.PersonsOrder(verdict, "store", os.getpid(), ours.started + shift)
+    started = ours.started + shift
+    given = order.PersonsOrder(os.getpid(), started, "1", "store", verdict)
     path = tmp_path / order.ORDER
     path.write_bytes(msgspec.json.encode(given))
     assert order.take(tmp_path, tmp_path / "x.yaml") == (None if shift else given)

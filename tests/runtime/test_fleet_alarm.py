@@ -2,7 +2,7 @@
 
 import pytest
 
-from bridges.kinds.shared.decision import AlarmInputs
+from bridges.kinds.shared.decision import AlarmInputs, OperatorReset
 from bridges.kinds.shared.fleet_alarm import RENEW_S, FleetAlarmLimits
 from bridges.messages import definitions as d
 from bridges.messages.releases import NEWEST, RELEASES, Release
@@ -72,7 +72,7 @@ class Site:
         self.rounds()
 
     def resets(self, name: str) -> None:
-        self.nodes[name].reset()
+        self.nodes[name].obey(OperatorReset())
         self.rounds()
 
     def rounds(self) -> None:

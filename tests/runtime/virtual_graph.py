@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from bridges.kinds.shared.decision import OperatorReset
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.messages.definitions import Message
 from bridges.messages.releases import NEWEST
@@ -271,7 +272,7 @@ class Served:
 
     def reset(self) -> None:
         """Reset the node as an operator does. Latched faults may then clear."""
-        self.node.reset()
+        self.node.obey(OperatorReset())
         self.node.round()
 
     def hear(self, topic: Topic[Any], message: Any) -> None:

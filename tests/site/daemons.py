@@ -289,7 +289,7 @@ class GraphDaemon:
 
     def reset(self) -> None:
         """Reset the daemon as `rmf-bridge reset` does."""
-        self.node.reset()
+        self.node.obey(OperatorReset())
         self._round()
 
     def says(self, topic: Topic[Any], message: Message) -> None:

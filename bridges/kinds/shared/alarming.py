@@ -21,7 +21,7 @@ AlarmTopic = Literal["fire_alarm_trigger", "emergency_signal"]
 TOPICS: Final[Mapping[str, Topic[Message]]] = {
     topic.name: topic for topic in (FIRE_ALARM_TRIGGER, EMERGENCY_SIGNAL)
 }
-STATE, FLEETS, CAUSES = "alarm state", "alarm fleets", "alarm causes"
+STATE, FLEETS, CAUSES, SINCE = "alarm state", "alarm fleets", "alarm causes", "alarm since"
 """The keys of a daemon's statement on `/diagnostics`. The status file has the same words below
 `alarm`."""
 RAISED: Final = frozenset({"alarm", "drill"})

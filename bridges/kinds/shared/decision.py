@@ -104,6 +104,17 @@ class DecidedByPerson(msgspec.Struct, frozen=True):
     request: str = ""
 
 
+class DrillOrdered(msgspec.Struct, frozen=True):
+    """A person has run `rmf-bridge drill`. `for_s`: the duration of the drill (s); 0 ends the ordered
+    drill."""
+
+    for_s: float
+
+
+OrderedByPerson = OperatorReset | DecidedByPerson | DrillOrdered
+"""The orders of a person to a running daemon."""
+
+
 class Report(Protocol):
     """The content of RMF's state message and of the status file."""
 

@@ -27,8 +27,11 @@ FLEET-ALARM-6. Latched causes, the published `true` and other nodes' alarms surv
    restart a raised alarm is published again, because the earlier process took its retained `true` with
    it. In the quiet start no `false` is published, because other nodes state their alarms each second. A
    daemon that ends publishes nothing.
-FLEET-ALARM-7. A drill raises the alarm without latching, and its end needs no reset. If a cause comes
-   during a drill, the alarm becomes a real alarm.
+FLEET-ALARM-7. A drill raises the alarm without latching, and its end needs no reset. A device asks for
+   the drill, or a person orders it for a duration. If a cause comes during a drill, the alarm becomes a
+   real alarm, which ends the ordered drill. No drill is ordered during an alarm for one of the same
+   fleets, or in the quiet start, in which such an alarm may not have been heard yet. A restart ends the
+   ordered drill.
 FLEET-ALARM-8. If the wire hides a message's sender, any present publisher that is not one of our nodes
    may have sent the message. Until discovery names the sender, its alarm stands as that of an unknown
    node.
@@ -40,7 +43,14 @@ from typing import Final
 import msgspec
 from msgspec.structs import replace
 
-from bridges.kinds.shared.decision import AlarmInputs, Decision, Fault, OperatorReset, Said
+from bridges.kinds.shared.decision import (
+    AlarmInputs,
+    Decision,
+    DrillOrdered,
+    Fault,
+    OperatorReset,
+    Said,
+)
 from bridges.kinds.shared.durations import AGES_AGO, NEVER, RIVAL_QUIET_S, SILENT_S
 from bridges.kinds.shared.graph_kind import MaySpeak, Woken
 from bridges.messages.definitions import Bool, EmergencySignal, Message
@@ -93,7 +103,14 @@ class AlarmStated(msgspec.Struct, frozen=True):
 
 
 FleetAlarmEvent = (
-    DeviceTells | AlarmHeard | AlarmNamed | AlarmStated | MaySpeak | Woken | OperatorReset
+    DeviceTells
+    | AlarmHeard
+    | AlarmNamed
+    | AlarmStated
+    | MaySpeak
+    | Woken
+    | OperatorReset
+    | DrillOrdered
 )
 
 
@@ -123,7 +140,8 @@ class FleetAlarmMemory(msgspec.Struct, frozen=True):
     longer counts, so a raised alarm must be published again. `others`: the fleets of each other node's
     standing alarm. `ours`: the time of the last statement of each other node of ours. `may_end`: the
     quiet start is over. `contradicted`: the nodes that published `false` against our alarm, and the
-    time.
+    time. `drill_until`: the end of the drill that a person has ordered. `shown`: the last decision's
+    `state`. `since`: the time when that state began; None if it began before the daemon's start.
     """
 
     inputs: Mapping[str, AlarmInputs] = {}
@@ -136,26 +154,39 @@ class FleetAlarmMemory(msgspec.Struct, frozen=True):
     ours: Mapping[str, float] = {}
     may_end: bool = False
     contradicted: tuple[str, float] = ("", AGES_AGO)
+    drill_until: float = AGES_AGO
+    shown: str = "quiet"
+    since: float | None = None
 
     @property
     def drill(self) -> bool:
         """Return whether only a drill raises the alarm."""
-        return not self.latched and any(inputs.drill for inputs in self.inputs.values())
+        asked = any(inputs.drill for inputs in self.inputs.values())
+        return not self.latched and (asked or self.drill_until > AGES_AGO)
 
     @property
     def raised(self) -> bool:
         """Return whether the robots of our fleets must stand for a cause or a drill of our own."""
         return bool(self.latched) or self.drill
 
+    @property
+    def state(self) -> str:
+        """Return `quiet`, `alarm`, `drill`, or `reset` if our `true` waits for the end of other
+        alarms."""
+        if self.raised:
+            return "drill" if self.drill else "alarm"
+        return "quiet" if self.told is None else "reset"
+
 
 class FleetAlarmReport(msgspec.Struct, frozen=True):
-    """The daemon's statement. `state`: `quiet`, `alarm`, `drill`, or `reset` if our `true` waits for
-    the end of other alarms. `waits`: the nodes of these alarms."""
+    """The daemon's statement. `state` and `since`: see `FleetAlarmMemory`. `waits`: the nodes whose
+    alarms our `true` waits for."""
 
     state: str
     causes: tuple[AlarmCause, ...] = ()
     waits: tuple[str, ...] = ()
     faults: tuple[Fault, ...] = ()
+    since: float | None = None
     read_at: float | None = None
 
     def news(self) -> object:
@@ -177,10 +208,15 @@ def decide(
     memory: FleetAlarmMemory, event: FleetAlarmEvent, now: float, limits: FleetAlarmLimits
 ) -> Decision[FleetAlarmMemory, None, FleetAlarmReport]:
     """Take the event, latch the present causes, and publish what the rules ask for."""
+    if AGES_AGO < memory.drill_until <= now:
+        memory = replace(memory, drill_until=AGES_AGO)
     memory, refused = _take(memory, event, now, limits)
     memory = _latch(memory)
     memory, say = _say(memory, now, limits)
+    if memory.state != memory.shown:
+        memory = replace(memory, shown=memory.state, since=now)
     due = (
+        memory.drill_until,
         memory.told_at + AGAIN_S if memory.owed and memory.raised else NEVER,
         memory.contradicted[1] + RIVAL_QUIET_S,
     )
@@ -205,6 +241,8 @@ def _take(
             return replace(memory, may_end=yes), ""
         case OperatorReset():
             return _reset(memory, limits)
+        case DrillOrdered(for_s):
+            return _drill(memory, now + for_s, now, limits)
     return memory, ""
 
 
@@ -271,6 +309,19 @@ def _reset(memory: FleetAlarmMemory, limits: FleetAlarmLimits) -> tuple[FleetAla
     return replace(memory, latched=left), why
 
 
+def _drill(
+    memory: FleetAlarmMemory, until: float, now: float, limits: FleetAlarmLimits
+) -> tuple[FleetAlarmMemory, str]:
+    if until <= now:
+        return replace(memory, drill_until=AGES_AGO), ""
+    standing = [*map(str, memory.latched), *_standing(memory, limits.fleets)]
+    if standing:
+        return memory, f"no drill during an alarm: {', '.join(standing)}"
+    if not memory.may_end:
+        return memory, "no drill yet: this daemon has just started, and listens for alarms"
+    return replace(memory, drill_until=until), ""
+
+
 def _is_over(cause: AlarmCause, memory: FleetAlarmMemory, limits: FleetAlarmLimits) -> bool:
     if cause.device not in limits.devices:
         return True
@@ -281,7 +332,9 @@ def _is_over(cause: AlarmCause, memory: FleetAlarmMemory, limits: FleetAlarmLimi
 def _latch(memory: FleetAlarmMemory) -> FleetAlarmMemory:
     present = {AlarmCause(d, signal) for d, one in memory.inputs.items() for signal in one.present}
     new = sorted(present.difference(memory.latched))
-    return replace(memory, latched=(*memory.latched, *new)) if new else memory
+    if not new:
+        return memory
+    return replace(memory, latched=(*memory.latched, *new), drill_until=AGES_AGO)
 
 
 def _say(
@@ -309,19 +362,18 @@ def _message(topic: Topic[Message], fleets: Fleets, *, on: bool) -> Said:
 
 def _waits(memory: FleetAlarmMemory) -> tuple[str, ...]:
     """Return the nodes whose alarms stand for one of the fleets that we have told."""
-    told = memory.told
-    if told is None:
-        return ()
+    return () if memory.told is None else _standing(memory, memory.told)
+
+
+def _standing(memory: FleetAlarmMemory, told: Fleets) -> tuple[str, ...]:
+    """Return the other nodes whose alarms stand for one of these fleets."""
     return tuple(sorted(node for node, fleets in memory.others.items() if overlap(told, fleets)))
 
 
 def _report(memory: FleetAlarmMemory, now: float) -> FleetAlarmReport:
     waits = _waits(memory)
-    if memory.raised:
-        state = "drill" if memory.drill else "alarm"
-    else:
-        state = "quiet" if memory.told is None else "reset"
-    return FleetAlarmReport(state, memory.latched, waits, tuple(_faults(memory, waits, now)))
+    faults = tuple(_faults(memory, waits, now))
+    return FleetAlarmReport(memory.state, memory.latched, waits, faults, memory.since)
 
 
 def _faults(memory: FleetAlarmMemory, waits: tuple[str, ...], now: float) -> list[Fault]:

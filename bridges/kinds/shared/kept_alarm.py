@@ -37,9 +37,10 @@ def persist(memory: FleetAlarmMemory) -> bytes:
 def restore(kept: bytes) -> FleetAlarmMemory:
     """Make the memory at a restart. Raises ValueError for bytes that `persist` did not make."""
     found = keep.read(kept, KeptAlarm, VERSION, "an alarm's memory")
-    return FleetAlarmMemory(
+    memory = FleetAlarmMemory(
         latched=tuple(AlarmCause(*cause) for cause in found.latched),
         told=None if found.told is None else frozenset(found.told),
         owed=True,
         others={node: frozenset(fleets) for node, fleets in found.others.items()},
     )
+    return msgspec.structs.replace(memory, shown=memory.state)

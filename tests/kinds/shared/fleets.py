@@ -11,7 +11,7 @@ import msgspec
 from msgspec.structs import replace
 
 from bridges.kinds.shared import alarming, fleet_alarm, kept_alarm
-from bridges.kinds.shared.decision import AlarmInputs, OperatorReset, Said
+from bridges.kinds.shared.decision import AlarmInputs, DrillOrdered, OperatorReset, Said
 from bridges.kinds.shared.durations import NEVER
 from bridges.kinds.shared.fleet_alarm import (
     AlarmHeard,
@@ -74,6 +74,10 @@ class AlarmGraph(msgspec.Struct, frozen=True):
     def resets(self, name: str) -> "AlarmGraph":
         """Reset a daemon, as a person does."""
         return self._decides(name, OperatorReset())
+
+    def drills(self, name: str, for_s: float) -> "AlarmGraph":
+        """Order a drill, as a person does; 0 ends it."""
+        return self._decides(name, DrillOrdered(for_s))
 
     def kill(self, name: str) -> "AlarmGraph":
         """End a daemon's process; its retained messages go with it."""

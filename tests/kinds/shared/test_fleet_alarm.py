@@ -5,7 +5,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from bridges.kinds.shared import alarming, fleet_alarm, kept_alarm
-from bridges.kinds.shared.decision import OperatorReset
+from bridges.kinds.shared.decision import DrillOrdered, OperatorReset
 from bridges.kinds.shared.fleet_alarm import (
     AlarmHeard,
     AlarmNamed,
@@ -149,6 +149,63 @@ def test_a_drill_ends_by_itself_and_a_cause_during_a_drill_is_an_alarm() -> None
     assert said(g) == [(5.0, "a", True), (10.0, "a", False)]
     g = g.tells("a", drill=True).tells("a", "fire", drill=True).tells("a").until(30.0)
     assert (g.daemons["a"].state, g.stands) == ("alarm", {"tiny": True})
+
+
+def test_an_ordered_drill_ends_at_its_time_or_by_order() -> None:
+    """FLEET-ALARM-7."""
+    g = graph(a=()).drills("a", 3.95)
+    assert (g.daemons["a"].state, g.daemons["a"].faults) == ("drill", ("ALARM_DRILL",))
+    g = g.until(20.0).drills("a", 600.0).until(24.0).drills("a", 0.0).until(30.0)
+    assert said(g) == [(5.0, "a", True), (9.0, "a", False), (20.0, "a", True), (24.0, "a", False)]
+    assert g.daemons["a"].state == "quiet"
+
+
+def test_an_alarm_in_an_ordered_drill_is_an_alarm_and_its_reset_lets_the_robots_drive() -> None:
+    """FLEET-ALARM-7."""
+    g = graph(a=()).drills("a", 600.0).tells("a", "fire").until(10.0)
+    assert (g.daemons["a"].state, g.daemons["a"].faults) == ("alarm", ("ALARM_RAISED",))
+    g = g.tells("a").until(20.0)
+    assert g.stands == {"tiny": True}
+    g = g.resets("a").until(30.0)
+    assert (g.daemons["a"].state, g.stands) == ("quiet", {"tiny": False})
+
+
+def test_the_death_of_the_daemon_ends_an_ordered_drill_with_its_next_start() -> None:
+    """FLEET-ALARM-7."""
+    g = graph(a=()).drills("a", 600.0).until(10.0).kill("a").until(20.0)
+    assert g.stands == {"tiny": True}
+    g = g.start("a").until(30.0)
+    assert (g.daemons["a"].state, g.stands) == ("quiet", {"tiny": False})
+
+
+def test_no_drill_is_ordered_in_an_alarm_or_before_other_alarms_can_be_heard() -> None:
+    """FLEET-ALARM-7. An alarm of another building forbids nothing."""
+
+    def refused(g: AlarmGraph, name: str) -> str:
+        memory, fleets = g.daemons[name].memory, g.daemons[name].fleets
+        assert memory is not None
+        limits = FleetAlarmLimits(FIRE_ALARM_TRIGGER, fleets, frozenset({"Panel"}))
+        return fleet_alarm.decide(memory, DrillOrdered(60.0), g.now, limits).refused
+
+    g = graph(a=("x",), b=("x", "y"), c=("z",)).tells("b", "fire").until(8.0)
+    assert refused(g, "a") == "no drill during an alarm: b"
+    assert refused(g, "b") == "no drill during an alarm: fire of Panel"
+    assert refused(g, "c") == ""
+    started = "no drill yet: this daemon has just started, and listens for alarms"
+    assert refused(g.kill("c").start("c"), "c") == started
+
+
+def test_each_state_has_its_beginning_unless_a_restart_has_hidden_it() -> None:
+    def since(g: AlarmGraph) -> tuple[str, float | None]:
+        memory = g.daemons["a"].memory
+        assert memory is not None
+        return memory.state, memory.since
+
+    g = graph(a=()).drills("a", 60.0).until(7.0)
+    assert since(g) == ("drill", 5.0)
+    g = g.tells("a", "fire").until(9.0).tells("a", "fire", "code_blue").until(11.0)
+    assert since(g) == ("alarm", 7.0)
+    assert since(g.kill("a").start("a").until(20.0)) == ("alarm", None)
 
 
 def test_an_alarm_of_one_building_does_not_hold_the_other_building() -> None:

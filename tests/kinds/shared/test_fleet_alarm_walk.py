@@ -33,6 +33,7 @@ def moves(*fleets: str) -> dict[str, Move]:
             f"{name} burns": lambda g, n=name: g.tells(n, "fire"),  # type: ignore[misc]
             f"{name} is out": lambda g, n=name: g.tells(n),  # type: ignore[misc]
             f"{name} drills": lambda g, n=name: g.tells(n, drill=True),  # type: ignore[misc]
+            f"{name} is ordered to drill": lambda g, n=name: g.drills(n, 12.0),  # type: ignore[misc]
             f"{name} is unread": lambda g, n=name: g.tells(n, seen=False),  # type: ignore[misc]
             f"{name} is reset": lambda g, n=name: g.resets(n),  # type: ignore[misc]
             f"{name} dies": lambda g, n=name: g.kill(n),  # type: ignore[misc]
