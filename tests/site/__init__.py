@@ -12,6 +12,8 @@ again.
     robots.py    fleet adapters and their robots, each with an endless day
     trouble.py   faults and their repair
     laws.py      rules for messages, relays, and the true positions of cars, doors and robots
+    storeroom.py a dispenser, with a delivery each hour
+    fire_panels.py  two fire panels and three fleet adapters, with drills and alarms once a day
     growth.py    threads, file descriptors, objects and memory, by the hour
     day.py       all parts together
     on_dds.py    the same robots in real time, on DDS, with daemons that are processes

@@ -23,6 +23,7 @@ from tests.site.daemons import (
     rmfs_door_supervisor,
     rmfs_lift_supervisor,
 )
+from tests.site.fire_panels import FirePanels
 from tests.site.growth import Look, look
 from tests.site.laws import BOUND_S, Laws
 from tests.site.network import CLEAR, Air, Place
@@ -87,6 +88,7 @@ class Site:
         self.kill_every_s = kill_every_s
         self.kills = {"supervisor kills": 0, "of them with a robot in a car": 0}
         self.storeroom = Storeroom(timeline, Random(f"storeroom {seed}"), self.laws.require)
+        self.fire_panels = FirePanels(timeline, Random(f"fire {seed}"), self.laws.require)
         self.looks: list[Look] = []
         self._people = Random(self.random.random())
         self._people_at: dict[str, float] = {}
@@ -132,6 +134,7 @@ class Site:
                 done[what] = done.get(what, 0) + count
         done["scans"] = sum(daemon.scans for daemon in self.daemons.values())
         done["dispensings"] = sum(self.storeroom.done.values())
+        done["drills and alarms"] = sum(self.fire_panels.done.values())
         kills = self.kills if self.kill_every_s else {}
         return {**done, **kills, "checks": self.laws.checks, **self.air.counts}
 
@@ -144,6 +147,7 @@ class Site:
             assert name == daemon.name
         self.laws.speakers = self._speakers
         self.storeroom.open()
+        self.fire_panels.open()
         parties: list[Mortal] = [*self.nodes, *self.robots]
         for party in parties:
             self.timeline.after(self.random.uniform(2.0, 6.0), party.start)
