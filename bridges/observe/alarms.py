@@ -1,35 +1,50 @@
-"""The alarms for fleets, as our daemons state them on `/diagnostics`."""
+"""The alarms of the fleets: our daemons' statements on `/diagnostics`, and messages of other nodes.
 
-from collections.abc import Iterator, Mapping
+RMF's fleet adapters obey the last word of any node. So a `false` ends the alarm of every node that
+makes no statements.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from datetime import datetime
 from typing import Final
 
 from msgspec import Struct
 
-from bridges.kinds.shared.alarming import CAUSES, FLEETS, RAISED, STATE, fleets_in
+from bridges.kinds.shared.alarming import CAUSES, FLEETS, RAISED, SINCE, STATE, fleets_in
+from bridges.kinds.shared.fleet_alarm import Fleets, overlap
+from bridges.messages.definitions import Bool, EmergencySignal
+from bridges.messages.heard import Heard
+from bridges.messages.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER
 from bridges.messages.words import printable
 from bridges.observe.diagnosis import Diagnosis
+from bridges.observe.requesters import Moment
 
 STANDS: Final = frozenset((*RAISED, "reset"))
+PUBLISHED: Final = "published"
+"""The state of an alarm that a node has published without a statement."""
+UNKNOWN: Final = "an unknown node"
+OLD_S: Final = 3.0
+"""The time (s) after the beginning in which a message may be an old one that its publisher retains."""
+MOST: Final = 50
 
 
 class ObservedAlarm(Struct, frozen=True):
-    """The alarm of a daemon, as the daemon states it.
-
-    `state`: `quiet`, `alarm`, `drill` or `reset`. `fleets`: the names of the fleets, or "" for all
-    fleets. `current`: False if the daemon has fallen silent. An alarm does not end when its daemon
-    falls silent.
-    """
+    """The alarm of a node. `state`: the statement (`quiet`, `alarm`, `drill` or `reset`), or PUBLISHED.
+    `fleets`: their names, "" for all. `current`: the daemon still makes statements. The alarm of a
+    daemon that falls silent goes on standing. `since`: the beginning of the state (s since the epoch);
+    None if it is unknown."""
 
     node: str
     state: str
     causes: str
     fleets: str
     current: bool
+    since: float | None = None
 
     @property
     def stands(self) -> bool:
         """Return whether robots stand because of this alarm."""
-        return self.state in STANDS
+        return self.state == PUBLISHED or self.state in STANDS
 
     @property
     def condition(self) -> str:
@@ -37,27 +52,74 @@ class ObservedAlarm(Struct, frozen=True):
         stand`."""
         if not self.stands:
             return "no alarm"
-        word = {"alarm": f"ALARM: {self.causes}", "drill": "DRILL"}.get(self.state, "reset, waits")
+        words = {"alarm": f"ALARM: {self.causes}", "drill": "DRILL", "reset": "reset, waits"}
+        word = words.get(self.state, f"ALARM on {self.causes}")
         return f"{word}; {self.fleets or 'every fleet'} is to stand"
 
-    @property
-    def because(self) -> str:
-        """A sentence that says why the robots stand."""
+    def because(self, clock: Callable[[float], str]) -> str:
+        """One sentence that says why the robots stand. `clock(wall)`: the text of a time."""
         robots = f"Every robot of {self.fleets}" if self.fleets else "Every robot"
-        silent = "" if self.current else ", whose daemon has been silent since then"
+        at = "at an unknown time" if self.since is None else f"at {clock(self.since)}"
+        silent = "" if self.current else ", and has been silent since its last statement"
         why = {
-            "alarm": f"because {self.causes} raised an alarm and nobody has reset {self.node}",
-            "drill": f"for a drill of {self.node}, which ends by itself",
-        }.get(self.state, f"until another alarm ends: {self.node} was reset")
+            "alarm": f"because {self.causes} raised an alarm {at} and nobody has reset {self.node}",
+            "drill": f"for a drill of {self.node}, which began {at} and ends by itself",
+            "reset": f"until another alarm ends: {self.node} was reset {at}",
+        }.get(self.state, f"because {self.node} published an alarm on {self.causes} {at}")
         return f"{robots} is to stand {why}{silent}."
 
 
-def alarms(nodes: Mapping[str, Diagnosis], now: float) -> Iterator[ObservedAlarm]:
-    """Yield the alarm of each daemon that may raise an alarm. `nodes`: each daemon's report on itself,
-    by `<node>: daemon`."""
+class PublishedAlarms:
+    """The alarms that nodes have published, by node. A `false` ends them as it lets RMF's robots
+    drive. At first it may be an old one, and ends only its sender's alarm."""
+
+    def __init__(self) -> None:
+        self.found: dict[str, tuple[str, Fleets, Moment]] = {}
+
+    def hear(self, heard: Heard, moment: Moment, began: float) -> None:
+        """Take a message, if it is about an alarm."""
+        topic, message = heard.topic.rpartition("/")[2], heard.message
+        if isinstance(message, EmergencySignal):
+            topic, on, fleets = EMERGENCY_SIGNAL.name, message.is_emergency, message.fleet_names
+        elif isinstance(message, Bool) and topic == FIRE_ALARM_TRIGGER.name:
+            on, fleets = message.data, ()
+        else:
+            return
+        node = printable(heard.sender.node.lstrip("/")) if heard.sender else ""
+        told, old = frozenset(fleets), moment.at - began < OLD_S
+        if on:
+            if node not in self.found and len(self.found) < MOST:
+                since = Moment(moment.at, moment.wall, seen=not old)
+                self.found[node] = topic, told, since
+            return
+        for name, (_, stand, _) in [*self.found.items()]:
+            if overlap(stand, told) and (name == node or not old):
+                del self.found[name]
+
+
+def alarms(
+    nodes: Mapping[str, Diagnosis], published: PublishedAlarms, now: float
+) -> Iterator[ObservedAlarm]:
+    """Yield the statement of each daemon that may raise an alarm, and the alarm of each other node.
+    `nodes`: the report of each daemon, by `<node>: daemon`."""
+    stated = set()
     for name, said in sorted(nodes.items()):
         if STATE in said.values:
             told = ", ".join(sorted(fleets_in(said.value(FLEETS))))
             state, causes = said.value(STATE), printable(said.value(CAUSES))
-            node = printable(name.rpartition(": ")[0])
-            yield ObservedAlarm(node, state, causes, printable(told), said.is_current(now))
+            node, since = printable(name.rpartition(": ")[0]), _wall(said.value(SINCE))
+            stated.add(node)
+            current = said.is_current(now)
+            yield ObservedAlarm(node, state, causes, printable(told), current, since)
+    for node, (topic, fleets, at) in sorted(published.found.items()):
+        if node not in stated and (node or not stated):
+            told = printable(", ".join(sorted(fleets)))
+            wall = at.wall if at.seen else None
+            yield ObservedAlarm(node or UNKNOWN, PUBLISHED, topic, told, True, wall)
+
+
+def _wall(text: str) -> float | None:
+    try:
+        return datetime.fromisoformat(text).timestamp()
+    except ValueError:
+        return None

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard, Own
+from bridges.observe.alarms import ObservedAlarm, PublishedAlarms, alarms
 from bridges.observe.charger import ObservedCharger
 from bridges.observe.device import ObservedDevice
 from bridges.observe.diagnosis import Diagnosis, about, of_node, report
@@ -34,15 +35,13 @@ Key = tuple[words.Kind, str]
 class ObservedGraph(Generic[D]):
     """All observed devices of a graph.
 
-    `known` has every device, by kind and name. It has at most `most` devices of a kind. If a kind has
-    no place left, only a device with states gets a place. It replaces a device that has no states, or
-    whose states stopped FORGOTTEN_S ago.
-
-    - `crowded`: the kinds with a device that got no place
-    - `steps`: the times at which the listener's clock stepped, and the size (s) of each step
-    - `nodes`: the reports of our daemons and coordinators on themselves, by `<node>: <device>`
-    - `spoke`: the time when each fleet adapter last spoke. The key is `FLEET/ROBOT` for a robot's
-      request, `FLEET` for a robot's END, and `FLEET/` for a state of the fleet.
+    In a full table a device with states replaces a device without states. A new device also replaces a
+    device whose states stopped FORGOTTEN_S ago. Otherwise the devices heard first stay. `crowded`: the
+    kinds of which devices were left out. `steps`: the times of steps of the listener's clock, and their
+    size (s). `nodes`: the reports of our daemons and coordinators on themselves, by `<node>: <device>`.
+    `published`: the alarms that nodes have published.
+    `spoke`: the time when each fleet adapter last spoke. The key is `FLEET/ROBOT` for a request of a
+    robot, `FLEET` for an END of a robot, and `FLEET/` for the fleet's own state.
     """
 
     makes: ClassVar[Mapping[words.Kind, Callable[[str, Moment], Any]]]
@@ -54,6 +53,7 @@ class ObservedGraph(Generic[D]):
         self.steps: list[tuple[Moment, float]] = []
         self.crowded: set[words.Kind] = set()
         self.nodes: dict[str, Diagnosis] = {}
+        self.published = PublishedAlarms()
         self.spoke: OrderedDict[str, Moment] = OrderedDict()
         self._most = most
         self._offset: float | None = None
@@ -70,6 +70,7 @@ class ObservedGraph(Generic[D]):
         if isinstance(message, d.DiagnosticArray):
             return [*self._diagnosed(message, moment)]
         self._speaks(topic, message, moment)
+        self.published.hear(heard, moment, self.began.at if self.began else 0.0)
         found = [*self._about(message, moment)]
         if isinstance(message, words.Stated):
             for device in found:
@@ -118,6 +119,10 @@ class ObservedGraph(Generic[D]):
         messages."""
         every = self.known.values()
         return [one for one in every if kind in (None, one.kind) and one.state is not None]
+
+    def alarms(self) -> list[ObservedAlarm]:
+        """Return the alarms of all nodes at the last message."""
+        return [*alarms(self.nodes, self.published, self.now.at)]
 
     def make(self, kind: words.Kind, name: str) -> D:
         """Make a device that has not yet heard a message."""

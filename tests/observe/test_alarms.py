@@ -1,11 +1,12 @@
 """The texts of `watch`, `explain` and the page about alarms, from our daemons' diagnostics."""
 
+from datetime import UTC, datetime
 from typing import Any
 
 from bridges.kinds.shared import alarming
 from bridges.kinds.shared.fleet_alarm import AlarmCause, FleetAlarmReport
 from bridges.messages import definitions as d
-from bridges.messages.heard import Heard
+from bridges.messages.heard import Heard, Sender
 from bridges.messages.stamps import stamp
 from bridges.observe.alarms import ObservedAlarm, alarms
 from bridges.observe.all_devices import PlainGraph
@@ -17,10 +18,16 @@ WALL = 1_700_000_000.0
 CAUSE = (AlarmCause("Panel", "fire"),)
 
 
-def told(at: float, state: str, *fleets: str, panel: Any = None, **daemon: Any) -> Heard:
+BEGAN = "2023-11-14T22:10:00Z"
+
+
+def told(
+    at: float, state: str, *fleets: str, panel: Any = None, since: str = BEGAN, **daemon: Any
+) -> Heard:
     """Return the diagnostics in which a panel's daemon states its alarm."""
     report = FleetAlarmReport(state, CAUSE if state == "alarm" else ())
-    status = {**daemon, "alarm": alarming.statement(report, frozenset(fleets))}
+    statement = alarming.statement(report, frozenset(fleets))
+    status = {**daemon, "alarm": {**statement, "since": since}}
     devices = {} if panel is None else {"Panel": panel}
     array = diagnosis("bridge", "alarm", status, devices, stamp(WALL + at))
     return Heard(at, WALL + at, "diagnostics", array)
@@ -30,27 +37,82 @@ def observed(*heard: Heard, now: float | None = None) -> list[ObservedAlarm]:
     graph = PlainGraph()
     for one in heard:
         graph.hear(one)
-    return [*alarms(graph.nodes, heard[-1].at if now is None else now)]
+    return [*alarms(graph.nodes, graph.published, heard[-1].at if now is None else now)]
+
+
+def utc(wall: float) -> str:
+    return f"{datetime.fromtimestamp(wall, UTC):%H:%M}"
 
 
 def test_each_state_of_an_alarm_is_one_sentence() -> None:
     def because(*heard: Heard, now: float | None = None) -> str:
         [found] = observed(*heard, now=now)
         assert found.stands
-        return found.because
+        return found.because(utc)
 
     alarm = (
-        "Every robot is to stand because fire of Panel raised an alarm and nobody has reset bridge"
+        "Every robot is to stand because fire of Panel raised an alarm at 22:10 and nobody has reset"
+        " bridge"
     )
     assert because(told(0.0, "alarm")) == f"{alarm}."
-    silent = f"{alarm}, whose daemon has been silent since then."
+    silent = f"{alarm}, and has been silent since its last statement."
     assert because(told(0.0, "alarm"), now=60.0) == silent
     assert because(told(0.0, "drill", "y", "x")) == (
-        "Every robot of x, y is to stand for a drill of bridge, which ends by itself."
+        "Every robot of x, y is to stand for a drill of bridge, which began at 22:10 and ends by"
+        " itself."
     )
     assert because(told(0.0, "alarm"), told(1.0, "reset")) == (
-        "Every robot is to stand until another alarm ends: bridge was reset."
+        "Every robot is to stand until another alarm ends: bridge was reset at 22:10."
     )
+    for unknown in ("-", "soon"):
+        assert "raised an alarm at an unknown time and" in because(
+            told(0.0, "alarm", since=unknown)
+        )
+
+
+def published(at: float, on: bool, node: str = "", *fleets: str) -> Heard:
+    """Return a message about an alarm from a node; "" if the wire hides the node."""
+    sender = Sender(f"/{node}") if node else None
+    if fleets:
+        message = d.EmergencySignal(fleets, on)
+        return Heard(at, WALL + at, "/emergency_signal", message, sender)
+    return Heard(at, WALL + at, "fire_alarm_trigger", d.Bool(on), sender)
+
+
+def test_an_alarm_of_another_node_stands_until_any_node_ends_it_for_its_fleets() -> None:
+    """RMF's fleet adapters obey the last word of any node."""
+
+    def told_of(*heard: Heard) -> list[str]:
+        began = told(-9.0, "quiet")
+        return [one.because(utc) for one in observed(began, *heard) if one.stands]
+
+    desk = "Every robot is to stand because desk published an alarm on fire_alarm_trigger at 22:13."
+    assert told_of(published(0.0, True, "desk")) == [desk]
+    assert told_of(published(0.0, True, "desk"), published(9.0, False, "nurse")) == []
+    of_x = published(0.0, True, "desk", "x")
+    [two] = told_of(of_x, published(1.0, False, "desk", "y"))
+    assert two.startswith(
+        "Every robot of x is to stand because desk published an alarm on emergency"
+    )
+    assert told_of(of_x, published(1.0, False)) == []
+
+
+def test_a_message_of_our_own_daemon_or_of_a_hidden_node_beside_it_is_not_counted_twice() -> None:
+    [one] = observed(told(0.0, "alarm"), published(9.0, True, "bridge"), published(9.0, True))
+    assert one.node == "bridge"
+
+
+def test_in_the_beginning_an_old_end_ends_only_its_senders_alarm() -> None:
+    heard = (published(0.0, True, "desk"), published(0.1, False, "nurse"))
+    [one] = observed(*heard)
+    assert (one.node, one.since, one.condition) == (
+        "desk",
+        None,
+        "ALARM on fire_alarm_trigger; every fleet is to stand",
+    )
+    assert observed(*heard, published(0.2, False, "desk")) == []
+    [hidden] = observed(published(0.0, True))
+    assert hidden.node == "an unknown node"
 
 
 def test_a_daemon_without_an_alarm_says_nothing() -> None:
@@ -88,7 +150,8 @@ def test_explain_begins_with_the_alarm_for_which_the_robots_stand() -> None:
     before = site.explain("lift", "Lift1", None).now
     site.take(told(1.0, "alarm"))
     alarm = (
-        "Every robot is to stand because fire of Panel raised an alarm and nobody has reset bridge."
+        "Every robot is to stand because fire of Panel raised an alarm at 22:10:00 and nobody has"
+        " reset bridge."
     )
-    assert site.explain("lift", "Lift1", None).now[0] == alarm
+    assert site.explain("lift", "Lift1", UTC).now[0] == alarm
     assert not any("stand" in text for text in before)

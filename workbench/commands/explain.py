@@ -19,6 +19,7 @@ from bridges.runtime import faults
 from bridges.transports.transport import TransportError
 from workbench.explain.explanation import Explained, Explanation
 from workbench.explain.heard_devices import HeardDevices
+from workbench.explain.phrases import TimePhrases
 from workbench.explain.text import SCREEN_LINES, lines
 from workbench.graph.board import SECONDS
 from workbench.graph.join import (
@@ -125,6 +126,8 @@ def _all(site: HeardDevices, devices: list[tuple[Explained, str]], *, as_json: b
     if as_json:
         print(json.dumps([asdict(one) for one in told]))
         return 0
+    for sentence in site.because(TimePhrases(site.now, None).time):
+        print(sentence)
     for one in told:
         print(f"{one.kind} {one.device}: {one.now[0]}")
     print("\nFor more about a device, give its name after FILE.")

@@ -276,9 +276,8 @@ class Live:
     ) -> None:
         self._transport = transport
         self._publishers: dict[str, Publisher[Message]] = {}
-        self._ear = Ear(
-            transport, (*OF_DEVICES, FIRE.live(), topics.FLEET_STATES), others_only=True
-        )
+        live = [topic.live() for topic in OF_DEVICES]
+        self._ear = Ear(transport, (*live, topics.FLEET_STATES), others_only=True)
         self._retained = transport.subscribe(FIRE, lambda message: None)
         allowed = {topic for name in beside for topic in BESIDE[name]}
         speaks = {topic.name for topic in performance.speaks} if performance else set()

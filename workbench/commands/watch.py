@@ -83,6 +83,8 @@ def listen_on(transport: Transport) -> Ear:
         topics.DOOR_SUPERVISOR_HEARTBEAT,
         topics.CHARGING_ASSIGNMENTS,
         topics.DIAGNOSTICS,
+        topics.FIRE_ALARM_TRIGGER,
+        topics.EMERGENCY_SIGNAL,
     )
     return Ear(transport, shown)
 

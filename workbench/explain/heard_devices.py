@@ -5,7 +5,7 @@ day takes no more memory than a recording of a minute.
 """
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from datetime import tzinfo
@@ -17,7 +17,6 @@ from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.heard import Heard, Own
 from bridges.messages.words import KINDS, Kind
-from bridges.observe.alarms import alarms
 from bridges.observe.all_devices import Key, ObservedGraph
 from bridges.observe.diagnosis import COORDINATOR
 from bridges.observe.limits import FLAPS, MOST_DEVICES
@@ -126,7 +125,12 @@ class HeardDevices(ObservedGraph[Device]):
             found += [(kind, one) for one in sorted(d.id for d in self.stated(kind))]
         return [*found, *(("robot", one.who) for one in robots(self.nodes))]
 
-    def kinds(self, name: str) -> list[Explained]:
+    def because(self, clock: Callable[[float], str]) -> list[str]:
+        """Return a sentence for each alarm that lets robots stand. `clock(wall)`: the text of a
+        time."""
+        return [one.because(clock) for one in self.alarms() if one.stands]
+
+    def kinds(self, name: str) -> list[Kind]:
         """Return the kinds of the devices with this name. States tell the kinds. Without states,
         requests tell the kinds."""
         found: list[Explained] = [kind for kind in KINDS if (kind, name) in self.known]
@@ -176,8 +180,7 @@ class HeardDevices(ObservedGraph[Device]):
             _act_on(answer, reason, around.remedies)
         if answer.because is None:
             common.say_waits(answer, device, clock)
-        because = [one.because for one in alarms(self.nodes, self.now.at) if one.stands]
-        answer.now[:0] = because
+        answer.now[:0] = self.because(clock.time)
         if device is not last and last.state is not None:
             held = "" if kind == "door" else f"; held by {words.holder(last.state) or 'nobody'}"
             later = f"{words.condition(last.state)}{held}"

@@ -143,12 +143,12 @@ class Board:
     def _alarms(self, now: float) -> Iterator[BoardRow]:
         """Yield a row for each daemon's alarm, and for each alarm panel."""
         nodes = self._graph.nodes
-        for one in alarms(nodes, now):
-            daemon = nodes[f"{one.node}: daemon"]
+        for one in alarms(nodes, self._graph.published, now):
+            daemon = nodes.get(f"{one.node}: daemon")
             mark = "" if one.current or not one.stands else "SILENT"
             if one.current or one.stands:
-                simulated = self._simulated(daemon, now)
-                text, faults = one.condition, _faults([daemon])
+                simulated = daemon is not None and self._simulated(daemon, now)
+                text, faults = one.condition, _faults([daemon] if daemon else [])
                 yield BoardRow(
                     "alarm", one.node, text, mark=mark, simulated=simulated, faults=faults
                 )

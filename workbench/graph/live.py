@@ -1,7 +1,7 @@
 """A live graph as a stream of `Heard`. A reader of a recording gives the same stream."""
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import partial
 from queue import Empty, SimpleQueue
 from typing import Final
@@ -33,17 +33,35 @@ OF_DEVICES: Final[tuple[AnyTopic, ...]] = (
     topics.INGESTOR_REQUESTS,
     topics.INGESTOR_RESULTS,
     topics.DIAGNOSTICS,
+    topics.FIRE_ALARM_TRIGGER,
+    topics.EMERGENCY_SIGNAL,
 )
-"""Topics about devices. The subscriptions are volatile, because a retained request would look like a
-new request."""
+"""Topics about devices. The subscriptions are volatile, so that no retained request looks like a new
+request; only alarms are retained, because they stand until they are ended."""
+
+
+def subscribed(
+    transport: Transport,
+    heard: Iterable[AnyTopic],
+    receiver: Callable[[AnyTopic], Callable[[Message], None]],
+    *,
+    others_only: bool = False,
+) -> dict[str, Subscription]:
+    """Subscribe to these topics. Return topic -> subscription. A ROS machine without the packages of
+    workcells hears no workcells."""
+    ends: dict[str, Subscription] = {}
+    for topic in heard:
+        try:
+            ends[topic.name] = transport.subscribe(topic, receiver(topic), others_only=others_only)
+        except TransportError:
+            if PACKAGES[topic.type] not in OF_WORKCELLS:
+                raise
+    return ends
 
 
 class Ear:
-    """A listener that hears these topics from now on.
-
-    With `others_only`, the listener ignores the messages of its own transport. `ends` is topic ->
-    subscription. A ROS machine without the workcells' packages hears no workcells.
-    """
+    """Hears these topics from now on. `others_only`: without the messages of this transport itself.
+    `ends`: topic -> subscription."""
 
     def __init__(
         self,
@@ -54,16 +72,12 @@ class Ear:
     ) -> None:
         self._sender = transport.sender
         self._waiting: SimpleQueue[Heard] = SimpleQueue()
-        self.ends: dict[str, Subscription] = {}
-        for topic in heard:
-            received = partial(self._received, topic.name)
-            try:
-                end = transport.subscribe(topic, received, others_only=others_only)
-            except TransportError:
-                if PACKAGES[topic.type] not in OF_WORKCELLS:
-                    raise
-            else:
-                self.ends[topic.name] = end
+        self.ends = subscribed(
+            transport,
+            heard,
+            lambda topic: partial(self._received, topic.name),
+            others_only=others_only,
+        )
 
     def _received(self, topic: str, message: Message) -> None:
         at, wall = time.monotonic(), time.time()

@@ -13,7 +13,9 @@ from bridges.system.certificates import SOON_S, URGENT_S, CertificateEnd, told
 from workbench.notify.settings import NotifySettings, Severity
 
 RAISED: Final = "ALARM_RAISED"
-"""Fault code of a daemon whose raised alarm stops robots."""
+"""The fault of a daemon whose alarm lets robots stand."""
+ALARMS: Final = "ALARM_"
+"""The beginning of the faults whose details say why robots stand."""
 
 
 class Trouble(Struct, frozen=True):
@@ -90,7 +92,8 @@ def _of_nodes(graph: ObservedGraph[Any], now: Moment) -> Iterator[Trouble]:
         for code in sorted(report.faults) if report.is_current(now.at) else ():
             severity: Severity = "critical" if code == RAISED else "warning"
             shown = printable(code)
-            yield Trouble(kind, named, shown, severity, f"{kind} {named}: {shown}")
+            detail = f": {printable(report.faults[code][0])}" if code.startswith(ALARMS) else ""
+            yield Trouble(kind, named, shown, severity, f"{kind} {named}: {shown}{detail}")
 
 
 def _of_lift(one: AnyDevice, name: str, now: Moment, settings: NotifySettings) -> Iterator[Trouble]:

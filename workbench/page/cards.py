@@ -26,6 +26,7 @@ Key = tuple[str, str]
 STATUS: Final = "status"
 WRONG: Final = "wrong"
 ROBOTS: Final = "robots"
+STANDING: Final = "standing"
 
 
 def place_of(key: Key) -> str:
@@ -99,8 +100,17 @@ class Cards:
         return {place: html for place, html in self._parts.items() if before.get(place) != html}
 
     def parts(self) -> dict[str, str]:
-        """Draw everything except the cards. Return place -> content."""
-        return {STATUS: self.status(), WRONG: self.attention(), ROBOTS: self.robots()}
+        """Draw everything except the cards: place -> content."""
+        return {
+            STATUS: self.status(),
+            STANDING: self.standing(),
+            WRONG: self.attention(),
+            ROBOTS: self.robots(),
+        }
+
+    def standing(self) -> str:
+        """Say why robots stand, if an alarm or a drill stops them."""
+        return drawing.standing(self._site.alarms())
 
     def attention(self) -> str:
         """List the devices that need attention, each with its trouble and the remedy."""

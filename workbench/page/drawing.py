@@ -12,6 +12,7 @@ from urllib.parse import quote
 from bridges.messages import definitions as d
 from bridges.messages import words
 from bridges.messages.words import Stated
+from bridges.observe.alarms import ObservedAlarm
 from workbench.explain.answer import Remedies
 from workbench.page.live_site import DeviceView, RobotShown, Stands
 
@@ -66,9 +67,14 @@ def path_of(kind: str, name: str) -> str:
     return f"/{kind}/{quote(name, safe='')}"
 
 
-def linked(kind: str) -> bool:
-    """Has the device or robot a view of its own?"""
-    return kind in (*words.KINDS, "robot")
+def standing(alarms: Iterable[ObservedAlarm]) -> str:
+    """Say why robots stand: one sentence for each alarm and drill that stops them."""
+    told = []
+    for one in alarms:
+        sentence = escape(one.because(lambda wall: "\0")).replace("\0", when(one.since or 0.0))
+        sign = "◔" if one.state == "drill" else "✖"
+        told += [f'<p class="panel {one.state}">{sign} {sentence}</p>'] if one.stands else []
+    return f'<div role="alert">{"".join(told)}</div>' if told else ""
 
 
 def attention(wrong: Sequence[DeviceView], remedies: Remedies) -> str:

@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import closing
+from functools import partial
 from queue import Empty, Full, Queue
 from typing import Final
 
@@ -14,6 +15,7 @@ from bridges.messages.heard import Heard, Sender, bounded
 from bridges.messages.topics import AnyTopic
 from bridges.system.log import pairs
 from bridges.transports.transport import Transport, TransportError
+from workbench.graph.live import subscribed
 from workbench.page.live_site import HEARD, LiveSite
 
 log = logging.getLogger(__name__)
@@ -72,8 +74,7 @@ class Listener:
         while not self._ended.is_set():
             try:
                 with closing(self._join()) as transport:
-                    for topic in HEARD:
-                        transport.subscribe(topic, self._receive(topic, transport.sender))
+                    subscribed(transport, HEARD, partial(self._receive, transport.sender))
                     self.trouble = ""
                     self._stay(transport)
             except TransportError as error:
@@ -92,7 +93,7 @@ class Listener:
                 self.trouble = ""
 
     def _receive(
-        self, topic: AnyTopic, sender: Callable[[], Sender | None]
+        self, sender: Callable[[], Sender | None], topic: AnyTopic
     ) -> Callable[[Message], None]:
         def receive(message: Message) -> None:
             kept = bounded(message)

@@ -17,6 +17,7 @@ from bridges.messages import topics, words
 from bridges.messages.heard import Heard
 from bridges.messages.topics import AnyTopic
 from bridges.messages.words import KINDS, Kind, Requested, Stated
+from bridges.observe.alarms import ObservedAlarm
 from bridges.observe.all_devices import Key
 from bridges.observe.charger import NOBODY, ObservedCharger
 from bridges.observe.diagnosis import FLEET, PANEL, about, kind_in
@@ -30,6 +31,7 @@ from workbench.explain.device_timeline import Drawing
 from workbench.explain.explanation import Explanation
 from workbench.explain.timeline import Timeline
 from workbench.graph.board import Board, BoardRow
+from workbench.graph.live import OF_DEVICES
 
 KEPT_S: Final = 600.0
 """Time (s) before now that a device's page shows."""
@@ -41,22 +43,9 @@ each device, a large site would take 150 MB."""
 MOST_ROBOTS: Final = 500
 
 HEARD: Final[tuple[AnyTopic, ...]] = (
-    topics.LIFT_STATES,
-    topics.DOOR_STATES,
-    topics.CHARGER_STATES,
-    topics.LIFT_REQUESTS,
-    topics.ADAPTER_LIFT_REQUESTS.live(),
-    topics.DOOR_REQUESTS,
-    topics.ADAPTER_DOOR_REQUESTS,
-    topics.CHARGER_REQUESTS,
-    topics.CHARGER_CANCELS,
-    topics.ADAPTER_CHARGER_REQUESTS,
-    topics.ADAPTER_CHARGER_CANCELS,
-    topics.CHARGER_REFUSALS,
-    topics.DOOR_SUPERVISOR_HEARTBEAT,
+    *OF_DEVICES,
     topics.CHARGING_ASSIGNMENTS,
     topics.FLEET_STATES,
-    topics.DIAGNOSTICS,
 )
 
 
@@ -165,6 +154,10 @@ class LiveSite:
         if device is None:
             return self._story.explain("robot", name, zone, remedies)
         return self._story.explain(device.kind, device.id, zone, remedies)
+
+    def alarms(self) -> list[ObservedAlarm]:
+        """Return the alarms of all nodes."""
+        return self._story.alarms()
 
     def timeline(self, kind: str, name: str, now: float) -> Timeline | None:
         """Return the last ten minutes of a device. `name` is the device's printable name.

@@ -19,8 +19,8 @@ from workbench.explain.picture import svg
 from workbench.page import tables
 from workbench.page.actions import Deeds
 from workbench.page.buttons import Buttons
-from workbench.page.cards import AGES_S, ROBOTS, STATUS, WRONG, Cards, Key, Wall, place_of
-from workbench.page.drawing import linked, path_of
+from workbench.page.cards import AGES_S, ROBOTS, STANDING, STATUS, WRONG, Cards, Key, Wall, place_of
+from workbench.page.drawing import path_of
 from workbench.page.explanation_html import explanation, story
 from workbench.page.head import head, main, part
 from workbench.page.live_site import LiveSite
@@ -64,6 +64,7 @@ class SiteWall(Tab):
         self._missed = False
         self._built = 0
         part(f'<div id="{STATUS}">{cards.status()}</div>{LOST}{FILTERS}')
+        part(f'<div id="{STANDING}">{cards.standing()}</div>')
         part(f'<div id="{WRONG}">{cards.attention()}</div>')
         self._box = part()
         part(f'<div id="{ROBOTS}">{cards.robots()}</div>')

@@ -61,7 +61,7 @@ def test_all_changes_of_a_turn_are_one_script_for_every_browser() -> None:
         walls[0].changes
         == walls[1].changes
         == [
-            ["card/lift/Lift1", "card/lift/Lift2", "status", "wrong", "robots"],
+            ["card/lift/Lift1", "card/lift/Lift2", "status", "standing", "wrong", "robots"],
             ["card/lift/Lift1", "card/lift/Lift2"],
         ]
     )
