@@ -68,6 +68,16 @@ class ObservedAlarm(Struct, frozen=True):
         }.get(self.state, f"because {self.node} published an alarm on {self.causes} {at}")
         return f"{robots} is to stand {why}{silent}."
 
+    @property
+    def ends(self) -> tuple[str, str]:
+        """Who must act to let the robots drive (`a person` or `nobody`), and how."""
+        reset = f"when the cause is over and it is safe: `rmf-bridge reset FILE` of {self.node}"
+        return {
+            "alarm": ("a person", reset),
+            "drill": ("nobody", "the drill ends by itself"),
+            "reset": ("a person", "end the other alarms: `rmf-bridge watch` shows them"),
+        }.get(self.state, ("a person", f"end the alarm of {self.node}, where it was raised"))
+
 
 class PublishedAlarms:
     """The alarms that nodes have published, by node. A `false` ends them as it lets RMF's robots

@@ -11,6 +11,7 @@ from bridges.messages.stamps import stamp
 from bridges.observe.alarms import ObservedAlarm, alarms
 from bridges.observe.all_devices import PlainGraph
 from bridges.runtime.diagnostics import diagnosis
+from workbench.explain.explanation import NextStep
 from workbench.explain.heard_devices import HeardDevices
 from workbench.graph.board import Board, BoardRow
 
@@ -153,5 +154,11 @@ def test_explain_begins_with_the_alarm_for_which_the_robots_stand() -> None:
         "Every robot is to stand because fire of Panel raised an alarm at 22:10:00 and nobody has"
         " reset bridge."
     )
-    assert site.explain("lift", "Lift1", UTC).now[0] == alarm
+    explained = site.explain("lift", "Lift1", UTC)
+    assert explained.now[0] == alarm
+    how = "when the cause is over and it is safe: `rmf-bridge reset FILE` of bridge"
+    assert explained.next == (NextStep("a person", how),)
+    site.take(told(2.0, "drill"))
+    drill = (NextStep("nobody", "the drill ends by itself"),)
+    assert site.explain("lift", "Lift1", UTC).next == drill
     assert not any("stand" in text for text in before)

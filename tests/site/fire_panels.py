@@ -9,7 +9,7 @@ Laws:
 - A daemon publishes `false` only after all of its causes have ended and a person has reset the
   daemon, and only if no other panel's alarm stands.
 - A drill is stated as a drill. It ends at its time, without a reset.
-- After each exercise every robot drives.
+- After each exercise every robot drives. `rmf-bridge judge alarm` finds no broken law of any panel.
 """
 
 from collections.abc import Callable
@@ -25,6 +25,7 @@ from bridges.kinds.shared.decision import DrillOrdered, OperatorReset
 from bridges.kinds.shared.fleet_alarm import FleetAlarmLimits
 from bridges.messages import definitions as d
 from bridges.messages import topics
+from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
 from bridges.runtime.clock import Clock
 from bridges.runtime.diagnostics import diagnosis
@@ -38,6 +39,8 @@ from tests.site.building import CONFIG, Device
 from tests.site.daemons import LEAST_GAP_S, DeviceDaemon
 from tests.site.network import Air, Place, Weather
 from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
+from workbench.judge.judge import Judge
+from workbench.judge.law import Verdict
 
 FIRST_S, EVERY_S = 40.0, 86400.0
 CASE_S = 150.0
@@ -197,6 +200,10 @@ class FirePanels:
         self.air = Air(self.timeline, self.random)
         self.air.weather = Weather(lost=0.0, states_lost=0.0)  # reliable, as the topic's QoS is
         self.air.watch = self._said
+        self._judges = {name: Judge("alarm", name) for name in PANELS}
+        ear = Place(self.air, "judge", lambda: None)
+        for topic in (topics.FIRE_ALARM_TRIGGER.live(), topics.DIAGNOSTICS):
+            ear.subscribe(topic, partial(self._hears, ear, topic))
         self.panels = {name: Panel(self.timeline, self.air, name) for name in PANELS}
         self.fleets = [FleetAdapter(self.timeline, self.air, name) for name in FLEETS]
         self._cases = [
@@ -247,6 +254,13 @@ class FirePanels:
         for fleet in self.fleets:
             self._law(not fleet.stands, f"{fleet.name} stands without an alarm")
         self.done[self._case] = self.done.get(self._case, 0) + 1
+
+    def _hears(self, ear: Place, topic: topics.AnyTopic, message: Any) -> None:
+        now = self.timeline.now
+        for name, judge in self._judges.items():
+            judge.hear(Heard(now, EPOCH + now, topic.name, message, ear.sender()))
+            found = [one for one in judge.verdicts() if one.verdict is Verdict.BROKEN]
+            self._law(not found, f"{name} breaks {[(one.law.id, one.evidence) for one in found]}")
 
     def _law(self, holds: bool, law: str) -> None:
         self.require(holds, f"exercise '{self._case}': {law}")

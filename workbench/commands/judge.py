@@ -1,4 +1,4 @@
-"""`rmf-bridge judge`: check any lift, door or charger node, or a fleet adapter, against RMF's contract.
+"""`rmf-bridge judge`: check a device's node, a fleet adapter or a node's alarm against RMF's contract.
 
 `workbench/judge/` has the laws and the plays. This file has the options, the graph, the clock and the
 verdict.
@@ -55,7 +55,9 @@ STATES = {
     "dispenser": topics.DISPENSER_STATES.name,
     "ingestor": topics.INGESTOR_STATES.name,
     "adapter": topics.ADAPTER_LIFT_REQUESTS.name,
+    "alarm": topics.DIAGNOSTICS.name,
 }
+ALARMS = (FIRE, topics.EMERGENCY_SIGNAL)
 WIDTH = 120
 BESIDE: dict[str, tuple[str, ...]] = {
     "supervisor": (
@@ -76,7 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "name",
         metavar="NAME",
         nargs="?",
-        help="the device as RMF names it; an adapter: FLEET, or FLEET/ROBOT",
+        help="the device as RMF names it; an adapter: FLEET, or FLEET/ROBOT; an alarm: its node",
     )
     add_graph_arguments(parser)
     parser.add_argument(
@@ -278,7 +280,7 @@ class Live:
         self._publishers: dict[str, Publisher[Message]] = {}
         live = [topic.live() for topic in OF_DEVICES]
         self._ear = Ear(transport, (*live, topics.FLEET_STATES), others_only=True)
-        self._retained = transport.subscribe(FIRE, lambda message: None)
+        self._retained = [transport.subscribe(topic, lambda message: None) for topic in ALARMS]
         allowed = {topic for name in beside for topic in BESIDE[name]}
         speaks = {topic.name for topic in performance.speaks} if performance else set()
         self._sole = sorted(speaks - allowed)
@@ -320,8 +322,11 @@ class Live:
             judging.judge.history.senders = (*names, *unnamed)
             publishers = self._ear.ends[FIRE.name].matched()
             supervisors = self._ear.ends[topics.LIFT_REQUESTS.name].matched()
-            retaining = self._retained.matched()
+            retaining = self._retained[0].matched()
             judging.judge.fire_ends(publishers, retaining, supervisors, now, wall)
+            every = [n for topic in ALARMS for n in self._ear.ends[topic.name].senders()]
+            retain = [n for end in self._retained for n in end.senders()]
+            judging.judge.alarm_ends(every, retain, now, wall)
         self._say(judging.turn(now, wall))
 
     def _say(self, said: list[Said]) -> None:

@@ -181,6 +181,9 @@ class HeardDevices(ObservedGraph[Device]):
         if answer.because is None:
             common.say_waits(answer, device, clock)
         answer.now[:0] = self.because(clock.time)
+        if all(step.who == "nobody" for step in answer.next):
+            ends = [one.ends for one in self.alarms() if one.stands]
+            answer.next = [NextStep(*end) for end in ends] or answer.next
         if device is not last and last.state is not None:
             held = "" if kind == "door" else f"; held by {words.holder(last.state) or 'nobody'}"
             later = f"{words.condition(last.state)}{held}"

@@ -1,15 +1,23 @@
 """Check one device's messages against the laws of the device's kind. A fleet adapter also counts as a
 device."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, Final, Literal
 
 from bridges.messages import words
 from bridges.messages.heard import Heard
-from workbench.judge import adapter_laws, charger_laws, door_laws, lift_laws, workcell_laws
+from workbench.judge import (
+    adapter_laws,
+    alarm_laws,
+    charger_laws,
+    door_laws,
+    lift_laws,
+    workcell_laws,
+)
 from workbench.judge.adapter_history import AdapterHistory
+from workbench.judge.alarm_history import AlarmHistory
 from workbench.judge.charger_history import ChargerHistory
 from workbench.judge.door_history import DoorHistory
 from workbench.judge.history import AnyHistory
@@ -17,8 +25,8 @@ from workbench.judge.law import Doubt, Evidence, JudgedLaw, Law, Verdict
 from workbench.judge.lift_history import LiftHistory
 from workbench.judge.workcell_history import DispenserHistory, IngestorHistory
 
-JudgedKind = words.Kind | Literal["adapter"]
-KINDS: Final[tuple[JudgedKind, ...]] = (*words.KINDS, "adapter")
+JudgedKind = words.Kind | Literal["adapter", "alarm"]
+KINDS: Final[tuple[JudgedKind, ...]] = (*words.KINDS, "adapter", "alarm")
 LAWS: Final[Mapping[JudgedKind, tuple[Law[Any], ...]]] = MappingProxyType(
     {
         "lift": lift_laws.LAWS,
@@ -27,6 +35,7 @@ LAWS: Final[Mapping[JudgedKind, tuple[Law[Any], ...]]] = MappingProxyType(
         "dispenser": workcell_laws.LAWS,
         "ingestor": workcell_laws.LAWS,
         "adapter": adapter_laws.LAWS,
+        "alarm": alarm_laws.LAWS,
     }
 )
 SCENES: Final[Mapping[JudgedKind, Callable[[str], AnyHistory]]] = MappingProxyType(
@@ -37,6 +46,7 @@ SCENES: Final[Mapping[JudgedKind, Callable[[str], AnyHistory]]] = MappingProxyTy
         "dispenser": DispenserHistory,
         "ingestor": IngestorHistory,
         "adapter": AdapterHistory,
+        "alarm": AlarmHistory,
     }
 )
 MUTE_S: Final = 10.0
@@ -113,9 +123,25 @@ class Judge:
             found = None if 0 < volatile <= supervisors else volatile > 0
             self.history.volatile = found if found == self._volatile_before else None
             self._volatile_before = found
-            for tally in self._tallies:
-                if tally.law.id == "L12.retained":
-                    self._check(tally, at, wall)
+            self._check_one("L12.retained", at, wall)
+
+    def alarm_ends(
+        self, names: Collection[str], retaining: Collection[str], at: float, wall: float
+    ) -> None:
+        """Take the nodes that publish alarms, and those among them that retain their messages. Only a
+        repeated finding counts, because publishers are discovered one by one."""
+        if isinstance(self.history, AlarmHistory):
+            node = self.history.name
+            ours = node in {name.lstrip("/") for name in names}
+            found = node not in {name.lstrip("/") for name in retaining} if ours else None
+            self.history.volatile = found if found == self._volatile_before else None
+            self._volatile_before = found
+            self._check_one("A3.retained", at, wall)
+
+    def _check_one(self, law: str, at: float, wall: float) -> None:
+        for tally in self._tallies:
+            if tally.law.id == law:
+                self._check(tally, at, wall)
 
     def end(self, at: float, wall: float, heard_s: float = 0.0) -> tuple[JudgedLaw, ...]:
         """End the judgement after `heard_s`. Return each law with its verdict, in the laws' order."""

@@ -74,7 +74,7 @@ def text(report: Judgement, width: int) -> str:
 
 
 def _counted(report: Judgement) -> str:
-    return "request" if report.kind == "adapter" else "state"
+    return {"adapter": "request", "alarm": "message"}.get(report.kind, "state")
 
 
 def _lines(judged: JudgedLaw, width: int) -> list[str]:

@@ -118,14 +118,17 @@ def statement(report: FleetAlarmReport, fleets: Fleets) -> dict[str, str]:
 
 def stated(message: DiagnosticArray) -> Iterator[AlarmStated]:
     """Yield the statements of our daemons in a message of `/diagnostics`. A message may have none."""
+    for node, state, fleets in statements(message):
+        yield AlarmStated(node, state in RAISED, fleets)
+
+
+def statements(message: DiagnosticArray) -> Iterator[tuple[str, str, Fleets]]:
+    """Yield the node, the state and the fleets of each statement in a message of `/diagnostics`."""
     for status in message.status:
         values = {pair.key: pair.value for pair in status.values}
         if STATE in values:
-            yield AlarmStated(
-                status.hardware_id.lstrip("/"),
-                values[STATE] in RAISED,
-                fleets_in(values.get(FLEETS, "")),
-            )
+            fleets = fleets_in(values.get(FLEETS, ""))
+            yield status.hardware_id.lstrip("/"), values[STATE], fleets
 
 
 def fleets_in(text: str) -> Fleets:

@@ -1,0 +1,165 @@
+"""The laws of a node's alarm. Each law has a story in which it is not seen, kept, and broken.
+
+Each party that could be at fault has a story of its own, in which only that party is blamed.
+"""
+
+from collections.abc import Iterable
+
+import pytest
+
+from bridges.kinds.shared import alarming
+from bridges.kinds.shared.fleet_alarm import FleetAlarmReport
+from bridges.messages import definitions as d
+from bridges.messages import topics
+from bridges.messages.heard import Heard, Sender
+from bridges.messages.stamps import stamp
+from bridges.runtime.diagnostics import diagnosis
+from workbench.judge.judge import LAWS, Judge
+
+NODES = {name: Sender(f"/{name}") for name in ("panel", "lift", "desk")}
+
+
+def says(at: float, on: bool, node: str = "panel", *fleets: str) -> Heard:
+    """Return a message of a node; of a hidden node with the name ""."""
+    if fleets:
+        message = d.EmergencySignal(fleets, on)
+        return Heard(at, at, topics.EMERGENCY_SIGNAL.name, message, NODES.get(node))
+    return Heard(at, at, topics.FIRE_ALARM_TRIGGER.name, d.Bool(on), NODES.get(node))
+
+
+def states(at: float, state: str, node: str = "panel", *fleets: str) -> Heard:
+    report = FleetAlarmReport(state)
+    status = {"alarm": alarming.statement(report, frozenset(fleets))}
+    told = diagnosis(node, "alarm", status, {}, stamp(at))
+    return Heard(at, at, topics.DIAGNOSTICS.name, told, NODES[node])
+
+
+def stating(state: str, begin: int, end: int, node: str = "panel") -> list[Heard]:
+    """Return a statement for each second."""
+    return [states(float(at), state, node) for at in range(begin, end)]
+
+
+def judged(lines: Iterable[Heard], node: str = "panel") -> dict[str, str]:
+    """Return the verdict on each law."""
+    judge = Judge("alarm", node)
+    told = sorted(lines, key=lambda line: line.at)
+    for line in told:
+        judge.hear(line)
+    last = told[-1].at
+    return {one.law.id: one.verdict.value for one in judge.end(last, last)}
+
+
+def retained(*retaining: str) -> dict[str, str]:
+    judge = Judge("alarm", "/panel")
+    judge.hear(states(0.0, "quiet"))
+    for _ in range(2):
+        judge.alarm_ends(["/panel", "/lift"], retaining, 1.0, 1.0)
+    return {one.law.id: one.verdict.value for one in judge.end(2.0, 2.0)}
+
+
+ALARM = [*stating("quiet", 0, 2), says(1.5, True), *stating("alarm", 2, 8)]
+OVER = [*ALARM, says(8.5, False), *stating("quiet", 9, 14)]
+LIFTS = [states(0.0, "quiet", "lift"), says(1.0, True, "lift"), *stating("alarm", 1, 12, "lift")]
+STORIES: dict[str, tuple[list[Heard], list[Heard], list[Heard]]] = {
+    "A1.false": (
+        [says(1.0, False), says(2.0, True)],
+        [says(1.0, True), says(2.0, False)],
+        [says(1.0, False), says(2.0, False), says(3.0, False)],
+    ),
+    "A1.others": (
+        [says(1.0, True), says(2.0, False)],
+        [says(0.5, True, "lift"), says(1.0, False, "lift"), says(1.0, True), says(9.0, False)],
+        [*LIFTS, says(5.0, True), says(6.0, False), states(13.0, "quiet")],
+    ),
+    "A1.fleets": (
+        [says(1.0, True, "panel", "x"), says(2.0, False, "lift", "y")],
+        [says(1.0, True, "panel", "x", "y"), says(2.0, False, "panel", "y", "x", "z")],
+        [says(1.0, True, "panel", "x", "y"), says(2.0, False, "panel", "y")],
+    ),
+    "A2.told": (
+        stating("alarm", 0, 9),
+        ALARM,
+        [*stating("quiet", 0, 2), *stating("alarm", 2, 8)],
+    ),
+    "A2.again": (
+        ALARM,
+        [*ALARM, says(3.2, False, "desk"), says(3.3, True)],
+        [*ALARM, says(3.2, False, "desk")],
+    ),
+    "A2.ends": (ALARM, OVER, [*ALARM, *stating("quiet", 8, 14)]),
+}
+
+
+@pytest.mark.parametrize("law", STORIES)
+def test_a_law_needs_its_occasion(law: str) -> None:
+    assert [judged(story)[law] for story in STORIES[law]] == ["not seen", "kept", "broken"]
+
+
+def test_a_publisher_that_retains_nothing_is_found_by_its_name() -> None:
+    found = [one["A3.retained"] for one in (judged(ALARM), retained("/panel"), retained("/lift"))]
+    assert found == ["not seen", "kept", "broken"]
+
+
+def test_every_law_has_its_stories() -> None:
+    assert [*STORIES, "A3.retained"] == [law.id for law in LAWS["alarm"]]
+
+
+def broken(lines: Iterable[Heard], node: str) -> set[str]:
+    return {law for law, verdict in judged(lines, node).items() if verdict == "broken"}
+
+
+def test_of_two_nodes_only_the_one_that_ends_the_others_alarm_is_blamed() -> None:
+    """The lift repeats its alarm, as it must."""
+    ended = [*LIFTS, says(5.0, False, "desk"), says(5.1, True, "lift")]
+    assert broken(ended, "desk") == {"A1.others"}
+    assert broken(ended, "lift") == set()
+
+
+def test_a_node_that_does_not_repeat_its_alarm_is_blamed_beside_the_one_that_ended_it() -> None:
+    ended = [*LIFTS, says(5.0, False, "desk")]
+    assert (broken(ended, "desk"), broken(ended, "lift")) == ({"A1.others"}, {"A2.again"})
+
+
+def test_after_a_third_nodes_false_nobody_else_is_blamed_for_the_end() -> None:
+    """The alarm of a node without statements ends with the first `false`: its robots drive already."""
+    alarm = [says(0.5, True, "lift"), says(1.0, True), says(5.0, False, "desk")]
+    assert broken([*alarm, says(9.0, False)], "panel") == set()
+    assert broken([*alarm, says(9.0, False)], "desk") == {"A1.others"}
+
+
+def test_two_nodes_may_end_one_alarm_together() -> None:
+    both = [*LIFTS[:6], says(1.5, True), says(5.0, False), says(5.2, False, "lift")]
+    both += stating("quiet", 6, 14, "lift")
+    assert (broken(both, "panel"), broken(both, "lift")) == (set(), set())
+
+
+def test_what_the_wire_hides_is_nobodys_fault() -> None:
+    """A message without a sender may be the node's own."""
+    hidden = [*stating("quiet", 0, 2), says(1.5, True, ""), *stating("alarm", 2, 8)]
+    hidden += [says(8.5, False, ""), *stating("quiet", 9, 14)]
+    found = judged(hidden)
+    assert set(found.values()) == {"not seen"}
+    assert broken([*OVER[:9], says(8.5, False, ""), *stating("quiet", 9, 14)], "panel") == set()
+
+
+def test_a_statement_that_crosses_its_message_breaks_no_law() -> None:
+    """The topics have no common order."""
+    begins = [
+        *stating("quiet", 0, 2),
+        says(1.9, True),
+        states(2.0, "quiet"),
+        *stating("alarm", 3, 9),
+    ]
+    ends = [says(9.9, False), states(10.0, "alarm"), *stating("quiet", 11, 15)]
+    assert broken([*begins, *ends], "panel") == set()
+
+
+def test_a_listener_that_came_late_knows_no_beginning_of_the_alarm() -> None:
+    late = [line for line in OVER if line.at >= 3.0]
+    assert set(judged(late).values()) <= {"not seen", "kept"}
+
+
+def test_an_alarm_of_another_building_may_end() -> None:
+    lift = [says(0.5, True, "lift", "y"), *(states(n, "alarm", "lift", "y") for n in range(1, 9))]
+    ours = [says(1.0, True, "panel", "x"), says(5.0, False, "panel", "x")]
+    assert broken([*lift, *ours], "panel") == set()
