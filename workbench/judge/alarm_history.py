@@ -45,6 +45,7 @@ class AlarmHistory(AnyHistory):
         self.over: dict[str, float] = {}
         self.volatile: bool | None = None
         self._stating: set[str] = set()
+        self._fleets: Fleets = frozenset()
 
     def take(self, heard: Heard, own: bool = False) -> bool:
         """Take a message on an alarm's topic, or statements of our daemons."""
@@ -103,7 +104,8 @@ class AlarmHistory(AnyHistory):
         if not event.on:
             self._end(event.fleets)
             self._is_over(node)
-            if self.told is not None and overlap(self.told, event.fleets):
+            ours = self._fleets if self.told is None and self.raised else self.told
+            if ours is not None and overlap(ours, event.fleets):
                 self.ended_at = self.against_at = self.now
 
     def _end(self, fleets: Fleets) -> None:
@@ -116,7 +118,7 @@ class AlarmHistory(AnyHistory):
         if node == self.name:
             self.states += 1
             self.new, self.stated_before, self.stated = True, self.stated, state
-            self.stated_at = self.now
+            self.stated_at, self._fleets = self.now, fleets
             self.quiet_at = self.now if state == "quiet" else self.quiet_at
             self.rose = self.raised and (self.rose or self.stated_before == "quiet")
             return

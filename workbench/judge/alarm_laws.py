@@ -57,8 +57,7 @@ def _again(history: AlarmHistory) -> Finding:
     if history.again:
         return KEPT
     against = history.against_at
-    late = against + TOLD_S < history.stated_at
-    if history.new and history.raised and history.told is not None and against > 0.0 and late:
+    if history.new and history.raised and 0.0 <= against < history.stated_at - TOLD_S:
         return f"another node's `false` was {history.now - against:.1f} s ago: robots drive"
     return None
 

@@ -157,6 +157,9 @@ def test_a_statement_that_crosses_its_message_breaks_no_law() -> None:
 def test_a_listener_that_came_late_knows_no_beginning_of_the_alarm() -> None:
     late = [line for line in OVER if line.at >= 3.0]
     assert set(judged(late).values()) <= {"not seen", "kept"}
+    ended = [*late[:5], says(3.2, False, "desk")]
+    assert broken(ended, "panel") == {"A2.again"}
+    assert judged([*ended, says(3.3, True)])["A2.again"] == "kept"
 
 
 def test_an_alarm_of_another_building_may_end() -> None:
