@@ -6,7 +6,7 @@ makes no statements.
 
 from collections.abc import Callable, Iterator, Mapping
 from datetime import datetime
-from typing import Final
+from typing import Final, Literal
 
 from msgspec import Struct
 
@@ -19,6 +19,7 @@ from bridges.messages.words import printable
 from bridges.observe.diagnosis import Diagnosis
 from bridges.observe.requesters import Moment
 
+Actor = Literal["a person", "nobody"]
 STANDS: Final = frozenset((*RAISED, "reset"))
 PUBLISHED: Final = "published"
 """The state of an alarm that a node has published without a statement."""
@@ -69,14 +70,15 @@ class ObservedAlarm(Struct, frozen=True):
         return f"{robots} is to stand {why}{silent}."
 
     @property
-    def ends(self) -> tuple[str, str]:
+    def ends(self) -> tuple[Actor, str]:
         """Who must act to let the robots drive (`a person` or `nobody`), and how."""
         reset = f"when the cause is over and it is safe: `rmf-bridge reset FILE` of {self.node}"
-        return {
-            "alarm": ("a person", reset),
-            "drill": ("nobody", "the drill ends by itself"),
-            "reset": ("a person", "end the other alarms: `rmf-bridge watch` shows them"),
-        }.get(self.state, ("a person", f"end the alarm of {self.node}, where it was raised"))
+        if self.state == "drill":
+            return "nobody", "the drill ends by itself"
+        return "a person", {
+            "alarm": reset,
+            "reset": "end the other alarms: `rmf-bridge watch` shows them",
+        }.get(self.state, f"end the alarm of {self.node}, where it was raised")
 
 
 class PublishedAlarms:

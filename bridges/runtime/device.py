@@ -264,18 +264,16 @@ class Node(Generic[S, L, M, X, E, O, R]):
             self._publish(topic, self._kind.stamped(message, stamp))
 
     def _send(self, report: R) -> bool:
-        """Publish the state. Return False if the state was not sent, or if RMF has no message for such
-        a state."""
-        topic = self._kind.states
-        if topic is None:
+        """Publish the state. Return False if it was not sent, or if RMF has no message for it."""
+        topic, state_of = self._kind.states, self._kind.state_message
+        if topic is None or state_of is None:
             return False
         try:
             at = self._clock.stamp(report.read_at)
         except ClockError as error:
             self._not_sent(topic, error)
             return False
-        state = self._kind.state_message(self.name, self._settings, report, at)
-        return self._publish(topic, state) is not False
+        return self._publish(topic, state_of(self.name, self._settings, report, at)) is not False
 
     def _log(self) -> None:
         """Log the changes. This is the last step of a scan, because a log line takes as long as a whole

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Generic
 
-from bridges.kinds.shared.decision import Fault, M, OrderedByPerson, R, RequestRefused
+from bridges.kinds.shared.decision import Fault, M, OperatorReset, R, RequestRefused
 from bridges.kinds.shared.durations import NEVER
 from bridges.kinds.shared.graph_kind import GraphEvent, GraphKind, MaySpeak, Woken
 from bridges.kinds.shared.kind import E, L, S
@@ -94,7 +94,7 @@ class GraphNode(Generic[S, L, M, E, R]):
         self._answers = RefusalAnswers()
         self._keeper = Keeper(kind, kept, self._publish)
         self._started_at = clock.monotonic()
-        self._orders: deque[OrderedByPerson] = deque()
+        self._orders: deque[OperatorReset | E] = deque()
         self._may = MaySpeak(False, alone=self.alone is None)
         self._hears: dict[str, Subscription] = {}
         self._unsaid: list[tuple[Topic[Message], Message]] = []
@@ -116,7 +116,7 @@ class GraphNode(Generic[S, L, M, E, R]):
                 self._named(topic), hear, others_only=others_only
             )
 
-    def obey(self, order: OrderedByPerson) -> None:
+    def obey(self, order: OperatorReset | E) -> None:
         """Let every subject obey a person's order. Any thread may call this."""
         self._orders.append(order)
         self.inbox.wake()

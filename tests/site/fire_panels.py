@@ -227,8 +227,10 @@ class FirePanels:
 
     def _exercise(self) -> None:
         self._open = True
-        for party in (*self.panels.values(), *self.fleets):
-            (party.start if isinstance(party, Panel) else party.restart)()
+        for panel in self.panels.values():
+            panel.start()
+        for fleet in self.fleets:
+            fleet.restart()
         cases = self.random.sample(self._cases, len(self._cases))
         for number, case in enumerate(cases):
             self.timeline.after(10.0 + number * CASE_S, partial(self._begin, case))
@@ -386,7 +388,12 @@ class FirePanels:
         one.plant.fail(signal, "off")
         one.daemon.look()
         self._sees(one)
-        self._in(20.0, lambda: (one.plant.fail(signal, None), one.daemon.look()))
+
+        def is_mended() -> None:
+            one.plant.fail(signal, None)
+            one.daemon.look()
+
+        self._in(20.0, is_mended)
         self._in(40.0, lambda: self._reset(one))
 
     def _late_fleet(self, one: Panel, other: Panel) -> None:

@@ -6,9 +6,10 @@ from typing import Final
 from workbench.judge.alarm_history import AlarmHistory
 from workbench.judge.history import NOT_YET
 from workbench.judge.law import KEPT, Doubt, Finding, Law, shown
-from workbench.judge.lift_checks import ALARMS_END_S
 
 HANDLES: Final = "rmf_ros2 FleetUpdateHandle::handle_emergency"
+ALARMS_END_S: Final = 3.0
+"""The longest time (s) between the `false` messages of nodes that end one alarm together."""
 FALSES: Final = 3
 """The number of needless `false` in a row that no missed `true` can explain."""
 TOLD_S: Final = 2.0

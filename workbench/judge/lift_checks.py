@@ -20,10 +20,8 @@ SUPERVISED_S: Final = 10.0
 """Time (s) without a request on lift_requests. After this time, the supervisor may be dead, or the
 recording may lack the supervisor."""
 SETTLED_S: Final = 3.0
-"""Time (s) after a node's first state. Within this time, the node may still obey requests that we did
-not hear."""
-ALARMS_END_S: Final = 3.0
-"""Maximum time (s) between the `false` messages of several nodes that end one alarm together."""
+"""Time (s) after a node's first state in which the node may still obey requests that we have not
+heard."""
 
 
 def _is_open(history: LiftHistory) -> d.LiftState | None:
@@ -307,26 +305,12 @@ def grants_nothing(history: LiftHistory) -> Finding:
 
 
 def no_false(history: LiftHistory) -> Finding:
-    """Check that `false` comes only after an alarm. If several lifts are on the graph, the publisher is
-    unknown."""
+    """Check that the lift's node publishes `false` only after an alarm."""
     if not isinstance(history.news, d.Bool) or history.others:
         return None
     if history.often(history.false_alarms):
         return "`false` 3 times, with no alarm to call off"
     return KEPT if history.called_off else None
-
-
-def others_alarms(history: LiftHistory) -> Finding:
-    """Check that no node sends `false` during another node's alarm. Several nodes may end one alarm
-    together."""
-    if not isinstance(history.news, d.Bool) or history.ended_by is None:
-        return None
-    by, others = history.ended_by, [s for s in history.alarming if s is not history.ended_by]
-    standing = [sender for sender in others if history.alarming[sender]]
-    if not standing:
-        return KEPT if others else None
-    who = f"`false` of {shown(by.node)} during the alarm of {shown(standing[0].node)}"
-    return Doubt(who, lambda: not any(map(history.alarming.get, standing)), ALARMS_END_S)
 
 
 def retained(history: LiftHistory) -> Finding:

@@ -9,7 +9,7 @@ from bridges.messages import topics
 from bridges.messages.heard import Heard, Sender
 from bridges.observe.lift import HAZARDS, ObservedLift
 from bridges.observe.limits import SLOWEST_S
-from workbench.judge.history import NOT_YET, REMEMBERED, History, keep
+from workbench.judge.history import NOT_YET, History, keep
 
 GRACE_S: Final = 65.0
 """Time (s) in which an ended session may resume, because its robot may still be in the car."""
@@ -97,10 +97,8 @@ class LiftHistory(History[d.LiftState]):
     - `bare_end`: whether the previous session ended at an END without a floor.
     - `free_since`: the beginning of the present time without session and hazard.
     - `false_alarms`: times of needless `false` messages on the fire topic.
-    - `called_off`: whether the latest message on the fire topic ended an alarm.
-    - `alarming`: sender -> its last message on the fire topic.
-    - `ended_by`: sender of the latest `false`.
-    - `volatile`: whether the fire topic's publisher retains nothing; None if unknown.
+    - `called_off`: the latest message on the fire topic ended an alarm.
+    - `volatile`: the fire topic's publisher retains nothing; None if unknown.
     """
 
     seen: ObservedLift
@@ -123,8 +121,6 @@ class LiftHistory(History[d.LiftState]):
         self.travelled = self.bare_end = False
         self.false_alarms: deque[float] = deque(maxlen=3)
         self.alarmed = self.called_off = False
-        self.alarming: dict[Sender, bool] = {}
-        self.ended_by: Sender | None = None
         self.volatile: bool | None = None
         self.free_since = NOT_YET
         self._open: tuple[str, float] = ("", NOT_YET)
@@ -288,9 +284,9 @@ class LiftHistory(History[d.LiftState]):
             self.unserved_at = self.now if unserved else self.unserved_at
 
     def _alarm(self, on: bool, sender: Sender | None) -> bool:
-        self.ended_by = None if on else sender
-        if sender is not None and (sender in self.alarming or len(self.alarming) < REMEMBERED):
-            self.alarming[sender] = on
+        """Take a message of this lift's node, or of an unknown node."""
+        if sender and self._sender and sender.node != self._sender.node:
+            return False
         self.called_off = self.alarmed and not on
         if not on and not self.alarmed:
             self.false_alarms.append(self.now)

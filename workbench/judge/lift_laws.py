@@ -184,14 +184,6 @@ LAWS: Final[tuple[Law[LiftHistory], ...]] = (
         checks.no_false,
     ),
     Law(
-        "L12.others",
-        "No `false` while the alarm of another node stands",
-        "a `false`, after alarms of two nodes that the wire tells apart",
-        "Fleet adapters resume at any `false`. The robots drive although the other alarm goes on",
-        "rmf_ros2 FleetUpdateHandle::handle_emergency; open-rmf/rmf-web#129",
-        checks.others_alarms,
-    ),
-    Law(
         "L12.retained",
         "fire_alarm_trigger is published TRANSIENT_LOCAL",
         "a publisher of fire_alarm_trigger, with only one lift on the graph",

@@ -4,13 +4,6 @@ state."""
 from collections.abc import Mapping
 
 from bridges.kinds.alarm.report import PanelReport
-from bridges.messages.definitions import Message, Time
-
-
-def state_message(name: str, settings: object, report: PanelReport, stamp: Time) -> Message:
-    """Raise NotImplementedError. Nobody calls this function, because the kind has no topic of
-    states."""
-    raise NotImplementedError("RMF has no message for the state of an alarm panel")
 
 
 def summary(report: PanelReport) -> Mapping[str, str]:

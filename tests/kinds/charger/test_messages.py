@@ -3,7 +3,7 @@
 import pytest
 from msgspec.structs import replace
 
-from bridges.kinds.charger import KIND
+from bridges.kinds.charger import KIND, messages
 from bridges.kinds.charger.memory import ChargerLimits
 from bridges.kinds.charger.report import ChargerReport
 from bridges.kinds.charger.settings import ChargerDurations, ChargerSettings
@@ -88,7 +88,7 @@ def test_a_charging_station_is_reported_as_rmf_reads_it() -> None:
         robot="AMR01",
         measured=Measured(time_to_full_s=90.5),
     )
-    assert KIND.state_message("charger_a", SETTINGS, shown, Time(5, 6)) == ChargerState(
+    assert messages.state_message("charger_a", SETTINGS, shown, Time(5, 6)) == ChargerState(
         charger_time=Time(5, 6),
         state=3,
         charger_name="charger_a",
@@ -104,7 +104,7 @@ def test_a_charging_station_is_reported_as_rmf_reads_it() -> None:
 def test_every_state_but_idle_has_a_request_id_even_if_nobody_asked(
     state: ChargerStateValue,
 ) -> None:
-    message = KIND.state_message("charger_a", SETTINGS, ChargerReport(1.0, state), Time())
+    message = messages.state_message("charger_a", SETTINGS, ChargerReport(1.0, state), Time())
     free = state is ChargerStateValue.CHARGER_IDLE
     assert message == ChargerState(
         state=int(state),

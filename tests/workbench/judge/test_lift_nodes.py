@@ -111,6 +111,11 @@ def test_a_lift_whose_supervisor_has_died_owes_nobody_a_session() -> None:
     assert watched("lift", "Lift1", Taken(), *parties, for_s=90.0)["broken"] == set()
 
 
+def test_a_false_of_another_node_is_not_the_lifts() -> None:
+    falses = [(5.0 + n, topics.FIRE_ALARM_TRIGGER, d.Bool(False)) for n in range(9)]
+    assert watched("lift", "Lift1", RightLift(), Script(*falses))["broken"] == set()
+
+
 def test_with_two_lifts_nobody_knows_whose_alarm_it_is() -> None:
     class Other(RightLift):
         name = "Lift2"

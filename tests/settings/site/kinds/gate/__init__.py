@@ -14,12 +14,9 @@ KIND: AnyDeviceKind = Kind(
     name="gate",
     devices_key="gates",
     states=topics.DOOR_STATES,
-    requests={},
     device_name=_unused,
-    sender=lambda message: "",
     limits=_unused,
     initial=_unused,
     decide=_unused,
-    state_message=_unused,
     summary=_unused,
 )
