@@ -142,7 +142,7 @@ class TestFieldsOnHttp(LinkedPanelContract):
         settings = msgspec.convert(plain, http_panel.HttpPanelSettings)
         plant = http_alarm.FAKE.plant("panel", settings, [])
         world = RealTime({"panel": plant})
-        station = http_alarm.FakeHttpPanel(plant, settings)
+        station = http_alarm.FAKE.station(plant, settings)
         with on_http(world, station, TIMEOUT_S) as (bus, clock):
             yield Bench(http_panel.HttpPanel(settings, bus), plant, clock)
 

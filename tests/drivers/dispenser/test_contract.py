@@ -11,8 +11,8 @@ from bridges.kinds.dispenser.signals import Item, WorkcellOutputs, WorkcellSampl
 from drivers import DriverError
 from drivers.dispenser import dry_contact, http, register
 from drivers.hal import modbus
-from hal_fakes.http_dispenser import PARTS, FakeHttpWorkcell
-from hal_fakes.http_dispenser import contacts as http_contacts
+from hal_fakes.http_dispenser import FakeHttpWorkcell
+from hal_fakes.http_flags import PARTS, contacts, flags
 from hal_fakes.modbus.register_dispenser import FakeRegisterWorkcell
 from hal_fakes.modbus.register_dispenser import contacts as register_contacts
 from hal_fakes.plants import dispenser
@@ -148,7 +148,7 @@ class TestHttp(WiredWorkcellContract):
 
     @contextmanager
     def benches(self) -> Iterator[Bench]:
-        wires = http_contacts(self.settings)
+        wires = contacts(flags(self.settings.inputs), "start")
         plant = WorkcellPlant("cell", wires, steady=True, parts=PARTS)
         world = RealTime({"cell": plant})
         with on_http(world, FakeHttpWorkcell(plant, self.settings), TIMEOUT_S) as (bus, clock):

@@ -15,7 +15,8 @@ from drivers.door import http as door_http
 from drivers.door.http import HttpDoorSettings, create, decode
 from drivers.hal import HalError, http
 from drivers.json_fields import JsonFlag
-from hal_fakes.http_door import PARTS, FakeHttpDoor, contacts
+from hal_fakes.http_door import FakeHttpDoor
+from hal_fakes.http_flags import PARTS, contacts, flags
 from hal_fakes.plants.door import DoorPlant
 from hal_fakes.plants.plant import FailureMode
 from hal_fakes.realtime import RealTime
@@ -35,7 +36,9 @@ class HttpContract(WiredDoorContract):
 
     @contextmanager
     def benches(self) -> Iterator[Bench]:
-        plant = DoorPlant("door", contacts(self.settings), parts=PARTS, **QUICK)
+        plant = DoorPlant(
+            "door", contacts(flags(self.settings.inputs), door_http.HOLD), parts=PARTS, **QUICK
+        )
         world = RealTime({"door": plant})
         station = FakeHttpDoor(world.plants["door"], self.settings)
         with on_http(world, station, timeout_s=0.3) as (bus, clock):
