@@ -74,11 +74,16 @@ def flag_if(answer: Mapping[str, object], place: JsonFlag | None) -> bool | None
 
 
 def certain(answer: Mapping[str, object], place: JsonFlag | None) -> bool:
-    """Return a flag that reports a danger. Return False without a place. Raises DriverError as `flag`
-    does, and for null too, because null says nothing about the danger."""
+    """Return the flag; False without a place. Raises DriverError as `flag` does. Raises it for null
+    too, because null says nothing about a danger, a contact or a relay."""
     if place and needed(answer, place.field) is None:
         raise wrong(place.field, None, "yes or no")
     return place is not None and flag(answer, place)
+
+
+def certain_if(answer: Mapping[str, object], place: JsonFlag | None) -> bool | None:
+    """Return the flag as `certain` does; None without a place. Raises DriverError."""
+    return None if place is None else certain(answer, place)
 
 
 def place_text(place: JsonFlag | JsonNumber) -> str:

@@ -9,6 +9,8 @@ from bridges.observe.device import ObservedDevice, Wait
 from bridges.observe.news import News
 from bridges.observe.requesters import Fact, Moment
 
+FINAL: Final = ("success", "failed")
+"""RMF's words for the results that end a request."""
 SHOWN: Final = 10
 """The maximum number of a queue's guids that are kept for display."""
 
@@ -38,9 +40,9 @@ class ObservedWorkcell(ObservedDevice[d.DispenserState]):
         return guid in map(self.text, queue)
 
     def waits(self, now: Moment) -> Iterator[Wait]:
-        """Yield a `Wait` for each request that a fleet adapter still repeats."""
+        """Yield each request that a fleet adapter still repeats, and that has no final result yet."""
         for one in self.requesters:
-            if one.asks(now):
+            if one.asks(now) and self.results.get(one.who) not in FINAL:
                 yield Wait(one.who, one.wants, one.since)
 
     def _hear_other(self, moment: Moment, topic: str, message: d.Message) -> Iterator[News]:

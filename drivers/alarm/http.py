@@ -4,7 +4,7 @@ A field has no cable of its own. If the loop behind a field is cut, only the con
 cut.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Annotated
 
 from msgspec import Meta
@@ -64,7 +64,8 @@ class HttpPanel:
     def read(self) -> PanelSample:
         """Read every source now. Raises DriverError."""
         answer = self._bus.get_json(self._settings.state_path)
-        sources = {name: _flag(answer, at) for name, at in self._settings.sources.items()}
+        places = self._settings.sources.items()
+        sources = {name: json_fields.certain(answer, at) for name, at in places}
         return PanelSample(sources, json_fields.flag_if(answer, self._settings.drill))
 
     def write(self, outputs: PanelOutputs) -> None:
@@ -75,14 +76,6 @@ class HttpPanel:
 
     def close(self) -> None:
         """Do nothing, because the bus closes its connection."""
-
-
-def _flag(answer: Mapping[str, object], place: JsonFlag) -> bool:
-    """Return the flag as true or false. Raises DriverError for null too, because an unknown source must
-    not count as clear."""
-    if json_fields.found(answer, place.field) is None:
-        raise json_fields.wrong(place.field, None, "a value")
-    return json_fields.flag(answer, place)
 
 
 DRIVER = DriverType(

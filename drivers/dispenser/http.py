@@ -135,9 +135,9 @@ class HttpWorkcell:
         answer, found = self._bus.get_json(self._settings.state_path), self._settings.inputs
         return WorkcellSample(
             done=json_fields.flag(answer, found.done),
-            busy=json_fields.flag_if(answer, found.busy),
+            busy=json_fields.certain_if(answer, found.busy),
             ready=json_fields.flag_if(answer, found.ready),
-            fault=json_fields.flag_if(answer, found.fault),
+            fault=json_fields.certain_if(answer, found.fault),
         )
 
     def write(self, outputs: WorkcellOutputs) -> None:

@@ -200,14 +200,12 @@ class HttpDoor:
         self._told = on
 
     def _held(self, answer: Mapping[str, object]) -> bool | None:
-        return json_fields.flag_if(answer, self._settings.held)
+        return json_fields.certain_if(answer, self._settings.held)
 
 
 def decode(settings: HttpDoorSettings, answer: Mapping[str, object]) -> DoorSample:
     """Decode the answer. Raises DriverError with the name of an invalid field."""
-    found, said = settings.inputs, partial(json_fields.flag_if, answer)
-    for danger in (found.obstruction, found.fire):
-        json_fields.certain(answer, danger)
+    found, said = settings.inputs, partial(json_fields.certain_if, answer)
     return DoorSample(
         said(found.opened), said(found.closed), said(found.obstruction), said(found.fire)
     )

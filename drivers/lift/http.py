@@ -341,7 +341,7 @@ class HttpLift:
         self._called = None
 
     def _shown(self, name: Held, answer: Mapping[str, object]) -> bool | None:
-        return json_fields.flag_if(answer, self._held[name].shown)
+        return json_fields.certain_if(answer, self._held[name].shown)
 
 
 def _wants(outputs: LiftOutputs, name: Held) -> bool:

@@ -321,8 +321,8 @@ class _Exchange:
 
     def _take(self, heard: Heard) -> None:
         if isinstance(heard.message, d.DiagnosticArray):
-            boarded = _boarded(heard.message, self.request.name)
-            self.seen = replace(self.seen, boarded=boarded or self.seen.boarded)
+            if told := _told(heard.message, self.request):
+                self.seen = replace(self.seen, told=told, told_at=heard.at)
             return
         before, self.seen = self.seen, self.seen.hears(heard, self.request.about)
         if self.seen.states == before.states:
@@ -368,10 +368,10 @@ class _Exchange:
         self.out.flush()
 
 
-def _boarded(message: d.DiagnosticArray, lift: str) -> str:
-    """Return the value `boarded` from this lift's own diagnostics. Return "" for other diagnostics."""
+def _told(message: d.DiagnosticArray, request: Request) -> dict[str, str]:
+    """Return the values in the diagnostics of the request's device; {} for other diagnostics."""
     for status in message.status:
         values = {value.key: value.value for value in status.values}
-        if (status.hardware_id, values.get("kind")) == (lift, "lift"):
-            return values.get("boarded", "")
-    return ""
+        if (status.hardware_id, values.get("kind")) == (request.name, request.kind):
+            return values
+    return {}

@@ -15,8 +15,8 @@ from workbench.explain.phrases import TimePhrases, lasted, listed
 
 TWO_NODES: Final = "TWO_NODES_FOR_ONE_DEVICE"
 BUS: Final = (
-    "check the bus or network: the module at its end, its supply, cable and address, and whether a"
-    " second master is on the line; `rmf-bridge log` shows each lost reply"
+    "check the bus or network: the module at its end, its supply, cable and address, and on Modbus a"
+    " second master on the line; `rmf-bridge log` shows each lost reply"
 )
 FLICKERS: Final = (
     "find what kept changing: an input that flickers (check its wire and contact), or a relay module"
@@ -33,8 +33,8 @@ OWN: Final[Mapping[str, tuple[str, str]]] = {
     "COMMUNICATION_LOST": ("", BUS),
     "OUTPUTS_NOT_WRITTEN": (
         "What the daemon asks for does not reach the controller, so the controller is not to blame.",
-        "check the relay module that the fault names: its supply, its line, and whether a second master"
-        " writes to it",
+        "check the relays that the fault names: their supply, their line, and on Modbus whether a"
+        " second master writes to them",
     ),
     "RELAY_RESTS": (
         "While the relay rests, the daemon asks the controller for nothing, so the controller is not to"

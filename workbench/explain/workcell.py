@@ -7,6 +7,7 @@ adapter has no time limit.
 
 from typing import Final
 
+from bridges.observe.workcell import FINAL
 from workbench.explain import answer as common
 from workbench.explain import first_causes
 from workbench.explain.answer import Answer
@@ -51,17 +52,20 @@ def _doubt(found: Answer, workcell: WorkcellFacts, clock: TimePhrases) -> None:
 
 
 def _next(found: Answer, workcell: WorkcellFacts, clock: TimePhrases) -> None:
-    waits = list(workcell.waits(clock.now))
-    if not waits:
+    asks = [one for one in workcell.requesters if one.asks(clock.now)]
+    if not asks:
         queue = workcell.queue.value
         left = f" Its state still lists {queue}, which no fleet adapter repeats." if queue else ""
         found.say(f"Nobody requests the workcell.{left}", "nobody", "there is nothing to do")
         return
-    first = waits[0]
+    waits = [one for one in asks if workcell.results.get(one.who) not in FINAL]
+    first = (waits or asks)[0]
     said = f"Request {first.who} asks for {first.wants} {clock.since(first.since)}."
-    result = workcell.results.get(first.who, "")
-    if result in ENDS:
-        found.say(f"{said} {ENDS[result]}", "the fleet adapter", "go on")
+    if not waits:
+        ended = (
+            f"Request {first.who} for {first.wants} is over. {ENDS[workcell.results[first.who]]}"
+        )
+        found.say(ended, "the fleet adapter", "go on")
     elif workcell.mode.value == "offline":
         found.say(said, "a person", DECIDE)
     elif workcell.mode.value == "busy":

@@ -193,7 +193,7 @@ def _read(memory: LiftMemory, sample: LiftSample, now: float, limits: LiftLimits
     return replace(
         memory,
         senses=take(memory.senses, sample, now, limits),
-        io_fault="",
+        io_fault=memory.io_fault if memory.write_failed else "",
         unwritten_since=memory.unwritten_since if memory.write_failed else None,
         write_failed=False,
     )

@@ -172,6 +172,21 @@ class TestHttp(WiredWorkcellContract):
             bench.write(RUN)
         assert bench.starts() == [True]
 
+    @pytest.mark.parametrize("signal", ["busy", "fault"])
+    def test_an_input_that_is_null_gives_no_reading(self, signal: str) -> None:
+        """Null would hide a fault, and would end a cycle that still runs."""
+        fields = {one: place.field for one, place in flags(self.settings.inputs).items()}
+        answer: dict[str, object] = dict.fromkeys(fields.values(), True)
+        answer[fields[signal]] = None
+
+        class Answers:
+            def get_json(self, path: str) -> dict[str, object]:
+                return answer
+
+        driver = http.create("cell", self.settings, Answers())  # type: ignore[arg-type]
+        with pytest.raises(DriverError, match="is null, and yes or no is expected"):
+            driver.read()
+
     def test_the_request_takes_the_place_of_the_marks_and_cannot_leave_its_text(self) -> None:
         nasty = Item('box", "n": 99', 2)
         call = http.filled(self.settings.start, WorkcellOutputs(True, '"}', nasty))

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import msgspec
 import pytest
 
-from bridges.kinds.door.signals import DoorOutputs, DoorSample
+from bridges.kinds.door.signals import DoorOutputs
 from bridges.settings.load import load
 from drivers import DriverError
 from drivers.door import http as door_http
@@ -154,17 +154,17 @@ def test_an_input_that_is_neither_yes_nor_no_gives_no_reading() -> None:
     for value in values:
         with pytest.raises(DriverError, match=r"'input:0\.state' is .* true or false is expected"):
             create("door", SETTINGS, Relay(opened=value)).read()
-    assert create("door", SETTINGS, Relay(opened=None)).read() == DoorSample(False, True)
 
 
-@pytest.mark.parametrize("danger", ["obstruction", "fire"])
-def test_a_danger_that_is_null_gives_no_reading(danger: str) -> None:
-    inputs = msgspec.structs.replace(SETTINGS.inputs, **{danger: JsonFlag(field="danger")})
+@pytest.mark.parametrize("signal", ["opened", "closed", "obstruction", "fire"])
+def test_an_input_that_is_null_gives_no_reading(signal: str) -> None:
+    """A door of which neither end were known would be MOVING."""
+    inputs = msgspec.structs.replace(SETTINGS.inputs, **{signal: JsonFlag(field="it")})
     settings = msgspec.structs.replace(SETTINGS, inputs=inputs)
     answer = Relay().get_json("")
-    assert getattr(decode(settings, {**answer, "danger": True}), danger) is True
-    with pytest.raises(DriverError, match="'danger' is null, and yes or no is expected"):
-        decode(settings, {**answer, "danger": None})
+    assert getattr(decode(settings, {**answer, "it": True}), signal) is True
+    with pytest.raises(DriverError, match="'it' is null, and yes or no is expected"):
+        decode(settings, {**answer, "it": None})
 
 
 WRONG = {

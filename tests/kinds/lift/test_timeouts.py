@@ -13,6 +13,7 @@ from bridges.kinds.lift.signals import (
     Side,
 )
 from bridges.kinds.shared.decision import (
+    Fault,
     OperatorReset,
     WriteFailed,
 )
@@ -323,6 +324,14 @@ def test_inputs_are_believed_though_outputs_cannot_be_written() -> None:
     story.building.driven = OFF  # the module's own watchdog has switched off
     story.run(story.now + 5.0)
     assert story.state == "OFFLINE, closed at L1, A to L1"
+
+
+def test_a_write_that_succeeds_again_leaves_no_fault_without_its_reason() -> None:
+    """The fault lasts until the next reading. Its text must last as long."""
+    alone = Alone(stale_after_s=2.0)(0.0, AT_L1, WriteFailed("timeout"))
+    alone(1.0, AT_L1, WriteFailed("timeout"))(2.5, AT_L1)
+    assert alone.decision.report.faults == (Fault("OUTPUTS_NOT_WRITTEN", "timeout"),)
+    assert alone(3.0, AT_L1).decision.report.faults == ()
 
 
 def test_unwritten_outputs_are_judged_by_their_age_when_a_request_comes() -> None:

@@ -36,7 +36,7 @@ def told(
     Return (time in s, way) of each request, the hints, and the outcome. The way is "supervisor" or
     "direct".
     """
-    seen = RequestProgress(0.0, 10.0, listeners, boarded=boarded)
+    seen = RequestProgress(0.0, 10.0, listeners, told={"boarded": boarded})
     sent, hints = list[tuple[int, str]](), list[str]()
     for now, state in enumerate(states):
         seen = seen.hears(Heard(now, now, "", state), request.about)
@@ -106,7 +106,7 @@ def test_whether_a_robot_is_inside_is_read_from_the_lifts_own_diagnostics() -> N
     lift.publisher(topics.DIAGNOSTICS).publish(d.DiagnosticArray(status=(health, other)))
     lift.publisher(topics.LIFT_STATES).publish(GRANTED)
     exchange.look()
-    assert exchange.seen.boarded == "no"
+    assert exchange.seen.told["boarded"] == "no"
     exchange.seen = replace(exchange.seen, began_at=time.monotonic() - 6.0)
     lift.publisher(topics.LIFT_STATES).publish(GRANTED)
     exchange.look()

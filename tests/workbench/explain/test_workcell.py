@@ -7,6 +7,7 @@ import pytest
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
+from bridges.observe.all_devices import PlainGraph
 from workbench.explain.heard_devices import HeardDevices
 
 WALL = 1_800_000_000.0
@@ -57,6 +58,23 @@ def test_it_says_which_request_waits_and_who_must_act(lines: Any, says: str, who
     found = told(*lines)
     assert says in " ".join(found.now)
     assert [step.who for step in found.next][:1] == [who]
+
+
+@pytest.mark.parametrize(("status", "waits"), [(0, [4.5]), (1, []), (2, [])])
+def test_a_wait_ends_with_its_result_though_rmf_repeats_the_request(
+    status: int, waits: list[float]
+) -> None:
+    """notify, the exporter and the recorder count the same waits."""
+    graph = PlainGraph()
+    request = [(at + 4.0, topic, message) for at, topic, message in asks(3)]
+    for at, topic, message in sorted([*states(9, 0), *request, result(5.0, status)], key=_at):
+        graph.hear(Heard(at, WALL + at, f"dispenser_{topic}", message))
+    [store] = graph.stated("dispenser")
+    assert [wait.since.at for wait in store.waits(graph.now)] == waits
+
+
+def _at(line: tuple[float, str, Any]) -> float:
+    return line[0]
 
 
 def test_the_story_has_the_request_its_results_and_the_changes() -> None:

@@ -1,6 +1,6 @@
 """`send` in virtual time: the requests and their times, the outcome, and the texts for failures."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import msgspec
@@ -53,10 +53,12 @@ def tell(
     listen_from: float = 0.0,
     timeout_s: float = 10.0,
     graph: str = "",
+    told: Mapping[str, str] | None = None,
 ) -> Ran:
     """Run `send` in steps of 0.1 s from 0 s on. Deliver each message of the story at its time."""
     left = sorted(story, key=lambda entry: entry[0])
-    seen, ran = RequestProgress(0.0, timeout_s, graph=graph), Ran([], [], Fulfilled(""), 0.0)
+    seen = RequestProgress(0.0, timeout_s, graph=graph, told=told or {})
+    ran = Ran([], [], Fulfilled(""), 0.0)
     for tick in range(10_000):
         now = round(tick * 0.1, 1)
         while left and left[0][0] <= now:
@@ -178,7 +180,9 @@ def test_a_floor_that_is_not_served_fails_at_once_with_the_nearest_name() -> Non
 
 def test_where_a_robot_may_be_in_the_car_the_remedy_asks_to_look_into_it() -> None:
     held = replace(LIFT, session_id=OTHER, current_mode=d.LiftMode(2))
-    seen = replace(RequestProgress(0.0, 10.0), states=(held,), stated_at=1.0, boarded="yes")
+    seen = replace(
+        RequestProgress(0.0, 10.0), states=(held,), stated_at=1.0, told={"boarded": "yes"}
+    )
     assert next(iter(RIDE.obstacles(seen))).remedy == (
         "a robot may be in the car; if it is empty:"
         " rmf-bridge release Lift1 --car-empty --localhost"

@@ -32,9 +32,36 @@ def test_the_request_is_repeated_with_one_guid_until_its_result() -> None:
     assert ran.outcome == Fulfilled("store has served request mine")
 
 
+SILENT = [(2.0, state()), (3.0, state()), (4.0, state())]
+
+
 def test_a_failure_is_told() -> None:
-    ran = tell(ASK, [(0.1, state()), (1.0, result(2))])
+    ran = tell(ASK, [(0.1, state()), (1.0, result(2)), *SILENT])
     assert ran.outcome == Failed("store has failed request mine: see its log")
+    assert ran.at == 4.0
+
+
+@pytest.mark.parametrize(
+    ("told", "why"),
+    [
+        (
+            {
+                "last_refusal request": "mine",
+                "last_refusal reason": "cannot be asked here: most is 1",
+            },
+            "it was refused: cannot be asked here: most is 1",
+        ),
+        (
+            {"WORKCELL_HALTED": "mine has failed: done did not come; rmf-bridge reset when clear"},
+            "done did not come; rmf-bridge reset when clear",
+        ),
+        ({"WORKCELL_HALTED": "theirs has failed: jam"}, "see its log"),
+        ({"last_refusal request": "theirs", "last_refusal reason": "x"}, "see its log"),
+    ],
+)
+def test_a_failure_gives_the_daemons_own_reason(told: dict[str, str], why: str) -> None:
+    ran = tell(ASK, [(0.1, state()), (1.0, result(2)), *SILENT], told=told)
+    assert ran.outcome == Failed(f"store has failed request mine: {why}")
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ which the most specific obstacle comes first. The last obstacle always applies.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import ClassVar, Final, NamedTuple, TypeVar
@@ -35,10 +35,9 @@ class RequestProgress(Struct, frozen=True):
     - `graph`: the name of our graph, in words for people.
     - `hinted`: the hints printed.
     - `heartbeat`: the door supervisor's latest heartbeat, which came at `heartbeat_at`.
-    - `boarded`: whether a robot is in the car, "yes" or "no", from the lift's diagnostics; "" if not
-      heard.
+    - `told`: the values in the device's own diagnostics, which last came at `told_at`.
     - `refusals`: the chargers' refusals after our first request.
-    - `results`: the workcells' results.
+    - `results`: the workcells' results, with their times.
     """
 
     began_at: float
@@ -53,9 +52,10 @@ class RequestProgress(Struct, frozen=True):
     hinted: frozenset[str] = frozenset()
     heartbeat: SupervisorHeartbeat | None = None
     heartbeat_at: float = NEVER_AT
-    boarded: str = ""
+    told: Mapping[str, str] = {}
+    told_at: float = NEVER_AT
     refusals: tuple[ChargerRefusal, ...] = ()
-    results: tuple[words.WorkcellResulted, ...] = ()
+    results: tuple[tuple[float, words.WorkcellResulted], ...] = ()
 
     def hears(self, heard: Heard, about: Callable[[words.Stated], bool]) -> "RequestProgress":
         """Take a message. `about(state)` tells whether the state concerns the request."""
@@ -66,7 +66,7 @@ class RequestProgress(Struct, frozen=True):
             refusal = read(message) if self.first_sent_at is not None else None
             return replace(self, refusals=(*self.refusals, refusal)) if refusal else self
         if isinstance(message, words.WorkcellResulted):
-            return replace(self, results=(*self.results[-9:], message))
+            return replace(self, results=(*self.results[-9:], (heard.at, message)))
         if not isinstance(message, words.Stated):
             return self
         there = self.there | {(words.kind(message), words.device(message))}

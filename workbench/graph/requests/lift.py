@@ -70,7 +70,7 @@ class LiftRide(_Lift):
         )
 
     def _remedy(self, seen: RequestProgress) -> str:
-        if seen.boarded != "yes":
+        if seen.told.get("boarded") != "yes":
             return f"to end that session: {self._release}"
         release = self.line.other("release", self.name, "--car-empty")
         return f"a robot may be in the car; if it is empty: {release}"
@@ -179,7 +179,7 @@ class LiftEnd(_Lift):
         return found._replace(remedy=f"if the car is empty: {self.line.again_with('--car-empty')}")
 
     def _outside(self, seen: RequestProgress) -> bool:
-        return self.car_empty or seen.boarded == "no"
+        return self.car_empty or seen.told.get("boarded") == "no"
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
         """Return the obstacle that the lift still shows the session."""

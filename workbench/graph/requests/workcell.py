@@ -9,6 +9,8 @@ from bridges.messages import topics, words
 from bridges.messages.topics import AnyTopic
 from workbench.graph.requests import Failed, Fulfilled, Obstacle, Request, RequestProgress
 
+TELLS_S = 2.5
+"""The time (s) after a result in which its daemon says why. Diagnostics come each second."""
 DECIDE = "its daemon's machine: rmf-bridge status, then rmf-bridge workcell done, again or failed"
 
 
@@ -37,15 +39,26 @@ class Dispensing(Request):
         return self.made(d.Time(), self.guid, self.name, self.transporter, items)  # type: ignore[arg-type]
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Return the outcome that a result gives. In RMF, a request that the workcell no longer lists
-        would also count as done."""
-        for one in seen.results:
+        """Return the outcome that a result gives. RMF would also count an unlisted request as done."""
+        for at, one in seen.results:
             if (one.source_guid, one.request_guid) == (self.name, self.guid):
                 if one.status == d.WorkcellStatus.SUCCESS:
                     return Fulfilled(f"{self.name} has served request {self.guid}")
-                if one.status == d.WorkcellStatus.FAILED:
-                    return Failed(f"{self.name} has failed request {self.guid}: see its log")
+                if one.status == d.WorkcellStatus.FAILED and (why := self._why(seen, at)):
+                    return Failed(f"{self.name} has failed request {self.guid}: {why}")
         return None
+
+    def _why(self, seen: RequestProgress, failed_at: float) -> str:
+        """Return why the request has failed, as its daemon says; "" until its daemon may have said
+        it."""
+        told = seen.told
+        if told.get("last_refusal request") == self.guid:
+            return f"it was refused: {told.get('last_refusal reason')}"
+        prefix = f"{self.guid} has failed: "
+        if (halted := told.get("WORKCELL_HALTED", "")).startswith(prefix):
+            return halted.removeprefix(prefix)
+        heard_at = max(seen.stated_at, seen.told_at)
+        return "" if heard_at < failed_at + TELLS_S else "see its log"
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
         """Return the obstacles that the workcell's last state shows."""
