@@ -16,6 +16,7 @@ from typing import Any, Final, get_args
 
 from bridges import __version__
 from bridges.settings.building_map import BuildingMap, load_map
+from bridges.settings.fleet_site import read_site
 from bridges.settings.load import understood
 from bridges.system.written import no_folder, not_written
 from bridges.yaml.parsing import SettingsError
@@ -57,8 +58,12 @@ def _is_lift(given: Given) -> bool:
     return bool(given["kind"] == "lift")
 
 
+def _is_fleet(given: Given) -> bool:
+    return bool(given["kind"] == "fleet")
+
+
 def _is_lift_on_contacts(given: Given) -> bool:
-    return _is_lift(given) and given["wiring"] != "gateway"
+    return _is_lift(given) and given["wiring"] not in ("gateway", "http")
 
 
 def _in_table(name: str, given: Given) -> bool:
@@ -94,7 +99,9 @@ def _on_the_header(given: Given) -> bool:
 QUESTIONS: Final = (
     Question("kind", "What is it?", lambda given: "lift", lambda given: get_args(Kind)),
     Question(
-        "name", "The device's name on RMF's map?", lambda given: f"{given['kind'].capitalize()}1"
+        "name",
+        "The device's name on RMF's map?",
+        lambda given: "AMR01" if _is_fleet(given) else f"{given['kind'].capitalize()}1",
     ),
     Question(
         "wiring",
@@ -150,6 +157,13 @@ QUESTIONS: Final = (
         lambda given: get_args(Level),
         needed=_on_the_header,
     ),
+    Question(
+        "fleet_config",
+        "RMF's config.yaml of the fleet?",
+        lambda given: "config.yaml",
+        needed=_is_fleet,
+    ),
+    Question("graph", "The fleet's nav graph?", lambda given: "nav_graph.yaml", needed=_is_fleet),
     *_places(),
     Question("domain_id", "RMF's ROS_DOMAIN_ID?", lambda given: "0"),
 )
@@ -159,7 +173,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the argument for the file, and an option for each question."""
     parser.add_argument("file", type=Path, metavar="FILE", help="the YAML to write")
     parser.add_argument("--kind", choices=get_args(Kind))
-    parser.add_argument("--name", help="the device's name, as on RMF's map")
+    parser.add_argument("--name", help="as on RMF's map; the robots of a fleet: AMR01,AMR02")
     parser.add_argument(
         "--wiring",
         choices=get_args(Wiring),
@@ -180,6 +194,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for name, meanings in gateway.NUMBERS.items():
         text = f"a gateway's numbers for {meanings}, such as 0,1,2"
         parser.add_argument(f"--{name.replace('_', '-')}", metavar="N,N", help=text)
+    parser.add_argument("--fleet-config", metavar="FILE", help="RMF's config.yaml of the fleet")
+    parser.add_argument("--graph", metavar="FILE", help="the fleet's navigation graph")
     parser.add_argument("--domain-id", help="RMF's ROS_DOMAIN_ID")
     parser.add_argument(
         "--from",
@@ -227,7 +243,9 @@ def _written(file: Path, given: Given) -> int:
     """Write the draft if `check` finds no error in the draft. Return the exit code."""
     try:
         text = draft(answers(given))
-        understood(file, text.encode())
+        config = understood(file, text.encode())
+        if config.kind == "fleet":
+            read_site(config)  # RMF's own files
         write(file, f"{_schema_line()}{text}")
     except SettingsError as error:
         told = "\n".join(problem.text for problem in error.problems)
@@ -276,7 +294,7 @@ def _of_map(name: str, given: Given, found: BuildingMap | None) -> str | None:
     """Return the answer if the map allows only one answer. Otherwise return None."""
     if found is None:
         return None
-    if name == "name" and len(names := tuple(found.named[given["kind"]])) == 1:
+    if name == "name" and len(names := tuple(found.named.get(given["kind"], ()))) == 1:
         return names[0]
     if name == "floors":
         return ",".join(found.stops.get(given["name"], found.named["floor"]))
@@ -298,7 +316,7 @@ def _ask(question: Question, offered: str, given: Given, found: BuildingMap | No
         ) from None
     choices = question.choices(given)
     if found is not None and question.name == "name":
-        choices = tuple(found.named[given["kind"]])
+        choices = tuple(found.named.get(given["kind"], ()))
     if choices and question.several:
         ticked = offered.split(",")
         boxes = [questionary.Choice(c, checked=c in ticked) for c in choices]

@@ -32,9 +32,11 @@ def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def combinations() -> Iterator[tuple[str, ...]]:
     for kind, wirings in WIRINGS.items():
-        for wiring in wirings:
+        for wiring in wirings if kind != "fleet" else ():
             for encoding in (
-                ("binary", "gray", "one_hot") if kind == "lift" and wiring != "gateway" else ("",)
+                ("binary", "gray", "one_hot")
+                if kind == "lift" and wiring not in ("gateway", "http")
+                else ("",)
             ):
                 yield (kind, wiring, encoding)
 
@@ -53,6 +55,23 @@ def test_each_draft_passes_check_and_the_schema_that_it_names(
     assert list(Draft202012Validator(schema).iter_errors(safe_load(text))) == []
     misspelt = safe_load(text) | {"busses": {}}
     assert list(Draft202012Validator(schema).iter_errors(misspelt)) != []
+
+
+@pytest.mark.parametrize("wiring", ["http", "mqtt"])
+def test_a_fleets_draft_has_its_robots_and_agrees_with_rmfs_files(
+    wiring: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, config = tmp_path / "robots.yaml", Path("config").absolute()
+    words = ["init", str(file), "--kind", "fleet", "--wiring", wiring, "--yes"]
+    assert cli.main(words) == 64
+    assert "config.yaml cannot be read" in capsys.readouterr().err
+    words += ["--fleet-config", f"{config}/fleet_tiny.yaml"]
+    words += ["--graph", f"{config}/fleet_tiny_graph.yaml"]
+    assert cli.main(words) == 64
+    assert "AMR02" in capsys.readouterr().err
+    assert cli.main([*words, "--name", "AMR01, AMR02,AMR03"]) == 0
+    assert list(load(file).devices) == ["AMR01", "AMR02", "AMR03"]
+    assert cli.main(["check", str(file)]) == 0
 
 
 def test_options_are_the_answers(tmp_path: Path) -> None:
@@ -97,7 +116,7 @@ def test_a_gateway_is_drafted_from_its_register_table(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("contacts", ["high", "low"])
 @pytest.mark.parametrize("relays", ["high", "low"])
-@pytest.mark.parametrize("kind", ["lift", "door", "charger"])
+@pytest.mark.parametrize("kind", ["lift", "door", "charger", "alarm", "dispenser", "ingestor"])
 def test_on_the_header_a_cut_wire_and_the_time_before_the_daemon_are_safe(
     tmp_path: Path, kind: str, contacts: str, relays: str
 ) -> None:
@@ -135,7 +154,8 @@ def test_a_missing_folder_is_reported_before_any_question_is_asked(
     [
         ("--kind door", "there is no terminal for questions: give --name, or --yes for 'Door1'"),
         ("--kind door --floors L1 --yes", "--floors does not apply to a door on modbus"),
-        ("--kind lift --wiring http --yes", "a lift is not wired by http: gpio, modbus, rs485"),
+        ("--kind lift --wiring can --yes", "a lift is not wired by can: gpio, modbus, rs485"),
+        ("--kind door --graph x.yaml --yes", "--graph does not apply to a door on modbus"),
         ("--kind lift --floors L1 --yes", "a lift has at least two floors, each name once, not L1"),
         (
             "--kind lift --floors A,B,C,D,E,F,G,H,I,J,K --encoding one_hot --yes",

@@ -11,6 +11,7 @@ from typing import Final
 import msgspec
 
 from drivers.charger import dry_contact as charger
+from drivers.dispenser import dry_contact as dispenser
 from drivers.door import dry_contact as door
 from drivers.lift import wiring
 from workbench.commissioning.init import gateway
@@ -21,9 +22,13 @@ from workbench.commissioning.reference import meaning
 DRIVERS: Final = {"http": "http", "can": "canopen", "gateway": "register"}
 """Wiring -> driver. Any other wiring uses the driver `dry_contact`."""
 WIRINGS: Final = {
-    "lift": ("gpio", "modbus", "rs485", "gateway"),
-    "door": ("modbus", "rs485", "gpio", "http", "gateway"),
-    "charger": ("http", "can", "modbus", "rs485", "gpio"),
+    "lift": ("gpio", "modbus", "rs485", "gateway", "http", "mqtt"),
+    "door": ("modbus", "rs485", "gpio", "http", "mqtt", "gateway"),
+    "charger": ("http", "can", "modbus", "rs485", "gpio", "mqtt"),
+    "alarm": ("gpio", "modbus", "rs485", "http"),
+    "dispenser": ("gpio", "modbus", "rs485", "http"),
+    "ingestor": ("gpio", "modbus", "rs485", "http"),
+    "fleet": ("http", "mqtt"),
 }
 BUSES: Final = {
     "gpio": "  header: {{type: gpio}}",
@@ -32,12 +37,14 @@ BUSES: Final = {
     "    serial: {{port: {address}, baudrate: 19200, parity: none, stopbits: 1}}",
     "http": "  web: {{type: http, api_base: {address}}}",
     "can": "  can: {{type: can, socketcan: {address}}}",
+    "mqtt": "  building:\n    type: mqtt\n    host: {address}",
 }
 ADDRESSES: Final = {
     "modbus": "192.168.1.50",
     "rs485": "/dev/ttyUSB0",
     "http": "192.168.1.60",
     "can": "can0",
+    "mqtt": "192.168.1.10",
     "gateway": "192.168.1.60",
 }
 """Wiring -> default address. A GPIO header has no address."""
@@ -65,6 +72,42 @@ CHARGER_HTTP: Final = """\
       stopping: [6]                  # current still flows
       released: [7]
       error: [8, 255]"""
+WORKCELL_HTTP: Final = """\
+    limits: {stale_after_s: 4}
+    state_path: /state
+    inputs:                          # names with dots between them
+      done: {field: phase, when: [done]}
+      busy: {field: phase, when: [moving]}
+      ready: {field: phase, when: [idle]}
+      fault: {field: error}
+    start: {path: /start, body: '{"job": "$guid", "type": "$type_guid"}'}
+    stop: {path: /stop}"""
+LIFT_HTTP: Final = """\
+    # The fields and requests of the lift's gateway. Its own timers must end AGV mode and release the
+    # door when the network is gone; the daemon renews them in each scan.
+    floors: [FLOORS]                 # RMF's names, from below
+    limits: {stale_after_s: 3}
+    api:
+      state_path: /lift
+      state:                         # names with dots between them; an unlisted value is a fault
+        floor: {field: car.floor, values: {NUMBERS}, between_floors: [-1]}
+        motion: {field: car.moves, stopped: [none], up: [up], down: [down]}
+        door: {field: car.door, open: [open], closed: [closed], moving: [moving]}
+        service: {field: mode, normal: [normal], agv_mode: [robot]}
+        fire_alarm: {field: fire}
+      commands:
+        agv_mode_request:
+          ask: {path: /robot, body: '{"on": true, "seconds": 10}'}
+          release: {path: /robot, body: '{"on": false}'}
+          shown: {field: outputs.robot}
+          switches_off_after_s: 10   # the same number as in `ask`
+        door_open:
+          ask: {path: /door, body: '{"hold": true, "seconds": 10}'}
+          release: {path: /door, body: '{"hold": false}'}
+          shown: {field: outputs.door}
+          switches_off_after_s: 10
+        call: {path: /call, body: '{"floor": "{level}"}'}
+        cancel: {path: /cancel}"""
 CHARGER_CANOPEN: Final = """\
     node: 10                         # the receiver's node id
     heartbeat_timeout_s: 0.5         # a heartbeat comes each 0.1 s
@@ -78,11 +121,16 @@ def draft(answers: DraftAnswers) -> str:
             f"a {answers.kind} is not wired by {answers.wiring}: {', '.join(WIRINGS[answers.kind])}"
         )
     address = answers.address or ADDRESSES.get(answers.wiring, "")
+    points = points_for(answers)
+    fleet = answers.kind == "fleet"
+    section = [f"{answers.kind}s:", f"  {quoted(answers.name)}:"]
+    section += [] if fleet else SECTIONS[answers.kind](answers, points)
+    driver = DRIVERS.get(answers.wiring, "vda5050" if fleet else "dry_contact")
     lines = [
         f"# {answers.name}: compare every point with the wires, then `rmf-bridge check` this file.",
         "# docs/reference/configuration.md lists every key, docs/how-to/wire.md shows how wires fail.",
         f"kind: {answers.kind}",
-        f"driver: {DRIVERS.get(answers.wiring, 'dry_contact')}",
+        f"driver: {driver}",
         "",
         "rmf:",
         "  transport: auto        # rclpy where ROS 2 is installed, else DDS or zenoh without ROS",
@@ -90,10 +138,7 @@ def draft(answers: DraftAnswers) -> str:
         "",
         "buses:",
         BUSES[_bus(answers.wiring, address)].format(address=quoted(address)),
-        "",
-        f"{answers.kind}s:",
-        f"  {quoted(answers.name)}:",
-        *SECTIONS[answers.kind](answers, points_for(answers)),
+        *(["", "robots:", *_robots(answers)] if fleet else [*points.listed(), "", *section]),
     ]
     return "\n".join(lines) + "\n"
 
@@ -113,6 +158,11 @@ def _lift(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
         raise Impossible(f"a lift has at least two floors, each name once, not {', '.join(floors)}")
     if answers.wiring == "gateway":
         yield from gateway.lift(answers, floors)
+        return
+    if answers.wiring == "http":
+        numbers = ", ".join(f"{floor}: {number}" for number, floor in enumerate(floors))
+        api = LIFT_HTTP.replace("FLOORS", ", ".join(floors)).replace("NUMBERS", numbers)
+        yield from api.splitlines()
         return
     calls = [
         f"      {floor}: {{{points.relay()}}}" for floor in floors
@@ -187,6 +237,51 @@ def _charger(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
     yield f"      enable: {{{points.relay()}}}   {_said(charger.ChargerOutputWiring, 'enable')}"
 
 
+def _alarm(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
+    """Yield the lines below the name of a fire panel."""
+    yield "    alarm: fire_alarm_trigger  # every fleet; emergency_signal (Kilted) names fleets"
+    yield "    silent_alarm_after_s: 60   # a broken cable stops the robots after this time"
+    if answers.wiring == "http":
+        yield "    limits: {stale_after_s: 5}"
+        yield "    state_path: /state"
+    yield "    sources:                   # in an alarm, and with a cut wire, a contact is open"
+    for source in ("fire_panel", "code_blue"):
+        field = f"field: inputs.{source}, when: [false]"
+        yield f"      {source}: {{{field if answers.wiring == 'http' else points.loop()}}}"
+
+
+def _workcell(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
+    """Yield the lines below the name of a dispenser or ingestor."""
+    yield "    items:"
+    yield "      box: {}                  # the type_guid in RMF's request"
+    if answers.wiring == "http":
+        yield from WORKCELL_HTTP.splitlines()
+        return
+    yield "    pulse_s: 0.5               # how long the start is on"
+    yield "    inputs:"
+    for signal in ("done", "busy", "ready"):
+        yield f"      {signal}: {{{points.contact()}}}   {_said(dispenser.WorkcellInputWiring, signal)}"
+    yield f"      fault: {{{points.loop()}}}   # opens at a fault, as a cut wire does"
+    yield "    outputs:"
+    yield f"      start: {{{points.relay()}}}   {_said(dispenser.WorkcellOutputWiring, 'start')}"
+
+
+def _robots(answers: DraftAnswers) -> Iterator[str]:
+    """Yield the lines of all robots, and RMF's files of their fleet."""
+    for number, name in enumerate(answers.name.split(","), start=1):
+        yield f"  {quoted(name.strip())}:"
+        if answers.wiring == "http":
+            yield "    profile: rmf-demos         # the manager of RMF's tutorial; else its own `api`"
+        else:
+            yield f"    # The topics begin with uagv/v2/acme/{number:04}."
+            yield "    manufacturer: acme"
+            yield f'    known_as: "{number:04}"           # the serial number'
+    yield ""
+    yield "fleet:                         # RMF's own files, as they are"
+    yield f"  config: {quoted(answers.fleet_config)}"
+    yield f"  graph: {quoted(answers.graph)}"
+
+
 def _said(struct: type, key: str) -> str:
     """Return the YAML comment for a key. The comment is the first clause of the key's description."""
     return f"# {re.split('[;:.]', meaning(struct, key))[0]}"
@@ -200,4 +295,11 @@ def quoted(text: str) -> str:
     return msgspec.json.encode(text).decode()
 
 
-SECTIONS: Final = {"lift": _lift, "door": _door, "charger": _charger}
+SECTIONS: Final = {
+    "lift": _lift,
+    "door": _door,
+    "charger": _charger,
+    "alarm": _alarm,
+    "dispenser": _workcell,
+    "ingestor": _workcell,
+}

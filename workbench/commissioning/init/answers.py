@@ -5,8 +5,8 @@ from typing import Final, Literal
 
 import msgspec
 
-Kind = Literal["lift", "door", "charger"]
-Wiring = Literal["gpio", "modbus", "rs485", "http", "can", "gateway"]
+Kind = Literal["lift", "door", "charger", "alarm", "dispenser", "ingestor", "fleet"]
+Wiring = Literal["gpio", "modbus", "rs485", "http", "can", "mqtt", "gateway"]
 Encoding = Literal["binary", "gray", "one_hot"]
 Level = Literal["high", "low"]
 
@@ -31,6 +31,7 @@ class DraftAnswers(msgspec.Struct, frozen=True, kw_only=True):
     - `contacts`: the level of a closed contact on the header. A wire to 3.3 V gives high, and a wire to
       ground gives low.
     - `relays`: the level that switches relays on.
+    - `fleet_config`, `graph`: RMF's files of a fleet.
     - `places`: a gateway's answers, with the names in `gateway.py`.
     """
 
@@ -45,4 +46,6 @@ class DraftAnswers(msgspec.Struct, frozen=True, kw_only=True):
     encoding: Encoding = "binary"
     contacts: Level = "high"
     relays: Level = "high"
+    fleet_config: str = "config.yaml"
+    graph: str = "nav_graph.yaml"
     places: Mapping[str, str] = {}

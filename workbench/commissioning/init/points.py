@@ -1,5 +1,6 @@
 """Give each signal of a draft a free pin of the header, or a free address of the module."""
 
+import re
 from collections.abc import Iterator
 from itertools import count
 from typing import Final, Protocol
@@ -17,7 +18,7 @@ A relay belongs on a pin whose level keeps the relay off. Source: BCM2835 ARM Pe
 
 
 class FreePoints(Protocol):
-    """A source of free points. Each method returns the text inside a YAML mapping."""
+    """The next free points. `contact`, `loop` and `relay` return the text inside a YAML mapping."""
 
     def contact(self) -> str:
         """Take a point for a contact that is closed while its signal is on. With a cut wire, the signal
@@ -29,6 +30,9 @@ class FreePoints(Protocol):
 
     def relay(self) -> str:
         """Take a point for a relay whose energised state is on."""
+
+    def listed(self) -> Iterator[str]:
+        """Yield the lines below the bus that describe the points taken, if its points have names."""
 
 
 class PinHeader:
@@ -53,6 +57,10 @@ class PinHeader:
     def relay(self) -> str:
         """Take the next pin that keeps its relay off from power-on."""
         return f'point: "J8:{_first(self._outputs)}", active: {self._relays}'
+
+    def listed(self) -> Iterator[str]:
+        """Yield nothing, because pins have numbers."""
+        yield from ()
 
     def _input(self) -> int:
         return _first(self._inputs or self._outputs)
@@ -87,9 +95,49 @@ class Module:
         """Take the next coil."""
         return f'point: "unit {self._unit} coil {next(self._coils)}", active: high'
 
+    def listed(self) -> Iterator[str]:
+        """Yield nothing, because registers have numbers."""
+        yield from ()
+
+
+class Broker:
+    """Points behind an MQTT broker: each is a topic below the device's name. Payload 1 is a closed
+    contact or an energised relay."""
+
+    def __init__(self, name: str) -> None:
+        self._topic = re.sub(r"[^A-Za-z0-9_-]+", "_", name)
+        self._inputs = self._relays = 0
+
+    def contact(self) -> str:
+        """Take the next contact; an open contact publishes 0."""
+        self._inputs += 1
+        return f"point: input {self._inputs}, active: high"
+
+    def loop(self) -> str:
+        """Take the next contact. The signal is on while the contact publishes 0."""
+        self._inputs += 1
+        return f"point: input {self._inputs}, active: low"
+
+    def relay(self) -> str:
+        """Take the next relay."""
+        self._relays += 1
+        return f"point: relay {self._relays}, active: high"
+
+    def listed(self) -> Iterator[str]:
+        """Yield a line for each point. A relay switches itself off when its word is not repeated."""
+        words = "when: ['1'], when_not: ['0'], stale_after_s: 5"
+        yield "    points:                  # the topics and words of your device"
+        for number in range(1, self._inputs + 1):
+            yield f"      input {number}: {{topic: {self._topic}/input/{number}, {words}}}"
+        for number in range(1, self._relays + 1):
+            topic = f"{self._topic}/relay/{number}"
+            yield f"      relay {number}:"
+            yield f"        {{topic: {topic}, {words}, switches_off_after_s: 10,"
+            yield f"         command: {{topic: {topic}/set, payload_on: '1', payload_off: '0'}}}}"
+
 
 def points_for(answers: DraftAnswers) -> FreePoints:
     """Return the points of this wiring. All points are free."""
     if answers.wiring == "gpio":
         return PinHeader(answers.contacts, answers.relays)
-    return Module(answers.unit)
+    return Broker(answers.name) if answers.wiring == "mqtt" else Module(answers.unit)
