@@ -88,7 +88,7 @@ COMMANDS = {
         "judge lift Lift1 --active --ride L1 L3 --localhost",
     ),
     "release": ("end the session that holds a lift", "release Lift1"),
-    "reset": ("tell a running daemon that its latched faults may clear", "reset my_lift.yaml"),
+    "reset": ("let a running daemon clear its latched faults", "reset my_lift.yaml"),
     "drill": (
         "let the robots stand for some time, as in an alarm, and then drive on",
         "drill my_panel.yaml --for 300",

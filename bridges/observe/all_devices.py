@@ -35,13 +35,16 @@ Key = tuple[words.Kind, str]
 class ObservedGraph(Generic[D]):
     """All observed devices of a graph.
 
-    In a full table a device with states replaces a device without states. A new device also replaces a
-    device whose states stopped FORGOTTEN_S ago. Otherwise the devices heard first stay. `crowded`: the
-    kinds of which devices were left out. `steps`: the times of steps of the listener's clock, and their
-    size (s). `nodes`: the reports of our daemons and coordinators on themselves, by `<node>: <device>`.
-    `published`: the alarms that nodes have published.
-    `spoke`: the time when each fleet adapter last spoke. The key is `FLEET/ROBOT` for a request of a
-    robot, `FLEET` for an END of a robot, and `FLEET/` for the fleet's own state.
+    `known` has every device, by kind and name. It has at most `most` devices of a kind. If a kind has
+    no place left, only a device with states gets a place. It replaces a device that has no states, or
+    whose states stopped FORGOTTEN_S ago.
+
+    - `crowded`: the kinds with a device that got no place
+    - `steps`: the times at which the listener's clock stepped, and the size (s) of each step
+    - `nodes`: the reports of our daemons and coordinators on themselves, by `<node>: <device>`
+    - `published`: the alarms that nodes have published
+    - `spoke`: the time when each fleet adapter last spoke. The key is `FLEET/ROBOT` for a robot's
+      request, `FLEET` for a robot's END, and `FLEET/` for a state of the fleet.
     """
 
     makes: ClassVar[Mapping[words.Kind, Callable[[str, Moment], Any]]]

@@ -72,32 +72,41 @@ class Keeping(Struct, Generic[M], frozen=True):
 class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     """One kind of device: its settings, limits, memory, sample, requests, outputs and report.
 
-    `devices_key`: the section of the devices in the YAML. A kind about which RMF has no messages leaves
-    out `states`, `state_message`, `requests`, `device_name` and `sender`.
-    `states`: the topic of the devices' states.
-    `requests`: each topic that it obeys, with `accept(message, settings) -> event`, which raises
-    RequestRefused for a message that is malformed or impossible for this device.
-    `device_name`: the device named in a message (request or state). `sender`: the requester behind a
-    request. If several requests wait for the next scan, only the last of each sender counts.
-    `limits(settings, debounce_s)`: the limits, from the device's settings and the debounce of each
-    signal in the wiring table. `initial(limits, now)`: the core's memory at start.
-    `decide`: the core. `state_message(name, settings, report, stamp)`: the report as RMF's message.
-    `summary(report)`: key -> value for the log line, the status file and `watch`.
-    `published(memory, report)`: the memory after this report has gone out to RMF.
-    `publishes(settings)`: the topics on which a device publishes beside its states.
-    `alarm_inputs(report)`: the causes of an alarm for the fleets that the device sees
-    (`bridges/kinds/shared/fleet_alarm.py`); None for a kind without alarms.
-    `answer(name, request, reason, report)`: the published answer to a refused request; None for no
-    answer. `request`: the message if it is malformed, else the event.
-    `on_map(settings)`: settings that name a place on RMF's map, as `Place`s. The device's own name is
-    checked for every kind.
-    `drives`: do its devices have outputs? Without outputs there is nothing to switch off.
-    `results(name, report)`: messages that go out right after the state of this report; while there
-    are any, the state is due. `stamped(message, stamp)`: a result or an answer with its time.
-    `section`: the key and the struct of a section that all devices of a file share.
-    `keeping`: for a memory that must survive a restart.
-    `attended_by`: a topic of requests; the core gets `Attended` when its publishers appear or vanish.
-    `recorded`: topics with messages about the device that are recorded, and that no core gets.
+    Messages. A kind about which RMF has no messages leaves them out:
+    - `states`: the topic of the devices' states.
+    - `state_message(name, settings, report, stamp)`: the report as RMF's message.
+    - `requests`: each topic that a device obeys, with `accept(message, settings) -> event`. `accept`
+      raises RequestRefused for a message that is malformed or impossible for this device.
+    - `device_name`: the device named in a message (request or state).
+    - `sender`: the requester behind a request. If several requests wait for the next scan, only the
+      last request of each sender counts.
+    - `publishes(settings)`: the topics on which a device publishes beside its states.
+    - `answer(name, request, reason, report)`: the published answer to a refused request; None for no
+      answer. `request`: the message if it is malformed, else the event.
+    - `results(name, report)`: messages that go out right after the state of this report. While there
+      are any, the state is due.
+    - `stamped(message, stamp)`: a result or an answer with its time.
+    - `attended_by`: a topic of requests. The core gets `Attended` when the topic's publishers appear or
+      vanish.
+    - `recorded`: topics with messages about the device that are recorded, and that no core gets.
+
+    The core:
+    - `limits(settings, debounce_s)`: the limits, from the device's settings and the debounce of each
+      signal in the wiring table.
+    - `initial(limits, now)`: the core's memory at start.
+    - `decide`: the core.
+    - `summary(report)`: key -> value for the log line, the status file and `watch`.
+    - `published(memory, report)`: the memory after this report has gone out to RMF.
+    - `alarm_inputs(report)`: the causes of a fleet alarm that the device sees
+      (`bridges/kinds/shared/fleet_alarm.py`); None for a kind without alarms.
+    - `keeping`: for a memory that must survive a restart.
+
+    Settings:
+    - `devices_key`: the section of the devices in the YAML.
+    - `section`: the key and the struct of a section that all devices of a file share.
+    - `on_map(settings)`: settings that name a place on RMF's map, as `Place`s. The device's own name is
+      checked for every kind.
+    - `drives`: whether the devices have outputs. Without outputs nothing must be switched off.
     """
 
     name: str
