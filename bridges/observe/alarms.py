@@ -11,7 +11,10 @@ from typing import Final, Literal
 from msgspec import Struct
 
 from bridges.kinds.shared.alarming import CAUSES, FLEETS, RAISED, SINCE, STATE, fleets_in
-from bridges.kinds.shared.fleet_alarm import Fleets, overlap
+from bridges.kinds.shared.fleet_alarm_memory import (
+    Fleets,
+    overlap,
+)
 from bridges.messages.definitions import Bool, EmergencySignal
 from bridges.messages.heard import Heard
 from bridges.messages.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER

@@ -13,9 +13,8 @@ from bridges.kinds.shared import alarming, fleet_alarm, kept_alarm
 from bridges.kinds.shared.decision import AlarmInputs, Fault
 from bridges.kinds.shared.durations import NEVER
 from bridges.kinds.shared.fields import GraphSettings
-from bridges.kinds.shared.fleet_alarm import (
-    RENEW_S,
-    UNKNOWN,
+from bridges.kinds.shared.fleet_alarm import RENEW_S, UNKNOWN
+from bridges.kinds.shared.fleet_alarm_memory import (
     AlarmNamed,
     DeviceTells,
     FleetAlarmEvent,

@@ -38,7 +38,7 @@ from bridges.runtime.outlet import Named, Outlet
 from bridges.runtime.predecessor import SafeFirst
 from bridges.runtime.ring_writer import NOBODY, NoWriter
 from bridges.runtime.serving import Rounds, Serving
-from bridges.runtime.subject import AnySubject, Status
+from bridges.runtime.subject import AnySubject, Status, refusals_of
 from bridges.settings.load import Config
 from bridges.system.log import pairs
 from bridges.transports.transport import Subscription, Transport
@@ -135,15 +135,6 @@ def service(
         memories = DeviceMemories(kept, new=new)
     alarm = node_for(config.devices, transport, clock, named, kept, writer)
     return Devices(config, kind, transport, open_bus, named, clock, unsafe, writer, alarm, memories)
-
-
-def refusals_of(order: OrderedByPerson, subjects: Sequence[AnySubject]) -> dict[str, str] | None:
-    """Return the subjects that have refused this order, with their reasons; None until every subject
-    has taken it."""
-    taken = {one.name: one.ordered for one in subjects}
-    if any(given is not order for given, _ in taken.values()):
-        return None
-    return {name: why for name, (_, why) in taken.items() if why}
 
 
 class GraphService:

@@ -4,7 +4,7 @@ A `Subject` keeps the core's memory, acts on each decision, counts refusals and 
 """
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Generic, TypeVar
 
 from msgspec import Struct
@@ -134,3 +134,12 @@ class Subject(Generic[M, V, O, R]):
 
 AnySubject = Subject[Any, Any, Any, Any]
 """A subject whose core's types are unknown."""
+
+
+def refusals_of(order: OrderedByPerson, subjects: Sequence[AnySubject]) -> dict[str, str] | None:
+    """Return the subjects that have refused this order, with their reasons; None until every subject
+    has taken it."""
+    taken = {one.name: one.ordered for one in subjects}
+    if any(given is not order for given, _ in taken.values()):
+        return None
+    return {name: why for name, (_, why) in taken.items() if why}

@@ -4,7 +4,10 @@ from datetime import UTC, datetime
 from typing import Any
 
 from bridges.kinds.shared import alarming
-from bridges.kinds.shared.fleet_alarm import AlarmCause, FleetAlarmReport
+from bridges.kinds.shared.fleet_alarm_memory import (
+    AlarmCause,
+    FleetAlarmReport,
+)
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard, Sender
 from bridges.messages.stamps import stamp

@@ -3,7 +3,10 @@
 import pytest
 
 from bridges.kinds.shared.decision import AlarmInputs, OperatorReset
-from bridges.kinds.shared.fleet_alarm import RENEW_S, FleetAlarmLimits
+from bridges.kinds.shared.fleet_alarm import RENEW_S
+from bridges.kinds.shared.fleet_alarm_memory import (
+    FleetAlarmLimits,
+)
 from bridges.messages import definitions as d
 from bridges.messages.releases import NEWEST, RELEASES, Release
 from bridges.messages.topics import DIAGNOSTICS, EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, AnyTopic

@@ -22,7 +22,9 @@ from msgspec.structs import replace
 
 from bridges.kinds.alarm import KIND
 from bridges.kinds.shared.decision import DrillOrdered, OperatorReset
-from bridges.kinds.shared.fleet_alarm import FleetAlarmLimits
+from bridges.kinds.shared.fleet_alarm_memory import (
+    FleetAlarmLimits,
+)
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.heard import Heard

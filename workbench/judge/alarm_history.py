@@ -4,7 +4,11 @@ A wire may hide a message's sender. Such a message is nobody's: no law blames a 
 """
 
 from bridges.kinds.shared import alarming
-from bridges.kinds.shared.fleet_alarm import AlarmHeard, Fleets, overlap
+from bridges.kinds.shared.fleet_alarm_memory import (
+    AlarmHeard,
+    Fleets,
+    overlap,
+)
 from bridges.messages import definitions as d
 from bridges.messages import topics, words
 from bridges.messages.heard import Heard

@@ -6,7 +6,7 @@ from typing import Annotated, Final, Literal
 import msgspec
 
 from bridges.kinds.shared.fields import DeviceSettings, Name, tells
-from bridges.kinds.shared.fleet_alarm import (
+from bridges.kinds.shared.fleet_alarm_memory import (
     AlarmHeard,
     AlarmStated,
     FleetAlarmLimits,

@@ -37,10 +37,9 @@ FLEET-ALARM-8. If the wire hides a message's sender, any present publisher that 
    node.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from typing import Final
 
-import msgspec
 from msgspec.structs import replace
 
 from bridges.kinds.shared.decision import (
@@ -52,7 +51,20 @@ from bridges.kinds.shared.decision import (
     Said,
 )
 from bridges.kinds.shared.durations import AGES_AGO, NEVER, RIVAL_QUIET_S, SILENT_S
-from bridges.kinds.shared.graph_kind import MaySpeak, Woken
+from bridges.kinds.shared.fleet_alarm_memory import (
+    AlarmCause,
+    AlarmHeard,
+    AlarmNamed,
+    AlarmStated,
+    DeviceTells,
+    FleetAlarmEvent,
+    FleetAlarmLimits,
+    FleetAlarmMemory,
+    FleetAlarmReport,
+    Fleets,
+    overlap,
+)
+from bridges.kinds.shared.graph_kind import MaySpeak
 from bridges.messages.definitions import Bool, EmergencySignal, Message
 from bridges.messages.topics import EMERGENCY_SIGNAL, Topic
 
@@ -67,136 +79,6 @@ UNKNOWN: Final = "unknown node"
 """The beginning of the provisional name of a node that discovery has not named yet."""
 OR: Final = " or "
 """The word between the names of several nodes. One of these nodes has sent a message."""
-
-Fleets = frozenset[str]
-"""The fleets that are told; empty for all fleets."""
-
-
-class DeviceTells(msgspec.Struct, frozen=True):
-    """A device of this daemon reports its causes."""
-
-    device: str
-    inputs: AlarmInputs
-
-
-class AlarmHeard(msgspec.Struct, frozen=True):
-    """Another node has published an alarm, or its end. `senders`: the nodes that may have sent it."""
-
-    senders: frozenset[str]
-    on: bool
-    fleets: Fleets = frozenset()
-
-
-class AlarmNamed(msgspec.Struct, frozen=True):
-    """The nodes that may have sent the messages that were heard from `unknown`."""
-
-    unknown: str
-    senders: frozenset[str]
-
-
-class AlarmStated(msgspec.Struct, frozen=True):
-    """Another of our nodes states on `/diagnostics` whether its alarm is raised."""
-
-    node: str
-    raised: bool
-    fleets: Fleets = frozenset()
-
-
-FleetAlarmEvent = (
-    DeviceTells
-    | AlarmHeard
-    | AlarmNamed
-    | AlarmStated
-    | MaySpeak
-    | Woken
-    | OperatorReset
-    | DrillOrdered
-)
-
-
-class AlarmCause(msgspec.Struct, frozen=True, order=True):
-    """A device and its signal."""
-
-    device: str
-    signal: str
-
-    def __str__(self) -> str:
-        return f"{self.signal} of {self.device}"
-
-
-class FleetAlarmLimits(msgspec.Struct, frozen=True):
-    """The settings of the alarm: its topic, its fleets, and the devices that report causes."""
-
-    topic: Topic[Message]
-    fleets: Fleets = frozenset()
-    devices: frozenset[str] = frozenset()
-
-
-class FleetAlarmMemory(msgspec.Struct, frozen=True):
-    """The memory of one daemon's alarm.
-
-    `told`: the fleets that our `true` went to; None if we have published no `true` since our last
-    `false`. `told_at`, `ended_at`: the times of our last `true` and `false`. `owed`: our `true` no
-    longer counts, so a raised alarm must be published again. `others`: the fleets of each other node's
-    standing alarm. `ours`: the time of the last statement of each other node of ours. `may_end`: the
-    quiet start is over. `contradicted`: the nodes that published `false` against our alarm, and the
-    time. `drill_until`: the end of the drill that a person has ordered. `shown`: the last decision's
-    `state`. `since`: the time when that state began; None if it began before the daemon's start.
-    """
-
-    inputs: Mapping[str, AlarmInputs] = {}
-    latched: tuple[AlarmCause, ...] = ()
-    told: Fleets | None = None
-    told_at: float = AGES_AGO
-    ended_at: float = AGES_AGO
-    owed: bool = False
-    others: Mapping[str, Fleets] = {}
-    ours: Mapping[str, float] = {}
-    may_end: bool = False
-    contradicted: tuple[str, float] = ("", AGES_AGO)
-    drill_until: float = AGES_AGO
-    shown: str = "quiet"
-    since: float | None = None
-
-    @property
-    def drill(self) -> bool:
-        """Return whether only a drill raises the alarm."""
-        asked = any(inputs.drill for inputs in self.inputs.values())
-        return not self.latched and (asked or self.drill_until > AGES_AGO)
-
-    @property
-    def raised(self) -> bool:
-        """Return whether the robots of our fleets must stand for a cause or a drill of our own."""
-        return bool(self.latched) or self.drill
-
-    @property
-    def state(self) -> str:
-        """Return `quiet`, `alarm`, `drill`, or `reset` if our `true` waits for the end of other
-        alarms."""
-        if self.raised:
-            return "drill" if self.drill else "alarm"
-        return "quiet" if self.told is None else "reset"
-
-
-class FleetAlarmReport(msgspec.Struct, frozen=True):
-    """The daemon's statement. `state` and `since`: see `FleetAlarmMemory`. `waits`: the nodes whose
-    alarms our `true` waits for."""
-
-    state: str
-    causes: tuple[AlarmCause, ...] = ()
-    waits: tuple[str, ...] = ()
-    faults: tuple[Fault, ...] = ()
-    since: float | None = None
-    read_at: float | None = None
-
-    def news(self) -> object:
-        """Return everything."""
-        return self.state, self.causes, self.waits, self.faults
-
-
-def overlap(one: Fleets, other: Fleets) -> bool:
-    """Return whether both sets tell the same fleet. An empty set means all fleets."""
-    return not one or not other or bool(one & other)
 
 
 def initial() -> FleetAlarmMemory:

@@ -5,7 +5,11 @@ from typing import Final
 import msgspec
 
 from bridges.kinds.shared import keep
-from bridges.kinds.shared.fleet_alarm import UNKNOWN, AlarmCause, FleetAlarmMemory
+from bridges.kinds.shared.fleet_alarm import UNKNOWN
+from bridges.kinds.shared.fleet_alarm_memory import (
+    AlarmCause,
+    FleetAlarmMemory,
+)
 
 VERSION: Final = 1
 

@@ -13,6 +13,7 @@ from drivers.alarm import dry_contact
 from drivers.alarm import http as http_panel
 from drivers.hal import modbus
 from hal_fakes import http_alarm
+from hal_fakes.http_flags import FlagStation
 from hal_fakes.plants.alarm import PanelPlant
 from hal_fakes.plants.plant import FailureMode
 from hal_fakes.realtime import RealTime
@@ -142,7 +143,7 @@ class TestFieldsOnHttp(LinkedPanelContract):
         settings = msgspec.convert(plain, http_panel.HttpPanelSettings)
         plant = http_alarm.FAKE.plant("panel", settings, [])
         world = RealTime({"panel": plant})
-        station = http_alarm.FAKE.station(plant, settings)
+        station = FlagStation(plant, settings.state_path, http_alarm.fields(settings))
         with on_http(world, station, TIMEOUT_S) as (bus, clock):
             yield Bench(http_panel.HttpPanel(settings, bus), plant, clock)
 

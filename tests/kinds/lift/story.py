@@ -16,6 +16,7 @@ from bridges.kinds.lift.settings import Floor, LiftDurations, LiftSettings
 from bridges.kinds.lift.signals import DoorReading, Hazard, LiftOutputs, LiftSample, Motion
 from bridges.kinds.shared import alarming, fleet_alarm
 from bridges.kinds.shared.decision import OperatorReset, RivalSeen
+from bridges.kinds.shared.fleet_alarm_memory import DeviceTells
 from bridges.kinds.shared.graph_kind import MaySpeak
 from bridges.kinds.shared.kind import AnyDeviceKind
 from bridges.messages.definitions import (
@@ -330,7 +331,7 @@ class Story:
         self.node.scan(events)
         decision = self.node.subject.decision
         assert decision is not None
-        self._alarm_hears(fleet_alarm.DeviceTells("Lift1", decision.report.alarm))
+        self._alarm_hears(DeviceTells("Lift1", decision.report.alarm))
         if self.incoming:
             arrived, self.incoming = self.incoming, []
             self.receive(*arrived)

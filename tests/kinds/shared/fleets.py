@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from bridges.kinds.shared import alarming, fleet_alarm, kept_alarm
 from bridges.kinds.shared.decision import AlarmInputs, DrillOrdered, OperatorReset, Said
 from bridges.kinds.shared.durations import NEVER
-from bridges.kinds.shared.fleet_alarm import (
+from bridges.kinds.shared.fleet_alarm_memory import (
     AlarmHeard,
     AlarmStated,
     DeviceTells,

@@ -6,12 +6,13 @@ from msgspec.structs import replace
 
 from bridges.kinds.shared import alarming, fleet_alarm, kept_alarm
 from bridges.kinds.shared.decision import DrillOrdered, OperatorReset
-from bridges.kinds.shared.fleet_alarm import (
+from bridges.kinds.shared.fleet_alarm_memory import (
     AlarmHeard,
     AlarmNamed,
     AlarmStated,
     FleetAlarmLimits,
     FleetAlarmMemory,
+    FleetAlarmReport,
 )
 from bridges.messages.definitions import (
     Bool,
@@ -271,15 +272,15 @@ def test_an_alarm_is_said_on_its_topic_to_its_fleets() -> None:
 
 
 def test_a_statement_comes_back_and_hostile_statements_mean_all_fleets() -> None:
-    def stated(**alarm: str) -> list[fleet_alarm.AlarmStated]:
+    def stated(**alarm: str) -> list[AlarmStated]:
         values = tuple(KeyValue(f"alarm {key}", text) for key, text in alarm.items())
         status = DiagnosticStatus(0, "a: daemon", "OK", "/a", values)
         return [*alarming.stated(DiagnosticArray(Header(Time()), (status,)))]
 
-    report = fleet_alarm.FleetAlarmReport("drill")
+    report = FleetAlarmReport("drill")
     told = frozenset({"x", 'y"'})
-    assert stated(**alarming.statement(report, told)) == [fleet_alarm.AlarmStated("a", True, told)]
-    assert stated(state="reset", fleets="[1]") == [fleet_alarm.AlarmStated("a", False)]
+    assert stated(**alarming.statement(report, told)) == [AlarmStated("a", True, told)]
+    assert stated(state="reset", fleets="[1]") == [AlarmStated("a", False)]
     assert stated(fleets="[]") == []
 
 

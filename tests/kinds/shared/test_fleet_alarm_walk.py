@@ -11,7 +11,10 @@ from typing import Final
 from msgspec.structs import replace
 
 from bridges.kinds.shared import fleet_alarm, kept_alarm
-from bridges.kinds.shared.fleet_alarm import overlap
+from bridges.kinds.shared.fleet_alarm_memory import (
+    FleetAlarmMemory,
+    overlap,
+)
 from tests.depth import depth
 from tests.kinds.shared.fleets import AlarmGraph, graph
 from tests.walk import reached
@@ -51,7 +54,7 @@ def latched(g: AlarmGraph, name: str) -> bool:
     return bool(kept(g, name).latched)
 
 
-def kept(g: AlarmGraph, name: str) -> fleet_alarm.FleetAlarmMemory:
+def kept(g: AlarmGraph, name: str) -> FleetAlarmMemory:
     """Return the memory on a daemon's disk."""
     disk = g.daemons[name].disk
     return fleet_alarm.initial() if disk is None else kept_alarm.restore(disk)

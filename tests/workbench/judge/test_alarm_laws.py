@@ -8,7 +8,9 @@ from collections.abc import Iterable
 import pytest
 
 from bridges.kinds.shared import alarming
-from bridges.kinds.shared.fleet_alarm import FleetAlarmReport
+from bridges.kinds.shared.fleet_alarm_memory import (
+    FleetAlarmReport,
+)
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.heard import Heard, Sender

@@ -6,7 +6,10 @@ import pytest
 from playwright.sync_api import Page
 
 from bridges.kinds.shared import alarming
-from bridges.kinds.shared.fleet_alarm import AlarmCause, FleetAlarmReport
+from bridges.kinds.shared.fleet_alarm_memory import (
+    AlarmCause,
+    FleetAlarmReport,
+)
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.stamps import stamp
