@@ -115,6 +115,7 @@ OF: Final = {
     "dispenser": "a dispenser",
     "ingestor": "an ingestor",
     "adapter": "a fleet's adapter",
+    "alarm": "a node's alarm",
 }
 LAWS_HEAD: Final = """\
 # Laws
