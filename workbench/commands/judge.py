@@ -47,7 +47,6 @@ from workbench.rmf_model import NEVER, Said
 
 NODE_NAME = "rmf_bridge_judge"
 LOOK_EVERY_S = 0.1
-FIRE = topics.FIRE_ALARM_TRIGGER
 STATES = {
     "lift": topics.LIFT_STATES.name,
     "door": topics.DOOR_STATES.name,
@@ -57,7 +56,7 @@ STATES = {
     "adapter": topics.ADAPTER_LIFT_REQUESTS.name,
     "alarm": topics.DIAGNOSTICS.name,
 }
-ALARMS = (FIRE, topics.EMERGENCY_SIGNAL)
+ALARMS = (topics.FIRE_ALARM_TRIGGER, topics.EMERGENCY_SIGNAL)
 WIDTH = 120
 BESIDE: dict[str, tuple[str, ...]] = {
     "supervisor": (
@@ -320,10 +319,6 @@ class Live:
             names = self._states.senders()
             unnamed = ["?"] * (self._states.matched() - len(names))
             judging.judge.history.senders = (*names, *unnamed)
-            publishers = self._ear.ends[FIRE.name].matched()
-            supervisors = self._ear.ends[topics.LIFT_REQUESTS.name].matched()
-            retaining = self._retained[0].matched()
-            judging.judge.fire_ends(publishers, retaining, supervisors, now, wall)
             every = [n for topic in ALARMS for n in self._ear.ends[topic.name].senders()]
             retain = [n for end in self._retained for n in end.senders()]
             judging.judge.alarm_ends(every, retain, now, wall)

@@ -107,40 +107,21 @@ class Judge:
             self.history.checked()
         self._resolve(heard.at)
 
-    def fire_ends(
-        self, publishers: int, retaining: int, supervisors: int, at: float, wall: float
-    ) -> None:
-        """Take three numbers: the fire topic's publishers, its retaining publishers, and the lift
-        supervisors.
-
-        The judge uses the numbers only if one lift is on the graph, because the topic does not name the
-        alarm's lift. Jazzy's lift supervisor has a volatile publisher, and never uses the publisher
-        (rmf_ros2 7eef65a, lift_supervisor/Node.cpp:52). Only a repeated finding counts, because the
-        transport discovers publishers one by one.
-        """
-        if isinstance(self.history, LiftHistory) and publishers and not self.history.others:
-            volatile = publishers - retaining
-            found = None if 0 < volatile <= supervisors else volatile > 0
-            self.history.volatile = found if found == self._volatile_before else None
-            self._volatile_before = found
-            self._check_one("L12.retained", at, wall)
-
     def alarm_ends(
         self, names: Collection[str], retaining: Collection[str], at: float, wall: float
     ) -> None:
         """Take the nodes that publish alarms, and those among them that retain their messages. Only a
         repeated finding counts, because publishers are discovered one by one."""
-        if isinstance(self.history, AlarmHistory):
-            node = self.history.name
-            ours = node in {name.lstrip("/") for name in names}
-            found = node not in {name.lstrip("/") for name in retaining} if ours else None
-            self.history.volatile = found if found == self._volatile_before else None
-            self._volatile_before = found
-            self._check_one("A3.retained", at, wall)
-
-    def _check_one(self, law: str, at: float, wall: float) -> None:
+        history = self.history
+        if not isinstance(history, AlarmHistory | LiftHistory):
+            return
+        nodes = history.senders if isinstance(history, LiftHistory) else (history.name,)
+        ours = _plain(nodes) & _plain(names)
+        found = bool(ours - _plain(retaining)) if ours else None
+        history.volatile = found if found == self._volatile_before else None
+        self._volatile_before = found
         for tally in self._tallies:
-            if tally.law.id == law:
+            if tally.law.id in ("L12.retained", "A3.retained"):
                 self._check(tally, at, wall)
 
     def end(self, at: float, wall: float, heard_s: float = 0.0) -> tuple[JudgedLaw, ...]:
@@ -182,3 +163,8 @@ class Judge:
             elif now - evidence.at > doubt.leeway_s:
                 tally.doubt = None
                 self._breaks(tally, evidence)
+
+
+def _plain(names: Iterable[str]) -> set[str]:
+    """Return the nodes' names without the slash of their namespace."""
+    return {name.lstrip("/") for name in names}

@@ -64,8 +64,9 @@ def fire_publisher(retaining: int) -> Look:
     """Return a function that shows the judge a publisher of the fire alarm twice."""
 
     def look(judge: Judge) -> None:
+        judge.history.senders = ("/a",)
         for _ in range(2):
-            judge.fire_ends(1, retaining, 0, 0.0, 0.0)
+            judge.alarm_ends(["/a", "/b"], ["/a"] * retaining, 0.0, 0.0)
 
     return look
 

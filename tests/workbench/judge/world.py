@@ -125,17 +125,16 @@ class World:
             place.subscribe(topic, lambda message: None)
             for topic in (topics.FIRE_ALARM_TRIGGER.live(), topics.FIRE_ALARM_TRIGGER)
         ]
-        ends.append(place.subscribe(topics.LIFT_REQUESTS, lambda message: None, others_only=True))
         states = place.subscribe(STATES[kind], lambda message: None)
         say([])
         also(judging)
         until = self.timeline.now + most_s
         while not judging.done and self.timeline.now < until:
             self.timeline.run(self.timeline.now + 0.5)
-            publishing, retaining, supervisors = (end.matched() for end in ends)
+            publishing, retaining = (end.senders() for end in ends)
             now = self.timeline.now
-            judging.judge.fire_ends(publishing, retaining, supervisors, now, EPOCH + now)
             judging.judge.history.senders = tuple(states.senders())
+            judging.judge.alarm_ends(publishing, retaining, now, EPOCH + now)
         alarm.set(NEVER)
         place.close()
         return judging
