@@ -123,6 +123,7 @@ class AlarmHistory(AnyHistory):
             self.states += 1
             self.new, self.stated_before, self.stated = True, self.stated, state
             self.stated_at, self._fleets = self.now, fleets
+            self.against_at = self.against_at if self.raised else NOT_YET
             self.quiet_at = self.now if state == "quiet" else self.quiet_at
             self.rose = self.raised and (self.rose or self.stated_before == "quiet")
             return

@@ -154,6 +154,9 @@ def test_a_statement_that_crosses_its_message_breaks_no_law() -> None:
     ]
     ends = [says(9.9, False), states(10.0, "alarm"), *stating("quiet", 11, 15)]
     assert broken([*begins, *ends], "panel") == set()
+    others = [*stating("quiet", 0, 9, "lift"), says(9.95, False, "lift")]
+    later = [says(20.5, True), *stating("alarm", 21, 30)]
+    assert broken([*begins, *ends, *others, *later], "panel") == set()
 
 
 def test_a_listener_that_came_late_knows_no_beginning_of_the_alarm() -> None:
