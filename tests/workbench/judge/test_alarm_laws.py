@@ -155,7 +155,7 @@ def test_a_statement_that_crosses_its_message_breaks_no_law() -> None:
     ends = [says(9.9, False), states(10.0, "alarm"), *stating("quiet", 11, 15)]
     assert broken([*begins, *ends], "panel") == set()
     others = [*stating("quiet", 0, 9, "lift"), says(9.95, False, "lift")]
-    later = [says(20.5, True), *stating("alarm", 21, 30)]
+    later = [states(20.4, "alarm"), says(20.5, True), *stating("alarm", 21, 30)]
     assert broken([*begins, *ends, *others, *later], "panel") == set()
 
 
