@@ -154,7 +154,7 @@ class Daemon:
         if given is None:
             self._service.obey(OperatorReset())
         else:
-            log.info(pairs("ordered", order=given.event, device=given.device))
+            log.info(pairs("ordered", what=type(given.event).__name__, order=given.event))
             self._service.obey(given.event, given.device)
 
     def _watch(self) -> None:
