@@ -9,14 +9,15 @@ from workbench.commissioning.init import ADDRESSES, WIRINGS, gateway
 from workbench.commissioning.init.answers import LIFT_INPUTS, OFFERED, Encoding, Kind, Level
 
 Given = dict[str, Any]
-"""Answers so far. Each key is the answer's name in DraftAnswers."""
+"""Answers that are already known. The keys are names of DraftAnswers' fields."""
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
     """A question: its name in DraftAnswers, its text and its condition.
 
-    `offered` is the default answer. `choices` are the possible answers; () allows any text.
+    `offered` is the default answer. `choices` lists the possible answers; with (), any text is
+    possible.
     """
 
     name: str
@@ -40,7 +41,7 @@ def _is_lift_on_contacts(given: Given) -> bool:
 
 
 def _in_table(name: str, given: Given) -> bool:
-    """Does the draft need this part of the register table?"""
+    """Return whether the draft needs this part of the register table."""
     if given["wiring"] != "gateway":
         return False
     if name == "motion_numbers":
