@@ -136,6 +136,7 @@ class Daemon:
         off."""
         signals.on_reset(self._obey)
         self._service.subscribe()
+        self._obey(signalled=False)  # an order that was given during the start
         log.info(pairs("serving", file=self._config.path, kind=self._config.kind, **self._about()))
         try:
             for loop in self._loops:
@@ -148,12 +149,15 @@ class Daemon:
             safe = self._shut_down()
         return 0 if safe else 1
 
-    def _obey(self) -> None:
-        """Obey a person: carry out the order in the runtime directory. If there is none, reset."""
-        given = self._ordered = order.take(self._runtime.path, self._config.path)
+    def _obey(self, *, signalled: bool = True) -> None:
+        """Obey a person: carry out the order in the runtime directory. If a signal has come without an
+        order, reset."""
+        given = order.take(self._runtime.path, self._config.path)
         if given is None:
-            self._service.obey(OperatorReset())
+            if signalled:
+                self._service.obey(OperatorReset())
         else:
+            self._ordered = given
             log.info(pairs("ordered", what=type(given.event).__name__, order=given.event))
             self._service.obey(given.event, given.device)
 
