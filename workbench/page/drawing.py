@@ -67,6 +67,11 @@ def path_of(kind: str, name: str) -> str:
     return f"/{kind}/{quote(name, safe='')}"
 
 
+def linked(kind: str) -> bool:
+    """Has the device or robot a view of its own?"""
+    return kind in (*words.KINDS, "robot")
+
+
 def standing(alarms: Iterable[ObservedAlarm]) -> str:
     """Say why robots stand: one sentence for each alarm and drill that stops them."""
     told = []

@@ -20,7 +20,7 @@ from workbench.page import tables
 from workbench.page.actions import Deeds
 from workbench.page.buttons import Buttons
 from workbench.page.cards import AGES_S, ROBOTS, STANDING, STATUS, WRONG, Cards, Key, Wall, place_of
-from workbench.page.drawing import path_of
+from workbench.page.drawing import linked, path_of
 from workbench.page.explanation_html import explanation, story
 from workbench.page.head import head, main, part
 from workbench.page.live_site import LiveSite
