@@ -130,7 +130,7 @@ class HeardDevices(ObservedGraph[Device]):
         time."""
         return [one.because(clock) for one in self.alarms() if one.stands]
 
-    def kinds(self, name: str) -> list[Kind]:
+    def kinds(self, name: str) -> list[Explained]:
         """Return the kinds of the devices with this name. States tell the kinds. Without states,
         requests tell the kinds."""
         found: list[Explained] = [kind for kind in KINDS if (kind, name) in self.known]
