@@ -1,5 +1,4 @@
-"""ChargerState's error_message names the robot on the pad, and a reader gets that name back
-unchanged."""
+"""ChargerState's error_message names the robot on the pad. A reader gets exactly that name back."""
 
 import pytest
 from hypothesis import given, settings

@@ -55,7 +55,7 @@ class Idle:
 
 @dataclass
 class Station:
-    """A charger's node that is scanned once a second. `said` has the node's messages."""
+    """A charger's node that scans once a second. `said` has the node's messages."""
 
     now: float = 0.0
     said: list[tuple[str, Any]] = field(default_factory=list)

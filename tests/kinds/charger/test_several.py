@@ -17,7 +17,8 @@ from tests.transports.memory import MemoryNetwork, MemoryTransport
 from tests.waiting import wait_until
 
 TIMEOUT_S = 0.5
-"""The timeout (s) of the bad station. The sound stations have a longer timeout, for a busy machine."""
+"""The timeout (s) of the faulty station. The other stations have a longer timeout, because the test's
+machine may be busy."""
 
 
 def silent(caller: Caller) -> None:

@@ -1,4 +1,4 @@
-"""A station that recognises the robot on its pad and can be switched.
+"""A station that recognises the robot on its pad and that can be switched.
 
 The stories play the five situations of a shared charger, in virtual time, with one poll a second.
 """
@@ -100,7 +100,9 @@ def test_a_receiver_that_is_lost_from_sight_while_current_flows_keeps_its_power(
 def test_nothing_is_energised_before_a_check_of_the_range_that_was_asked_for_says_yes() -> None:
     it = story().event(AMR1).sees((A.IDLE, NOBODY, 1), in_range=True)
     assert it.outputs == ChargerOutputs(power=False)
-    it.sees((A.IDLE, ONE, 1), in_range=True)  # older than the core's first check
+    it.sees(
+        (A.IDLE, ONE, 1), in_range=True
+    )  # this range reading comes before the core's first check
     assert it.outputs == ChargerOutputs(power=False, range_checks=1)
     it.sees((A.IDLE, ONE, 1), in_range=False)
     assert it.outputs == ChargerOutputs(power=False, range_checks=1)
@@ -346,7 +348,7 @@ def test_each_refusal_has_its_own_fault() -> None:
     ]
 
 
-# ---- CHARGER-5: a pad that the station moves
+# ---- CHARGER-5: a station that moves its pad
 
 
 def test_nothing_is_energised_before_the_pad_is_at_its_height_and_the_robot_in_range() -> None:

@@ -91,7 +91,8 @@ def test_from_every_state_a_sound_station_comes_back_and_charges_the_robot_that_
 
 
 def _mended(world: World, limits: ChargerLimits) -> World:
-    """Return the world after repairs: a clear pad, healthy parts that answer, and reset latches."""
+    """Return the world after all repairs: the pad is clear, all parts work and answer, no error is
+    latched."""
     world = replace(world, readable=True, writable=True)
     steps = ("idle", "the pad is clear", "in range", "gap right", "pad at height")
     then = ("A cancels", "B cancels", 32.0, "reset", 4.0)
@@ -99,7 +100,8 @@ def _mended(world: World, limits: ChargerLimits) -> World:
 
 
 def _charged(world: World, limits: ChargerLimits) -> World:
-    """Return the world in which the first robot has asked, has come, and has begun to charge."""
+    """Return the world in which the first robot has sent a request, has docked, and has begun to
+    charge."""
     asked = ChargeRequested("req-new", "tiny", "A")
     world = moved(world, lambda before: (before, [asked]), limits, check)
     world = walker(limits).path(world, "A docks", 2.0, seen=check)

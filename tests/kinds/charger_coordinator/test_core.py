@@ -35,7 +35,7 @@ from tests.kinds.charger_coordinator.virtual_site import RECEIVERS
 SERVED = [CHARGING, RELEASED]
 
 
-# ---- COORDINATOR-WISHES-1, COORDINATOR-WISHES-2: who wants to be charged
+# ---- COORDINATOR-WISHES-1, COORDINATOR-WISHES-2: which robots want to be charged
 
 
 def test_a_robot_that_passes_with_the_mode_of_its_last_charge_does_not_ask_for_another() -> None:
@@ -463,7 +463,7 @@ def test_a_request_made_before_a_rival_came_keeps_its_age_once_it_is_shown() -> 
     assert site_.memory.grants[A] == before
 
 
-# ---- COORDINATOR-4: what a station says
+# ---- COORDINATOR-4: the states of a station
 
 
 @pytest.mark.parametrize(

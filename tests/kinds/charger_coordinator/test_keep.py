@@ -1,4 +1,5 @@
-"""The coordinator's memory after a restart, and the entries that the coordinator then distrusts."""
+"""The coordinator's memory after a restart, and the stored entries that the coordinator does not
+trust."""
 
 import pytest
 from msgspec.structs import replace

@@ -1,4 +1,4 @@
-"""The whole text of each reason for which a robot waits in the queue."""
+"""The complete texts that tell why a robot waits in the queue."""
 
 from msgspec.structs import replace
 
@@ -26,7 +26,7 @@ X, Y = RobotName("big", "X"), RobotName("big", "Y")
 
 
 def site(stations: int) -> SiteLimits:
-    """Return a site with this number of stations, all of which suit every robot."""
+    """Return a site with this number of stations. Each station suits every robot."""
     names = tuple(f"s{i + 1}" for i in range(stations))
     robots = dict.fromkeys((ONE, TWO, THREE), names)
     places: dict[str, dict[str, str]] = {name: {} for name in names}
@@ -94,7 +94,8 @@ def test_while_it_may_not_publish_no_station_is_what_they_wait_for() -> None:
 
 
 def said(now: float, seen: StationSeen, *robots: RobotName) -> str:
-    """Return the reason why AMR01 waits, if these robots stand on the pad of its only station."""
+    """Return the reason why AMR01 waits. These robots stand on the pad of the only station for
+    AMR01."""
     one = SiteLimits({ONE: ("s1",)}, {}, {"s1": {"tiny": "p1"}}, {}, 60.0, 100.0, 90.0, 60.0)
     there = {who: Standing(Sighting(who, False, "p1", 50.0, ""), 10.0) for who in robots}
     memory = replace(BUSY, wishes=BUSY.wishes[:1], grants={}, stations={"s1": seen}, robots=there)

@@ -1,4 +1,5 @@
-"""The coordinator's report with its texts, and the times at which the coordinator wants to be woken."""
+"""The coordinator's report with its texts, and the times at which the loop must wake the
+coordinator."""
 
 import pytest
 

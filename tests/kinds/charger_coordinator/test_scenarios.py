@@ -1,8 +1,8 @@
 """The numbered charging scenarios, with every `finishing_request` and with RMF's retreat to a charger.
 
 The fleet shows its robots as RMF's adapter does (`workbench/rmf_model/fleet.py`). A robot that charges
-as its finishing request is IDLE and has no task. After its first charge a robot shows the mode CHARGING
-in every task.
+because of its finishing request is IDLE and has no task. After its first charge a robot shows the mode
+CHARGING in every task.
 """
 
 from typing import Final
@@ -28,8 +28,8 @@ def yard(finishing: Finishing, **changes: object) -> Yard:
 
 
 def home_from_work(finishing: Finishing, percent: float, jazzy: bool = False) -> Yard:
-    """Return a yard in which AMR01 has just ended its task in the ward. `percent` is its battery
-    level."""
+    """Return a yard in which AMR01 has just ended its task in the ward with this battery level
+    (`percent`)."""
     site = yard(finishing, jazzy=jazzy)
     site.fleet.works("AMR01", "ward", site.now)
     site.run(10.0)
@@ -39,7 +39,7 @@ def home_from_work(finishing: Finishing, percent: float, jazzy: bool = False) ->
 
 
 def charged_at_a(told_at: float, full_at: float, drives_s: float = 6.0) -> History:
-    """Return the history in which AMR01 is called to charger_a and charges there."""
+    """Return the history in which the coordinator calls AMR01 to charger_a, and AMR01 charges there."""
     return [
         (told_at, "charger_a <- charge AMR01"),
         (told_at, "charger_a: ASSIGNED AMR01"),
@@ -247,7 +247,7 @@ def test_1_the_schedule_calls_the_robots_that_it_names_and_is_shown(finishing: F
             (27.5, "charger_a: RELEASED AMR01"),
             (28.5, "charger_a: IDLE"),
         ]
-    else:  # RMF moves a robot only with a task
+    else:  # RMF moves a robot only in a task
         assert told == [(at + 4.0, what) for at, what in CALLED_IN_VAIN[3:]]
 
 
@@ -271,7 +271,7 @@ def test_2_a_robots_own_wish_and_an_operators_are_shown_apart(finishing: Finishi
 
 
 def three_at_two(finishing: Finishing) -> Yard:
-    """Return a yard in which both stations charge a robot, and AMR02 waits for the first free
+    """Return a yard in which each of the two stations charges a robot. AMR02 waits for a free
     station."""
     site = yard(finishing)
     for who in ("AMR03", "AMR01", "AMR02"):

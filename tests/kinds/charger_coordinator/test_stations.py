@@ -1,6 +1,6 @@
 """A station's state ends, fails or continues a request, and shows which side is at fault.
 
-Each test makes a memory, lets the station show a state, and compares the whole memory afterwards.
+Each test builds a memory and lets a station show a state. Then the test compares the whole memory.
 """
 
 import pytest
@@ -35,7 +35,7 @@ LOST, MISPLACED = "Charger unreachable", "wrong docking: tiny/AMR02 is not assig
 
 
 def at(who: RobotName, place: str | None, since: float = AGES_AGO) -> Standing:
-    """Return a robot without a task. `place` is the place that its fleet showed last."""
+    """Return a robot without a task. `place` is its last place in its fleet's reports."""
     return Standing(Sighting(who, False, place, 50.0, ""), 20.0, since, since)
 
 
@@ -54,7 +54,7 @@ def shows(state: int, error: str = "", since: float = 10.0, heard: float = 20.0)
 def after(memory: SiteMemory, state: int, error: str = "", request_id: str = "r1") -> SiteMemory:
     """Return the memory after charger_a has shown this state at 30 s.
 
-    The shown states themselves are left as before, so that a test sees only the conclusions.
+    The stored states of the stations stay as before, so that a test sees only the conclusions.
     """
     heard = ChargerStateHeard(A, state, request_id, ONE, error)  # type: ignore[arg-type]
     return replace(stations.heard(memory, heard, 30.0, SITE), stations=memory.stations)

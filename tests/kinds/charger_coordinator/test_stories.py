@@ -1,4 +1,4 @@
-"""Whole situations of shared chargers: the coordinator works with a fleet adapter and chargers'
+"""Whole situations of shared chargers. The coordinator works with a fleet adapter and chargers'
 cores."""
 
 from typing import Any
@@ -15,7 +15,7 @@ from tests.kinds.charger_coordinator.virtual_site import Yard
 
 
 def yard(**changes: object) -> Yard:
-    """Return a yard in which all parts run and no robot has a wish yet."""
+    """Return a yard in which all parts run and no robot wants to charge yet."""
     found = Yard(**changes)  # type: ignore[arg-type]
     assert found.run(5.0) == [
         (0.25, "charger_a: IDLE"),
@@ -235,7 +235,7 @@ def test_a_restart_keeps_the_queue_and_touches_no_charge_under_way() -> None:
 def charges_at_a(*, by_operator: bool, knows: bool) -> Yard:
     """Return a yard in which AMR01 charges at charger_a.
 
-    At 14 s the battery has 60 %, or 65 % if an operator made the request.
+    At 14 s the battery is at 60 %, or at 65 % if an operator sent the request.
     """
     site = yard(fills=1.0, knows=knows)
     if by_operator:
@@ -250,7 +250,7 @@ def charges_at_a(*, by_operator: bool, knows: bool) -> Yard:
 
 
 AGAIN: Any = [(16.25, "charger_a: ASSIGNED AMR01"), (18.25, "charger_a: CHARGING AMR01")]
-"""The end of the history: the station can be read again and gets a request."""
+"""The end of a history in which the station answers again and gets a request."""
 REFUSED = (16.25, "charger_a: ERROR AMR01 (wrong docking: tiny/AMR01 is not assigned here)")
 
 
@@ -341,7 +341,7 @@ def test_a_coordinator_that_has_lost_its_memory_takes_over_what_the_stations_sho
 def dedicate(site: Yard, **places: str) -> Publisher[Any]:
     """Publish RMF's charging schedule, which sends each robot to its place.
 
-    A robot with a place named `wait_…` waits there instead of charging.
+    A robot whose place is named `wait_…` does not charge. It waits at that place.
     """
     schedule: Publisher[Any] = site.rmf.publisher(topics.CHARGING_ASSIGNMENTS)
     modes = {who: int(place.startswith("wait")) for who, place in places.items()}

@@ -1,6 +1,6 @@
 """Robots' wishes to be charged, rule by rule.
 
-Each test makes a memory, and compares it with the memory after one FleetState.
+Each test builds a memory, and compares it with the memory after one FleetState.
 """
 
 import pytest
@@ -33,7 +33,7 @@ AT_NIGHT, AT_NOON = LocalTime(0, 23 * 60), LocalTime(0, 12 * 60)
 def seen(
     place: str | None = "wait_1", percent: float = 50.0, task: str = "", charges: bool = False
 ) -> Sighting:
-    """Return AMR01 as its fleet's FleetState shows the robot."""
+    """Return AMR01 as the FleetState of its fleet shows the robot."""
     return Sighting(ONE, charges, place, percent, task)
 
 
@@ -42,7 +42,7 @@ def after(
 ) -> SiteMemory:
     """Return the memory after this sighting.
 
-    The remembered sightings are left as before, so that a test sees only the conclusions.
+    The remembered sightings stay as before, so that a test sees only the conclusions.
     """
     return replace(wishes.sighted(memory, sighting, now, site), robots=memory.robots)
 
@@ -88,7 +88,7 @@ def test_a_withdrawal_is_by_the_operators_id_or_by_the_one_that_the_station_show
     assert wishes.unwanted(left, "r1") == (left, "no such request")
 
 
-# ---- COORDINATOR-WISHES-5: whether a called robot came
+# ---- COORDINATOR-WISHES-5: whether a robot came after its call
 
 
 @pytest.mark.parametrize(

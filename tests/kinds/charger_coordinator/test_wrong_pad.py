@@ -1,4 +1,4 @@
-"""Robots on the wrong pad, rule by rule. Each test makes a memory and compares the whole result."""
+"""Robots on the wrong pad, rule by rule. Each test builds a memory and compares the whole result."""
 
 from collections.abc import Mapping
 
@@ -37,8 +37,8 @@ PAD = "wrong docking: tiny/AMR01 is not assigned here"
 def at(
     who: RobotName, place: str | None, since: float, task: str = "", heard: float = 85.0
 ) -> Standing:
-    """Return a robot that came to this waypoint at `since`. `heard` is its fleet's last word about
-    it."""
+    """Return a robot that came to this waypoint at `since`. Its fleet last showed the robot at
+    `heard`."""
     return Standing(Sighting(who, False, place, 50.0, task), heard, since, since)
 
 
@@ -58,7 +58,7 @@ def site(*robots: Standing, **changes: object) -> SiteMemory:
 
 
 def found(memory: SiteMemory, *times: float) -> list[list[OnWrongPad]]:
-    """Return the robots on wrong pads, with one list for each of these times."""
+    """Return a list for each of these times, with the robots that stand on wrong pads at that time."""
     return [list(wrong_pad.found(memory, now, SITE).values()) for now in times]
 
 
@@ -101,8 +101,8 @@ def test_the_stations_own_word_for_who_is_on_its_pad_counts_at_once_and_only_in_
 def history(
     memory: SiteMemory, *times: float
 ) -> list[tuple[float, dict[RobotName, Nudge], bool, bool]]:
-    """Return an entry for each time: (s, nudges so far, whether ONE is nudged now, whether an alarm is
-    on)."""
+    """Return a tuple for each time: the time (s), the nudges so far, whether the coordinator nudges ONE
+    now, and whether an alarm is on."""
     lines = []
     for now in times:
         memory = wrong_pad.nudged(memory, now, SITE)
@@ -141,7 +141,7 @@ def test_a_stray_is_told_again_for_a_new_request_and_the_count_lasts_on_its_way(
     assert wrong_pad.nudged(left, 60.0, SITE).nudges == {ONE: Nudge("r1", 1, 22.0)}
 
 
-# ---- COORDINATOR-WRONG-PAD-3, COORDINATOR-WRONG-PAD-4: robots that cannot be nudged
+# ---- COORDINATOR-WRONG-PAD-3, COORDINATOR-WRONG-PAD-4: robots that the coordinator cannot nudge
 
 
 @pytest.mark.parametrize("why", ["it works", "another node assigns", "we may not speak"])
@@ -171,13 +171,13 @@ BLOCKS = OnWrongPad(TWO, A, 90.0, A, 1, waiter=ONE)
 
 
 def blocks(station: str) -> OnWrongPad:
-    """Return the finding that TWO blocks this station."""
+    """Return the finding that robot TWO blocks this station."""
     return BLOCKS._replace(station=station, why=station)
 
 
 def blocked(came_at: float = 30.0, **changes: object) -> SiteMemory:
-    """Return a memory in which TWO stands at charger_a without charging, while ONE waits for a
-    station."""
+    """Return a memory in which robot ONE waits for a station. Robot TWO stands at charger_a and does
+    not charge."""
     return site(at(TWO, AT[A], came_at), **{"wishes": WAITS, **changes})
 
 
@@ -195,7 +195,7 @@ def test_nobody_blocks_where_nobody_waits_or_the_waiting_robot_itself_stands() -
 
 
 def test_waiting_robots_are_looked_for_among_all_wishes_and_their_pads_in_order() -> None:
-    """THREE is first in the queue and has its station already. ONE and TWO wait, and TWO stands on a
+    """Robot THREE is first in the queue and has its station already. ONE and TWO wait. TWO stands on a
     pad."""
     memory = blocked(
         wishes=(Wish(THREE, "fleet"), Wish(TWO, "fleet"), Wish(ONE, "fleet")),
