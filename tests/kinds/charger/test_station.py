@@ -100,9 +100,7 @@ def test_a_receiver_that_is_lost_from_sight_while_current_flows_keeps_its_power(
 def test_nothing_is_energised_before_a_check_of_the_range_that_was_asked_for_says_yes() -> None:
     it = story().event(AMR1).sees((A.IDLE, NOBODY, 1), in_range=True)
     assert it.outputs == ChargerOutputs(power=False)
-    it.sees(
-        (A.IDLE, ONE, 1), in_range=True
-    )  # this range reading comes before the core's first check
+    it.sees((A.IDLE, ONE, 1), in_range=True)  # before the core has ordered a check
     assert it.outputs == ChargerOutputs(power=False, range_checks=1)
     it.sees((A.IDLE, ONE, 1), in_range=False)
     assert it.outputs == ChargerOutputs(power=False, range_checks=1)

@@ -49,10 +49,7 @@ def test_a_request_is_on_disk_then_listed_then_acknowledged_and_so_is_its_start(
         *("before the disk", "after the disk"),  # the daemon writes the request to its disk
         *("before dispenser_states", "after dispenser_states"),
         *("before dispenser_results", "after dispenser_results"),
-        *(
-            "before the disk",
-            "after the disk",
-        ),  # the daemon writes the start of the cycle to its disk
+        *("before the disk", "after the disk"),  # the daemon writes the start to its disk
         *("before the outputs", "after the outputs"),
     ]
 

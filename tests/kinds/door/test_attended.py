@@ -5,7 +5,7 @@ from tests.kinds.door.virtual import OBSTRUCTION, Door
 
 
 def held(**limits: float) -> Door:
-    """Return a door that is held open from 1 s on, and whose supervisor goes at 20 s."""
+    """Return a door that is held open from 1 s on. Its supervisor disappears at 20 s."""
     door = Door(limits=limits, inputs={"obstruction": OBSTRUCTION})
     door.scan(Attended(True))
     door.run(1.0)

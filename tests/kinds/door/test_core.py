@@ -257,7 +257,7 @@ def test_a_door_that_does_not_open_is_a_fault_and_stays_held() -> None:
     assert core.faults() == ()
 
 
-# ---- DOOR-7: a rival
+# ---- DOOR-7: a second node of the same name
 
 
 def test_a_rival_takes_the_door_offline_and_the_hold_off_until_five_quiet_seconds() -> None:

@@ -28,7 +28,7 @@ LIMITS = st.builds(
 
 
 def checked(step: Step) -> None:
-    """Check that the rules hold, and that the core decides the same when it is asked again."""
+    """Check the rules. Check also that the core makes the same decision when asked again."""
     check(step)
     once = step.decision
     assert decide(step.before, step.event, step.now, step.limits) == once

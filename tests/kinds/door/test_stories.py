@@ -20,7 +20,8 @@ class Corridor:
         self._told: tuple[int, int] | None = None
 
     def robot(self, name: str, mode: DoorModeValue) -> None:
-        """Let a robot's fleet adapter ask the supervisor. The supervisor may then ask the door."""
+        """Let this robot's fleet adapter send a request to the supervisor. The supervisor may then send
+        a request to the door."""
         self._deliver(door_request("door", name, mode, self.door.now))
 
     def run(self, until: float) -> None:
@@ -152,7 +153,7 @@ def test_a_thousand_opens_cost_the_relay_one_edge() -> None:
     assert door.relay == [(1.0, True)]
 
 
-# ---- DOOR-6: broken parts
+# ---- DOOR-6: parts that break
 
 
 def test_a_broken_operator_is_a_door_that_does_not_open() -> None:

@@ -1,6 +1,6 @@
 """DOOR-1: the grace after CLOSE limits how often the relay switches.
 
-The grace may lengthen a hold, but never refuses a hold.
+The grace may make a hold longer, but never delays or refuses a hold.
 """
 
 import pytest

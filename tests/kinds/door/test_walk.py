@@ -42,7 +42,7 @@ def path(*steps: str | float, limits: DoorLimits = PLAIN) -> World:
 
 
 class Scan:
-    """One more scan of a state. The rules are checked, and the scan has the core's decision."""
+    """One more scan of a state, with the core's decision. The rules are checked too."""
 
     def __init__(self, world: World, limits: DoorLimits) -> None:
         self._steps: list[Step] = []
@@ -79,7 +79,7 @@ def test_each_stage_of_a_passage_is_what_its_name_says() -> None:
 
 
 def check_rules_within(steps: int, roots: list[World], limits: DoorLimits) -> int:
-    """Check every step and state, and return the number of states."""
+    """Check every step and every state. Return the number of states."""
     found = walker(limits).walk(roots, steps, check)
     for world in found:
         nothing_changes_before_wake_at(world, limits)
@@ -105,14 +105,14 @@ def test_the_rules_hold_within_some_steps_of_all_stages_at_each_kind_of_site(sit
 
 
 def mended(world: World, limits: DoorLimits) -> World:
-    """Return the world after repairs: a shut door, an empty doorway, no fire, and contacts that
-    answer."""
+    """Return the world after all repairs: the door is shut, the doorway is empty, nothing burns, and
+    the contacts answer."""
     world = replace(world, sample=start(limits).sample, readable=True, writable=True)
     return path_checked(world, limits, 6.0)
 
 
 def path_checked(world: World, limits: DoorLimits, *steps: str | float) -> World:
-    """Return the world after these moves and waits (s). Each step is checked by the rules."""
+    """Return the world after these moves and waits (s). The rules check each step."""
     return walker(limits).path(world, *steps, seen=check)
 
 

@@ -1,4 +1,4 @@
-"""The door supervisor's rules, each tested alone, with all messages to the door's node."""
+"""The door supervisor's rules, each tested alone. Tests compare all messages to the door's node."""
 
 from itertools import pairwise
 
@@ -39,7 +39,7 @@ def test_a_request_that_counts_is_not_refused() -> None:
     assert (desk.sent, desk.refused) == ([(0.0, "OPEN"), (0.5, "CLOSED")], [])
 
 
-# ---- DOOR-SUPERVISOR-3: silence
+# ---- DOOR-SUPERVISOR-3: silent parties
 
 
 def test_silence_and_time_close_nothing() -> None:

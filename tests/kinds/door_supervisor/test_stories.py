@@ -1,4 +1,4 @@
-"""Whole stories of a door with its daemon, robots with RMF's rules, and a supervisor between them."""
+"""Whole stories of a door with its daemon, a supervisor, and robots that follow RMF's rules."""
 
 from bridges.kinds.door_supervisor import keep
 from bridges.messages import definitions as d
@@ -18,7 +18,8 @@ A, B = "fleet/a", "fleet/b"
 
 
 class Site:
-    """One door and robots with these plans. The supervisor is ours with its disk, or RMF's."""
+    """One door, robots with these plans, and a supervisor. The supervisor is ours with its disk, or
+    RMF's."""
 
     def __init__(
         self, *plans: list[tuple[float, float]], theirs: bool = False, **changes: object
@@ -163,7 +164,7 @@ def test_with_rmfs_own_supervisor_such_a_session_stays_for_ever() -> None:
     assert [on for _, on in site.relay] == [True]
 
 
-# ---- DOOR-SUPERVISOR-2: a door that was away
+# ---- DOOR-SUPERVISOR-2: a door that was offline
 
 
 def test_a_door_back_from_offline_with_an_open_session_is_opened_again() -> None:
@@ -226,7 +227,7 @@ def test_beside_another_supervisor_it_is_passive_and_takes_over_without_a_close(
 SUPERVISORS = (topics.DOOR_REQUESTS, topics.DOOR_SUPERVISOR_HEARTBEAT)
 
 
-# ---- the heartbeat, and each door by itself
+# ---- the heartbeat, and several doors
 
 
 def test_the_heartbeat_goes_out_each_second_and_when_the_table_changes() -> None:
@@ -244,7 +245,7 @@ def test_the_heartbeat_goes_out_each_second_and_when_the_table_changes() -> None
         (5.0, []),
         (5.25, listed),
         (6.25, listed),
-        (6.35, listed),  # the robot has asked again
+        (6.35, listed),  # the robot has repeated its request
         (7.25, listed),
         (8.25, listed),  # the robot is inside
     ]

@@ -1,4 +1,4 @@
-"""Commands of a robot: sent, done, sent again, stopped (FLEET-1, FLEET-2, FLEET-3, FLEET-4)."""
+"""A robot's commands: when they are sent, done, repeated and stopped (FLEET-1 to FLEET-4)."""
 
 from bridges.kinds.fleet.signals import Act, Navigate, Stop
 from bridges.kinds.shared.decision import Fault, OperatorReset

@@ -1,4 +1,4 @@
-"""Docking, wrong stations and robots that are out of service (FLEET-8, FLEET-9, FLEET-10)."""
+"""Docking, wrong stations, and robots that are out of service (FLEET-8, FLEET-9, FLEET-10)."""
 
 from typing import Any
 

@@ -1,4 +1,5 @@
-"""Places of a robot: silence, other maps, off the graph, lift rides (FLEET-5, FLEET-6, FLEET-7)."""
+"""A robot's place after silence, on another map, off the graph and after a lift ride (FLEET-5, FLEET-6,
+FLEET-7)."""
 
 import math
 from typing import Any

@@ -173,7 +173,7 @@ def test_a_car_may_pass_a_floor_unseen_in_exactly_its_least_travel_time() -> Non
     assert (alone.decision.report.floor, alone.faults) == ("L3", ())
 
 
-# ---- LIFT-SENSING-4: a floor code without a meaning outside AGV mode
+# ---- LIFT-SENSING-4: a floor code that is valid only in AGV mode
 
 
 class FloorsInAgvMode(Controller):

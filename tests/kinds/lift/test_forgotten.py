@@ -1,4 +1,4 @@
-"""LIFT-2: a supervisor has forgotten the robot in the car, by RMF's rules and rule by rule.
+"""LIFT-2: RMF's supervisor has forgotten the robot in the car. Tests by RMF's rules, then rule by rule.
 
 RMF's supervisor (rmf_ros2, lift_supervisor/Node.cpp) has one slot for each lift. The first session that
 asks takes the slot. The supervisor drops all requests of other sessions, even END.
@@ -83,7 +83,8 @@ def test_an_end_that_was_lost_while_another_robot_waits_is_heard_from_its_adapte
 
 
 class Overheard:
-    """A lift that `A` holds, open at L2. `adapter` sends A's requests directly to the lift's node."""
+    """A lift that stands open at L2 and that `A` holds. `adapter` sends A's requests directly to the
+    node."""
 
     def __init__(self, building: Building | None = None) -> None:
         self.story = Story(building or Controller())

@@ -1,4 +1,4 @@
-"""Hazards and rival nodes take the lift away from RMF. After them RMF gets the lift back."""
+"""A hazard or a rival node takes the lift away from RMF. After its end RMF gets the lift back."""
 
 import pytest
 from msgspec.structs import replace
@@ -37,8 +37,8 @@ MODES = [
 
 
 def waiting(**options: object) -> Story:
-    """Return a story in which A waits outside at L1. The car stands closed at L1, with its door
-    held."""
+    """Return a story in which A waits outside at L1. The car stands there with its door held but
+    closed."""
     story = Story(Building(CLOSED_AT_L1), door_timeout_s=600, **options)  # type: ignore[arg-type]
     story.run(1.0)
     story.asks("A", "L1")
@@ -56,7 +56,7 @@ def inside(**options: object) -> Story:
     return story
 
 
-# ---- LIFT-5: whether the open door is shown
+# ---- LIFT-5: when the open door is shown
 
 
 @pytest.mark.parametrize(("hazard", "mode"), MODES)
@@ -105,7 +105,7 @@ def test_after_boarding_the_true_door_is_shown_so_that_the_robot_gets_out(
     ]
 
 
-# ---- LIFT-4: a hazard that is over
+# ---- LIFT-4: a hazard that has ended
 
 
 @pytest.mark.parametrize(("hazard", "mode"), MODES)
@@ -221,7 +221,7 @@ def test_fire_comes_before_every_other_mode() -> None:
     assert story.faults == [h.name for h in Hazard]
 
 
-# ---- LIFT-4, LIFT-DRIVE-3, LIFT-DRIVE-5: overload only delays
+# ---- LIFT-4, LIFT-DRIVE-3, LIFT-DRIVE-5: an overload only delays the ride
 
 
 def test_an_overload_keeps_the_door_held_and_only_delays_the_ride() -> None:
@@ -397,12 +397,12 @@ def test_a_code_blue_is_told_to_the_fleets_where_the_settings_say_so_until_an_op
     on, off = EmergencySignal((), True), EmergencySignal((), False)
     story.building.hazard(Hazard.CODE_BLUE)
     story.run(5.0)
-    story.building.hazard(Hazard.CODE_BLUE, Hazard.FIRE)  # one alarm is sent, and only once
+    story.building.hazard(Hazard.CODE_BLUE, Hazard.FIRE)  # the fleets hear one alarm, and only once
     story.run(8.0)
     story.building.hazard()
     story.run(20.0)
     assert story.alarms == [(2.1, on)]
-    assert story.state.startswith("AGV")  # the lift is back, but the fleets wait for a person
+    assert story.state.startswith("AGV")  # RMF has the lift again, but the fleets wait for a person
     story.resets()
     story.run(21.0)
     assert story.alarms == [(2.1, on), (20.0, off)]
@@ -477,13 +477,13 @@ def test_a_latched_fire_stays_latched_while_nobody_can_see_whether_it_is_over(ov
     assert story.faults == ["FIRE_LATCHED", "INPUTS_NOT_FRESH"]
     story.building.unreadable = ""
     story.run(11.05)
-    story.resets()  # the inputs are read, but not yet debounced
+    story.resets()  # the inputs are read but not debounced yet
     story.run(20.0)
     assert story.faults == ["FIRE_LATCHED" if over else "FIRE"]
     assert story.alarms == [(2.1, Bool(True))]
 
 
-# ---- LIFT-4: a rival
+# ---- LIFT-4: a second node of the same name
 
 
 def test_a_second_node_for_this_lift_switches_it_off_until_it_is_gone() -> None:

@@ -1,4 +1,4 @@
-"""Relays that may never be on together, rests between changes, and switching off without delay."""
+"""Relays that must not be on together, rests between changes, and switching off without delay."""
 
 import pytest
 from msgspec.structs import replace
@@ -18,7 +18,8 @@ def limits(**changes: float) -> LiftDurations:
 def driven(
     relays: Relays, wishes: list[tuple[float, LiftOutputs]], rules: LiftDurations
 ) -> list[str]:
-    """Return the outputs after each wish: `A` for AGV mode, then the called floor or the held door."""
+    """Return the outputs after each wish. `A` stands for AGV mode, before the called floor or the held
+    door."""
     shown = []
     for now, wish in wishes:
         relays = relays.step(wish, now, rules)
@@ -36,7 +37,7 @@ def hold(side: Side = Side.FRONT) -> LiftOutputs:
     return LiftOutputs(agv_request=True, hold_door=side)
 
 
-# ---- LIFT-DRIVE-3: never on together
+# ---- LIFT-DRIVE-3: relays that are never on together
 
 
 def test_two_calls_are_never_on_together_and_their_relays_rest_between() -> None:
@@ -56,7 +57,7 @@ def test_two_doors_are_never_commanded_together_and_their_relays_rest_between() 
     assert driven(Relays(), wishes, limits(min_off_s=0)) == ["A front", "A", "A", "A rear"]
 
 
-# ---- LIFT-DRIVE-6: a relay rests, and off never waits
+# ---- LIFT-DRIVE-6: a relay rests, but switching off never waits
 
 
 def test_an_output_that_went_off_stays_off_for_its_time() -> None:
@@ -103,7 +104,7 @@ def test_the_core_wakes_when_relays_have_rested() -> None:
     assert worn.changes_at(call("L1"), 6.0, rules) == 7.0
 
 
-# ---- LIFT-DRIVE-2, LIFT-DRIVE-3: which output comes first
+# ---- LIFT-DRIVE-2, LIFT-DRIVE-3: which output is switched first
 
 
 def test_a_call_goes_before_a_door_command_when_both_are_wanted() -> None:
@@ -164,7 +165,7 @@ def test_a_door_that_is_only_open_for_its_own_dwell_time_is_not_offered(inside: 
         story.building.set(door=DoorReading.OPEN)
         story.until(lambda: story.state == "AGV, open at L1, A to L1")
         story.building.set(door=DoorReading.CLOSED)
-    for motion in (Motion.UP, Motion.STOPPED) * 2:  # a loose contact, so the relay must rest
+    for motion in (Motion.UP, Motion.STOPPED) * 2:  # the relay switches until it must rest
         story.run(story.now + 1.0)
         story.building.set(motion=motion)
     story.run(8.0)

@@ -1,8 +1,8 @@
 """LIFT-2: RMF's supervisor ends a session while its robot is in the car, or leaves a robot in the car.
 
-The first stories follow RMF's own rules (rmf_ros2, lift_supervisor/Node.cpp). A starting supervisor
-sends END for the session that the lift shows. It then takes the first session that asks. A starting
-fleet adapter sends END for its robot's session (RobotContext.cpp, _check_lift_state).
+The first stories follow RMF's own rules (rmf_ros2, lift_supervisor/Node.cpp). A supervisor that starts
+sends END for the session that the lift shows. It then takes the first session that asks. A fleet
+adapter that starts sends END for its robot's session (RobotContext.cpp, _check_lift_state).
 """
 
 import pytest
@@ -44,7 +44,7 @@ def riding(
 def test_a_supervisor_that_restarts_and_ends_the_session_takes_no_lift_from_a_robot_in_the_car(
     jazzy: bool, adapters_first: bool, after_s: float
 ) -> None:
-    """The robot keeps the lift at any moment of its ride, whichever session the supervisor takes."""
+    """The supervisor restarts at different moments of the ride. The robot keeps the lift each time."""
     rmf, a, b = riding(jazzy, adapters_first)
     rmf.run(rmf.story.now + after_s)
     edges = list(rmf.story.edges)
@@ -65,15 +65,14 @@ def test_a_supervisor_that_restarts_and_ends_the_session_takes_no_lift_from_a_ro
     rmf.until_done(b)
     assert sessions(rmf.story) == ["", A, "", B]
     granted_at = next(at for at, state in rmf.story.told if state.session_id == B)
-    assert granted_at - released_at < 6.0  # the grace of 3 s, and RMF's next request
+    assert granted_at - released_at < 6.0  # the grace of 3 s, then RMF's next request
 
 
 CALLED_AND_HELD = [("call", None), ("hold_door", "front")]
 
 
 class InMidRide(Overheard):
-    """A ride in which A was let in at L2 and now rides to L4. A's adapter has just repeated the
-    request."""
+    """A lift that let A in at L2 and now takes A to L4. A's adapter has just repeated its request."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -88,7 +87,7 @@ class InMidRide(Overheard):
         self.story.run(self.story.now + 0.2)
 
     def asks_for(self, seconds: float) -> None:
-        """Let A's adapter go on asking, once a second."""
+        """Let A's adapter repeat its request once a second."""
         for _ in range(int(seconds)):
             self.adapter(AGV, "L4")
             self.story.run(self.story.now + 0.8)
@@ -269,7 +268,7 @@ def test_a_person_who_has_looked_into_the_car_gives_the_lift_to_the_next_robot()
     assert sessions(lift.story)[-1] == B
 
 
-# ---- LIFT-2: an END that is older than its session
+# ---- LIFT-2: an END from before the session
 
 
 def test_an_end_from_before_the_session_counts_once_it_has_been_repeated_for_a_second() -> None:

@@ -1,4 +1,4 @@
-"""The node around the core: its publishing, its log, and failures of its driver."""
+"""The node around the core: its messages, its log, and failures of its driver."""
 
 import logging
 
@@ -81,7 +81,7 @@ def test_a_lift_that_was_never_read_is_offline_with_stamp_zero_and_nothing_is_wr
         )
     }
     assert story.node.ready
-    assert building.writes == 1  # the claim writes all outputs off
+    assert building.writes == 1  # the claim of the outputs writes all of them off
     assert story.faults == ["INPUTS_NOT_FRESH"]
 
 
@@ -106,7 +106,7 @@ def test_the_log_has_one_line_when_a_device_is_lost_and_one_when_it_is_back(
         lines = [r.getMessage().split()[0] for r in caplog.records]
         assert (lines.count("device_lost"), lines.count("device_back")) == (1, 1)
         assert (lines.count("fault"), lines.count("fault_over")) == (1, 1)
-        assert len(lines) == 6  # lost and restored are two more lines
+        assert len(lines) == 6  # two more lines: the device is lost, and it is back
 
 
 def test_a_new_daemon_finds_the_lift_in_agv_mode_and_waits_to_be_asked() -> None:

@@ -1,4 +1,4 @@
-"""Jazzy's RMF repeats some messages at every start, at every handover and in every idle second.
+"""Jazzy's RMF repeats some messages at every start, at every handover, and each second without work.
 
 The node must not warn about these repeats.
 """

@@ -1,4 +1,4 @@
-"""The rules hold on a debounced lift for any events in any order, and RMF recovers from a storm."""
+"""On a debounced lift the rules hold for any events in any order. RMF recovers after many failures."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,7 +25,8 @@ STORMS = settings(max_examples=examples(40))
 
 @dataclass
 class Judge:
-    """A judge of every decision of a story. `open_seen_at` is when the contact last said open (s)."""
+    """A judge of every decision of a story. `open_seen_at` is the last time (s) at which the contact
+    said open."""
 
     building: Building
     open_seen_at: float = -1.0
@@ -133,7 +134,7 @@ FATES = st.lists(
 
 
 def trouble(rmf: Rmf, robot: RobotContext, what: str) -> RobotContext:
-    """Restart one party, or let the building misbehave for half a second."""
+    """Restart one party, or let the building fail for half a second."""
     story = rmf.story
     if what == "supervisor":
         rmf.restart_supervisor()

@@ -1,4 +1,4 @@
-"""RMF's supervisor hears requests of earlier rides again, by RMF's rules and rule by rule."""
+"""RMF's supervisor hears requests of earlier rides again. Tests by RMF's rules, then rule by rule."""
 
 from collections.abc import Mapping
 
@@ -17,7 +17,7 @@ OPEN_FOR_A = "AGV, open at L2, fleet/a to L2"
 
 
 def on_its_threshold(rides_before: int) -> tuple[World, RobotContext]:
-    """Return a world whose robot is entering the car at L3, after this number of earlier rides."""
+    """Return a world in which a robot enters the car at L3, after this number of earlier rides."""
     robot = RobotContext(A)
     rmf = world(robot)
     for _ in range(rides_before):
@@ -35,7 +35,8 @@ def on_its_threshold(rides_before: int) -> tuple[World, RobotContext]:
 def test_an_earlier_ride_that_rmf_hears_again_lets_no_door_go_while_a_robot_goes_in(
     rides_before: int,
 ) -> None:
-    """`make soak SEED=7 RMF=kilted` found this case: an adapter was cut off for longer than a lease."""
+    """`make soak SEED=7 RMF=kilted` found this case. An adapter had been cut off for longer than a
+    lease."""
     rmf, robot = on_its_threshold(rides_before)
     before = list(rmf.story.edges)
     rmf.finds_again(robot)
@@ -60,8 +61,8 @@ def test_a_supervisor_that_restarts_and_hears_an_earlier_ride_lets_no_door_go_ei
 def test_a_robot_that_is_cut_off_before_it_gets_the_lift_is_as_safe_when_it_is_found_again() -> (
     None
 ):
-    """`make soak SEED=7 RMF=kilted` found this case at 12.6 h: the robot was cut off before its
-    grant."""
+    """`make soak SEED=7 RMF=kilted` found this case after 12.6 h. The robot's adapter was cut off
+    before the robot got the lift."""
     first, robot = RobotContext(B), RobotContext(A)
     rmf = world(first, robot)
     rmf.rides(robot, "L2", "L1")
@@ -83,9 +84,10 @@ def test_a_robot_that_is_cut_off_before_it_gets_the_lift_is_as_safe_when_it_is_f
 def test_an_earlier_ride_that_rmf_hears_again_shows_a_robot_no_door_that_was_let_go(
     after_s: float,
 ) -> None:
-    """RMF's real supervisor was dead when a robot's next ride began where its last ride had ended.
+    """RMF's real supervisor was dead when a robot's next ride began. The ride began at the floor where
+    the robot's last ride had ended.
 
-    The robot entered because of the state of the earlier ride, and then the door closed.
+    The lift still showed the state of the last ride, so the robot entered. Then the door closed.
     """
     lift = Overheard(Building(LiftSample("L2", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)))
     assert lift.story.state == OPEN_FOR_A

@@ -1,4 +1,4 @@
-"""One robot's ride, from the request to the end of the session: the lift's outputs and its states."""
+"""One robot's ride, from the request to the end of the session. Tests compare outputs and states."""
 
 import pytest
 from msgspec.structs import replace
@@ -225,7 +225,7 @@ def test_floors_have_any_names_and_are_never_read_by_their_last_character() -> N
     assert calls == ["L10", "B1", "8F_r", "G"]
 
 
-# ---- LIFT-3, LIFT-DRIVE-3: another destination
+# ---- LIFT-3, LIFT-DRIVE-3: a change of destination
 
 
 def test_of_two_requests_for_two_floors_in_one_scan_the_second_counts() -> None:

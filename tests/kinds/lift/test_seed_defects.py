@@ -1,7 +1,7 @@
-"""The twelve defects of RMF's first lift node for dry contacts. The old node fails each story.
+"""The twelve defects of RMF's first lift node for dry contacts. That node fails each story.
 
-The old node is sharp-rmf/low_level_lift 4425e25 (2020), and the letters are ours. The name of a test
-describes the behaviour of the old node.
+The old node is sharp-rmf/low_level_lift 4425e25 (2020). The letters of the defects are ours. The name
+of a test describes the behaviour of the old node.
 """
 
 import logging
@@ -19,7 +19,8 @@ OPEN_AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
 
 
 def test_defect_a_a_request_for_another_lift_changed_this_ones_session_and_destination() -> None:
-    """In this project the daemon's inbox sorts messages by name before a node gets them."""
+    """In this project the daemon's inbox sorts messages by the lift's name. A node gets only its own
+    messages."""
     story = Story(Controller())
     story.run(1.0)
     story.asks("A", "L3")
@@ -115,7 +116,7 @@ def test_defect_h_no_code_read_as_the_lowest_floor_and_a_passing_code_as_another
 ) -> None:
     story = Story(Building(LiftSample(level, DoorReading.CLOSED, motion=Motion.UP, agv=True)))
     story.run(1.0)
-    story.building.set(level="L3")  # the two bits of a floor code change one after the other
+    story.building.set(level="L3")  # the two bits of a floor code do not change together
     story._scan()
     story.run(1.05)
     story.building.set(level=level)

@@ -1,4 +1,4 @@
-"""The core's trust in inputs that are broken, contradictory, stale, restless or in motion."""
+"""When the core believes inputs that are broken, contradictory, old, restless, or from a moving car."""
 
 import pytest
 from msgspec.structs import replace
@@ -118,7 +118,7 @@ def test_an_open_contact_while_the_car_moves_reads_as_a_moving_door() -> None:
     assert story.edges == [(1.0, "agv_request", True), (1.0, "call", "L1")]
 
 
-# ---- LIFT-SENSING-4: lines without a meaning outside AGV mode
+# ---- LIFT-SENSING-4: lines that are valid only in AGV mode
 
 
 def test_lines_that_have_a_meaning_only_in_agv_mode_are_believed_there() -> None:
@@ -249,7 +249,7 @@ def test_a_car_that_was_not_read_for_a_while_may_have_moved() -> None:
     story = boarding()
     story.run(9.0)
     story.building.set(level="L3")
-    story.now = 19.0  # the loop has stalled
+    story.now = 19.0  # the loop was blocked until now
     story.run(20.0)
     assert (story.faults, story.state) == ([], "AGV, open at L3, A to L1")
 

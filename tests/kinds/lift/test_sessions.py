@@ -1,4 +1,4 @@
-"""The session that holds the lift: its grant, its refresh, refusals, its END and the grace after
+"""The session that holds the lift: its grant, its repeats, refusals, its END and the grace after
 END."""
 
 from typing import Any
@@ -31,7 +31,7 @@ OPEN_AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
 
 
 def boarded() -> Story:
-    """Return a story in which a robot may be inside, because OPEN was published 3 s ago."""
+    """Return a story in which a robot may be inside, because the lift showed OPEN 3 s ago."""
     story = Story(Building(OPEN_AT_L1))
     story.run(1.0)
     story.asks("A", "L1")
@@ -162,12 +162,12 @@ def test_nothing_that_was_off_is_energised_during_the_grace() -> None:
     story.run(1.0)
     story.asks("A", "L1")
     story.run(1.3)
-    story.ends("A")  # the car stands open in AGV mode, ready to be held, but no session asks
+    story.ends("A")  # the car stands open in AGV mode, but no session asks for it
     story.run(10.0)
     assert story.edges == [(1.0, "agv_request", True), (4.3, "agv_request", False)]
 
 
-# ---- LIFT-DRIVE-1: nothing without a session
+# ---- LIFT-DRIVE-1: no outputs without a session
 
 
 def test_a_call_is_never_energised_without_a_session() -> None:

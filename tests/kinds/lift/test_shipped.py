@@ -1,4 +1,4 @@
-"""The shipped wiring has no motion lines. Only debounce separates a glitch from a moving door."""
+"""The shipped lift has no motion lines. So only debounce tells a short glitch from a moving door."""
 
 from pathlib import Path
 

@@ -1,4 +1,5 @@
-"""Events that are late: AGV mode, the floor, the open door, RMF's next request, and an I/O answer."""
+"""Events that come too late: AGV mode, the floor, the open door, RMF's next request, and an I/O
+answer."""
 
 from itertools import pairwise
 
@@ -25,8 +26,8 @@ OFF = LiftOutputs()
 
 
 def lift(level: str, door: DoorReading, *, agv: bool, **limits: object) -> Story:
-    """Return a story with a standing car and a request for L1 at 1 s. The car is scanned twice a
-    second."""
+    """Return a story with a car that stands still and a request for L1 at 1 s. The lift is scanned
+    twice a second."""
     building = Building(LiftSample(level, door, motion=Motion.STOPPED, agv=agv))
     story = Story(building, scan_s=0.5, **limits)  # type: ignore[arg-type]
     story.run(1.0)
@@ -105,7 +106,8 @@ def test_a_latched_fault_ends_with_the_session() -> None:
 
 
 def test_a_latched_fault_ends_with_an_end_though_the_same_session_is_back_at_once() -> None:
-    """An operator ends the session, but the fleet adapter repeats its request within a second."""
+    """An operator ends the session. Within a second the fleet adapter repeats its request for this
+    session."""
     story = lift("L1", DoorReading.OPEN, agv=True, door_timeout_s=4.0)
     story.run(3.0)
     story.building.set(door=DoorReading.CLOSED)
@@ -115,7 +117,7 @@ def test_a_latched_fault_ends_with_an_end_though_the_same_session_is_back_at_onc
     story.run(200.5)
     story.asks("A", "L1")
     assert (story.faults, story.outputs) == ([], HELD)
-    story.building.set(agv=False, door=DoorReading.OPEN)  # the robot is still known to be inside
+    story.building.set(agv=False, door=DoorReading.OPEN)  # the core knows that the robot is inside
     story.run(202.0)
     assert story.state == "HUMAN, open at L1, A to L1"
 
@@ -212,7 +214,7 @@ def test_agv_mode_lost_with_the_robot_at_the_open_door_shows_the_true_door() -> 
 
 
 def test_the_call_stays_on_while_people_take_the_car_first() -> None:
-    """Without an AGV status line people may take the car before the robot."""
+    """Without a status line for AGV mode, people may take the car before the robot."""
     building = Building(LiftSample("L2", DoorReading.CLOSED, motion=Motion.STOPPED, agv=None))
     story = Story(building)
     story.run(1.0)
@@ -228,9 +230,7 @@ def test_the_call_stays_on_while_people_take_the_car_first() -> None:
     building.set(level="L1", motion=Motion.STOPPED)
     story.run(10.0)
     assert story.outputs == HELD
-    building.set(
-        level=None, motion=Motion.UP
-    )  # people take the car while the robot is still outside
+    building.set(level=None, motion=Motion.UP)  # people take the car before the robot enters
     story.run(12.0)
     assert story.outputs == LiftOutputs(agv_request=True)
     building.set(level="L2", motion=Motion.STOPPED)
@@ -239,7 +239,7 @@ def test_the_call_stays_on_while_people_take_the_car_first() -> None:
     assert story.faults == []
 
 
-# ---- LIFT-DRIVE-1: RMF is silent
+# ---- LIFT-DRIVE-1: a silent RMF
 
 
 def test_rmf_silent_with_the_robot_outside_lets_the_lift_go_and_keeps_the_session() -> None:

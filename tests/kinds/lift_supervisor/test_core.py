@@ -1,4 +1,4 @@
-"""The lift supervisor's rules, each tested alone, with all messages to the lift's node."""
+"""The lift supervisor's rules, each tested alone. Tests compare all messages to the lift's node."""
 
 import math
 
@@ -181,7 +181,7 @@ def test_nobody_else_is_served_before_a_state_after_the_end_shows_that_it_was_ob
     desk = Alone()
     desk.asks("a")
     desk.asks("b", "L1")
-    desk.shows("", "L2")  # an old state, sent before the grant
+    desk.shows("", "L2")  # an old state, from before the grant
     desk.ends("a")
     desk.until(0.1)
     for second in range(1, 4):
@@ -204,7 +204,7 @@ def test_a_state_from_before_the_end_was_sent_confirms_nothing() -> None:
     desk = Alone()
     desk.asks("a")
     desk.until(0.05)
-    desk.ends("a")  # the pause after the last message delays the END
+    desk.ends("a")  # the pause after the last message delays this END
     desk.shows("", "L1")
     desk.asks("b")
     assert desk.report.holder == "a"
@@ -231,7 +231,7 @@ def test_an_end_from_a_robot_that_neither_has_nor_wants_the_lift_is_ignored() ->
 
 
 def test_an_end_of_the_session_that_the_lift_shows_is_passed_on_whoever_waits() -> None:
-    """The lift granted the session without this supervisor. The robot or an operator now ends the
+    """The lift granted the session without this supervisor. Now the robot or an operator ends the
     session."""
     desk = Alone()
     desk.asks("b")

@@ -1,5 +1,5 @@
-"""Limits of the supervisor: hazards, the quiet time after a start, a rival supervisor, stale
-requests."""
+"""Hazards, the quiet time after a start, a rival supervisor, and stale requests limit the
+supervisor."""
 
 import pytest
 from msgspec.structs import replace
@@ -175,7 +175,7 @@ def test_a_request_may_be_as_old_as_our_uptime_or_as_the_yaml_says_if_clocks_agr
 
 
 def test_a_request_from_the_future_is_not_believed_in_the_quiet_time() -> None:
-    """Our clock is not set yet, so even replayed requests have stamps in the future."""
+    """Our clock is not set yet, so the stamps of old requests can lie in the future."""
     desk = Alone(speaks=False)
     desk.skew = 3600.0
     desk.asks("a")

@@ -1,4 +1,5 @@
-"""Adapters' messages become events or are refused with a reason. The status file has its content."""
+"""Adapters' messages become events, or the supervisor refuses them with a reason. A test of the status
+file follows."""
 
 import pytest
 from msgspec.structs import replace

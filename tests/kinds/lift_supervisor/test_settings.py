@@ -1,4 +1,4 @@
-"""The supervisor's section of the YAML file, and the keys that reach the core."""
+"""The supervisor's section of the YAML file. Each key reaches the core."""
 
 import math
 from pathlib import Path

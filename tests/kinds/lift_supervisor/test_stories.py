@@ -43,7 +43,7 @@ def changes(world: World) -> list[str]:
 
 
 def shown(world: World) -> list[str]:
-    """Return the sessions that the lift has shown, one after the other."""
+    """Return the sessions that the lift has shown, in order."""
     return [session for _, session in sessions(world)]
 
 
@@ -168,7 +168,8 @@ def test_a_lift_node_that_restarts_in_mid_ride_gets_the_session_again_and_the_ri
 def test_a_supervisor_that_restarts_with_a_robot_in_the_car_moves_no_relay(
     skew: float, our_skew: float
 ) -> None:
-    """The robot keeps its ride, whatever the clocks of the supervisor and of the adapter show."""
+    """The clocks of the supervisor and of the adapter may be wrong by an hour. The robot keeps its
+    ride."""
     world = World()
     supervisor = OurSupervisor(world, wall_skew=our_skew)
     lift, robot = LiftNode(world), Rider(world, A, UP, skew=skew)
@@ -185,12 +186,13 @@ def test_a_supervisor_that_restarts_with_a_robot_in_the_car_moves_no_relay(
 def test_rmfs_own_supervisor_restarted_in_the_same_way_ends_the_ride_and_asks_for_it_again() -> (
     None
 ):
-    """The lift's node has a grace after END for RMF's supervisor. Our supervisor never needs it."""
+    """After END the lift's node keeps a grace for RMF's supervisor. Our supervisor never needs that
+    grace."""
     world = World()
     supervisor = RmfsSupervisor(world)
     lift, robot = LiftNode(world), Rider(world, A, UP)
     world.run(16.5)
-    world.retained.clear()  # the replay comes too late
+    world.retained.clear()  # the retained messages come too late
     supervisor.restart()
     world.run(60.0)
     assert changes(world)[2:4] == ["END fleet/a L3", "AGV fleet/a L3"]
@@ -270,7 +272,7 @@ def test_a_second_supervisor_of_ours_stands_by_and_takes_over() -> None:
 
 
 def test_an_operator_releases_the_lift_of_a_dead_robot_for_those_who_wait() -> None:
-    """The command `send lift Lift1 --end` sends this END. Here the operator's clock is a minute
+    """The command `send lift Lift1 --end` sends the operator's END. The operator's clock is a minute
     slow."""
     world = World()
     OurSupervisor(world)

@@ -1,4 +1,5 @@
-"""LIFT-SUPERVISOR-2, LIFT-SUPERVISOR-4: the true holder of the lift, and requesters that have gone."""
+"""LIFT-SUPERVISOR-2, LIFT-SUPERVISOR-4: the session that really has the lift, and requesters that have
+gone."""
 
 import math
 
@@ -7,7 +8,7 @@ from bridges.kinds.shared.decision import Fault
 from bridges.kinds.shared.durations import SILENT_S
 from tests.kinds.lift_supervisor.alone import Alone
 
-# ---- LIFT-SUPERVISOR-2: the true holder of the lift
+# ---- LIFT-SUPERVISOR-2: the session that really has the lift
 
 
 def test_a_session_that_the_lift_shows_goes_before_the_queue_if_its_robot_asks() -> None:
@@ -153,7 +154,8 @@ def test_a_lift_that_does_not_take_the_holder_or_does_not_release_it_raises_an_a
 
 
 def shown_each_second(desk: Alone, session: str, until: int) -> tuple[Fault, ...]:
-    """Let states show this session each second until the time `until`. Return the last faults."""
+    """Let a state show this session each second until the time `until`. Return the faults at the
+    end."""
     for second in range(int(desk.now), until + 1):
         desk.until(float(second))
         desk.shows(session, "L1", to="L3")

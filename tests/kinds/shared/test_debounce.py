@@ -1,4 +1,4 @@
-"""Debounce, sample by sample."""
+"""The debounce of one input, sample by sample."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""The rules decide by the adapter's stamps and by our clock whether an adapter's request counts."""
+"""The stamps of adapters and our clock decide whether an adapter's request counts."""
 
 import math
 
@@ -10,11 +10,11 @@ from bridges.messages.definitions import Time
 
 STAMP = 1_800_000_000.0
 STARTED = Rules(most_s=5.0)
-"""Rules for a daemon that started 5 s ago."""
+"""The rules of a daemon that started 5 s ago."""
 
 
 class Clocked:
-    """One requester, whose clock is `skew` s ahead of ours."""
+    """One requester. Its clock is `skew` seconds ahead of ours."""
 
     def __init__(self, rules: Rules = STARTED, skew: float = 0.0) -> None:
         self.rules = rules
@@ -22,9 +22,9 @@ class Clocked:
         self.requester = Requester()
 
     def at(self, now: float, *, sent: float | None = None, ends: bool = False) -> bool:
-        """Return whether a message counts that arrives at `now`.
+        """Return whether a message that arrives at `now` counts.
 
-        `sent` is the time of sending by our clock (s), by default `now`.
+        `sent` is the time of sending (s) by our clock, by default `now`.
         """
         sent = now if sent is None else sent
         stamp = STAMP + sent + self.skew
@@ -82,7 +82,7 @@ def test_a_request_from_the_future_counts_unless_a_limit_is_set() -> None:
 
 
 def test_an_end_is_compared_with_earlier_ends_only() -> None:
-    """A robot and the operator who ends its session may have different clocks."""
+    """An operator may end a robot's session, and the two clocks may differ."""
     requester = Clocked()
     assert requester.at(100.0)
     assert requester.at(100.0, sent=95.0, ends=True)

@@ -1,5 +1,5 @@
-"""The purity contract in pyproject.toml includes every kind, and the files listed for mutation
-exist."""
+"""The purity contract in pyproject.toml covers every kind. The files that pyproject.toml lists for
+mutation exist."""
 
 import tomllib
 from pathlib import Path

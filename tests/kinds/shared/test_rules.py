@@ -1,4 +1,4 @@
-"""A search for a rule's number finds the rule and its stories.
+"""A reader who searches for a rule's number finds the rule and its stories.
 
 So every rule must be cited by a test, and every citation must name a rule.
 """
