@@ -1,4 +1,4 @@
-"""`rmf-bridge backup`: the files that it saves and omits, and the content of a restored machine."""
+"""`rmf-bridge backup`: the files that it saves or leaves out, and the content of a restored machine."""
 
 import io
 import os
@@ -21,7 +21,7 @@ WANTS = "etc/systemd/system/rmf-bridges.target.wants"
 
 @pytest.fixture
 def machine(tmp_path: Path) -> Path:
-    """Return the root of a machine with one enabled and one disabled door, a secret, users and a
+    """Return the root of a machine with one enabled door, one disabled door, a secret, users and a
     memory."""
     root = tmp_path / "old"
     config, state = root / "etc/rmf-bridges", root / "var/lib/rmf-bridge/door_supervisor"
@@ -41,7 +41,7 @@ def machine(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def calls(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
-    """Return the list of commands that the test ran. Each command succeeds."""
+    """Return the list of commands that the test runs. Each command succeeds."""
     found: list[list[str]] = []
 
     def run(words: list[str]) -> subprocess.CompletedProcess[str]:

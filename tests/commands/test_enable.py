@@ -34,7 +34,7 @@ TARGET = "etc/rmf-bridges/lift_dry_contact.yaml"
 
 @pytest.fixture
 def calls(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
-    """Return the list of commands that the test ran. Each command succeeds."""
+    """Return the list of commands that the test runs. Each command succeeds."""
     found: list[list[str]] = []
 
     class Done:
@@ -200,7 +200,7 @@ def test_a_relay_that_is_not_verified_off_keeps_its_drop_in(
     off = services.SwitchOff(words, left.parent)
     live = _told(LIFT, Path("/"))
     live.dry_run = False
-    assert carry_out([off], live) == 0  # without a record no output can be on
+    assert carry_out([off], live) == 0  # no record of outputs, so no output can be on
     left.touch()
     assert carry_out([off, Remove(kept)], live) == os.EX_UNAVAILABLE
     told = capsys.readouterr().err
@@ -221,7 +221,7 @@ def test_a_step_that_fails_after_the_stop_ends_with_the_service_started_again(
     live.dry_run = False
     full = WriteFile(
         tmp_path / "file" / "drop_in", b""
-    )  # a missing folder raises OSError, as a full disk does
+    )  # a missing folder raises OSError, like a full disk
     assert carry_out([full, Remove(tmp_path / "never")], live, keeps=UNIT) == os.EX_IOERR
     assert calls == [["systemctl", "--quiet", "is-active", UNIT], ["systemctl", "start", UNIT]]
     assert "the steps after the failed step were not taken" in capsys.readouterr().err

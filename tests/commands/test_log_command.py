@@ -1,4 +1,4 @@
-"""`rmf-bridge log`: its command line for journalctl, and the lines that its pattern finds."""
+"""`rmf-bridge log`: its command line for journalctl, and the lines that its search pattern finds."""
 
 import argparse
 import os

@@ -1,4 +1,4 @@
-"""`rmf-bridge status`: its findings in runtime directories, its output and its exit codes."""
+"""`rmf-bridge status`: its findings in runtime directories, its output, and its exit codes."""
 
 import io
 import json
@@ -142,7 +142,7 @@ def test_a_status_that_says_little_is_shown_as_far_as_it_goes(
 def test_of_a_service_systemd_says_whether_it_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unit: str, state: str
 ) -> None:
-    """`status` asks systemd also about a service that could not write its name."""
+    """A service could not write its name into its directory. `status` asks systemd about it too."""
     monkeypatch.setattr(on_machine, "SERVICE_RUN", tmp_path)
     with served(tmp_path / "lift_a", lift()) as folder:
         (folder / HOLDER).unlink()

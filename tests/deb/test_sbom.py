@@ -1,4 +1,4 @@
-"""deb/sbom.py lists a package's libraries, and refuses a library without the text of its licence."""
+"""deb/sbom.py lists the libraries of a package. It refuses a library whose licence has no text."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""Upgrades with the real dpkg. After any interruption one version is whole and serves."""
+"""Upgrades with the real dpkg. After any interruption one whole version is in service."""
 
 import shutil
 from pathlib import Path
@@ -29,8 +29,8 @@ def whole(version: str) -> str:
 
 
 def system(folder: Path, deb: Path) -> System:
-    """Return a machine with this package and three services: active, failed, and stopped by a
-    person."""
+    """Return a machine with this package and three services. One service is active, one has failed, and
+    a person has stopped the third."""
     made = System(folder)
     assert made.dpkg("-i", deb).returncode == 0
     for name, state in (("door", "active"), ("failed", "failed"), ("stopped", "inactive")):
@@ -74,7 +74,7 @@ def test_whenever_the_power_is_cut_one_version_is_whole_and_dpkg_completes_the_o
         assert now in (whole(before), whole(after)), cut
         fits = "nothing" if now == whole(before) else after
         assert made.drop_in("door").read_text() == f"drop-in of {fits}\n", cut
-        if made.status()[1] == "H":  # dpkg has not unpacked the package, and needs its file again
+        if made.status()[1] == "H":  # dpkg has not unpacked the package, so it needs the file again
             made.dpkg("-i", debs[after])
         else:
             made.dpkg("--configure", "-a")

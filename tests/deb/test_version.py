@@ -1,4 +1,4 @@
-"""setup.py names the commit in the version, so that a mended package has a newer version."""
+"""setup.py adds the commit to the version, so that a corrected package has a newer version."""
 
 import shutil
 import subprocess

@@ -1,4 +1,4 @@
-"""deb/wheels.py fills a package's site-packages from wheels. Here the tests make the wheels."""
+"""deb/wheels.py fills a package's site-packages from wheels. The tests make these wheels."""
 
 import hashlib
 import subprocess
@@ -36,7 +36,8 @@ def wheel(folder: Path, name: str, *needs: str) -> Path:
 
 
 def fill(tmp_path: Path, arch: str, *options: str, lock: str | None = None) -> Path:
-    """Fill a site-packages for this architecture. The default `lock` lists the wheels made here."""
+    """Fill a site-packages for this architecture. By default `lock` lists the wheels that the tests
+    made."""
     shop = tmp_path / "shop"
     shop.mkdir()
     wheels = [wheel(shop, each) for each in ("for_arm", "for_pc")]
@@ -59,7 +60,7 @@ def fill(tmp_path: Path, arch: str, *options: str, lock: str | None = None) -> P
 
 
 def pinned(wheel: Path, marker: str = "") -> str:
-    """Return the wheel's entry of a lock in the form of uv."""
+    """Return the wheel's entry in a lock file of uv."""
     digest = hashlib.sha256(wheel.read_bytes()).hexdigest()
     name, version, *_ = wheel.name.split("-")
     return f"{name.replace('_', '-')}=={version} {marker}\\\n    --hash=sha256:{digest}\n"
@@ -134,7 +135,7 @@ def test_a_wheel_that_was_built_here_is_taken_before_the_lock(tmp_path: Path) ->
 
 
 def test_the_lock_has_a_fitting_version_of_each_library_of_a_package() -> None:
-    """`make lock` renews the lock."""
+    """If this test fails, run `make lock`."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
     wanted = [*project["dependencies"], *(need for one in IN_PACKAGES for need in extras[one])]

@@ -1,7 +1,7 @@
-"""A lift with one broken wire at a time, read through plant, wires, mock pins, gpiozero and driver.
+"""A lift with one broken wire. The driver reads it through plant, wires, mock pins and gpiozero.
 
 The car rides in AGV mode from L1 to L3, where the door opens and closes. Each reading must be true,
-unknown or a fault. A closed door is never read as open, and no floor is ever read wrong.
+unknown or a fault. No reading may show a closed door as open, or show a wrong floor.
 """
 
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ def lift() -> Iterator[WiredLift]:
 
 
 def ride(lift: WiredLift, until: float = 14.0) -> Iterator[tuple[float, LiftSample]]:
-    """Yield every scan of a ride to L3."""
+    """Yield the time and the reading of every scan during a ride to L3."""
     lift.write(agv_request=True)
     for i in range(1, round(until / SCAN_S)):
         lift.now = now = round(i * SCAN_S, 3)
@@ -37,7 +37,7 @@ def ride(lift: WiredLift, until: float = 14.0) -> Iterator[tuple[float, LiftSamp
 
 
 def changes(lift: WiredLift) -> list[tuple[float, LiftSample]]:
-    """Return each sample of a ride that differs from the sample before."""
+    """Return the readings of a ride that differ from the reading before."""
     seen: list[tuple[float, LiftSample]] = []
     for now, sample in ride(lift):
         if not seen or sample != seen[-1][1]:

@@ -1,4 +1,4 @@
-"""The five failures of a wire, each as a history of the level at the wire's far end."""
+"""The five failures of a wire. Each test gives the history of the level at the wire's far end."""
 
 from typing import Any
 
@@ -14,8 +14,8 @@ def wire(active: Any = "high", pull: Any = "down", direction: Any = "in") -> Wir
 
 
 def shown(contact: Contact, fed: str, step: float = 1.0) -> str:
-    """Return the level at the far end at each second, for these levels at the near end. 1 is
-    asserted."""
+    """Return the level at the far end for each second, as a text of 1 and 0. `fed` has the levels at
+    the near end. 1 means asserted."""
     seen = ""
     for i, value in enumerate(fed):
         contact.feed(value == "1", i * step)

@@ -1,4 +1,4 @@
-"""The control socket of a running world."""
+"""The control socket of a running simulation."""
 
 import socket
 import time
@@ -21,7 +21,7 @@ QUICK = LiftPace(floor_s=0.02, door_s=0.02, agv_s=0.02, dwell_s=0.02)
 
 
 class World:
-    """A running lift and its control socket."""
+    """A running lift with its control socket."""
 
     def __init__(self, path: Path) -> None:
         self.lift = LiftPlant("Lift1", shipped(), QUICK)
@@ -106,7 +106,7 @@ def test_a_caller_who_leaves_or_never_reads_does_not_stop_the_plants(world: Worl
     world.callers.remove(gone)
     plant = world.running.plants["Lift1"]
     told = 0
-    while told < 2000:  # far more than a socket holds for a caller that does not read
+    while told < 2000:  # a socket holds far fewer lines for a caller that does not read
         for i in range(50):
             plant.drive("door_open", i % 2 == 0, time.monotonic())
         told += len(list(islice(well.edges(), 50)))

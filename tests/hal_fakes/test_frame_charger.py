@@ -1,4 +1,4 @@
-"""The fake charger on CAN charges only as long as frames arrive."""
+"""The fake charger on CAN charges only while it receives frames."""
 
 import can
 import msgspec
@@ -17,7 +17,7 @@ FED_EVERY_S = 0.5
 
 
 class Bench:
-    """A driver that sends the charger its frames, in virtual time."""
+    """A charger and a driver that sends it frames, in virtual time."""
 
     def __init__(self) -> None:
         self.far = Reactive()
@@ -30,7 +30,8 @@ class Bench:
         self.driver.open()
 
     def passes(self, seconds: float, fed: bool) -> None:
-        """Let time pass when the charger looks at the bus. With `fed` the driver sends its frames."""
+        """Let time pass, with regular looks of the charger at the bus. With `fed` the driver sends its
+        frames."""
         until = self.far.now + seconds
         while self.far.now < until:
             self.far.now += STATUS_S / 2

@@ -95,7 +95,7 @@ def test_any_bytes_are_a_message_or_refused(kind: Any, body: bytes, little: bool
         message = decode(kind, bytes([0, little, 0, 0]) + body)
     except CdrError:
         return
-    again = encode(kind, message)  # compare bytes, because a float may be NaN, which equals nothing
+    again = encode(kind, message)  # a float may be NaN, which equals nothing, so compare bytes
     assert encode(kind, decode(kind, again)) == again
 
 

@@ -1,5 +1,5 @@
-"""Nodes of different RMF releases on one graph: which nodes hear each other, the release that `auto`
-chooses, and the faults."""
+"""Nodes of different RMF releases on one graph. The tests show which nodes hear each other, which
+release `auto` chooses, and which faults appear."""
 
 import logging
 from collections.abc import Callable, Iterator
@@ -130,7 +130,7 @@ def test_each_of_many_nodes_in_one_process_reads_what_the_others_speak(join_of: 
 
 
 def told(nodes: list[Transport], faults: list[tuple[str, str]]) -> Callable[[], bool]:
-    """Return a condition: each of the nodes reports these faults."""
+    """Return a condition: each of these nodes reports these faults."""
     return lambda: all(node.faults() == faults for node in nodes)
 
 
@@ -159,7 +159,7 @@ def test_our_own_daemons_are_no_evidence_of_a_release() -> None:
 
 
 def site(release: Release) -> tuple[Outlet, MemoryTransport, list[object]]:
-    """Return a node of this release, and the list of its alarms that others hear."""
+    """Return a node of this release, and the list of its alarms that another node hears."""
     network, heard = MemoryNetwork(), list[object]()
     ears = MemoryTransport(network, "ears")
     for topic in (topics.EMERGENCY_SIGNAL, topics.FIRE_ALARM_TRIGGER, topics.ALERT):
@@ -173,7 +173,7 @@ def site(release: Release) -> tuple[Outlet, MemoryTransport, list[object]]:
 def test_without_emergency_signal_the_alarm_and_its_end_go_out_on_fire_alarm_trigger() -> None:
     outlet, node, heard = site(JAZZY)
     outlet.publish(topics.EMERGENCY_SIGNAL, d.EmergencySignal((), True))
-    node.release = KILTED  # the node learns its release; the end goes out in the alarm's form
+    node.release = KILTED  # the node learns its release only after the alarm
     outlet.publish(topics.EMERGENCY_SIGNAL, d.EmergencySignal((), False))
     assert heard == [d.Bool(True), d.Bool(False)]
     outlet, _, heard = site(KILTED)

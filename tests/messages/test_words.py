@@ -1,4 +1,4 @@
-"""The words for messages that `watch`, `send` and the demo print."""
+"""The words with which `watch`, `send` and the demo print messages."""
 
 from bridges.messages import definitions as d
 from bridges.messages import stamps, words

@@ -1,4 +1,5 @@
-"""The texts of `watch`, `explain` and the page about alarms, from our daemons' diagnostics."""
+"""The texts about alarms in `watch`, `explain` and the page. They come from our daemons'
+diagnostics."""
 
 from typing import Any
 
@@ -18,7 +19,7 @@ CAUSE = (AlarmCause("Panel", "fire"),)
 
 
 def told(at: float, state: str, *fleets: str, panel: Any = None, **daemon: Any) -> Heard:
-    """Return the diagnostics in which a panel's daemon states its alarm."""
+    """Return diagnostics in which a panel's daemon states its alarm."""
     report = FleetAlarmReport(state, CAUSE if state == "alarm" else ())
     status = {**daemon, "alarm": alarming.statement(report, frozenset(fleets))}
     devices = {} if panel is None else {"Panel": panel}

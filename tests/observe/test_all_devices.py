@@ -1,4 +1,5 @@
-"""The memory of all devices: its bounds, the clock, the age of messages, and two nodes of one name."""
+"""The memory of all devices: its bounds, its clock, the age of messages, and two nodes with one
+name."""
 
 import pytest
 from msgspec.structs import replace

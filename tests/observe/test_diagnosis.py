@@ -1,4 +1,4 @@
-"""The memory of our nodes' messages on `/diagnostics` stays within bounds."""
+"""The memory of our nodes' messages on `/diagnostics` stays within its bounds."""
 
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard

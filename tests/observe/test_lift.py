@@ -1,4 +1,5 @@
-"""The memory of a lift: requesters, holder, waits, and the unmet conditions of RequestLift."""
+"""The memory of a lift: requesters, holder, waits, and the conditions for which RequestLift still
+waits."""
 
 import pytest
 
@@ -114,7 +115,7 @@ def test_a_robot_repeats_end_until_its_last_is_old() -> None:
 
 
 def not_passed_on(story: Story) -> str:
-    """Return the requester whose requests the supervisor does not pass on."""
+    """Return the requester whose requests the supervisor withholds from the lift."""
     lift = story.device("lift", "Lift1")
     assert isinstance(lift, ObservedLift)
     one = lift.not_passed_on(story.graph.now)

@@ -1,4 +1,4 @@
-"""Two publishers of one device's states, and cases that only look like two."""
+"""Two publishers of one device's states, and cases that look like two publishers but are not."""
 
 from bridges.messages.heard import Heard, Sender
 from bridges.observe.all_devices import PlainGraph
@@ -12,8 +12,8 @@ A, B, C = (Sender(f"/{name}") for name in "abc")
 def publishers(
     *told: Sender | None, step_s: float = 0.5, after_s: float = 0.0
 ) -> tuple[Sender, ...]:
-    """Return the publishers that count `after_s` after these senders published the same state in
-    turn."""
+    """Let these senders publish the same state in turn. Return the publishers that count `after_s`
+    later."""
     graph, at = PlainGraph(), 0.0
     for at, sender in enumerate(told):
         graph.hear(Heard(at * step_s, WALL, "lift_states", LIFT, sender))
@@ -32,7 +32,7 @@ def test_a_node_that_restarts_or_a_listener_that_joins_again_is_no_second_publis
     assert publishers(A, A, A) == (A,)
     assert publishers(A, A, B) == (B,)
     assert publishers(A, B, C) == (C,)
-    assert publishers(A, B, A, step_s=SLOWEST_S) == (A,)  # A came back after B had gone
+    assert publishers(A, B, A, step_s=SLOWEST_S) == (A,)  # A has come back, and B has gone
 
 
 def test_two_are_one_again_once_the_other_has_gone() -> None:

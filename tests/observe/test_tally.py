@@ -1,4 +1,5 @@
-"""Counts of rides, waits, door cycles, charges and availability, from messages on the graph."""
+"""Counts of rides, waits, door cycles, charges and availability, made from the messages on the
+graph."""
 
 from msgspec.structs import replace
 
@@ -19,7 +20,8 @@ def durations(histogram: DurationHistogram) -> tuple[int, float]:
 
 
 def asks_for(story: Story, floor: str, seconds: int, shown: tuple[str, str]) -> Story:
-    """Let a robot repeat its request for this time (s). The lift shows this session and floor."""
+    """Let a robot repeat its request for `seconds`. The lift shows this session and floor in that
+    time."""
     for _ in range(seconds):
         story.asks(RED, floor).lift(*shown).passes(1)
     return story.asks(RED, floor)
@@ -29,7 +31,8 @@ FREE, HELD = ("", "L2"), (RED, "L1")
 
 
 def ride(story: Story) -> Story:
-    """Let a robot ask at L1, board after 20 s, and ask for L2. It may leave the car 8 s later."""
+    """Let a robot ask at L1, board after 20 s, and ask for L2. Another 8 s later it may leave the
+    car."""
     asks_for(story.lift(*FREE), "L1", 20, FREE).lift(RED, "L1", OPEN)
     asks_for(story, "L2", 8, HELD).lift(RED, "L2", OPEN)
     return story.ends(RED).ends(RED, passed=True).lift()

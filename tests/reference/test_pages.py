@@ -16,7 +16,7 @@ ROOT = DOCS.parent
 
 @pytest.mark.parametrize("page", PAGES)
 def test_a_generated_page_is_what_the_program_makes(page: str) -> None:
-    """`make reference` renews the page."""
+    """If this test fails, run `make reference`."""
     assert (DOCS / page).read_text() == PAGES[page]()
 
 
@@ -33,7 +33,7 @@ def test_each_exit_code_that_a_command_names_is_told(command: str) -> None:
 
 
 def tracked(pattern: str) -> Iterator[Path]:
-    """Yield the files in git, without built files."""
+    """Yield the files in git except generated files."""
     for path in sorted(ROOT.rglob(pattern)):
         if not {".venv", ".venv-ros", "build", "dist"} & set(path.relative_to(ROOT).parts):
             yield path
@@ -44,7 +44,7 @@ PAGE = re.compile(r"\bdocs/[\w./-]+\.(?:md|svg|png)\b")
 
 @pytest.mark.parametrize("pattern", ["*.py", "*.md", "*.yaml", "*.service", "*.toml", "*.xml"])
 def test_each_page_of_docs_that_a_text_names_is_there(pattern: str) -> None:
-    """`make docs` checks the links within docs/."""
+    """`make docs` checks only the links within docs/."""
     wrong = {
         f"{path.relative_to(ROOT)}: {page}"
         for path in tracked(pattern)

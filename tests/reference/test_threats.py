@@ -1,4 +1,4 @@
-"""Each line of the threat model names an existing test, or states a gap."""
+"""Each line of the threat model names an existing test, or states that there is a gap."""
 
 import re
 from pathlib import Path

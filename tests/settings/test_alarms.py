@@ -1,4 +1,4 @@
-"""An alarm in a YAML: its topic, its fleets, its sources, and the answer of `check`."""
+"""An alarm in a YAML file: its topic, fleets and sources, and the answer of `check`."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The loader makes a Config or raises SettingsError for any content of a file."""
+"""For any content of a file the loader makes a Config or raises SettingsError."""
 
 from pathlib import Path
 

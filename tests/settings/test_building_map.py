@@ -1,4 +1,5 @@
-"""`rmf-bridge check FILE --building-map MAP` compares our names with RMF's, on maps of both forms."""
+"""`rmf-bridge check FILE --building-map MAP` compares our names with RMF's. Maps have one of two
+forms."""
 
 import os
 from pathlib import Path
@@ -98,7 +99,7 @@ coordinator:
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Work in a folder with maps, so that a test gives file names like a user."""
+    """Work in a folder with maps, so that a test types file names as a user does."""
     monkeypatch.chdir(tmp_path)
     Path("building.yaml").write_text(BUILDING)
     Path("graph.yaml").write_text(GRAPH)
@@ -107,7 +108,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def complaints(
     capsys: pytest.CaptureFixture[str], text: str, building: str = "building.yaml"
 ) -> list[str]:
-    """Return the complaints of `check` about the names in a device YAML."""
+    """Return the complaints of `check` about the names in this device YAML."""
     Path("device.yaml").write_text(text)
     code = main(["check", "-q", "device.yaml", "--building-map", building])
     said = capsys.readouterr().err.splitlines()

@@ -40,7 +40,7 @@ OK
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Work in an empty folder with a wide terminal, so that a test gives file names like a user."""
+    """Work in an empty folder with a wide terminal, so that a test types file names as a user does."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "130")
 

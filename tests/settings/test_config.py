@@ -109,7 +109,7 @@ LIMITS = st.fixed_dictionaries(
 
 @st.composite
 def gates(draw: st.DrawFn) -> dict[str, Any]:
-    """Return the raw values of a correct gate."""
+    """Draw the raw values of a correct gate."""
     names = draw(st.lists(NAMES, unique=True, max_size=9))
     lanes = draw(st.one_of(LANES, st.lists(NAMES, min_size=1)))
     lane = st.sampled_from(list(lanes))
@@ -122,7 +122,7 @@ def gates(draw: st.DrawFn) -> dict[str, Any]:
 
 
 class Quoting(yaml.SafeDumper):
-    """A YAML writer that quotes every string, also each key, and otherwise equals PyYAML's."""
+    """A YAML writer like PyYAML's, except that it quotes every string and each key."""
 
 
 Quoting.add_representer(

@@ -150,7 +150,7 @@ def test_a_coordinators_station_that_no_charger_has_is_an_error(
 
 
 def shipped(name: str, *changes: tuple[str, str]) -> str:
-    """Return a file of config/ with these changes."""
+    """Return the text of a file in config/ with these changes."""
     text = (CONFIG / name).read_text()
     for old, new in changes:
         text = text.replace(old, new)

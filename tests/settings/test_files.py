@@ -1,4 +1,4 @@
-"""A file that is no device YAML gives one clear problem with its place."""
+"""For a file that is not a device YAML, the loader reports one clear problem with its place."""
 
 import os
 import socket

@@ -54,7 +54,8 @@ levels:
 
 
 class Site:
-    """The coordinator's file, RMF's fleet config, and RMF's navigation graph if a test gives one."""
+    """The coordinator's file and RMF's fleet config. RMF's navigation graph is added if a test gives
+    one."""
 
     def __init__(self, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         self._folder, self._capsys = folder, capsys
@@ -62,7 +63,7 @@ class Site:
     def check(
         self, ours: str = OURS, theirs: str = THEIRS, graph: str = "", *more: str
     ) -> tuple[int, list[str]]:
-        """Return the exit code, and each problem and warning without the folder."""
+        """Return the exit code, and each problem and warning without its folder."""
         for name, text in (("ours.yaml", ours), ("config.yaml", theirs), ("graph.yaml", graph)):
             (self._folder / name).write_text(text)
         options = ["--building-map", str(self._folder / "graph.yaml")] if graph else []
@@ -347,8 +348,8 @@ def test_the_shipped_fleet_agrees_with_the_shipped_coordinator(
 
 
 def test_the_transform_of_the_adapter_templates_example_and_its_mean_squared_error() -> None:
-    """The example is config.yaml of open-rmf/fleet_adapter_template. nudged 0.3.1 gave each checked
-    value."""
+    """The points come from config.yaml of open-rmf/fleet_adapter_template. The expected values come
+    from nudged 0.3.1."""
     rmf = [(20.33, -3.156), (8.908, -2.57), (13.02, -3.601), (21.93, -4.124)]
     robot = [(59.0, 399.0), (57.0, 172.0), (68.0, 251.0), (75.0, 429.0)]
     found = estimate(rmf, robot)
@@ -360,7 +361,7 @@ def test_the_transform_of_the_adapter_templates_example_and_its_mean_squared_err
 
 
 def _nudged(x: list[tuple[float, float]], y: list[tuple[float, float]]) -> tuple[float, ...]:
-    """Return scale and rotation (s, r) and the translation, by the least-squares normal equations."""
+    """Return scale and rotation (s, r) and the translation, computed by least squares."""
     n = len(x)
     a1, b1 = sum(p[0] for p in x), sum(p[1] for p in x)
     c1, d1 = sum(p[0] for p in y), sum(p[1] for p in y)
@@ -377,7 +378,7 @@ def _nudged(x: list[tuple[float, float]], y: list[tuple[float, float]]) -> tuple
 
 def test_a_known_transform_is_found_and_undone() -> None:
     rmf = [(0.0, 0.0), (1.0, 0.0), (0.0, 2.0)]
-    robot = [(5.0, 5.0), (5.0, 7.0), (1.0, 5.0)]  # turned by 90 degrees, twice as large, shifted
+    robot = [(5.0, 5.0), (5.0, 7.0), (1.0, 5.0)]  # turned by 90 degrees, scaled by 2, shifted
     found = estimate(rmf, robot)
     assert cmath.isclose(found.turn, 2j, abs_tol=1e-12)
     assert cmath.isclose(found.shift, 5 + 5j, abs_tol=1e-12)

@@ -1,5 +1,5 @@
-"""A fleet's YAML, and the two files of RMF named in it. `check` finds each mistake that would end RMF's
-adapter."""
+"""A fleet's YAML, and the two files of RMF that the YAML names. `check` finds each mistake that would
+stop RMF's adapter."""
 
 import os
 from collections.abc import Callable
@@ -24,7 +24,8 @@ Write = Callable[..., Path]
 
 @pytest.fixture
 def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
-    """Return a function that writes the shipped files with changes: (file, old text, new text)."""
+    """Return a function that writes the shipped files. Each change is a tuple (file, old text, new
+    text)."""
     monkeypatch.setattr(texts, "_texts", {})
 
     def written(*changes: tuple[str, str, str]) -> Path:

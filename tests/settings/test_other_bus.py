@@ -1,4 +1,5 @@
-"""An input's `bus:`: what is accepted, what is refused and where, and what `check` shows."""
+"""The key `bus:` of an input: accepted values, refused values with their place, and the text of
+`check`."""
 
 from pathlib import Path
 
@@ -136,7 +137,7 @@ def test_a_bus_that_no_device_names_is_still_refused(file: Path) -> None:
 
 
 def test_a_mistyped_point_does_not_make_its_bus_unused(file: Path) -> None:
-    """The bus has this contact alone."""
+    """The mistyped contact is the only contact on its bus."""
     text = TWO
     for i in range(1, 5):
         start = text.index(f"        L{i}: {{bus: header")

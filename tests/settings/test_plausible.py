@@ -1,4 +1,4 @@
-"""Values that the types allow, but that no integrator intends, give an error or a warning."""
+"""Some values fit the types, but no integrator intends them. They give an error or a warning."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ TCP = "tcp: {host: 192.168.1.50}"
 
 
 def door(bus: str = TCP, rmf: str = "{}", limits: str = "{}") -> str:
-    """Return the YAML of the door with these changes."""
+    """Return the YAML of a door with this bus, RMF section and limits."""
     text = DOOR.replace(TCP, bus).replace("buses:", f"rmf: {rmf}\nbuses:")
     return f"{text}    limits: {limits}\n"
 

@@ -1,4 +1,4 @@
-"""The loader reads a YAML with an earlier version's key, and warns. `migrate` rewrites the key."""
+"""The loader reads a key of an earlier version, and warns. `migrate` rewrites the key in the file."""
 
 import os
 from pathlib import Path
@@ -39,7 +39,7 @@ MAP = "".join(
 
 @pytest.fixture
 def old(tmp_path: Path) -> Path:
-    """Return a charger's file in the form of the first version, with the old name in the map."""
+    """Return a charger's file in the form of the first version, with the old key in its `map`."""
     file = tmp_path / "bay.yaml"
     file.write_text(HEAD + BAY + MAP)
     return file

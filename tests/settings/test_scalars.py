@@ -1,4 +1,4 @@
-"""Strings, numbers and choices that YAML could misread, or that are out of bounds."""
+"""Strings, numbers and choices that YAML could misread, or that lie outside their bounds."""
 
 from pathlib import Path
 

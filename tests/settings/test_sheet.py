@@ -1,4 +1,5 @@
-"""`check --json` for programs and `check --sheet` for signatures agree with the printed text."""
+"""`check --json` serves programs, and `check --sheet` serves signatures. Both agree with the printed
+text."""
 
 import json
 import os
@@ -17,7 +18,7 @@ EVIL = '"<script>alert(1)</script>&"'
 
 
 class Page(HTMLParser):
-    """A page's text, its tags, and everything that the page would load or run."""
+    """A page with its text, its tags, and everything that it would load or run."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -53,7 +54,7 @@ def sheet_of(*files: str) -> Page:
 
 
 def json_of(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, Any]:
-    """Return the exit code and the printed JSON. The command must print nothing else."""
+    """Return the exit code and the printed JSON. Fail if the command prints anything else."""
     code = main(["check", "--json", *arguments])
     out, err = capsys.readouterr()
     assert err == ""

@@ -1,4 +1,5 @@
-"""Every shipped YAML is correct. After one spoiling change the loader names the place of the change."""
+"""Every shipped YAML is correct. After a change that spoils it, the loader names the place of the
+change."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -42,15 +43,15 @@ T = TypeVar("T")
 
 CONFIG = Path(__file__).parents[2] / "config"
 FILES = device_yamls()
-NAMES = ['"17"', "x", ""]  # as a name each may be right, or wrong in another place
+NAMES = ['"17"', "x", ""]  # each may be a valid name, or be wrong in another place
 SORTS = {"accept_unsafe": "signal", "setpoints": "setpoint", "values": "value", "when": "value"}
-"""Words for the keys of some sections. Elsewhere the word is `key`."""
+"""The loader's word for an unknown key in these sections. In all other sections the word is `key`."""
 TRAPS = ["017", "1:30", "no", "1e3", "~", "1.0", "17", "[]", *NAMES]
 
 
 @dataclass(frozen=True)
 class Place:
-    """A mapping's entry in a file's text. `parent` is the key of the mapping around the entry."""
+    """An entry of a mapping in a file's text. `parent` is the key of the whole mapping."""
 
     key: ScalarNode
     value: Node
@@ -59,7 +60,7 @@ class Place:
 
     @property
     def end(self) -> int:
-        """Return the end of the entry's text. YAML's own end of a block value is too late."""
+        """Return the end of the entry's text. The end that YAML gives for a block value is too late."""
         node = self.value
         while isinstance(node, CollectionNode) and not node.flow_style and node.value:
             last = node.value[-1]
@@ -87,7 +88,7 @@ def places(node: Node, parent: Node) -> Iterator[Place]:
 
 @dataclass(frozen=True)
 class Leaf:
-    """A scalar value, with the key of its entry and the key of the mapping around (`parent`)."""
+    """A scalar value with the key of its entry. `parent` is the key of the whole mapping."""
 
     node: ScalarNode
     key: Node
@@ -95,7 +96,7 @@ class Leaf:
 
 
 def scalars(node: Node, key: Node, parent: Node) -> Iterator[Leaf]:
-    """Yield every scalar value, but no keys."""
+    """Yield every scalar value except keys."""
     if isinstance(node, ScalarNode):
         yield Leaf(node, key, parent)
     elif isinstance(node, SequenceNode):
@@ -115,7 +116,8 @@ def spots(problems: list[str]) -> list[str]:
 
 
 def own_names(config: Path) -> set[str]:
-    """Return the freely chosen names of a file: buses, devices, and names in the kind's section."""
+    """Return the names in a file that a site can choose: buses, devices, and names in the kind's
+    section."""
     loaded = load(config)
     in_buses = (name for bus in loaded.buses.values() for name in names_in(bus))
     return {*loaded.buses, *loaded.devices, *names_in(loaded.section), *in_buses}
@@ -136,7 +138,8 @@ def some(of: Sequence[T], config: Path, turn: int) -> Sequence[T]:
 
 
 def is_own(name: str, names: set[str]) -> bool:
-    """Return whether the site chose the key. Floors and codes are `L1` and `1` in these files."""
+    """Return whether the site chose this key. Names of floors (`L1`) and codes (`1`) count as
+    chosen."""
     return name in names or name[0].isupper() or name[0].isdigit()
 
 
@@ -196,7 +199,7 @@ def test_every_field_of_every_driver_and_bus_is_of_a_sort_that_is_read() -> None
 ANSWERS = ("values", "between_floors", "open", "closed", "moving", "stopped", "up", "down")
 """Keys whose values in an HTTP answer may be anything."""
 NAMED_FREELY = ("temperatures",)
-"""Sections with freely chosen keys."""
+"""Sections whose keys the site can choose."""
 
 
 def test_every_misspelt_key_is_found_where_it_stands(config: Path, file: Path) -> None:
@@ -257,10 +260,10 @@ def test_every_key_that_is_taken_out_leaves_a_right_file_or_is_missed(
 
 
 def is_blamed(leaf: Leaf, trap: str, found: list[str]) -> bool:
-    """Return whether one of these problems leads to this value.
+    """Return whether one of these problems leads a reader to this value.
 
-    A missing or changed number can be valid alone, but conflict with another value. The problem then
-    points at the mapping around the value, or names the value's key.
+    A missing or changed number can be valid alone, but conflict with another value. Then the problem
+    points at the mapping with the value, or names the value's key.
     """
     if at(leaf.node) in spots(found):
         return True

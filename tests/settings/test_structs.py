@@ -1,4 +1,4 @@
-"""Keys, lists and mappings that are unknown, doubled, missing, or of the wrong type."""
+"""Keys, lists and mappings that are unknown, repeated, missing, or of the wrong type."""
 
 from pathlib import Path
 

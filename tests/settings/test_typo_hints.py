@@ -1,4 +1,4 @@
-"""`check` describes typing mistakes in plain words with a subject, without parser's words or
+"""`check` describes typing mistakes in plain words. It names a subject, and shows no parser's words or
 patterns."""
 
 from collections.abc import Iterator
@@ -165,7 +165,7 @@ doors:
 
 
 def patterns(wanted: Type, words: str = "") -> Iterator[tuple[str, str]]:
-    """Yield every pattern in a type, with the words that describe the pattern."""
+    """Yield every pattern in a type, together with the words that describe this pattern."""
     match wanted:
         case Metadata(type=inner, extra=extra):
             yield from patterns(inner, (extra or {}).get("pattern", words))

@@ -1,4 +1,4 @@
-"""systemd itself judges the unit with the drop-in of each shipped file."""
+"""systemd itself checks the unit with the drop-in of each shipped file."""
 
 import configparser
 import re
@@ -25,8 +25,9 @@ OTHERS = (RECORDER, PAGE, EXPORTER, NOTIFY, EARLY)
 CONFIG = device_yamls()
 VERIFY = ("systemd-analyze", "verify", "--man=no")
 MOST = 2.0
-"""The limit of exposure. On systemd 252 a service on the network has 1.5; GPIO or a serial port gives
-1.7. CAN's own sockets also give 1.7, because AF_CAN counts as an exotic family (0.2)."""
+"""The highest permitted exposure. On systemd 252 a service on the network has 1.5. A service with GPIO
+or a serial port has 1.7. A service with CAN sockets has 1.7 too, because AF_CAN counts as exotic
+(0.2)."""
 
 needs_systemd = pytest.mark.skipif(
     shutil.which("systemd-analyze") is None, reason="systemd-analyze is not installed"
@@ -54,7 +55,7 @@ def exposure(folder: Path, name: str) -> float:
     )
     found = re.search(r"Overall exposure level for .*: ([0-9.]+) ", done.stdout)
     assert found, done.stdout
-    assert not done.stderr  # such as "Unknown key name"
+    assert not done.stderr  # for example "Unknown key name"
     return float(found[1])
 
 

@@ -1,4 +1,4 @@
-"""The charging demo, with real processes on real DDS, and the demo's verdict."""
+"""The charging demo with real processes on real DDS, and the demo's verdict."""
 
 import os
 import signal
@@ -66,8 +66,8 @@ def test_ctrl_c_in_the_middle_leaves_nothing_behind(directory: Path) -> None:
 
 
 def journal(*told: tuple[str, str, str]) -> Journal:
-    """Return a journal of these charges in turn, each (charger, robot, request id), with IDLE
-    between."""
+    """Return a journal of these charges, one after the other. Each charge is (charger, robot, request
+    id). Between two charges the charger is IDLE."""
     made = Journal(0.0, lambda text: None, colour=False)
     for charger, robot, request_id in told:
         value = int(d.ChargerStateValue.CHARGER_CHARGING)

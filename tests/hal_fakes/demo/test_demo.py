@@ -17,7 +17,7 @@ from tests.waiting import PATIENCE_S, wait_until
 
 CONFIG = Path(__file__).parents[3] / "config"
 PATIENTLY = ("--patience", "10")
-"""Options for a busy machine, so that its slowness does not fail the demo."""
+"""Options that let the demo wait longer, because the test's machine may be busy."""
 
 
 @contextmanager

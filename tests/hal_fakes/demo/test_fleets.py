@@ -1,4 +1,4 @@
-"""A fleet from a configuration file in the form of RMF's tutorial."""
+"""A fleet from a configuration file in the form that RMF's tutorial uses."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The demo accepts only a correct day. It sees and names each possible mistake."""
+"""The demo accepts only a day without mistakes. It finds and names each possible mistake."""
 
 from collections.abc import Callable
 from typing import Any

@@ -20,7 +20,7 @@ def at(plant: ChargerPlant, now: float) -> Reading:
 
 
 def parked(*failures: tuple[str, FailureMode]) -> ChargerPlant:
-    """Return a station with these failures. A robot comes onto its pad at 1 s."""
+    """Return a station with these failures. A robot drives onto its pad at 1 s."""
     plant = ChargerPlant("a")
     for part, mode in failures:
         plant.fail(part, mode)
@@ -35,7 +35,7 @@ def commanded(asked: bool = False, cleared: bool = True) -> ChargerPlant:
 
 
 def powered(cleared: bool = True) -> ChargerPlant:
-    """Return a station whose power is on when a robot comes at 1 s."""
+    """Return a station with its power on. A robot drives onto its pad at 1 s."""
     plant = commanded(cleared=cleared)
     plant.press("robot", True, 1.0)
     plant.drive("power", True, 1.0)

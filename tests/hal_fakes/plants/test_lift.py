@@ -1,4 +1,4 @@
-"""The lift plant: whole histories of its terminal block in virtual time."""
+"""The lift plant. Tests compare whole histories of its terminal block in virtual time."""
 
 from collections.abc import Callable
 from typing import Any

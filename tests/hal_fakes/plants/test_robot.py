@@ -1,4 +1,4 @@
-"""The simulated robot drives, turns, drains its battery, charges, rides, and fails as its table
+"""The simulated robot drives, turns, drains its battery, charges and rides. It fails as its table
 says."""
 
 import msgspec
