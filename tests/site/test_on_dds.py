@@ -1,4 +1,4 @@
-"""Robots compete for one lift and one door on DDS. The test kills each daemon and one adapter once."""
+"""Robots compete for one lift and one door on DDS. The test kills each daemon once, and one adapter."""
 
 import signal
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""A short day at the site, played for a few random seeds. `make soak` plays whole days."""
+"""A short day at the site for a few random seeds. `make soak` plays whole days."""
 
 import pytest
 
@@ -9,17 +9,19 @@ from tests.site.growth import Look, growth
 from tests.site.laws import Broken
 
 SEEDS = depth([2], [1, 2, 3])
-"""Each seed has other supervisors. tests/workbench/replay/test_replay.py also plays seeds 1 and 3."""
+"""The seeds of the days. Each seed has other supervisors. tests/workbench/replay/test_replay.py also
+plays seeds 1 and 3."""
 MINUTES = depth(8, 20)
-"""The day's length (min). It exceeds the last minutes, in which robots go home (`WIND_DOWN_S`)."""
+"""The length of a day (min). It exceeds WIND_DOWN_S, the time in which the robots go home."""
 
 
 @pytest.mark.long(5)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_site_lives_through_its_troubles(seed: int) -> None:
-    """After a failure `make soak SEED=… HOURS=0.3333` plays the day again and prints the events before.
+    """After a failure, `make soak SEED=… HOURS=0.3333` plays the day again and prints the events before
+    it.
 
-    The seed chooses our supervisors, or RMF's of either release.
+    The seed chooses our supervisors, or RMF's supervisors of either release.
     """
     site = Site(seed)
     site.run(MINUTES / 60)
@@ -34,7 +36,7 @@ def test_a_site_lives_through_its_troubles(seed: int) -> None:
 def test_without_our_remedy_a_robot_that_rmfs_supervisor_forgets_stops_a_lift_for_good(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """This day has the deadlock that `bridges/kinds/lift/forgotten.py` ends."""
+    """This day contains the deadlock that `bridges/kinds/lift/forgotten.py` ends."""
     monkeypatch.setattr(forgotten, "heard", lambda session, asked, now: (session, False))
     site = Site(23, "kilted")  # a day with an early deadlock
     site.trouble._draw = site._restart_rmfs
