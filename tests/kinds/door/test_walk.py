@@ -87,7 +87,7 @@ def check_rules_within(steps: int, roots: list[World], limits: DoorLimits) -> in
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_a_doors_rules_hold_within_some_steps_of_the_start(site: str) -> None:
+def test_the_rules_of_a_door_hold_within_some_steps_of_the_start(site: str) -> None:
     limits = SITES[site]
     assert check_rules_within(depth(2, 3), [start(limits)], limits) > depth(80, 500)
 
@@ -98,7 +98,7 @@ def test_the_rules_hold_within_some_steps_of_each_stage_of_a_passage(stage: str)
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_the_rules_hold_within_some_steps_of_all_stages_at_each_kind_of_site(site: str) -> None:
+def test_the_rules_of_a_door_hold_near_all_stages_at_each_kind_of_site(site: str) -> None:
     limits = SITES[site]
     roots = [path(*steps, limits=limits) for steps in STAGES.values()]
     assert check_rules_within(depth(1, 2), roots, limits) > depth(80, 800)
@@ -123,7 +123,7 @@ def states_around_all_stages(limits: DoorLimits) -> list[World]:
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_from_every_state_a_sound_door_opens_when_asked_and_is_let_go_when_asked(
+def test_from_every_state_a_sound_door_opens_on_open_and_is_released_on_close(
     site: str,
 ) -> None:
     limits = SITES[site]
@@ -139,7 +139,7 @@ def test_from_every_state_a_sound_door_opens_when_asked_and_is_let_go_when_asked
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_from_every_state_silence_never_lets_go_of_a_door_that_is_wanted_open(site: str) -> None:
+def test_from_every_state_a_wanted_door_stays_held_in_silence(site: str) -> None:
     limits = SITES[site]
     for world in states_around_all_stages(limits):
         wanted = path_checked(mended(world, limits), limits, "A opens", "at open", 200.0)

@@ -191,7 +191,7 @@ def test_in_every_history_the_requests_follow_the_table_and_their_pace(
 
 @settings(max_examples=examples(300))
 @given(HISTORIES)
-def test_after_every_history_a_restart_knows_exactly_who_holds_the_door(
+def test_after_every_history_a_restart_knows_the_holders_of_the_door(
     history: list[tuple[float, Any]],
 ) -> None:
     ledger = told(history)

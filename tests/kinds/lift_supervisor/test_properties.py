@@ -62,7 +62,7 @@ Restart = st.tuples(st.floats(0, 150), st.sampled_from(["supervisor", "Lift1", *
     restarts=st.lists(Restart, max_size=6),
 )
 @example(seed=1, loss=0.0, our_skew=0.0, restarts=[])  # a late state started a second END
-def test_every_live_robot_is_served_whatever_is_lost_and_whoever_restarts(
+def test_every_live_robot_is_served_in_spite_of_losses_and_restarts(
     seed: int, loss: float, our_skew: float, restarts: list[tuple[float, str]]
 ) -> None:
     rng = random.Random(seed)
@@ -247,7 +247,7 @@ def test_long_histories_keep_the_rules_too(history: list[tuple[float, int]]) -> 
 
 @settings(max_examples=examples(100))
 @given(histories())
-def test_from_every_state_a_lift_that_obeys_is_granted_to_a_robot_that_asks(
+def test_from_every_state_a_robot_that_asks_gets_a_lift_that_obeys(
     history: list[tuple[float, int]],
 ) -> None:
     desk = Watched(core.initial("Lift1", 0.0), 0.0)

@@ -48,7 +48,7 @@ def check(one: Alone) -> None:
     assert bool(one.memory.claims) >= bool(one.report.waits)
 
 
-def test_in_every_history_whoever_waits_is_told_for_what() -> None:
+def test_in_every_history_the_report_tells_why_a_robot_waits() -> None:
     said = {
         one.report.waits for one, _ in histories(Alone(speaks=False), MOVES, depth(4, 5), after)
     }
