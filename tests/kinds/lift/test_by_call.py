@@ -49,7 +49,7 @@ def open_at(story: Story, floor: str) -> None:
     story.until(there)
 
 
-def test_a_call_brings_agv_mode_where_the_car_stands_and_the_hold_keeps_it() -> None:
+def test_a_call_to_the_present_floor_brings_agv_mode_and_the_hold_keeps_it() -> None:
     story = simulator()
     open_at(story, "L1")
     story.run(story.now + 60.0)
@@ -89,14 +89,14 @@ def called(agv: bool = True) -> tuple[Building, Story]:
     return building, story
 
 
-def test_a_call_that_brings_no_agv_mode_is_given_up_after_its_time() -> None:
+def test_a_call_without_agv_mode_is_given_up_after_its_time() -> None:
     _, story = called(agv=False)
     assert story.outputs.call == "L3"
     story.run(7.0)
     assert (story.outputs, story.faults) == (LiftOutputs(), ["AGV_MODE_NOT_GRANTED"])
 
 
-def test_agv_mode_that_ends_on_the_way_is_a_fault_and_is_called_for_again() -> None:
+def test_agv_mode_that_ends_on_the_way_is_a_fault_and_is_requested_by_a_new_call() -> None:
     building, story = called()
     building.set(agv=False, motion=Motion.UP, level=None)
     story.run(3.0)
@@ -132,7 +132,7 @@ def calls_and_holds(
     return shown
 
 
-def test_a_car_that_a_call_has_brought_is_not_called_again_because_its_floor_is_not_seen() -> None:
+def test_a_car_that_has_come_is_not_called_again_when_its_floor_is_unknown() -> None:
     """With `by_call` in AGV mode, the core calls a car again only after a reading at another floor."""
     alone = Alone(by_call=True)
     below = replace(CLOSED, level="L2", agv=False)

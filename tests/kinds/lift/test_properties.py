@@ -85,7 +85,7 @@ def happens(story: Story, what: Any) -> None:
 
 @FEW
 @given(st.lists(st.tuples(WAITS, HAPPENINGS), max_size=40), st.sampled_from([None, 0.4]))
-def test_the_invariants_hold_whatever_the_building_and_rmf_do(
+def test_the_invariants_hold_for_any_actions_of_building_and_rmf(
     happenings: Sequence[tuple[float, Any]], pulse_s: float | None
 ) -> None:
     story, judge = judged(Building(), call_pulse_s=pulse_s, fire_reset="manual")
@@ -97,7 +97,7 @@ def test_the_invariants_hold_whatever_the_building_and_rmf_do(
 
 @FEW
 @given(st.lists(st.tuples(WAITS, HAPPENINGS), max_size=25))
-def test_whatever_has_happened_the_lift_comes_back_and_serves(
+def test_after_any_events_the_lift_recovers_and_serves(
     happenings: Sequence[tuple[float, Any]],
 ) -> None:
     story, _ = judged(Building())

@@ -32,7 +32,7 @@ def on_its_threshold(rides_before: int) -> tuple[World, RobotContext]:
 
 
 @pytest.mark.parametrize("rides_before", [1, 2])
-def test_an_earlier_ride_that_rmf_hears_again_lets_no_door_go_while_a_robot_goes_in(
+def test_requests_of_an_earlier_ride_release_no_door_while_a_robot_enters(
     rides_before: int,
 ) -> None:
     """`make soak SEED=7 RMF=kilted` found this case. An adapter had been cut off for longer than a
@@ -48,7 +48,7 @@ def test_an_earlier_ride_that_rmf_hears_again_lets_no_door_go_while_a_robot_goes
     assert rmf.story.state == "AGV, open at L1, fleet/a to L1"
 
 
-def test_a_supervisor_that_restarts_and_hears_an_earlier_ride_lets_no_door_go_either() -> None:
+def test_after_a_supervisor_restart_requests_of_an_earlier_ride_release_no_door() -> None:
     rmf, robot = on_its_threshold(1)
     before = list(rmf.story.edges)
     rmf.supervisor = type(rmf.supervisor)()
@@ -58,9 +58,7 @@ def test_a_supervisor_that_restarts_and_hears_an_earlier_ride_lets_no_door_go_ei
     assert sessions(rmf.story)[-3:] == [A, "", A]
 
 
-def test_a_robot_that_is_cut_off_before_it_gets_the_lift_is_as_safe_when_it_is_found_again() -> (
-    None
-):
+def test_a_robot_that_was_cut_off_before_its_grant_stays_safe() -> None:
     """`make soak SEED=7 RMF=kilted` found this case after 12.6 h. The robot's adapter was cut off
     before the robot got the lift."""
     first, robot = RobotContext(B), RobotContext(A)
@@ -81,7 +79,7 @@ def test_a_robot_that_is_cut_off_before_it_gets_the_lift_is_as_safe_when_it_is_f
 
 
 @pytest.mark.parametrize("after_s", [2.8, 3.2], ids=["within the grace", "after it"])
-def test_an_earlier_ride_that_rmf_hears_again_shows_a_robot_no_door_that_was_let_go(
+def test_requests_of_an_earlier_ride_show_no_robot_a_released_door_as_open(
     after_s: float,
 ) -> None:
     """RMF's real supervisor was dead when a robot's next ride began. The ride began at the floor where
@@ -110,7 +108,7 @@ def test_an_earlier_ride_that_rmf_hears_again_shows_a_robot_no_door_that_was_let
 # ---- LIFT-REPLAYED-1, LIFT-REPLAYED-2, LIFT-REPLAYED-3: rule by rule
 
 
-def test_a_floor_that_only_the_supervisor_asks_for_counts_after_a_while() -> None:
+def test_a_floor_that_only_the_supervisor_requests_counts_after_three_seconds() -> None:
     lift = Overheard()
     lift.adapter(AGV, "L2")
     began = lift.story.now
@@ -140,7 +138,7 @@ def test_a_request_for_the_present_floor_ends_the_doubt_and_a_new_one_begins_aft
     assert ons(lift.story, "hold_door") == 1
 
 
-def test_the_robots_own_request_ends_the_doubt_at_once_whichever_comes_first() -> None:
+def test_the_own_request_of_the_robot_ends_the_doubt_in_any_order_of_arrival() -> None:
     lift = Overheard()
     lift.adapter(AGV, "L2")
     lift.story.asks(A, "L4")
@@ -150,7 +148,7 @@ def test_the_robots_own_request_ends_the_doubt_at_once_whichever_comes_first() -
     assert lift.story.state == "AGV, moving at L2, fleet/a to L4"
 
 
-def test_the_robots_own_request_counts_for_nothing_before_the_supervisor_has_passed_it_on() -> None:
+def test_the_own_request_of_the_robot_has_no_effect_before_the_supervisor_passes_it_on() -> None:
     lift = Overheard()
     lift.adapter(AGV, "L2")
     lift.adapter(AGV, "L4")
@@ -170,7 +168,7 @@ def test_a_robot_that_has_ended_or_was_never_heard_raises_no_doubt() -> None:
         assert lift.story.state == "AGV, moving at L2, fleet/a to L4"
 
 
-def test_of_more_robots_than_any_site_has_those_heard_first_are_forgotten() -> None:
+def test_among_very_many_robots_those_heard_first_are_forgotten() -> None:
     own: Mapping[str, str] = {}
     for number in range(MOST + 1):
         own = noted(own, LiftRequested(f"robot{number}", True, "L1"))

@@ -105,7 +105,7 @@ def test_a_latched_fault_ends_with_the_session() -> None:
     assert story.outputs == HELD
 
 
-def test_a_latched_fault_ends_with_an_end_though_the_same_session_is_back_at_once() -> None:
+def test_a_latched_fault_ends_with_an_end_even_if_the_session_returns_at_once() -> None:
     """An operator ends the session. Within a second the fleet adapter repeats its request for this
     session."""
     story = lift("L1", DoorReading.OPEN, agv=True, door_timeout_s=4.0)
@@ -156,7 +156,7 @@ def test_a_reset_during_a_retry_lets_the_request_wait_for_agv_mode_again() -> No
     assert history(reset_at=17.0) == [*before, (17.0, True, []), (22.0, False, [failed])]
 
 
-def test_in_a_fault_an_open_door_is_not_offered() -> None:
+def test_during_a_fault_an_open_door_is_not_offered() -> None:
     story = latched()
     story.building.set(door=DoorReading.OPEN)
     keep_asking(story, 210.0)
@@ -176,14 +176,14 @@ def test_a_later_try_that_succeeds_ends_the_fault_and_resets_the_count() -> None
     assert [round(b - a, 1) for a, b in pairwise(starts[2:])] == [34.0, 64.0]
 
 
-def test_the_end_of_a_wait_for_the_lift_wakes_the_core() -> None:
+def test_the_core_wakes_at_the_end_of_a_wait_for_the_lift() -> None:
     alone = Alone(stale_after_s=900.0, request_timeout_s=30.0, door_timeout_s=4.0)
     alone(0.0, CLOSED)(1.0, ASKED)
     assert alone.decision.outputs == LiftOutputs(agv_request=True, hold_door=Side.FRONT)
     assert alone.decision.wake_at == 5.0
 
 
-def test_agv_mode_lost_on_the_way_switches_outputs_off_and_is_requested_again() -> None:
+def test_agv_mode_that_is_lost_on_the_way_is_requested_again() -> None:
     story = Story(Building(LiftSample("L2", DoorReading.CLOSED, motion=Motion.STOPPED, agv=True)))
     story.run(1.0)
     story.asks("A", "L1")
@@ -242,7 +242,7 @@ def test_the_call_stays_on_while_people_take_the_car_first() -> None:
 # ---- LIFT-DRIVE-1: a silent RMF
 
 
-def test_rmf_silent_with_the_robot_outside_lets_the_lift_go_and_keeps_the_session() -> None:
+def test_if_rmf_is_silent_with_the_robot_outside_the_session_stays_without_outputs() -> None:
     story = lift("L1", DoorReading.CLOSED, agv=True, door_timeout_s=600)
     story.run(30.5)
     assert story.outputs == HELD
@@ -259,7 +259,7 @@ def test_rmf_silent_with_the_robot_outside_lets_the_lift_go_and_keeps_the_sessio
     assert (story.outputs, story.faults) == (HELD, [])
 
 
-def test_rmf_silent_with_a_robot_inside_holds_and_warns() -> None:
+def test_if_rmf_is_silent_with_a_robot_inside_the_outputs_stay_on_with_a_warning() -> None:
     story = lift("L1", DoorReading.OPEN, agv=True)
     story.run(300.0)
     assert (story.outputs, story.faults) == (HELD, ["RMF_SILENT"])
@@ -268,7 +268,7 @@ def test_rmf_silent_with_a_robot_inside_holds_and_warns() -> None:
     assert story.faults == []
 
 
-def test_the_core_wakes_for_rmfs_silence_and_for_the_next_try() -> None:
+def test_the_core_wakes_for_a_silence_of_rmf_and_for_the_next_try() -> None:
     alone = Alone(stale_after_s=900.0, request_timeout_s=30.0)(0.0, AT_L1)(1.0, ASKED)
     assert alone.decision.wake_at == 31.0
     alone = Alone(stale_after_s=900.0, request_timeout_s=30.0, door_timeout_s=4.0)
@@ -280,7 +280,7 @@ def test_the_core_wakes_for_rmfs_silence_and_for_the_next_try() -> None:
 # ---- LIFT-4: outputs that cannot be written
 
 
-def test_outputs_that_cannot_be_written_soon_become_a_fault_with_all_outputs_off() -> None:
+def test_outputs_that_cannot_be_written_cause_a_fault_and_all_outputs_off() -> None:
     story = lift("L1", DoorReading.OPEN, agv=True)
     story.run(5.0)
     story.building.unwritable = "no answer from the relay module"
@@ -314,7 +314,7 @@ def test_a_failed_write_is_repaired_by_the_next_one() -> None:
     assert story.faults == []
 
 
-def test_inputs_are_believed_though_outputs_cannot_be_written() -> None:
+def test_inputs_are_believed_even_if_outputs_cannot_be_written() -> None:
     story = Story(Controller())
     story.run(1.0)
     story.asks("A", "L1")
@@ -325,7 +325,7 @@ def test_inputs_are_believed_though_outputs_cannot_be_written() -> None:
     assert story.state == "OFFLINE, closed at L1, A to L1"
 
 
-def test_unwritten_outputs_are_judged_by_their_age_when_a_request_comes() -> None:
+def test_at_a_request_unwritten_outputs_are_judged_by_their_age() -> None:
     alone = Alone(stale_after_s=2.0)(0.0, AT_L1, WriteFailed("timeout"))
     assert alone(1.0, ASKED).decision.refused == ""
     alone = Alone(stale_after_s=2.0)(0.0, AT_L1, WriteFailed("timeout"))

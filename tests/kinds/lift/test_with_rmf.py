@@ -65,7 +65,7 @@ def test_a_hundred_requests_a_second_cause_no_additional_state() -> None:
 
 
 @pytest.mark.parametrize("adapters_first", [False, True])
-def test_a_robot_that_waits_is_served_after_the_one_that_rides(adapters_first: bool) -> None:
+def test_a_waiting_robot_is_served_after_the_robot_that_rides(adapters_first: bool) -> None:
     a, b = RobotContext(A), RobotContext(B)
     rmf = world(a, b, adapters_first=adapters_first)
     rmf.asks(a, "L2")
@@ -84,7 +84,7 @@ def test_a_robot_that_waits_is_served_after_the_one_that_rides(adapters_first: b
 
 
 @pytest.mark.parametrize("adapters_first", [False, True])
-def test_without_grace_the_next_robot_has_the_lift_within_three_states(
+def test_without_grace_the_next_robot_gets_the_lift_within_three_states(
     adapters_first: bool,
 ) -> None:
     a, b = RobotContext(A), RobotContext(B)
@@ -102,7 +102,7 @@ def test_without_grace_the_next_robot_has_the_lift_within_three_states(
 
 
 @pytest.mark.parametrize("times", [1, 10])
-def test_a_lost_end_is_repeated_until_it_is_heard(times: int) -> None:
+def test_a_lost_end_is_repeated_until_the_node_hears_it(times: int) -> None:
     robot = RobotContext(A)
     rmf = world(robot)
     rmf.asks(robot, "L2")
@@ -146,7 +146,7 @@ def test_a_supervisor_that_restarts_with_a_robot_in_the_car_does_not_end_its_ses
     rmf.until_done(robot)
 
 
-def test_a_supervisor_that_restarts_on_the_way_costs_one_call_and_never_agv_mode() -> None:
+def test_a_supervisor_restart_during_a_ride_repeats_one_call_and_keeps_agv_mode() -> None:
     robot = RobotContext(A)
     rmf = world(robot)
     rmf.asks(robot, "L4")
@@ -208,7 +208,7 @@ def test_a_fleet_adapter_that_restarts_ends_the_session_that_it_no_longer_wants(
     assert rmf.story.outputs == LiftOutputs()
 
 
-def test_a_restarted_node_starts_dark_and_grants_the_session_from_the_next_request() -> None:
+def test_a_restarted_node_starts_with_outputs_off_and_grants_the_next_request() -> None:
     robot = RobotContext(A)
     rmf = world(robot)
     rmf.asks(robot, "L3")
