@@ -61,7 +61,7 @@ def told(states: list[ChargerState], name: str) -> list[tuple[int, str]]:
 
 
 @pytest.mark.parametrize("bad", [silent, trickles], ids=["silent", "trickling"])
-def test_a_dead_station_is_shown_as_such_and_the_others_are_read_on_time(
+def test_a_dead_station_is_shown_as_dead_and_other_stations_are_read_on_time(
     tmp_path: Path, bad: Callable[[Caller], None]
 ) -> None:
     sound = always(answer(b'{"state": 5}'))

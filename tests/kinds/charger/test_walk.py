@@ -58,7 +58,7 @@ def test_each_stage_of_a_charge_is_what_its_name_says() -> None:
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_a_chargers_rules_hold_within_some_steps_of_the_start(site: str) -> None:
+def test_the_rules_of_a_charger_hold_within_some_steps_of_the_start(site: str) -> None:
     found = walker(SITES[site]).walk([World()], depth(3, 4), check)
     assert len(found) > depth(1000, 5000)
 
@@ -79,7 +79,7 @@ def test_the_rules_hold_within_some_steps_of_a_stage_at_a_verified_station(stage
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_from_every_state_a_sound_station_comes_back_and_charges_the_robot_that_asks(
+def test_from_every_state_a_station_without_faults_recovers_and_charges_the_robot_that_asks(
     site: str,
 ) -> None:
     limits = SITES[site]
