@@ -245,7 +245,7 @@ def after(ledger: Ledger, move: Any) -> Ledger:
     return ledger
 
 
-def test_every_history_of_so_many_moves_ends_well() -> None:
+def test_every_short_history_ends_with_all_robots_charged() -> None:
     ledger = Ledger()
     ledger.wants[ONE] = True
     ledger.passes()
@@ -256,7 +256,7 @@ def test_every_history_of_so_many_moves_ends_well() -> None:
 
 @hypothesis_settings(max_examples=examples(150))
 @given(st.lists(st.integers(0, len(MOVES) - 1), max_size=25))
-def test_every_long_history_ends_well(history: list[int]) -> None:
+def test_every_long_history_ends_with_all_robots_charged(history: list[int]) -> None:
     ledger = Ledger()
     for move in history:
         MOVES[move](ledger)
