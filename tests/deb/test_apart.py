@@ -104,7 +104,7 @@ def serves(made: System) -> bool:
 
 
 @pytest.mark.long(30)
-def test_daemons_alone_are_whole_before_the_workbench_comes_and_after_it_has_gone(
+def test_daemons_work_before_the_workbench_is_installed_and_after_its_removal(
     tmp_path: Path, debs: Debs
 ) -> None:
     made = System(tmp_path)

@@ -71,12 +71,12 @@ def test_requirements_are_those_of_the_target_machine(tmp_path: Path) -> None:
     assert modules == ["first", "for_arm"]
 
 
-def test_what_is_not_really_needed_is_left_out(tmp_path: Path) -> None:
+def test_requirements_that_the_target_does_not_need_are_left_out(tmp_path: Path) -> None:
     site = fill(tmp_path, "arm64", "--without", "first:for-arm")
     assert [file.stem for file in site.glob("*.py")] == ["first"]
 
 
-def test_the_daemons_own_user_may_read_what_root_has_built(tmp_path: Path) -> None:
+def test_the_user_of_the_daemons_may_read_files_built_by_root(tmp_path: Path) -> None:
     site = fill(tmp_path, "amd64")
     readable = {path.name: path.stat().st_mode & 0o005 for path in (site, site / "for_pc.py")}
     assert readable == {"site-packages": 0o005, "for_pc.py": 0o004}
@@ -100,7 +100,7 @@ def test_a_requirement_that_the_lock_lacks_ends_the_build(
     assert capfd.readouterr().err.endswith("lock.txt lacks for-pc: make lock\n")
 
 
-def test_of_two_versions_in_the_lock_the_one_for_the_target_counts(tmp_path: Path) -> None:
+def test_the_version_for_the_target_counts_among_two_versions_in_the_lock(tmp_path: Path) -> None:
     other = f"for-pc==9.0 ; python_version < '3.12' \\\n    --hash=sha256:{'0' * 64}\n"
     right = pinned(wheel(tmp_path, "for_pc"), "; python_version >= '3.12' ")
     site = fill(tmp_path, "amd64", lock=other + right)

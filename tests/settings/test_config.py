@@ -35,7 +35,7 @@ def gate(raw: Any) -> Any:
     return msgspec.convert(raw, named.driver_called("gate", "contact").settings, str_keys=True)
 
 
-def test_a_right_file_becomes_a_config(file: Path) -> None:
+def test_a_correct_file_becomes_a_config(file: Path) -> None:
     assert config_of(file, RIGHT) == Config(
         path=file,
         text=RIGHT.encode(),
@@ -131,7 +131,7 @@ Quoting.add_representer(
 
 
 @pytest.mark.parametrize("flow", [True, False])
-def test_every_right_file_becomes_what_msgspec_makes_of_its_values(file: Path, flow: bool) -> None:
+def test_every_correct_file_gives_the_same_structs_as_msgspec(file: Path, flow: bool) -> None:
     @settings(max_examples=examples(60))
     @given(st.dictionaries(NAMES, gates(), min_size=1, max_size=1))
     def check(devices: dict[str, Any]) -> None:

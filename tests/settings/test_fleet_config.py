@@ -86,7 +86,9 @@ def site(
     return Site(tmp_path, capsys)
 
 
-def test_two_files_that_agree_are_right_and_the_transforms_error_is_reported(site: Site) -> None:
+def test_files_that_agree_give_no_problem_and_the_error_of_the_transform_is_reported(
+    site: Site,
+) -> None:
     assert site.check() == (0, [])
     assert (
         "config.yaml: transformation error estimate for L1: 0"
@@ -156,7 +158,7 @@ def test_two_files_that_agree_are_right_and_the_transforms_error_is_reported(sit
         ),
     ],
 )
-def test_settings_that_cannot_be_right_are_named_where_they_stand(
+def test_contradictory_settings_are_named_at_their_place(
     site: Site, old: str, new: str, problem: str
 ) -> None:
     assert THEIRS.count(old) == 1
@@ -197,7 +199,7 @@ def test_a_key_without_which_no_robot_is_charged_is_an_error(
         ("{Lift1: L9}", os.EX_CONFIG, ["'Lift1' has an unknown floor 'L9'"]),
     ],
 )
-def test_each_lift_with_an_alarm_has_a_recall_floor_in_the_fleets_configuration(
+def test_a_lift_with_an_alarm_needs_a_recall_floor_in_the_fleet_configuration(
     site: Site, levels: str, code: int, begins: list[str]
 ) -> None:
     lift = (Path(__file__).parents[2] / "config" / "lift_io_module.yaml").read_text()
@@ -261,7 +263,7 @@ def test_a_station_that_releases_a_robot_before_rmfs_recharge_soc_is_a_mismatch(
         ),
     ],
 )
-def test_a_likely_mistake_is_warned_of(site: Site, old: str, new: str, warning: str) -> None:
+def test_a_likely_mistake_gives_a_warning(site: Site, old: str, new: str, warning: str) -> None:
     assert THEIRS.count(old) == 1
     assert site.check(theirs=THEIRS.replace(old, new)) == (0, [warning])
 
@@ -294,7 +296,7 @@ def test_waypoints_are_compared_with_the_navigation_graph(site: Site) -> None:
     )
 
 
-def test_a_waypoint_in_the_robots_coordinates_is_named_with_rmfs(site: Site) -> None:
+def test_a_waypoint_in_coordinates_of_the_robot_is_named_with_those_of_rmf(site: Site) -> None:
     code, found = site.check(OURS.replace("x: 10, y: 5", "x: 4, y: -5"), THEIRS, GRAPH)
     text = "this place is on the robot's map; on RMF's map write x: 10, y: 5 (graph.yaml:6)"
     assert (code, found) == (os.EX_CONFIG, [f"ours.yaml:8:9: {text}"])
@@ -347,7 +349,7 @@ def test_the_shipped_fleet_agrees_with_the_shipped_coordinator(
 # --- the transform -----------------------------------------------------------------------------
 
 
-def test_the_transform_of_the_adapter_templates_example_and_its_mean_squared_error() -> None:
+def test_the_transform_of_the_adapter_template_example_has_the_expected_error() -> None:
     """The points come from config.yaml of open-rmf/fleet_adapter_template. The expected values come
     from nudged 0.3.1."""
     rmf = [(20.33, -3.156), (8.908, -2.57), (13.02, -3.601), (21.93, -4.124)]
@@ -387,7 +389,7 @@ def test_a_known_transform_is_found_and_undone() -> None:
     assert math.dist(found.back((1.0, 5.0)), (0.0, 2.0)) < 1e-12
 
 
-def test_the_error_is_the_mean_of_the_squares_and_in_metres_its_root() -> None:
+def test_the_error_is_a_mean_square_and_is_shown_in_metres_as_its_root() -> None:
     found = estimate([(0.0, 0.0), (2.0, 0.0), (0.0, 0.0)], [(0.0, 2.0), (4.0, 0.0), (0.0, -2.0)])
     assert (round(found.mse, 9), round(found.error, 9)) == (
         round(8 / 3, 9),

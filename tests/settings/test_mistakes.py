@@ -62,5 +62,5 @@ def unlike(mistake: dict[str, Any], folder: Path) -> str:
 
 
 @pytest.mark.parametrize("mistake", MISTAKES, ids=lambda mistake: mistake["name"])
-def test_a_mistake_is_named_in_the_first_message(mistake: dict[str, Any], tmp_path: Path) -> None:
+def test_the_first_message_names_the_mistake(mistake: dict[str, Any], tmp_path: Path) -> None:
     assert (unlike(mistake, tmp_path) != "") == (mistake["name"] in OTHERWISE)

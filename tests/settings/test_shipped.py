@@ -149,11 +149,11 @@ def config(request: pytest.FixtureRequest) -> Path:
     return path
 
 
-def test_there_are_shipped_files() -> None:
+def test_shipped_files_exist() -> None:
     assert len(FILES) >= 3
 
 
-def test_a_shipped_file_is_right_and_has_something_to_show(config: Path) -> None:
+def test_a_shipped_file_is_correct_and_has_wires_or_addresses(config: Path) -> None:
     loaded = load(config)
     shown = lines(findings(loaded), 130)
     assert len(shown) > 4
@@ -161,7 +161,7 @@ def test_a_shipped_file_is_right_and_has_something_to_show(config: Path) -> None
     assert loaded.text == config.read_bytes()
 
 
-def test_a_shipped_files_devices_are_what_msgspec_makes_of_them(config: Path) -> None:
+def test_devices_of_shipped_files_equal_the_structs_of_msgspec(config: Path) -> None:
     for settings in load(config).devices.values():
         raw = msgspec.to_builtins(settings, str_keys=True)
         assert msgspec.convert(raw, type(settings), strict=False) == settings
@@ -187,7 +187,7 @@ def leaves(wanted: Type) -> Iterator[Type]:
         yield wanted
 
 
-def test_every_field_of_every_driver_and_bus_is_of_a_sort_that_is_read() -> None:
+def test_every_field_of_every_driver_and_bus_has_a_readable_type() -> None:
     structs = [Rmf, *(named.bus_called(name).settings for name in named.bus_types())]
     for kind in kind_names():
         structs += [named.driver_called(kind, name).settings for name in named.driver_names(kind)]
@@ -202,7 +202,7 @@ NAMED_FREELY = ("temperatures",)
 """Sections whose keys the site can choose."""
 
 
-def test_every_misspelt_key_is_found_where_it_stands(config: Path, file: Path) -> None:
+def test_every_misspelt_key_is_found_at_its_place(config: Path, file: Path) -> None:
     text = config.read_text()
     root = composed(text)
     names = own_names(config)
@@ -222,7 +222,7 @@ def test_every_misspelt_key_is_found_where_it_stands(config: Path, file: Path) -
         assert [p for p in found if p.startswith(where) and said in p], (place.key, found)
 
 
-def test_every_doubled_key_is_found_where_it_stands(config: Path, file: Path) -> None:
+def test_every_repeated_key_is_found_at_its_place(config: Path, file: Path) -> None:
     text = config.read_text()
     root = composed(text)
     for place in some(list(places(root, root)), config, 1):
@@ -239,9 +239,7 @@ def test_every_doubled_key_is_found_where_it_stands(config: Path, file: Path) ->
         ]
 
 
-def test_every_key_that_is_taken_out_leaves_a_right_file_or_is_missed(
-    config: Path, file: Path
-) -> None:
+def test_every_removed_key_leaves_a_correct_file_or_is_reported(config: Path, file: Path) -> None:
     text = config.read_text()
     root = composed(text)
     every = list(places(root, root))
@@ -276,7 +274,7 @@ def is_blamed(leaf: Leaf, trap: str, found: list[str]) -> bool:
     return any(re.search(rf"(?<!\w){re.escape(name)}(?!\w)", p.partition(": ")[2]) for p in found)
 
 
-def test_every_value_that_is_a_trap_is_found_where_it_stands(config: Path, file: Path) -> None:
+def test_every_tricky_value_is_found_at_its_place(config: Path, file: Path) -> None:
     text = config.read_text()
     root = composed(text)
     accepted, values = 0, list(scalars(root, root, root))
@@ -299,7 +297,7 @@ def test_every_value_that_is_a_trap_is_found_where_it_stands(config: Path, file:
     assert accepted < 40 + 3 * coordinates + len(TRAPS) * answers, accepted
 
 
-def test_every_shipped_file_cut_anywhere_is_right_or_refused_at_its_place(
+def test_every_shipped_file_cut_at_any_place_is_accepted_or_refused_there(
     config: Path, file: Path
 ) -> None:
     text = config.read_bytes()

@@ -17,7 +17,7 @@ MINUTES = depth(8, 20)
 
 @pytest.mark.long(5)
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_site_lives_through_its_troubles(seed: int) -> None:
+def test_a_site_survives_its_troubles(seed: int) -> None:
     """After a failure, `make soak SEED=… HOURS=0.3333` plays the day again and prints the events before
     it.
 
@@ -33,7 +33,7 @@ def test_a_site_lives_through_its_troubles(seed: int) -> None:
 
 
 @pytest.mark.long(3)
-def test_without_our_remedy_a_robot_that_rmfs_supervisor_forgets_stops_a_lift_for_good(
+def test_without_our_remedy_a_forgotten_robot_blocks_a_lift_for_ever(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """This day contains the deadlock that `bridges/kinds/lift/forgotten.py` ends."""
@@ -46,7 +46,7 @@ def test_without_our_remedy_a_robot_that_rmfs_supervisor_forgets_stops_a_lift_fo
 
 @pytest.mark.long(5)
 @pytest.mark.parametrize("rmf", depth(["jazzy"], ["jazzy", "kilted"]))
-def test_no_occupied_car_is_given_to_another_robot_while_rmfs_supervisor_dies_each_27_s(
+def test_no_other_robot_gets_an_occupied_car_if_the_supervisor_dies_every_27_s(
     rmf: str,
 ) -> None:
     """`make soak RMF=jazzy KILL_EVERY=27 HOURS=1.65 SEED=3` plays two hundred kills."""
@@ -56,7 +56,7 @@ def test_no_occupied_car_is_given_to_another_robot_while_rmfs_supervisor_dies_ea
 
 
 @pytest.mark.long(2)
-def test_the_same_seed_is_the_same_day() -> None:
+def test_the_same_seed_gives_the_same_day() -> None:
     days = [Site(5), Site(5)]
     for day in days:
         day.run(depth(0.03, 0.15))
