@@ -53,7 +53,7 @@ def test_commands_options_and_choices_are_completed(tmp_path: Path) -> None:
     assert completed(tmp_path, *OFFERED) == list(OFFERED.values())
 
 
-def test_the_names_of_the_files_devices_are_completed(tmp_path: Path) -> None:
+def test_the_names_of_the_devices_in_the_file_are_completed(tmp_path: Path) -> None:
     file = Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml"
     commands = ("press", "fail", "walk", "doctor", "log")
     lines = [f"rmf-bridge {command} {file} --device " for command in commands]

@@ -33,7 +33,7 @@ def shown(contact: Contact, fed: str, step: float = 1.0) -> str:
         ("wrong", "1100111000"),
     ],
 )
-def test_a_wire_that_fails_from_the_start_shows_what_its_failure_says(
+def test_a_wire_that_fails_from_the_start_shows_the_level_of_its_failure(
     mode: FailureMode | None, text: str
 ) -> None:
     assert SLOW_S == 2.0
@@ -45,7 +45,7 @@ def test_a_wire_that_fails_from_the_start_shows_what_its_failure_says(
 @pytest.mark.parametrize(
     ("mode", "held"), [("off", False), ("stuck", True), ("slow", True), ("wrong", False)]
 )
-def test_a_wire_that_fails_while_it_is_asserted_shows_it_again_once_mended(
+def test_an_asserted_wire_shows_its_level_again_after_a_repair(
     mode: FailureMode, held: bool
 ) -> None:
     contact = Contact(wire(), "seed")
@@ -107,7 +107,7 @@ def test_a_cut_input_that_nothing_pulls_is_garbage() -> None:
     assert seen == {True, False}
 
 
-def test_only_what_is_late_or_random_changes_by_itself() -> None:
+def test_only_a_slow_or_random_wire_changes_without_a_new_level() -> None:
     contact = Contact(wire(), "seed")
     modes: tuple[FailureMode | None, ...] = (None, "off", "stuck", "slow", "wrong")
     due = []

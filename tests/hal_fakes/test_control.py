@@ -44,7 +44,7 @@ def world(tmp_path: Path) -> Iterator[World]:
     made.running.close()
 
 
-def test_a_follower_hears_every_edge_from_then_on(world: World) -> None:
+def test_a_follower_hears_every_later_edge(world: World) -> None:
     caller = world.call()
     assert caller.say("follow") == "ok"
     before = time.monotonic()
@@ -57,7 +57,7 @@ def test_a_follower_hears_every_edge_from_then_on(world: World) -> None:
     assert [edge.at for edge in edges] == pytest.approx([before, before + QUICK.agv_s])
 
 
-def test_presses_and_failures_are_made_on_command(world: World) -> None:
+def test_commands_press_signals_and_break_parts(world: World) -> None:
     caller = world.call()
     assert caller.say("press Lift1 fire_alarm on") == "ok"
     assert world.running.plants["Lift1"].sense("fire_alarm")
@@ -99,7 +99,7 @@ def test_an_impossible_command_is_answered_with_the_reason(
     assert world.call().say(line) == answer
 
 
-def test_a_caller_who_leaves_or_never_reads_does_not_stop_the_plants(world: World) -> None:
+def test_a_caller_that_leaves_or_never_reads_does_not_stop_the_plants(world: World) -> None:
     gone, deaf, well = world.call(), world.call(), world.call()
     assert (gone.say("follow"), deaf.say("follow"), well.say("follow")) == ("ok", "ok", "ok")
     gone.close()
@@ -127,7 +127,7 @@ def test_a_socket_that_cannot_be_made_is_named(tmp_path: Path) -> None:
         Control(path, {})
 
 
-def test_a_socket_left_behind_by_a_dead_daemon_is_replaced(tmp_path: Path) -> None:
+def test_the_socket_of_a_dead_daemon_is_replaced(tmp_path: Path) -> None:
     path = tmp_path / "plant.sock"
     left = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     left.bind(str(path))

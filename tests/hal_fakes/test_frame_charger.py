@@ -51,7 +51,9 @@ class Bench:
         return [edge.value for edge in self.plant.edges if edge.signal == "power"]
 
 
-def test_a_charger_charges_while_it_is_fed_and_stops_three_periods_after_the_last_frame() -> None:
+def test_a_charger_charges_while_frames_arrive_and_stops_three_periods_after_the_last_frame() -> (
+    None
+):
     bench = Bench()
     bench.passes(5.0, fed=True)
     bench.passes((PERIODS - 1) * FED_EVERY_S - STATUS_S, fed=False)
@@ -60,7 +62,7 @@ def test_a_charger_charges_while_it_is_fed_and_stops_three_periods_after_the_las
     assert bench.enabled() == [True, False]
 
 
-def test_a_short_delay_by_a_busy_machine_does_not_make_it_stop() -> None:
+def test_a_short_delay_on_a_busy_machine_does_not_end_the_charge() -> None:
     bench = Bench()
     bench.passes(5.0, fed=True)
     bench.far.now += 10.0

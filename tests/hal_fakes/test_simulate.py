@@ -98,7 +98,7 @@ def test_closing_leaves_no_thread_and_no_socket(simulation: Simulation, tmp_path
     assert list(tmp_path.iterdir()) == []
 
 
-def test_each_of_several_buses_has_a_socket_of_its_own(tmp_path: Path) -> None:
+def test_each_of_several_buses_has_its_own_socket(tmp_path: Path) -> None:
     text = SHIPPED.read_text().replace(
         "  header: {type: gpio}", "  header: {type: gpio}\n  other: {type: gpio}"
     )

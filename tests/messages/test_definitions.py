@@ -198,7 +198,7 @@ GOLDEN = {
 }
 
 
-def test_there_are_no_constants_besides_those_of_the_table() -> None:
+def test_the_table_has_every_constant() -> None:
     enums = {kind for kind in vars(constants).values() if isinstance(kind, type)} - {IntEnum}
     assert enums == CONSTANTS.keys()
     assert enums == {kind for kind in vars(d).values() if isinstance(kind, type)} & enums
@@ -219,7 +219,7 @@ def test_every_constant_has_the_number_of_the_msg_file(enum: Any) -> None:
 
 
 @pytest.mark.parametrize("release", GOLDEN, ids=lambda release: release.name)
-def test_every_message_has_the_fields_of_the_releases_msg_file_in_their_order(
+def test_every_message_has_the_fields_of_the_msg_file_of_its_release_in_order(
     release: Release,
 ) -> None:
     ours = {

@@ -72,7 +72,7 @@ c0f72ce) rosbags computes the same hashes as for 4.1.0.
 HASHES: dict[Any, str] = {**SEEN_ON_JAZZY, **COMPUTED_BY_ROSBAGS, **BUILT_INTO_JAZZY}
 
 
-def test_there_is_a_hash_to_compare_with_for_every_type() -> None:
+def test_every_type_has_a_hash_to_compare_with() -> None:
     assert HASHES.keys() == d.PACKAGES.keys()
 
 
@@ -81,7 +81,7 @@ def test_the_hash_of_a_type_is_the_one_that_ros_computes(message_type: Any) -> N
     assert type_hash(message_type) == "RIHS01_" + HASHES[message_type]
 
 
-def test_jazzys_hashes_are_its_own_where_its_files_differ_and_the_newest_elsewhere() -> None:
+def test_hashes_of_jazzy_differ_only_for_files_that_differ() -> None:
     jazzys: dict[Any, str | None] = {**HASHES, **JAZZYS}
     wanted = {kind: "RIHS01_" + hashed for kind, hashed in jazzys.items() if hashed is not None}
     assert {kind: type_hash(kind, JAZZY) for kind in JAZZY.messages()} == wanted

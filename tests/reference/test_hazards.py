@@ -39,7 +39,7 @@ def test_each_row_has_its_own_id() -> None:
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.id)
-def test_a_row_names_a_guard_and_a_test_that_exist_or_says_that_there_is_a_gap(
+def test_a_row_names_an_existing_guard_and_test_or_states_a_gap(
     row: UnsafeAction,
 ) -> None:
     if row.gap:

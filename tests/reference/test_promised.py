@@ -25,7 +25,7 @@ def test_every_name_of_this_version_is_promised() -> None:
     assert present() - set(promised()) == set()
 
 
-def test_what_is_called_experimental_exists() -> None:
+def test_every_experimental_name_exists() -> None:
     section = PAGE.read_text().partition("\n## Experimental\n")[2].partition("\n## ")[0]
     named = re.findall(r"^\| `([\w: ]+)`", section, re.M)
     assert named

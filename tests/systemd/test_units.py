@@ -61,7 +61,7 @@ def exposure(folder: Path, name: str) -> float:
 
 @needs_systemd
 @pytest.mark.parametrize("file", CONFIG, ids=lambda file: file.stem)
-def test_no_shipped_file_needs_a_service_that_is_more_exposed_than_this(
+def test_the_service_of_each_shipped_file_stays_within_the_limit_of_exposure(
     file: Path, tmp_path: Path
 ) -> None:
     score = exposure(tmp_path, system(tmp_path, file))
@@ -103,14 +103,14 @@ def test_systemd_finds_nothing_wrong_with_the_units(tmp_path: Path) -> None:
     assert (done.returncode, ours) == (0, [])
 
 
-def test_the_unit_permits_no_device_and_says_that_it_fits_nothing() -> None:
+def test_the_unit_without_a_drop_in_permits_no_device() -> None:
     lines = UNIT.read_text().splitlines()
     assert "DevicePolicy=closed" in lines
     assert not [line for line in lines if line.startswith(("DeviceAllow", "SupplementaryGroups"))]
     assert "Environment=RMF_BRIDGE_SERVICE=1 RMF_BRIDGE_FITS=nothing PYTHONUNBUFFERED=1" in lines
 
 
-def test_can_is_back_by_itself_after_a_bus_off() -> None:
+def test_can_recovers_automatically_after_a_bus_off() -> None:
     network = configparser.ConfigParser()
     network.read(FILES / "80-rmf-can0.network")
     assert dict(network["CAN"]) == {"bitrate": "250K", "restartsec": "100ms"}
