@@ -42,7 +42,7 @@ def dispensed(world: World, jam: str = "", seconds: float = 12.0) -> WorkcellPha
     return phase
 
 
-def test_a_request_is_on_disk_then_listed_then_acknowledged_and_so_is_its_start() -> None:
+def test_a_request_and_its_start_are_on_disk_before_they_are_published() -> None:
     every = effects()
     asked = every.index("before the disk", every.index("after dispenser_states"))
     assert every[asked : asked + 10] == [
@@ -55,7 +55,7 @@ def test_a_request_is_on_disk_then_listed_then_acknowledged_and_so_is_its_start(
 
 
 @pytest.mark.parametrize("jam", ["", "stuck"])
-def test_wherever_the_daemon_dies_rmf_goes_on_only_with_the_item_and_with_one(jam: str) -> None:
+def test_wherever_the_daemon_dies_rmf_goes_on_only_with_exactly_one_item(jam: str) -> None:
     doubts = 0
     for place in range(len(effects(jam)) + 4):
         world = World(die_at=place)

@@ -88,7 +88,7 @@ def test_a_request_that_rmf_gave_up_while_its_start_was_not_on_disk_does_not_run
     assert (world.relays(), world.plant.moved) == ([], 0)
 
 
-def test_an_outcome_that_is_not_on_disk_is_not_told() -> None:
+def test_an_outcome_is_published_only_after_it_is_on_disk() -> None:
     world = World()
     phase = world.ask()
     world.run(5.0, until=lambda: world.relays() == [True])
@@ -171,7 +171,7 @@ def test_no_cycle_starts_with_a_rival_a_fault_or_a_dead_bus() -> None:
         ("garbage", "it has stopped, and done did not come within 1 s"),
     ],
 )
-def test_a_failed_cycle_is_told_with_outputs_off_and_halts_until_a_reset(
+def test_a_failed_cycle_is_reported_with_outputs_off_and_waits_for_a_reset(
     failure: str, why: str
 ) -> None:
     world = World()
@@ -260,7 +260,7 @@ def doubtful(world: World) -> WorkcellPhase:
     ("verdict", "outcome", "moved"),
     [("done", "completed", 1), ("failed", "failed", 1), ("again", "completed", 2)],
 )
-def test_a_person_decides_what_became_of_a_cycle_that_the_daemon_did_not_see_end(
+def test_a_person_decides_a_cycle_whose_end_the_daemon_did_not_see(
     verdict: str, outcome: str, moved: int
 ) -> None:
     world = World()
@@ -413,7 +413,7 @@ def test_a_request_is_forgotten_a_day_after_rmfs_last_request() -> None:
         (d.DispenserRequestItem("box", 1, "left"),),
     ],
 )
-def test_items_that_the_wiring_cannot_say_fail_at_once(items: object) -> None:
+def test_items_that_the_wiring_cannot_express_fail_at_once(items: object) -> None:
     world = World()
     phase = world.ask(items=items)
     world.run(3.0, until=over(phase))

@@ -32,7 +32,7 @@ def said(g: AlarmGraph) -> list[tuple[float, str, bool]]:
     return [(at, who, on) for at, who, on, _ in g.said]
 
 
-def test_an_alarm_is_said_once_and_ends_by_a_reset_after_its_cause() -> None:
+def test_an_alarm_is_published_once_and_ends_by_a_reset_after_its_cause() -> None:
     """FLEET-ALARM-1, FLEET-ALARM-2 and FLEET-ALARM-3."""
     g = graph(a=())
     g = g.tells("a", "fire").until(20.0)
@@ -49,7 +49,7 @@ def test_an_alarm_is_said_once_and_ends_by_a_reset_after_its_cause() -> None:
     assert len(g.said) == 2
 
 
-def test_a_reset_ends_the_causes_that_are_over_and_leaves_the_others() -> None:
+def test_a_reset_ends_the_causes_that_are_over_and_leaves_the_other_causes() -> None:
     """FLEET-ALARM-1."""
     g = graph(a=()).tells("a", "fire", "code_blue").tells("a", "code_blue").resets("a")
     memory = g.daemons["a"].memory
@@ -75,7 +75,7 @@ def test_a_refused_reset_names_the_causes() -> None:
     assert made.refused == "the alarm is not over: fire of Panel"
 
 
-def test_two_sources_are_one_alarm_and_each_takes_its_retained_true_back() -> None:
+def test_two_sources_make_one_alarm_and_each_withdraws_its_retained_true() -> None:
     """FLEET-ALARM-3."""
     g = graph(a=(), b=()).tells("a", "fire").until(8.0).tells("b", "fire").until(10.0)
     g = g.tells("a").resets("a").until(20.0)
@@ -160,7 +160,7 @@ def test_an_alarm_of_one_building_does_not_hold_the_other_building() -> None:
     assert g.daemons["a"].state == "quiet"
 
 
-def test_where_the_wire_hides_the_sender_a_stranger_among_the_publishers_is_believed() -> None:
+def test_without_a_named_sender_a_stranger_among_the_publishers_is_believed() -> None:
     """FLEET-ALARM-8."""
     memory = graph(a=(), b=()).until(8.0).daemons["a"].memory
     assert memory is not None
