@@ -453,7 +453,7 @@ def test_a_start_timeout_that_passed_without_a_reading_is_reported_later() -> No
     assert story.faults[-1] == "START_TIMEOUT: tiny/AMR01 did not start to charge in time"
 
 
-# ---- CHARGER-8: nobody asked
+# ---- CHARGER-8: charges without a request
 
 
 def test_a_restart_during_a_charge_adopts_the_charge_and_leaves_the_power_unchanged() -> None:
