@@ -30,8 +30,8 @@ class Terminal:
         self.wait_until(lambda: text.encode() in self.screen, text)
 
     def wait_until(self, condition: Callable[[], bool], what: str) -> None:
-        """Wait until the condition holds. Read the screen meanwhile, because a program whose output
-        nobody reads stops drawing."""
+        """Wait until the condition holds. Meanwhile read the screen, because an unread program stops
+        drawing."""
         deadline = time.monotonic() + PATIENCE_S
         while not condition():
             assert time.monotonic() < deadline, (what, self.screen[-2000:])

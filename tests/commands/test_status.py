@@ -142,7 +142,8 @@ def test_an_incomplete_status_is_shown_as_far_as_possible(
 def test_systemd_tells_whether_a_service_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unit: str, state: str
 ) -> None:
-    """A service could not write its name into its directory. `status` asks systemd about it too."""
+    """A service may be unable to write its name into its directory. `status` asks systemd about this
+    service too."""
     monkeypatch.setattr(on_machine, "SERVICE_RUN", tmp_path)
     with served(tmp_path / "lift_a", lift()) as folder:
         (folder / HOLDER).unlink()

@@ -70,7 +70,7 @@ def test_a_service_that_starts_logs_its_old_keys(
 ) -> None:
     monkeypatch.setenv(
         "RMF_BRIDGE_FITS", "nothing"
-    )  # a unit without drop-in: its daemon ends at once
+    )  # the unit has no drop-in, so its daemon ends at once
     assert cli.main(["run", str(old)]) == os.EX_CONFIG
     told = capsys.readouterr().err
     assert told.count("has a new name") == 1

@@ -119,7 +119,7 @@ class DeviceDaemon:
             self.scan(OperatorReset())
 
     def scan(self, *events: Any) -> None:
-        """Scan once, after giving the core these events."""
+        """Give the core these events, and scan once."""
         if not self.alive:
             return
         now = self._timeline.now

@@ -54,7 +54,7 @@ our supervisor repeats the request.
 
 STATED = (d.LiftState, d.DoorState, d.ChargerState)
 NO_DWELL = "D2.people"
-"""A law that this test does not judge. The plants' doors close at once when nobody pushes."""
+"""A law that this test does not judge, because the plants' doors close at once after each push."""
 SHOWN = ("floor", "door", "motion")
 """The groups of lines on which the shown door of a lift depends."""
 

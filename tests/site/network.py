@@ -141,7 +141,7 @@ class Place(MemoryTransport):
         return super().subscribe(topic, carried, others_only=others_only)
 
     def arrive(self, received: Callable[[Any], None], message: Any, sender: Sender | None) -> None:
-        """Hand the message over, unless the node has left."""
+        """Hand the message over if the node is still on the graph."""
         if not self._closed:
             self.heard_from = sender
             self._air.counts["arrived"] += 1

@@ -88,7 +88,7 @@ class DdsPlace:
         return self._inner.subscribe(topic, post, others_only=others_only)
 
     def sender(self) -> None:
-        """Return None. Publishers are known before their late messages arrive here."""
+        """Return None. The publisher of a late message is known before the message arrives here."""
 
     @property
     def lives(self) -> bool:

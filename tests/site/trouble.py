@@ -130,8 +130,8 @@ class Mortal(Protocol):
 
 @dataclass(frozen=True)
 class Ill:
-    """One possible trouble of a party. `begin` and `end` are functions, and limits of its duration
-    follow (s).
+    """One possible trouble of a party. The functions `begin` and `end` start and end it. It lasts from
+    `least_s` to `most_s` (s).
 
     `sort` is the heading under which it is counted. `reset` is the technician's action after the
     repair. If the ill lasted at most `heals_s` (s), the device recovers alone and the technician does

@@ -33,7 +33,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--recordings", type=int, default=300, help="that decode and are wrong")
     parser.add_argument("--forged-s", type=float, default=20.0, help="on each wire")
     options = parser.parse_args(argv)
-    # After nohup the daemons would inherit an ignored SIGHUP. Then they would ignore SIGHUP too.
+    # After nohup a daemon would inherit from this process that it ignores SIGHUP.
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
     seed = secrets.randbelow(10**6) if options.seed is None else options.seed
     began, table, failed = time.monotonic(), Table(), list[str]()

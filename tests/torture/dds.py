@@ -1,4 +1,4 @@
-"""Disturbances of DDS: names of ten megabytes, and a network that fails."""
+"""Disturbances of DDS. Names have ten megabytes, or the network fails."""
 
 import re
 import shutil

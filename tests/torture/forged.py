@@ -22,7 +22,7 @@ from tests.torture.table import Table
 SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
 SERIAL = r"/dev/serial/by-id/[^ ,}\n]*"
 LINES_MOST = 200
-"""The most lines that a daemon may log under attack, so that a stranger cannot fill the log."""
+"""The most lines that a daemon may log under attack. A stranger must not be able to fill the log."""
 
 
 class Liar:

@@ -60,7 +60,7 @@ def _memory(address: str, domain: int) -> float:
 
 
 def recordings(directory: Path, seed: int, times: int, table: Table) -> None:
-    """Read broken recordings that can still be decoded, and a small file that unpacks to much data."""
+    """Read recordings with wrong content. Also read a small file that unpacks to very much data."""
     for ending, number in endings(Mutator(seed), times, directory).items():
         command, _, code = ending.partition(": ")
         table.count(f"wrong recordings, {command}", f"exit code {code}", number)

@@ -1,7 +1,7 @@
 """QEMU with our image: boot, run a check, cut the power. QEMU uses KVM if KVM boots here, else TCG.
 
-Under TCG the machine's clock counts instructions, one for each nanosecond (`-icount shift=0`). So a
-time measured inside is that of a core of 1,000 MIPS, even on a busy host.
+Under TCG the machine's clock counts instructions, one for each nanosecond (`-icount shift=0`). So even
+on a busy host the measured times are those of a core of 1,000 MIPS.
 """
 
 import json
@@ -34,11 +34,10 @@ class Arch:
 
 
 FAST: Final = "mitigations=off"
-"""A kernel option that switches off the protection against leaks of real processors, which is slow on
-TCG.
+"""A kernel option for speed. It switches off the protection against leaks of real processors.
 
-Five levels of page tables cost time too, and so does SMAP, the kernel's protection from a program's
-pages. So the processor for amd64 has neither.
+Five levels of page tables cost time on TCG too. SMAP, the kernel's protection from a program's pages,
+costs time as well. So the processor for amd64 has neither.
 """
 COUNTED: Final = ("-accel", "tcg", "-icount", "shift=0")
 ARCHS: Final = {

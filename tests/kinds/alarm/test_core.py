@@ -174,7 +174,7 @@ def test_a_key_that_is_on_at_the_start_begins_no_drill() -> None:
 def test_no_history_hides_a_lasting_cause_or_makes_a_drill_last() -> None:
     """Try all histories of five readings, or of seven readings in `make deep`.
 
-    Readings are 0.375 s or 6 s apart. The rules that check each history do not use the core's code.
+    Readings are 0.375 s or 6 s apart. The checks do not use the core's code.
     """
     moves = ("fire", "out", "key", "no key", "dead", "later")
 

@@ -50,7 +50,7 @@ def the_message_is_whole(step: Step) -> None:
 
 
 def the_state_is_what_was_read(step: Step) -> None:
-    """Require the state CHARGING if current flows, and only then.
+    """Require the state CHARGING if current flows. Without current the state must not be CHARGING.
 
     Require ERROR if the station is lost or faulty, or if a second node serves the same station.
     """
@@ -93,7 +93,7 @@ def power_has_a_reason(step: Step) -> None:
 
 
 def nobody_else_is_energised(step: Step) -> None:
-    """Require that a station that recognises robots gives power only to the robot of the request.
+    """Require power only for the robot of the request, if the station recognises robots.
 
     The robot must be in range when the power begins.
     """
@@ -115,7 +115,7 @@ def nobody_else_is_energised(step: Step) -> None:
 
 
 def protection_lasts(step: Step) -> None:
-    """Require that a station stays out of service until a clearing of errors has helped.
+    """Require a station to stay out of service until a clearing of errors has helped.
 
     A good reading within CLEAR_S after the clearing proves that the clearing has helped.
     """

@@ -1,4 +1,4 @@
-"""A station that recognises the robot on its pad and that can be switched.
+"""A station that recognises the robot on its pad. The core can switch its power.
 
 The stories play the five situations of a shared charger, in virtual time, with one poll a second.
 """

@@ -343,7 +343,7 @@ def test_a_coordinator_without_memory_takes_over_the_requests_that_the_stations_
 def dedicate(site: Yard, **places: str) -> Publisher[Any]:
     """Publish RMF's charging schedule, which sends each robot to its place.
 
-    A robot whose place is named `wait_…` does not charge. It waits at that place.
+    A robot with a place named `wait_…` waits at this place and does not charge.
     """
     schedule: Publisher[Any] = site.rmf.publisher(topics.CHARGING_ASSIGNMENTS)
     modes = {who: int(place.startswith("wait")) for who, place in places.items()}

@@ -190,8 +190,8 @@ class Ledger:
         assert len(set(live)) == len(live), "one robot has two stations"
 
     def _live(self) -> list[RobotName]:
-        """Return each robot that still has a station. A cancelled request does not count, nor the state
-        RELEASED."""
+        """Return each robot that has a station with a valid request. A cancelled or released request is
+        not valid."""
         return [
             node.holder[1]
             for node in self.nodes.values()

@@ -58,7 +58,7 @@ def site(*robots: Standing, **changes: object) -> SiteMemory:
 
 
 def found(memory: SiteMemory, *times: float) -> list[list[OnWrongPad]]:
-    """Return a list for each of these times, with the robots that stand on wrong pads at that time."""
+    """Return one list for each of these times. The list has the robots on wrong pads at that time."""
     return [list(wrong_pad.found(memory, now, SITE).values()) for now in times]
 
 

@@ -106,7 +106,7 @@ class World:
         self.plant: WorkcellPlant = build(NAME, self.settings, self.table)
         self.far = PointsFar(self, self.plant, self.table)
 
-    # ---- what a story does
+    # ---- actions of a story
 
     def ask(self, guid: str = "task", items: Any = BOX) -> WorkcellPhase:
         """Begin RMF's phase with this request."""
@@ -141,7 +141,7 @@ class World:
         self.far.drive({w.point: w.level(False) for w in self.table if w.direction == "out"})
         self.starts_at = self.now + DOWN_S
 
-    # ---- what a story sees
+    # ---- results for a story
 
     @property
     def state(self) -> d.DispenserState:
@@ -233,7 +233,7 @@ class World:
 
 
 class _Mortal:
-    """A driver whose daemon may die immediately before or after each switched output."""
+    """A driver whose daemon may die right before or right after each switched output."""
 
     def __init__(self, driver: Any, around: Callable[[str], None]) -> None:
         self._driver = driver

@@ -1,4 +1,4 @@
-"""DOOR-2: a door whose supervisor has gone stays held open. A site may limit that time."""
+"""DOOR-2: a door without its supervisor stays held open. A site may limit the time of this hold."""
 
 from bridges.kinds.shared.decision import Attended
 from tests.kinds.door.virtual import OBSTRUCTION, Door

@@ -78,7 +78,7 @@ class World(msgspec.Struct, frozen=True):
 
 
 def start(limits: DoorLimits) -> World:
-    """Return a daemon that has just started on a closed door. An estimated door has no contacts."""
+    """Return a daemon right after its start, with a closed door. An estimated door has no contacts."""
     opened, closed = (None, None) if limits.estimated else (False, True)
     return World(initial(limits, 0.0), DoorSample(opened, closed, obstruction=False, fire=False))
 
@@ -151,7 +151,7 @@ MOVES: dict[str, Move] = {
     "reset": _event(OperatorReset()),
 }
 TIMES = (0.0625, 1.0, 4.0, 16.0, 64.0)
-"""Waits (s), chosen below and above each of these limits: debounce, end of a hazard, grace, travel
+"""Waits (s). They lie below and above each limit of the core: debounce, end of a hazard, grace, travel
 time, opening time, and greatest age."""
 
 
@@ -284,7 +284,7 @@ def _asked(
 def _unlike(
     ledger: Ledger, event: Event, now: float, limits: DoorLimits
 ) -> tuple[float | None, ...]:
-    """Return a time (s) for each contact: since then all readings have said "not asserted"."""
+    """Return a time (s) for each contact. Since that time all readings have said "not asserted"."""
     if isinstance(event, Sampled):
         gap = not fresh(ledger, now, limits)
         said = [getattr(event.sample, signal) for signal in UNLIKE]

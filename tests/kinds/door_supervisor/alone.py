@@ -50,7 +50,8 @@ class Alone(alone.Alone[SupervisedDoor, Event, DoorSupervisorLimits, DoorHoldRep
         return round(self.stamped(aged) * SECOND_NS)
 
     def shows(self, mode: str, until: float | None = None) -> None:
-        """Let a DoorState with this mode arrive: once, or each second until the time `until`."""
+        """Let a DoorState with this mode arrive. With `until` it arrives each second until that
+        time."""
         self.hears(DoorStateHeard(DoorModeValue[f"MODE_{mode}"]))
         while until is not None and self.now + 1.0 <= until:
             self.until(self.now + 1.0)

@@ -92,7 +92,7 @@ class Story:
         return self
 
     def see(self, for_s: float = 0.0, **changes: Any) -> "Story":
-        """Read this sample once, and then again and again for `for_s` seconds."""
+        """Read this sample once. With `for_s` read it again and again for that time."""
         self.sample = replace(self.sample, **changes)
         self.take(Sampled(self.sample))
         for _ in range(round(for_s / SCAN_S)):

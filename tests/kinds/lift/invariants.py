@@ -194,8 +194,8 @@ def open_is_the_truth(step: Step) -> None:
 def a_request_that_waits_has_a_reason(step: Step) -> None:
     """Require a reason for each waiting request.
 
-    A request waits if it has the session and the lift does not show OPEN at the requested floor. If a
-    worn relay must rest, the lift must show a fault too.
+    A request waits if it has the session and the lift does not show OPEN at the requested floor. A worn
+    relay that must rest also requires a fault.
     """
     shown, session = step.decision.report, step.decision.memory.session
     event = step.event

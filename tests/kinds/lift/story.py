@@ -36,7 +36,7 @@ from tests.accepted import accepted
 SCAN_S = 0.05
 LEAST_GAP_S = 0.001
 WALL = 1_000_000.0
-"""The wall clock when the story begins (s since the epoch)."""
+"""The wall clock at the beginning of the story (s since the epoch)."""
 
 DEBOUNCE: dict[str, float] = {"floor": 0.08, "door": 0.03, "rear_door": 0.03}
 DEBOUNCE |= dict.fromkeys(("motion", "agv_mode", *Hazard), 0.05)

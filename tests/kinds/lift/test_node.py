@@ -81,7 +81,7 @@ def test_a_lift_that_was_never_read_is_offline_with_stamp_zero_and_nothing_is_wr
         )
     }
     assert story.node.ready
-    assert building.writes == 1  # the claim of the outputs writes all of them off
+    assert building.writes == 1  # the claim of the outputs writes every output off
     assert story.faults == ["INPUTS_NOT_FRESH"]
 
 

@@ -25,8 +25,8 @@ STORMS = settings(max_examples=examples(40))
 
 @dataclass
 class Judge:
-    """A judge of every decision of a story. `open_seen_at` is the last time (s) at which the contact
-    said open."""
+    """A judge of every decision of a story. `open_seen_at` is the last time (s) with an open
+    contact."""
 
     building: Building
     open_seen_at: float = -1.0

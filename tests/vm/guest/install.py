@@ -71,7 +71,7 @@ def supervisors() -> str:
 
 
 def recorder() -> str:
-    """The recorder of incidents runs since the installation of the package."""
+    """The recorder of incidents has run since the installation of the package."""
     until(lambda: is_active("rmf-bridge-recorder.service"), "the recorder is ready")
     return f"ready after {ready_s('rmf-bridge-recorder.service'):.2f} s"
 

@@ -6,8 +6,8 @@ from typing import Final
 from tests.vm.guest.system import Wrong, disable, enable, far_side, pid, sh
 
 SITE: Final = ("ip", "-n", "site")
-"""The start of a command on the other machine. That machine is a network namespace at the end of a
-cable."""
+"""The start of a command on the other machine. A network namespace at the end of a cable stands in for
+it."""
 MOVES: Final = (("10.7.0", "open"), ("10.8.0", "close"))
 """Each new network, with the request that is sent over it."""
 

@@ -120,7 +120,7 @@ def _options(mount: str) -> set[str]:
 def labels() -> str:
     """The service finds the header's chip by its label on Raspberry Pi 3, 5 and 4."""
     sh("systemctl", "stop", SERVICE, "far-lift.service")
-    for label in header.LABELS:  # the other checks use the last label
+    for label in header.LABELS:  # the last label stays for the other checks
         header.unplug()
         header.plug(label)
         sh("udevadm", "settle")
