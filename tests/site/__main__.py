@@ -23,7 +23,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--rmf",
         choices=SUPERVISORS,
-        help="whose supervisors run, ours or RMF's of a release; the seed decides by default",
+        help="supervisors: ours, or RMF's of a release; by default the seed decides",
     )
     parser.add_argument(
         "--kill-every",

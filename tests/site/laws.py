@@ -221,7 +221,7 @@ class Laws:
             truth.session, truth.since = state.session_id, now
             others = sorted(set(truth.inside) - {state.session_id}) if state.session_id else []
             self.require(
-                not others, f"{name} is given to {state.session_id}, with {others} in the car"
+                not others, f"{name} is given to {state.session_id} while {others} is in the car"
             )
         if state.door_state != d.LiftDoor.DOOR_OPEN:
             return
@@ -375,7 +375,7 @@ class Laws:
         over = max(since + GRACE_S, self._on_since[name] + AT_ONCE_S) < now
         self.require(
             not (sighted and over and not truth.session),
-            f"{name} drives {sorted(on)} unrequested",
+            f"{name} drives {sorted(on)} without a request",
         )
         self.require(on == {"agv_mode_request"} or "agv_mode_request" in on, f"{name}: {on}")
 
@@ -472,8 +472,8 @@ class Laws:
         waited = self._timeline.now - max(since, calm_since)
         self.require(
             waited <= BOUND_S,
-            f"{robot} waits for {what} since {since:.0f} s, and"
-            f" everything is well since {calm_since:.0f} s",
+            f"{robot} has waited for {what} since {since:.0f} s, and"
+            f" everything has been well since {calm_since:.0f} s",
         )
 
     def at_rest(self) -> None:

@@ -27,11 +27,11 @@ from tests.torture.wires import wires
 def main(argv: Sequence[str] | None = None) -> int:
     """Attack real daemons, and print the table."""
     parser = argparse.ArgumentParser(prog="python -m tests.torture", description=__doc__)
-    parser.add_argument("--seed", type=int, help="one is drawn and printed if left out")
+    parser.add_argument("--seed", type=int, help="seed; by default random and printed")
     parser.add_argument("--kills", type=int, default=200)
-    parser.add_argument("--times", type=int, default=10, help="of each shortage")
-    parser.add_argument("--recordings", type=int, default=300, help="that decode and are wrong")
-    parser.add_argument("--forged-s", type=float, default=20.0, help="on each wire")
+    parser.add_argument("--times", type=int, default=10, help="number of tries of each shortage")
+    parser.add_argument("--recordings", type=int, default=300, help="number of wrong recordings")
+    parser.add_argument("--forged-s", type=float, default=20.0, help="seconds on each wire")
     options = parser.parse_args(argv)
     # After nohup a daemon would inherit from this process that it ignores SIGHUP.
     signal.signal(signal.SIGHUP, signal.SIG_DFL)

@@ -65,7 +65,7 @@ def main() -> int:
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m tests.vm", description=__doc__)
     parser.add_argument("--arch", choices=ARCHS, default="amd64")
-    parser.add_argument("--only", choices=PARTS, default="", help="a part")
+    parser.add_argument("--only", choices=PARTS, default="", help="run only this part")
     return parser.parse_args()
 
 

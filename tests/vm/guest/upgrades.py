@@ -74,7 +74,7 @@ def _first_writes() -> tuple[float, list[header.Write]]:
     switched an output on."""
     writes = [each for each in header.writes() if each.line in LIFT]
     if {each.line for each in writes} != LIFT.keys():
-        raise Wrong(f"writes: {writes}")
+        raise Wrong(f"not every output of the lift was written; writes: {writes}")
     first = {line: min(w.at for w in writes if w.line == line) for line in LIFT}
     return max(first.values()), [each for each in writes if each.level == LIFT[each.line]]
 
@@ -173,7 +173,7 @@ def back() -> str:
     sh("systemctl", "start", unit("lift_supervisor"))
     off = header.off_at(relays, when)
     if off.keys() != relays.keys() or not all(map(is_active, map(unit, SERVICES))):
-        raise Wrong(f"{version()}: off {off}")
+        raise Wrong(f"version {version()}, relays written off: {off}")
     return f"{version()}: off after {max(off.values()) - when:.1f} s, all serve, status {_status()}"
 
 

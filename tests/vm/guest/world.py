@@ -40,7 +40,7 @@ def edited_yaml() -> str:
         YAML.write_text(text)
         sh("systemctl", "restart", SERVICE)
     if new != {25, 26}:
-        raise Wrong(f"the service has written the new pins {new}")
+        raise Wrong(f"of the new pins the service has written only {sorted(new)}")
     return f"old pins off after {took:.2f} s, back with the new ones"
 
 
@@ -147,5 +147,7 @@ def said() -> str:
     if not lines:
         raise Wrong("the journal has no line of the service")
     if others := [line for line in lines if not EVENT.match(line)]:
-        raise Wrong(f"{len(others)} of {len(lines)} lines: {others[0]}")
+        raise Wrong(
+            f"{len(others)} of {len(lines)} log lines have another form, first: {others[0]}"
+        )
     return f"{len(lines)} lines, the longest has {max(map(len, lines))} characters"
