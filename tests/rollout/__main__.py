@@ -145,7 +145,7 @@ def relays() -> Iterator[dict[str, str]]:
 
 
 def renew(yaml: Path) -> None:
-    """Write the present content of the YAML into its form, as a new kill test does."""
+    """Write the checksum of the present YAML into its form, as a new kill test does."""
     form, new = yaml.with_suffix(".md"), sha256(yaml.read_bytes()).hexdigest()
     form.write_text(re.sub("sha256 [0-9a-f]{64}", f"sha256 {new}", form.read_text()))
 
