@@ -14,7 +14,7 @@ from bridges.runtime.holder import HOLDER, ourselves
 def served(folder: Path, told: object) -> Iterator[Path]:
     """Yield the runtime directory of a live daemon.
 
-    After the block the daemon is dead, and another process has the daemon's process id.
+    After the block the daemon is dead, and another process has its process id.
     """
     folder.mkdir()
     (folder / "status.json").write_text(json.dumps(told))

@@ -1,4 +1,4 @@
-"""A terminal with a typing person, for commands that ask questions."""
+"""A terminal with a person who types, for commands that ask questions."""
 
 import fcntl
 import os
@@ -15,7 +15,7 @@ from tests.waiting import PATIENCE_S
 
 
 class Terminal:
-    """A terminal with a typing person."""
+    """A terminal with a person who types."""
 
     def __init__(self, *words: str | Path, environ: Mapping[str, str] = os.environ) -> None:
         self.screen = b""
@@ -30,7 +30,7 @@ class Terminal:
         self.wait_until(lambda: text.encode() in self.screen, text)
 
     def wait_until(self, condition: Callable[[], bool], what: str) -> None:
-        """Wait until the condition holds. Read all the time, because an unread program stops
+        """Wait until the condition holds. Meanwhile read the screen, because an unread program stops
         drawing."""
         deadline = time.monotonic() + PATIENCE_S
         while not condition():
@@ -41,7 +41,7 @@ class Terminal:
     def _read(self) -> None:
         try:
             chunk = os.read(self._end, 65536)
-        except OSError as error:  # Linux raises this error when the program has ended
+        except OSError as error:  # Linux raises this error after the end of the program
             raise AssertionError(f"the program has ended: {self.screen[-2000:]!r}") from error
         self.screen += chunk
         if b"\x1b[6n" in chunk:  # the program asks for the position of the cursor
@@ -55,7 +55,8 @@ class Terminal:
         os.close(self._end)
 
     def wait(self) -> int:
-        """Return the exit code, or minus the signal. Reading of the screen stops."""
+        """Return the exit code, or the negative number of the signal. After this call nobody reads the
+        screen."""
         _, status = os.waitpid(self.pid, 0)
         return os.waitstatus_to_exitcode(status)
 

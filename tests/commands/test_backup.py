@@ -1,4 +1,4 @@
-"""`rmf-bridge backup`: the files that it saves and omits, and the content of a restored machine."""
+"""`rmf-bridge backup`: the files that it saves or leaves out, and the content of a restored machine."""
 
 import io
 import os
@@ -21,7 +21,7 @@ WANTS = "etc/systemd/system/rmf-bridges.target.wants"
 
 @pytest.fixture
 def machine(tmp_path: Path) -> Path:
-    """Return the root of a machine with one enabled and one disabled door, a secret, users and a
+    """Return the root of a machine with one enabled door, one disabled door, a secret, users and a
     memory."""
     root = tmp_path / "old"
     config, state = root / "etc/rmf-bridges", root / "var/lib/rmf-bridge/door_supervisor"
@@ -41,7 +41,7 @@ def machine(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def calls(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
-    """Return the list of commands that the test ran. Each command succeeds."""
+    """Return the list of commands that the test runs. Each command succeeds."""
     found: list[list[str]] = []
 
     def run(words: list[str]) -> subprocess.CompletedProcess[str]:
@@ -115,7 +115,7 @@ def test_a_backup_with_an_invalid_yaml_changes_nothing(
 @pytest.mark.parametrize(
     "name", ["../etc/passwd", "/etc/passwd", "etc/passwd", "etc/rmf-bridges/../passwd"]
 )
-def test_a_file_outside_our_folders_is_no_backup(tmp_path: Path, name: str) -> None:
+def test_a_backup_with_a_file_outside_our_folders_is_refused(tmp_path: Path, name: str) -> None:
     file, new = tmp_path / "bad.tar.gz", tmp_path / "new"
     with tarfile.open(file, "w:gz") as out:
         member = tarfile.TarInfo(name)
@@ -125,7 +125,7 @@ def test_a_file_outside_our_folders_is_no_backup(tmp_path: Path, name: str) -> N
     assert content(new) == {}
 
 
-def test_a_link_in_a_backup_is_refused_and_so_is_what_is_no_archive(tmp_path: Path) -> None:
+def test_a_link_in_a_backup_and_a_file_that_is_no_archive_are_refused(tmp_path: Path) -> None:
     file, new = tmp_path / "bad.tar.gz", tmp_path / "new"
     with tarfile.open(file, "w:gz") as out:
         member = tarfile.TarInfo("etc/rmf-bridges/a.yaml")
@@ -165,7 +165,7 @@ def test_a_machine_without_files_has_nothing_to_save(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("bytes_left", [0, 40, 200])
-def test_a_backup_that_was_cut_is_refused_in_one_line(
+def test_a_truncated_backup_is_refused_in_one_line(
     machine: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], bytes_left: int
 ) -> None:
     file, new = tmp_path / "backup.tar.gz", tmp_path / "new"

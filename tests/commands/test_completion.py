@@ -1,4 +1,4 @@
-"""The commands' parsers give both the shell completion and the manual page."""
+"""The shell completion and the manual page both come from the commands' parsers."""
 
 import os
 import subprocess
@@ -31,7 +31,8 @@ imports."""
 
 
 def completed(folder: Path, *lines: str) -> list[list[str]]:
-    """Return the words that argcomplete's own protocol offers at the end of each line."""
+    """Return the words that argcomplete offers at the end of each line, by argcomplete's own
+    protocol."""
     told = [folder / str(n) for n in range(len(lines))]
     words = [str(word) for each in zip(told, lines, strict=True) for word in each]
     environ = os.environ | {"_ARGCOMPLETE_IFS": "\n", "_ARGCOMPLETE_SHELL": "bash"}
@@ -52,7 +53,7 @@ def test_commands_options_and_choices_are_completed(tmp_path: Path) -> None:
     assert completed(tmp_path, *OFFERED) == list(OFFERED.values())
 
 
-def test_the_names_of_the_files_devices_are_completed(tmp_path: Path) -> None:
+def test_the_names_of_the_devices_in_the_file_are_completed(tmp_path: Path) -> None:
     file = Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml"
     commands = ("press", "fail", "walk", "doctor", "log")
     lines = [f"rmf-bridge {command} {file} --device " for command in commands]

@@ -34,7 +34,7 @@ TARGET = "etc/rmf-bridges/lift_dry_contact.yaml"
 
 @pytest.fixture
 def calls(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
-    """Return the list of commands that the test ran. Each command succeeds."""
+    """Return the list of commands that the test runs. Each command succeeds."""
     found: list[list[str]] = []
 
     class Done:
@@ -69,7 +69,7 @@ def test_an_instance_is_stopped_and_off_before_its_file_and_drop_in_change(tmp_p
     ]
 
 
-def test_what_was_left_on_is_switched_off_by_the_installed_files_record() -> None:
+def test_outputs_left_on_are_switched_off_by_the_record_of_the_installed_file() -> None:
     assert switch_off("a").words[1:] == (
         "-P",
         "-m",
@@ -80,7 +80,7 @@ def test_what_was_left_on_is_switched_off_by_the_installed_files_record() -> Non
     assert switch_off("a").state == Path("/var/lib/rmf-bridge/a")
 
 
-def test_a_system_that_is_not_running_gets_file_drop_in_and_links(
+def test_a_system_that_is_not_running_gets_file_and_drop_in_and_links(
     tmp_path: Path, calls: list[list[str]]
 ) -> None:
     (tmp_path / "etc").mkdir()
@@ -146,7 +146,7 @@ def test_a_dry_run_prints_every_step_and_does_nothing(
     assert (calls, list(tmp_path.iterdir())) == ([], [])
 
 
-def test_without_a_start_everything_else_is_done(capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_start_all_other_steps_are_done(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["enable", str(LIFT), "--dry-run"]) == 0
     whole = capsys.readouterr().out.splitlines()
     assert main(["enable", str(LIFT), "--dry-run", "--no-start"]) == 0
@@ -154,7 +154,7 @@ def test_without_a_start_everything_else_is_done(capsys: pytest.CaptureFixture[s
     assert whole[-1] == f"systemctl start {UNIT}"
 
 
-def test_pins_that_another_service_has_are_refused_by_place(
+def test_pins_of_another_service_are_refused_with_their_place(
     tmp_path: Path, calls: list[list[str]], capsys: pytest.CaptureFixture[str]
 ) -> None:
     main(["enable", str(LIFT), "--root", str(tmp_path)])
@@ -200,7 +200,7 @@ def test_a_relay_that_is_not_verified_off_keeps_its_drop_in(
     off = services.SwitchOff(words, left.parent)
     live = _told(LIFT, Path("/"))
     live.dry_run = False
-    assert carry_out([off], live) == 0  # without a record no output can be on
+    assert carry_out([off], live) == 0  # no record of outputs, so no output can be on
     left.touch()
     assert carry_out([off, Remove(kept)], live) == os.EX_UNAVAILABLE
     told = capsys.readouterr().err
@@ -209,7 +209,7 @@ def test_a_relay_that_is_not_verified_off_keeps_its_drop_in(
     assert kept.exists()
 
 
-def test_a_step_that_fails_after_the_stop_ends_with_the_service_started_again(
+def test_after_a_failed_step_the_stopped_service_starts_again(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     calls: list[list[str]],
@@ -221,7 +221,7 @@ def test_a_step_that_fails_after_the_stop_ends_with_the_service_started_again(
     live.dry_run = False
     full = WriteFile(
         tmp_path / "file" / "drop_in", b""
-    )  # a missing folder raises OSError, as a full disk does
+    )  # a missing folder raises OSError, like a full disk
     assert carry_out([full, Remove(tmp_path / "never")], live, keeps=UNIT) == os.EX_IOERR
     assert calls == [["systemctl", "--quiet", "is-active", UNIT], ["systemctl", "start", UNIT]]
     assert "the steps after the failed step were not taken" in capsys.readouterr().err

@@ -21,7 +21,7 @@ def test_the_help_of_each_command_ends_with_an_example(
 
 
 @pytest.mark.parametrize("command", cli.COMMANDS)
-def test_each_example_is_a_right_command_line(command: str) -> None:
+def test_each_example_is_a_valid_command_line(command: str) -> None:
     name, *arguments = shlex.split(cli.COMMANDS[command][1], comments=False)
     assert name == command
     if ">" in arguments:
@@ -40,7 +40,7 @@ def test_each_example_is_a_right_command_line(command: str) -> None:
         ("status --frequency 2 lift", "status", "--frequency lift"),
     ],
 )
-def test_an_unknown_option_is_answered_with_the_commands_own_usage(
+def test_an_unknown_option_is_answered_with_the_usage_of_the_command(
     line: str, usage: str, unknown: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as left:
@@ -73,7 +73,7 @@ def test_the_help_of_each_request_ends_with_an_example(
         ("xyzzy", "invalid choice: 'xyzzy' (choose from "),
     ],
 )
-def test_a_word_that_is_nearly_right_is_answered_with_the_right_one(
+def test_a_misspelt_word_is_answered_with_the_right_word(
     line: str, said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as left:

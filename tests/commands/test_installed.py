@@ -1,4 +1,4 @@
-"""A plain `pip install` installs every file. The installed commands start without an extra."""
+"""A plain `pip install` installs every file. The installed commands start even without an extra."""
 
 import subprocess
 import sys

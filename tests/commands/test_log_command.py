@@ -1,4 +1,4 @@
-"""`rmf-bridge log`: its command line for journalctl, and the lines that its pattern finds."""
+"""`rmf-bridge log`: its command line for journalctl, and the lines that its search pattern finds."""
 
 import argparse
 import os
@@ -75,7 +75,7 @@ def test_a_daemon_that_was_started_by_hand_has_its_log_where_it_runs(
     )
 
 
-def test_an_unknown_service_is_reported_before_the_journals_lines(tmp_path: Path) -> None:
+def test_an_unknown_service_is_reported_before_the_lines_of_the_journal(tmp_path: Path) -> None:
     journal = tmp_path / "journalctl"
     journal.write_text("#!/bin/sh\necho asked for $1\n")
     journal.chmod(0o755)

@@ -36,7 +36,7 @@ def test_no_command_takes_a_name_that_is_not_utf_8(
     assert capsys.readouterr().err == "rmf-bridge: b'caf\\xe9.yaml' is not UTF-8: rename it\n"
 
 
-def test_a_terminal_without_our_signs_is_no_defect(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_terminal_without_our_characters_is_no_defect(monkeypatch: pytest.MonkeyPatch) -> None:
     shown = io.BytesIO()
     monkeypatch.setattr("sys.stdout", io.TextIOWrapper(shown, encoding="ascii"))
     assert main(["completion", "bash"]) == 0

@@ -1,4 +1,4 @@
-"""`rmf-bridge status`: its findings in runtime directories, its output and its exit codes."""
+"""`rmf-bridge status`: its findings in runtime directories, its output, and its exit codes."""
 
 import io
 import json
@@ -59,7 +59,7 @@ def shown(found: list[DaemonStatus]) -> list[str]:
     return out.getvalue().splitlines()
 
 
-def test_a_daemon_that_serves_is_shown_with_its_devices_and_who_hears_it(tmp_path: Path) -> None:
+def test_a_running_daemon_is_shown_with_its_devices_and_its_subscribers(tmp_path: Path) -> None:
     with served(tmp_path / "lift_a", lift()) as folder:
         found = seen(folder)
         lines = shown(found)
@@ -73,7 +73,7 @@ def test_a_daemon_that_serves_is_shown_with_its_devices_and_who_hears_it(tmp_pat
     ]
 
 
-def test_a_fault_is_shown_with_its_cause_and_what_to_do(tmp_path: Path) -> None:
+def test_a_fault_is_shown_with_its_cause_and_its_remedy(tmp_path: Path) -> None:
     with served(tmp_path / "lift_a", lift(STUCK)) as folder:
         found = seen(folder)
         lines = shown(found)
@@ -86,7 +86,7 @@ def test_a_fault_is_shown_with_its_cause_and_what_to_do(tmp_path: Path) -> None:
     ]
 
 
-def test_a_remedy_names_the_device_its_file_and_what_the_file_sets() -> None:
+def test_a_remedy_names_the_device_and_its_file_and_its_settings() -> None:
     file = str(Path(__file__).parents[2] / "config" / "lift_dry_contact.yaml")
     known = faults.values(file, "Lift1")
     told = faults.remedies()
@@ -122,7 +122,7 @@ def test_a_daemon_that_starts_is_down_until_it_has_written_its_first_status(
 
 
 @pytest.mark.parametrize("told", [{}, {"devices": {}}, {"devices": {"Lift1": {}}}])
-def test_a_status_that_says_little_is_shown_as_far_as_it_goes(
+def test_an_incomplete_status_is_shown_as_far_as_possible(
     tmp_path: Path, told: dict[str, Any]
 ) -> None:
     with served(tmp_path / "lift_a", told) as folder:
@@ -139,10 +139,11 @@ def test_a_status_that_says_little_is_shown_as_far_as_it_goes(
         ("inactive (dead)", "died"),
     ],
 )
-def test_of_a_service_systemd_says_whether_it_runs(
+def test_systemd_tells_whether_a_service_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unit: str, state: str
 ) -> None:
-    """`status` asks systemd also about a service that could not write its name."""
+    """A service may be unable to write its name into its directory. `status` asks systemd about this
+    service too."""
     monkeypatch.setattr(on_machine, "SERVICE_RUN", tmp_path)
     with served(tmp_path / "lift_a", lift()) as folder:
         (folder / HOLDER).unlink()
@@ -150,7 +151,7 @@ def test_of_a_service_systemd_says_whether_it_runs(
     assert [(one.state, one.unit) for one in found] == [(state, unit)]
 
 
-def test_a_daemon_that_left_its_status_has_died(tmp_path: Path) -> None:
+def test_a_daemon_that_left_its_status_file_has_died(tmp_path: Path) -> None:
     with served(tmp_path / "lift_a", lift()) as folder:
         pass
     found = seen(folder)
@@ -158,7 +159,7 @@ def test_a_daemon_that_left_its_status_has_died(tmp_path: Path) -> None:
     assert len(shown(found)) == 1
 
 
-def test_the_age_of_a_reading_counts_from_now_not_from_the_status_file(tmp_path: Path) -> None:
+def test_the_age_of_a_reading_counts_up_to_now(tmp_path: Path) -> None:
     with served(tmp_path / "lift_a", lift()) as folder:
         assert shown(seen(folder, age_s=0.9))[-1] == "  Lift1: mode AGV, floor L1; read 0.9 s ago"
 
@@ -193,7 +194,7 @@ def test_a_daemon_that_ended_well_has_left_only_its_lock(tmp_path: Path) -> None
     assert [(one.state, one.level) for one in seen(folder)] == [("stopped", WELL)]
 
 
-def test_a_unit_that_failed_is_shown_though_it_has_no_directory() -> None:
+def test_a_failed_unit_without_a_directory_is_shown() -> None:
     found = list(daemons([], {"lift_b": "failed (failed)"}, 0.0))
     assert [(one.name, one.state, one.level) for one in found] == [("lift_b", "failed", DOWN)]
     assert shown(found) == ["lift_b: failed (service, failed (failed))"]
@@ -206,14 +207,14 @@ def test_an_unreadable_status_counts_as_missing(tmp_path: Path, broken: str) -> 
         assert [one.state for one in seen(folder)] == ["old"]
 
 
-def test_a_name_from_the_graph_moves_no_cursor(tmp_path: Path) -> None:
+def test_a_name_from_the_graph_cannot_move_the_cursor(tmp_path: Path) -> None:
     told = lift()
     told["devices"] = {"\x1b[2J": told["devices"]["Lift1"]}
     with served(tmp_path / "lift_a", told) as folder:
         assert "\x1b" not in "".join(shown(seen(folder)))
 
 
-def test_for_programs_it_prints_json_and_nothing_found_is_unknown(
+def test_the_output_for_programs_is_json_and_an_empty_result_is_unknown(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with served(tmp_path / "lift_a", lift(STUCK)) as folder:
@@ -224,7 +225,7 @@ def test_for_programs_it_prints_json_and_nothing_found_is_unknown(
     assert cli.main(["status", "--runtime-dir", str(tmp_path / "nowhere")]) == NONE
 
 
-def test_each_fault_of_the_source_has_a_remedy_and_each_remedy_a_fault() -> None:
+def test_each_fault_has_a_remedy_and_each_remedy_belongs_to_a_fault() -> None:
     sources = "".join(path.read_text() for path in (ROOT / "bridges").rglob("*.py"))
     named = set(re.findall(r'Fault\(\s*"([A-Z_]+)"', sources))
     constants = set(re.findall(r'^[A-Z_]+(?:: Final)? = "([A-Z]+(?:_[A-Z]+)+)"$', sources, re.M))
@@ -235,7 +236,7 @@ def test_each_fault_of_the_source_has_a_remedy_and_each_remedy_a_fault() -> None
     assert known - named - constants - hazards == set()
 
 
-def test_an_unknown_name_is_answered_with_the_known_ones(
+def test_an_unknown_name_is_answered_with_the_known_names(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
@@ -264,7 +265,7 @@ def test_an_unknown_name_is_answered_with_the_known_ones(
         ),
     ],
 )
-def test_a_device_with_a_user_is_not_idle_and_an_unknown_kind_neither(
+def test_a_device_with_a_user_or_of_an_unknown_kind_is_not_idle(
     kind: str, device: dict[str, str], told: list[str]
 ) -> None:
     status = {"kind": kind, "devices": {"X": device}}

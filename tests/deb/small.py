@@ -2,7 +2,7 @@
 
 The scripts call real commands except `systemctl`. The stand-in for `systemctl` keeps a file for each
 unit. A counter counts each command that changes something. At a chosen count the test kills all
-processes, dpkg included, as a power cut would.
+processes, even dpkg, as a power cut would.
 """
 
 import os
@@ -56,7 +56,7 @@ esac
 
 
 def package(folder: Path, version: str, modules: Collection[str], *, old: bool = False) -> Path:
-    """Return one of our packages. `old` makes a package from before 0.1.0+r, when dpkg owned the
+    """Return one of our packages. `old` makes it a package from before 0.1.0+r, when dpkg owned the
     tree."""
     work = folder / version
     tree = work / LIB if old else work.with_suffix(".tree")
@@ -103,7 +103,7 @@ def _replace(file: Path, text: str) -> None:
 
 
 class System:
-    """A root directory with services. Its systemd only keeps files."""
+    """A root directory with services. Its `systemctl` only keeps files."""
 
     def __init__(self, folder: Path) -> None:
         self.root, self.fakes = folder / "root", folder / "fakes"
@@ -129,7 +129,7 @@ class System:
         (self.fakes / "bin" / name).chmod(0o755)
 
     def service(self, name: str, state: str = "active") -> None:
-        """Make a service as `enable` does."""
+        """Make a service as the command `enable` does."""
         (self.root / f"etc/rmf-bridges/{name}.yaml").write_text("kind: lift\n")
         self.drop_in(name).parent.mkdir(parents=True)
         self.drop_in(name).write_text("drop-in of nothing\n")
@@ -150,7 +150,7 @@ class System:
         }
 
     def dpkg(self, *words: str | Path, cut: int = 0) -> subprocess.CompletedProcess[str]:
-        """Run dpkg. At the counted command number `cut` all processes die."""
+        """Run dpkg. If `cut` is not 0, kill all processes at the counted command with that number."""
         (self.fakes / "count").unlink(missing_ok=True)
         (self.fakes / "cut").write_text(str(cut))
         force = [f"--force-{each}" for each in FORCE]
@@ -164,29 +164,29 @@ class System:
         return done
 
     def fails(self, name: str) -> Callable[[], None]:
-        """Let a command fail, as on a full disk. Return a function that mends the command."""
+        """Let a command fail, as on a full disk. Return a function that repairs the command."""
         file = self.fakes / "bin" / name
         real = file.read_text()
         file.write_text("#!/bin/sh\nexit 1\n")
         return partial(_replace, file, real)
 
     def called(self) -> list[str]:
-        """Return the calls of systemctl."""
+        """Return the calls of systemctl so far."""
         return (self.fakes / "calls").read_text().splitlines()
 
     def counted(self) -> int:
-        """Return the number of commands counted in the last run of dpkg."""
+        """Return the number of commands that the last run of dpkg has counted."""
         return int((self.fakes / "count").read_text())
 
     def off(self) -> str:
-        """Return the output of `outputs-off`: its version, and the modules of its tree."""
+        """Return what `outputs-off` prints: its version, and the modules of its tree."""
         done = subprocess.run(
             [self.root / LIB / "bin/rmf-bridge", "outputs-off"], capture_output=True
         )
         return (done.stdout + done.stderr).decode().strip()
 
     def status(self) -> str:
-        """Return the package's state and version from dpkg."""
+        """Return the package's state and version, as dpkg reports them."""
         words = ["dpkg-query", f"--admindir={self.root}/var/lib/dpkg", "-W"]
         text = "${db:Status-Abbrev}${Version}"
         return subprocess.run([*words, "-f", text], capture_output=True, text=True).stdout

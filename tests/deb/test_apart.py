@@ -1,7 +1,7 @@
-"""The daemons' package alone, with the workbench's package, and with another version of the workbench.
+"""The daemons' package alone, with the workbench's package, and with a workbench of another version.
 
-The tree holds our own code and the libraries of the tests' environment. The real dpkg installs the
-tree.
+The tree of files has our own code and the libraries of the tests' environment. The real dpkg installs
+it.
 """
 
 import os
@@ -31,7 +31,7 @@ sys.exit(main())
 
 
 def daemons(folder: Path, version: str) -> Path:
-    """Return the package rmf-bridges, whose tree has our code."""
+    """Return the package rmf-bridges with our code."""
     work, tree = folder / version, folder / f"{version}.tree"
     for name in ("bridges", "drivers"):
         shutil.copytree(ROOT / name, tree / SITE / name)
@@ -55,7 +55,7 @@ def workbench(folder: Path, version: str) -> Path:
 
 
 Debs = dict[str, tuple[Path, Path]]
-"""The packages of the daemons and of the workbench for each version."""
+"""The packages of the daemons and of the workbench, by version."""
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,7 @@ def how(version: str) -> str:
 
 
 def serves(made: System) -> bool:
-    """Return whether the daemons' commands work and each workbench command names the missing
+    """Return whether the daemons' commands work, and whether each workbench command names the missing
     package."""
     for asked in (("check", LIFT), ("outputs-off", NO_OUTPUTS), ("--help",)):
         assert code(made, *asked) == 0
@@ -104,7 +104,7 @@ def serves(made: System) -> bool:
 
 
 @pytest.mark.long(30)
-def test_daemons_alone_are_whole_before_the_workbench_comes_and_after_it_has_gone(
+def test_daemons_work_before_the_workbench_is_installed_and_after_its_removal(
     tmp_path: Path, debs: Debs
 ) -> None:
     made = System(tmp_path)

@@ -1,4 +1,4 @@
-"""deb/release.sh makes nothing unless tree, tag, version, CHANGELOG and key agree."""
+"""deb/release.sh makes a release only if tree, tag, version, CHANGELOG and key agree."""
 
 import shutil
 import subprocess
@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture
 def sources(tmp_path: Path) -> Path:
-    """Return a checkout with the commit and CHANGELOG of a release. The release's tag is missing."""
+    """Return a checkout with a release's commit and CHANGELOG, but without the release's tag."""
     for name in ("deb/release.sh", "bridges/__init__.py", "ros/package.xml", "CHANGELOG.md"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)
@@ -33,7 +33,7 @@ def commit(folder: Path) -> None:
 
 
 def refusal(folder: Path, key: str = "nobody's") -> str:
-    """Run the script, which must fail, and return its reason."""
+    """Run the script, which must fail. Return its reason."""
     environment = {"PATH": "/usr/bin:/bin", "KEY": key, "GNUPGHOME": str(folder / ".git")}
     script = ["sh", "deb/release.sh"]
     done = subprocess.run(script, cwd=folder, env=environment, capture_output=True, text=True)

@@ -1,4 +1,4 @@
-"""deb/sbom.py lists a package's libraries, and refuses a library without the text of its licence."""
+"""deb/sbom.py lists the libraries of a package. It refuses a library whose licence has no text."""
 
 import json
 import subprocess
@@ -69,7 +69,7 @@ def test_a_library_without_its_licence_ends_the_build(
     ("name", "licence", "holder"),
     [("mcap", "MIT", "Foxglove Technologies Inc"), ("pyserial", "BSD-3-Clause", "Chris Liechti")],
 )
-def test_what_a_wheel_forgets_comes_from_us(
+def test_missing_licence_texts_of_a_wheel_come_from_our_files(
     tmp_path: Path, name: str, licence: str, holder: str
 ) -> None:
     site = tmp_path / "site"

@@ -1,4 +1,4 @@
-"""Upgrades with the real dpkg. After any interruption one version is whole and serves."""
+"""Upgrades with the real dpkg. After any interruption one whole version is in service."""
 
 import shutil
 from pathlib import Path
@@ -29,8 +29,8 @@ def whole(version: str) -> str:
 
 
 def system(folder: Path, deb: Path) -> System:
-    """Return a machine with this package and three services: active, failed, and stopped by a
-    person."""
+    """Return a machine with this package and three services. One service is active, one has failed, and
+    a person has stopped the third."""
     made = System(folder)
     assert made.dpkg("-i", deb).returncode == 0
     for name, state in (("door", "active"), ("failed", "failed"), ("stopped", "inactive")):
@@ -51,7 +51,7 @@ def is_complete(made: System, version: str) -> bool:
 
 
 @pytest.mark.parametrize(("before", "after"), [(OLD, ONE), (ONE, TWO), (TWO, ONE)])
-def test_an_upgrade_or_a_downgrade_serves_on_with_all_that_served_before(
+def test_after_an_upgrade_or_downgrade_all_earlier_services_run(
     tmp_path: Path, debs: dict[str, Path], before: str, after: str
 ) -> None:
     made = system(tmp_path, debs[before])
@@ -74,7 +74,7 @@ def test_whenever_the_power_is_cut_one_version_is_whole_and_dpkg_completes_the_o
         assert now in (whole(before), whole(after)), cut
         fits = "nothing" if now == whole(before) else after
         assert made.drop_in("door").read_text() == f"drop-in of {fits}\n", cut
-        if made.status()[1] == "H":  # dpkg has not unpacked the package, and needs its file again
+        if made.status()[1] == "H":  # dpkg has not unpacked the package, so it needs the file again
             made.dpkg("-i", debs[after])
         else:
             made.dpkg("--configure", "-a")
@@ -101,7 +101,7 @@ def test_a_file_that_the_new_version_refuses_leaves_everything_as_it_was(
     assert is_complete(made, TWO)
 
 
-def test_a_service_that_does_not_start_and_an_output_that_is_not_off_are_named_and_all_others_serve(
+def test_a_failed_service_and_an_unverified_output_are_named_and_the_others_serve(
     tmp_path: Path, debs: dict[str, Path]
 ) -> None:
     made = system(tmp_path, debs[ONE])
@@ -136,7 +136,7 @@ def test_a_full_disk_at_any_step_leaves_every_service_running(
     assert is_complete(made, TWO)
 
 
-def test_what_somebody_has_disabled_stays_so_and_a_first_installation_enables(
+def test_a_disabled_unit_stays_disabled_and_a_first_installation_enables(
     tmp_path: Path, debs: dict[str, Path]
 ) -> None:
     made = system(tmp_path, debs[ONE])
@@ -149,7 +149,7 @@ def test_what_somebody_has_disabled_stays_so_and_a_first_installation_enables(
     assert len([line for line in made.called() if " enable " in line]) == 1
 
 
-def test_after_a_removal_an_installation_starts_what_ran_and_a_purge_leaves_nothing(
+def test_an_installation_after_a_removal_starts_the_earlier_services_and_a_purge_leaves_nothing(
     tmp_path: Path, debs: dict[str, Path]
 ) -> None:
     made = system(tmp_path, debs[ONE])

@@ -1,4 +1,4 @@
-"""setup.py names the commit in the version, so that a mended package has a newer version."""
+"""setup.py adds the commit to the version, so that a corrected package has a newer version."""
 
 import shutil
 import subprocess
@@ -34,7 +34,7 @@ def sources(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_each_commit_and_each_change_beside_it_is_a_newer_version(sources: Path) -> None:
+def test_each_commit_and_each_uncommitted_change_gives_a_newer_version(sources: Path) -> None:
     git(sources, "init", "-q")
     seen = []
     for number in (1, 2):
@@ -53,7 +53,7 @@ def test_each_commit_and_each_change_beside_it_is_a_newer_version(sources: Path)
         subprocess.run(["dpkg", "--compare-versions", older, "lt", newer], check=True)
 
 
-def test_without_a_checkout_of_its_own_the_build_is_unknown(sources: Path) -> None:
+def test_without_its_own_checkout_the_build_is_unknown(sources: Path) -> None:
     git(sources, "init", "-q")
     inner = sources / "archive"
     shutil.copytree(sources / "bridges", inner / "bridges")
@@ -61,7 +61,7 @@ def test_without_a_checkout_of_its_own_the_build_is_unknown(sources: Path) -> No
     assert version(inner) == __version__
 
 
-def test_the_commit_with_the_versions_tag_is_that_version_until_something_changes(
+def test_the_commit_with_the_tag_of_a_version_has_that_version_without_changes(
     sources: Path,
 ) -> None:
     git(sources, "init", "-q")
@@ -76,6 +76,6 @@ def test_the_commit_with_the_versions_tag_is_that_version_until_something_change
     assert version(sources).startswith(f"{__version__}+r1.g")
 
 
-def test_ros_package_has_the_version_too() -> None:
+def test_the_ros_package_has_the_same_version() -> None:
     package = ElementTree.parse(ROOT / "ros/package.xml").getroot()
     assert package.findtext("version") == __version__

@@ -1,4 +1,4 @@
-"""deb/wheels.py fills a package's site-packages from wheels. Here the tests make the wheels."""
+"""deb/wheels.py fills a package's site-packages from wheels. The tests make these wheels."""
 
 import hashlib
 import subprocess
@@ -36,7 +36,8 @@ def wheel(folder: Path, name: str, *needs: str) -> Path:
 
 
 def fill(tmp_path: Path, arch: str, *options: str, lock: str | None = None) -> Path:
-    """Fill a site-packages for this architecture. The default `lock` lists the wheels made here."""
+    """Fill a site-packages for this architecture. By default `lock` lists the wheels that the tests
+    made."""
     shop = tmp_path / "shop"
     shop.mkdir()
     wheels = [wheel(shop, each) for each in ("for_arm", "for_pc")]
@@ -59,7 +60,7 @@ def fill(tmp_path: Path, arch: str, *options: str, lock: str | None = None) -> P
 
 
 def pinned(wheel: Path, marker: str = "") -> str:
-    """Return the wheel's entry of a lock in the form of uv."""
+    """Return the wheel's entry in a lock file of uv."""
     digest = hashlib.sha256(wheel.read_bytes()).hexdigest()
     name, version, *_ = wheel.name.split("-")
     return f"{name.replace('_', '-')}=={version} {marker}\\\n    --hash=sha256:{digest}\n"
@@ -70,12 +71,12 @@ def test_requirements_are_those_of_the_target_machine(tmp_path: Path) -> None:
     assert modules == ["first", "for_arm"]
 
 
-def test_what_is_not_really_needed_is_left_out(tmp_path: Path) -> None:
+def test_requirements_that_the_target_does_not_need_are_left_out(tmp_path: Path) -> None:
     site = fill(tmp_path, "arm64", "--without", "first:for-arm")
     assert [file.stem for file in site.glob("*.py")] == ["first"]
 
 
-def test_the_daemons_own_user_may_read_what_root_has_built(tmp_path: Path) -> None:
+def test_the_user_of_the_daemons_may_read_files_built_by_root(tmp_path: Path) -> None:
     site = fill(tmp_path, "amd64")
     readable = {path.name: path.stat().st_mode & 0o005 for path in (site, site / "for_pc.py")}
     assert readable == {"site-packages": 0o005, "for_pc.py": 0o004}
@@ -99,7 +100,7 @@ def test_a_requirement_that_the_lock_lacks_ends_the_build(
     assert capfd.readouterr().err.endswith("lock.txt lacks for-pc: make lock\n")
 
 
-def test_of_two_versions_in_the_lock_the_one_for_the_target_counts(tmp_path: Path) -> None:
+def test_the_version_for_the_target_counts_among_two_versions_in_the_lock(tmp_path: Path) -> None:
     other = f"for-pc==9.0 ; python_version < '3.12' \\\n    --hash=sha256:{'0' * 64}\n"
     right = pinned(wheel(tmp_path, "for_pc"), "; python_version >= '3.12' ")
     site = fill(tmp_path, "amd64", lock=other + right)
@@ -134,7 +135,7 @@ def test_a_wheel_that_was_built_here_is_taken_before_the_lock(tmp_path: Path) ->
 
 
 def test_the_lock_has_a_fitting_version_of_each_library_of_a_package() -> None:
-    """`make lock` renews the lock."""
+    """If this test fails, run `make lock`."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
     wanted = [*project["dependencies"], *(need for one in IN_PACKAGES for need in extras[one])]

@@ -1,7 +1,7 @@
-"""A lift with one broken wire at a time, read through plant, wires, mock pins, gpiozero and driver.
+"""A lift with one broken wire. The driver reads it through plant, wires, mock pins and gpiozero.
 
 The car rides in AGV mode from L1 to L3, where the door opens and closes. Each reading must be true,
-unknown or a fault. A closed door is never read as open, and no floor is ever read wrong.
+unknown or a fault. No reading may show a closed door as open, or show a wrong floor.
 """
 
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ def lift() -> Iterator[WiredLift]:
 
 
 def ride(lift: WiredLift, until: float = 14.0) -> Iterator[tuple[float, LiftSample]]:
-    """Yield every scan of a ride to L3."""
+    """Yield the time and the reading of every scan during a ride to L3."""
     lift.write(agv_request=True)
     for i in range(1, round(until / SCAN_S)):
         lift.now = now = round(i * SCAN_S, 3)
@@ -37,7 +37,7 @@ def ride(lift: WiredLift, until: float = 14.0) -> Iterator[tuple[float, LiftSamp
 
 
 def changes(lift: WiredLift) -> list[tuple[float, LiftSample]]:
-    """Return each sample of a ride that differs from the sample before."""
+    """Return the readings of a ride that differ from the reading before."""
     seen: list[tuple[float, LiftSample]] = []
     for now, sample in ride(lift):
         if not seen or sample != seen[-1][1]:
@@ -51,7 +51,7 @@ def sample(
     return LiftSample(level=level, door=door, agv=agv)
 
 
-def test_with_whole_wires_the_ride_is_seen_as_it_is(lift: WiredLift) -> None:
+def test_with_whole_wires_the_readings_show_the_ride(lift: WiredLift) -> None:
     assert changes(lift) == [
         (0.05, sample("L1", agv=False)),
         (0.5, sample("L1")),
@@ -87,7 +87,7 @@ def test_a_cut_input_never_reads_as_an_open_door_or_another_floor(
 
 @pytest.mark.parametrize("signal", [s for s in INPUTS if s.startswith("floor")])
 @pytest.mark.parametrize("mode", ["off", "stuck", "wrong"])
-def test_one_bad_floor_line_is_a_fault_and_not_another_floor(
+def test_one_bad_floor_line_is_a_fault_and_no_other_floor(
     lift: WiredLift, signal: str, mode: FailureMode
 ) -> None:
     lift.at(0.0)
@@ -99,7 +99,7 @@ def test_one_bad_floor_line_is_a_fault_and_not_another_floor(
     assert faults - {""} <= {"parity is not even: a line is broken"}
 
 
-def test_a_stuck_fire_contact_stays_as_it_was(lift: WiredLift) -> None:
+def test_a_stuck_fire_contact_keeps_its_state(lift: WiredLift) -> None:
     lift.at(0.0)
     lift.plant.fail("fire_alarm", "stuck")
     lift.plant.press("fire_alarm", True, 1.0)
@@ -119,7 +119,7 @@ def relays(lift: WiredLift) -> list[tuple[float, str, object]]:
 
 
 @pytest.mark.parametrize("signal", ["agv_mode_request", "call_L3"])
-def test_a_cut_output_moves_nothing_though_we_drive_it(lift: WiredLift, signal: str) -> None:
+def test_a_cut_output_moves_nothing_even_if_it_is_driven(lift: WiredLift, signal: str) -> None:
     lift.plant.fail(signal, "off")
     levels = {seen.level for _, seen in ride(lift)}
     assert (levels, relays(lift)) == (

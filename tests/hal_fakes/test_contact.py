@@ -1,4 +1,4 @@
-"""The five failures of a wire, each as a history of the level at the wire's far end."""
+"""The five failures of a wire. Each test gives the history of the level at the wire's far end."""
 
 from typing import Any
 
@@ -14,8 +14,8 @@ def wire(active: Any = "high", pull: Any = "down", direction: Any = "in") -> Wir
 
 
 def shown(contact: Contact, fed: str, step: float = 1.0) -> str:
-    """Return the level at the far end at each second, for these levels at the near end. 1 is
-    asserted."""
+    """Return the level at the far end for each second, as a text of 1 and 0. `fed` has the levels at
+    the near end. 1 means asserted."""
     seen = ""
     for i, value in enumerate(fed):
         contact.feed(value == "1", i * step)
@@ -33,7 +33,7 @@ def shown(contact: Contact, fed: str, step: float = 1.0) -> str:
         ("wrong", "1100111000"),
     ],
 )
-def test_a_wire_that_fails_from_the_start_shows_what_its_failure_says(
+def test_a_wire_that_fails_from_the_start_shows_the_level_of_its_failure(
     mode: FailureMode | None, text: str
 ) -> None:
     assert SLOW_S == 2.0
@@ -45,7 +45,7 @@ def test_a_wire_that_fails_from_the_start_shows_what_its_failure_says(
 @pytest.mark.parametrize(
     ("mode", "held"), [("off", False), ("stuck", True), ("slow", True), ("wrong", False)]
 )
-def test_a_wire_that_fails_while_it_is_asserted_shows_it_again_once_mended(
+def test_an_asserted_wire_shows_its_level_again_after_a_repair(
     mode: FailureMode, held: bool
 ) -> None:
     contact = Contact(wire(), "seed")
@@ -107,7 +107,7 @@ def test_a_cut_input_that_nothing_pulls_is_garbage() -> None:
     assert seen == {True, False}
 
 
-def test_only_what_is_late_or_random_changes_by_itself() -> None:
+def test_only_a_slow_or_random_wire_changes_without_a_new_level() -> None:
     contact = Contact(wire(), "seed")
     modes: tuple[FailureMode | None, ...] = (None, "off", "stuck", "slow", "wrong")
     due = []

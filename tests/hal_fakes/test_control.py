@@ -1,4 +1,4 @@
-"""The control socket of a running world."""
+"""The control socket of a running simulation."""
 
 import socket
 import time
@@ -21,7 +21,7 @@ QUICK = LiftPace(floor_s=0.02, door_s=0.02, agv_s=0.02, dwell_s=0.02)
 
 
 class World:
-    """A running lift and its control socket."""
+    """A running lift with its control socket."""
 
     def __init__(self, path: Path) -> None:
         self.lift = LiftPlant("Lift1", shipped(), QUICK)
@@ -44,7 +44,7 @@ def world(tmp_path: Path) -> Iterator[World]:
     made.running.close()
 
 
-def test_a_follower_hears_every_edge_from_then_on(world: World) -> None:
+def test_a_follower_hears_every_later_edge(world: World) -> None:
     caller = world.call()
     assert caller.say("follow") == "ok"
     before = time.monotonic()
@@ -57,7 +57,7 @@ def test_a_follower_hears_every_edge_from_then_on(world: World) -> None:
     assert [edge.at for edge in edges] == pytest.approx([before, before + QUICK.agv_s])
 
 
-def test_presses_and_failures_are_made_on_command(world: World) -> None:
+def test_commands_press_signals_and_break_parts(world: World) -> None:
     caller = world.call()
     assert caller.say("press Lift1 fire_alarm on") == "ok"
     assert world.running.plants["Lift1"].sense("fire_alarm")
@@ -99,14 +99,14 @@ def test_an_impossible_command_is_answered_with_the_reason(
     assert world.call().say(line) == answer
 
 
-def test_a_caller_who_leaves_or_never_reads_does_not_stop_the_plants(world: World) -> None:
+def test_a_caller_that_leaves_or_never_reads_does_not_stop_the_plants(world: World) -> None:
     gone, deaf, well = world.call(), world.call(), world.call()
     assert (gone.say("follow"), deaf.say("follow"), well.say("follow")) == ("ok", "ok", "ok")
     gone.close()
     world.callers.remove(gone)
     plant = world.running.plants["Lift1"]
     told = 0
-    while told < 2000:  # far more than a socket holds for a caller that does not read
+    while told < 2000:  # a socket holds far fewer lines for a caller that does not read
         for i in range(50):
             plant.drive("door_open", i % 2 == 0, time.monotonic())
         told += len(list(islice(well.edges(), 50)))
@@ -127,7 +127,7 @@ def test_a_socket_that_cannot_be_made_is_named(tmp_path: Path) -> None:
         Control(path, {})
 
 
-def test_a_socket_left_behind_by_a_dead_daemon_is_replaced(tmp_path: Path) -> None:
+def test_the_socket_of_a_dead_daemon_is_replaced(tmp_path: Path) -> None:
     path = tmp_path / "plant.sock"
     left = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     left.bind(str(path))

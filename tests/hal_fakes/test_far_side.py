@@ -1,4 +1,4 @@
-"""The far side of a bus runs in its own process, serves, and never outlives the daemon."""
+"""The far side of a bus runs in its own process, answers, and never outlives the daemon."""
 
 import json
 import signal
@@ -34,7 +34,7 @@ def simulation(config: Config, tmp_path: Path) -> Iterator[Simulation]:
     made.close()
 
 
-def test_a_real_bus_is_pointed_at_the_fake_and_moves_the_plant(
+def test_a_real_bus_connects_to_the_fake_and_moves_the_plant(
     simulation: Simulation, config: Config
 ) -> None:
     bus = simulation.open_bus("module")
@@ -107,7 +107,7 @@ def far_side(tmp_path: Path) -> Iterator["subprocess.Popen[str]"]:
         started.kill()
 
 
-def test_a_far_side_says_where_it_is_ignores_ctrl_c_and_ends_with_its_input(
+def test_a_far_side_prints_its_address_and_ignores_ctrl_c_and_ends_with_its_input(
     far_side: "subprocess.Popen[str]", tmp_path: Path
 ) -> None:
     assert far_side.stdin is not None
@@ -122,7 +122,7 @@ def test_a_far_side_says_where_it_is_ignores_ctrl_c_and_ends_with_its_input(
     assert far_side.wait(PATIENCE_S) == 0
 
 
-def test_a_far_side_that_cannot_start_is_a_hal_error_and_says_why(
+def test_a_far_side_that_cannot_start_is_a_hal_error_with_a_reason(
     config: Config, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     simulation = Simulation(config, tmp_path / "missing")

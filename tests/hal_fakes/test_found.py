@@ -1,4 +1,4 @@
-"""Each driver and each bus names a fake that exists, so `--simulate` works for all."""
+"""Each driver and each bus names an existing fake, so `--simulate` works for all of them."""
 
 from importlib import import_module
 

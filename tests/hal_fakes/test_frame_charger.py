@@ -1,4 +1,4 @@
-"""The fake charger on CAN charges only as long as frames arrive."""
+"""The fake charger on CAN charges only while it receives frames."""
 
 import can
 import msgspec
@@ -17,7 +17,7 @@ FED_EVERY_S = 0.5
 
 
 class Bench:
-    """A driver that sends the charger its frames, in virtual time."""
+    """A charger and a driver that sends it frames, in virtual time."""
 
     def __init__(self) -> None:
         self.far = Reactive()
@@ -30,7 +30,8 @@ class Bench:
         self.driver.open()
 
     def passes(self, seconds: float, fed: bool) -> None:
-        """Let time pass when the charger looks at the bus. With `fed` the driver sends its frames."""
+        """Let time pass, with regular looks of the charger at the bus. With `fed` the driver sends its
+        frames."""
         until = self.far.now + seconds
         while self.far.now < until:
             self.far.now += STATUS_S / 2
@@ -50,7 +51,9 @@ class Bench:
         return [edge.value for edge in self.plant.edges if edge.signal == "power"]
 
 
-def test_a_charger_charges_while_it_is_fed_and_stops_three_periods_after_the_last_frame() -> None:
+def test_a_charger_charges_while_frames_arrive_and_stops_three_periods_after_the_last_frame() -> (
+    None
+):
     bench = Bench()
     bench.passes(5.0, fed=True)
     bench.passes((PERIODS - 1) * FED_EVERY_S - STATUS_S, fed=False)
@@ -59,7 +62,7 @@ def test_a_charger_charges_while_it_is_fed_and_stops_three_periods_after_the_las
     assert bench.enabled() == [True, False]
 
 
-def test_a_short_delay_by_a_busy_machine_does_not_make_it_stop() -> None:
+def test_a_short_delay_on_a_busy_machine_does_not_end_the_charge() -> None:
     bench = Bench()
     bench.passes(5.0, fed=True)
     bench.far.now += 10.0

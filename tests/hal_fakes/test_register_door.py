@@ -1,4 +1,5 @@
-"""`run config/door_register.yaml --simulate` without the daemon: doors on registers move."""
+"""`run config/door_register.yaml --simulate` without the daemon. The simulated doors on registers
+move."""
 
 from pathlib import Path
 

@@ -1,4 +1,5 @@
-"""`run --simulate` without the daemon: real buses in real time, with fakes on the far side."""
+"""`run --simulate` without the daemon: real buses in real time, with simulated devices at the far
+side."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -21,7 +22,7 @@ CONFIG = SHIPPED.parent
 
 
 class SimulatedLift:
-    """The shipped lift at a fast pace, opened as the daemon opens it."""
+    """The shipped lift at a fast pace. The test opens it as the daemon does."""
 
     def __init__(self, simulation: Simulation, config: Config) -> None:
         self.bus = simulation.open_bus("header")
@@ -32,7 +33,7 @@ class SimulatedLift:
         self.driver.open()
 
     def until(self, reached: Callable[[LiftSample], bool]) -> LiftSample:
-        """Read at each edge, as the loop does, until a sample fulfils the condition."""
+        """Read at each edge, as the loop does, until a reading fulfils the condition."""
         while not reached(sample := self.driver.read()):
             assert self._edge.wait(PATIENCE_S), f"no edge for long after {sample}"
             self._edge.clear()
@@ -97,7 +98,7 @@ def test_closing_leaves_no_thread_and_no_socket(simulation: Simulation, tmp_path
     assert list(tmp_path.iterdir()) == []
 
 
-def test_each_of_several_buses_has_a_socket_of_its_own(tmp_path: Path) -> None:
+def test_each_of_several_buses_has_its_own_socket(tmp_path: Path) -> None:
     text = SHIPPED.read_text().replace(
         "  header: {type: gpio}", "  header: {type: gpio}\n  other: {type: gpio}"
     )
@@ -121,7 +122,8 @@ def test_each_of_several_buses_has_a_socket_of_its_own(tmp_path: Path) -> None:
 
 
 def test_a_lift_on_two_buses_is_one_plant_behind_both(tmp_path: Path) -> None:
-    """Its relays are at a real Modbus server, its floor lines on pins, all in the daemon's process."""
+    """The relays are at a real Modbus server, and the floor lines are on pins. Both are in one
+    process."""
     config = load(CONFIG / "lift_two_buses.yaml")
     simulation = Simulation(config, tmp_path)
     buses = {name: simulation.open_bus(name) for name in config.buses}

@@ -36,7 +36,7 @@ def lift(**changes: Any) -> LiftPlant:
 
 
 def history(plant: LiftPlant, *without: str) -> list[Event]:
-    """Return (s, signal, value) of every edge, but not of the signals in `without`."""
+    """Return (s, signal, value) of every edge except the edges of the signals in `without`."""
     skipped = tuple(without)
     return [(round(e.at, 6), e.signal, e.value) for e in plant.edges if e.signal not in skipped]
 

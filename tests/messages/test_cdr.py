@@ -33,7 +33,7 @@ def _fleet(robots: int, places: int) -> d.FleetState:
     return d.FleetState("hospital_fleet", (robot,) * robots)
 
 
-def test_two_hundred_robots_with_their_paths_are_heard_and_what_is_longer_is_not() -> None:
+def test_a_fleet_state_with_two_hundred_robots_is_read_but_a_longer_message_is_not() -> None:
     legal = _fleet(200, 50)
     sample = encode(d.FleetState, legal)
     assert len(sample) < 0.7 * LONGEST
@@ -42,21 +42,21 @@ def test_two_hundred_robots_with_their_paths_are_heard_and_what_is_longer_is_not
         decode(d.FleetState, encode(d.FleetState, _fleet(400, 50)))
 
 
-def test_a_request_or_state_is_short() -> None:
+def test_a_request_and_a_state_are_short() -> None:
     names = "x" * (LONGEST_FLAT - 100)
     assert decode(d.LiftRequest, encode(d.LiftRequest, d.LiftRequest(names))).lift_name == names
     with pytest.raises(CdrError, match="bytes long"):
         decode(d.LiftRequest, encode(d.LiftRequest, d.LiftRequest(names + "x" * 100)))
 
 
-def test_a_request_is_these_very_bytes() -> None:
+def test_a_request_has_exactly_these_bytes() -> None:
     assert encode(d.LiftRequest, REQUEST) == REQUEST_BYTES
     assert decode(d.LiftRequest, REQUEST_BYTES) == REQUEST
 
 
 @repeatable
 @given(MESSAGES)
-def test_every_message_comes_back_as_it_was(message: Any) -> None:
+def test_every_message_is_decoded_to_the_same_message(message: Any) -> None:
     assert decode(type(message), encode(type(message), message)) == message
 
 
@@ -81,7 +81,7 @@ def test_the_other_byte_order_is_read_too() -> None:
 
 @repeatable
 @given(MESSAGES, st.data())
-def test_a_sample_that_is_cut_short_is_refused(message: Any, data: st.DataObject) -> None:
+def test_a_truncated_sample_is_refused(message: Any, data: st.DataObject) -> None:
     sample = encode(type(message), message)
     length = data.draw(st.integers(0, len(sample) - 1))
     with pytest.raises(CdrError):
@@ -90,12 +90,12 @@ def test_a_sample_that_is_cut_short_is_refused(message: Any, data: st.DataObject
 
 @repeatable
 @given(st.sampled_from(MESSAGE_TYPES), st.binary(max_size=80), st.booleans())
-def test_any_bytes_are_a_message_or_refused(kind: Any, body: bytes, little: bool) -> None:
+def test_any_bytes_become_a_message_or_are_refused(kind: Any, body: bytes, little: bool) -> None:
     try:
         message = decode(kind, bytes([0, little, 0, 0]) + body)
     except CdrError:
         return
-    again = encode(kind, message)  # compare bytes, because a float may be NaN, which equals nothing
+    again = encode(kind, message)  # a float may be NaN, which equals nothing, so compare bytes
     assert encode(kind, decode(kind, again)) == again
 
 
@@ -114,7 +114,7 @@ def test_any_bytes_are_a_message_or_refused(kind: Any, body: bytes, little: bool
         (d.EmergencySignal, b"\0\x01\0\0" + b"\xff\xff\xff\xff\0", "a sequence of 4294967295"),
     ],
 )
-def test_what_is_wrong_with_a_sample_is_named(kind: Any, sample: bytes, refused: str) -> None:
+def test_the_refusal_names_the_mistake_in_a_sample(kind: Any, sample: bytes, refused: str) -> None:
     with pytest.raises(CdrError, match=refused):
         decode(kind, sample)
 
@@ -130,12 +130,12 @@ def test_what_is_wrong_with_a_sample_is_named(kind: Any, sample: bytes, refused:
         (d.DoorState, d.LiftState()),
     ],
 )
-def test_what_no_message_can_hold_is_not_sent(kind: Any, message: Any) -> None:
+def test_values_that_do_not_fit_a_message_are_not_sent(kind: Any, message: Any) -> None:
     with pytest.raises(CdrError, match=f"cannot be sent as {kind.__name__}"):
         encode(kind, message)
 
 
-def test_a_text_that_cannot_travel_does_not_silence_the_state_that_carries_it() -> None:
+def test_a_text_that_cannot_be_encoded_does_not_stop_the_state() -> None:
     sent = d.ChargerState(error_message="lost\0 \ud800")
     assert decode(d.ChargerState, encode(d.ChargerState, sent)) == d.ChargerState(
         error_message="lost? ?"

@@ -1,4 +1,4 @@
-"""`definitions.py` and `releases.py` against tables typed from the .msg files of each release.
+"""`definitions.py` and `releases.py`, compared with tables from the .msg files of each release.
 
 The source is open-rmf/rmf_internal_msgs at 3d4df023bacaf7a091564e98f4aff0776f72a612 (4.1.0):
 - every line of rmf_lift_msgs/msg, rmf_door_msgs/msg and rmf_charger_msgs/msg
@@ -11,8 +11,8 @@ Time, Duration, Bool and Header come from ROS 2 Jazzy's builtin_interfaces and s
 comes from ros2/common_interfaces c0c0bc57f958eb54a142446f0c2a475754367eee.
 
 Jazzy's differences come from the same files at tag 3.3.1, a351d51602383eb09a8138d302827a76241630a5.
-Kilted has the files of 4.1.0: branch kilted (3.5.0) at c0f72ce5e2129411d2868414b25f6fab1460fcdb shows
-the same content.
+Kilted's files have the content of 4.1.0. A comparison with branch kilted (3.5.0) at
+c0f72ce5e2129411d2868414b25f6fab1460fcdb showed no difference.
 """
 
 import typing
@@ -185,27 +185,28 @@ JAZZY: dict[str, str | None] = {
     "rmf_task_msgs/Alert": None,
     "rmf_task_msgs/AlertParameter": None,
 }
-"""Jazzy's differences from the table above. None means that Jazzy has no such file."""
+"""The message types that differ in Jazzy from the table above. None means that Jazzy has no such
+file."""
 NOT_IN_JAZZY = {
     d.RobotModeValue: {"MODE_PERFORMING_ACTION", "MODE_ACTION_COMPLETED"},
     d.AlertTier: {"TIER_INFO", "TIER_WARNING", "TIER_ERROR"},
 }
-"""The constants that Jazzy lacks. All others have the same number in Jazzy's files."""
+"""The constants that Jazzy lacks. All other constants have the same number in Jazzy's files."""
 GOLDEN = {
     releases.KILTED: FIELDS,
     releases.JAZZY: {name: text for name, text in {**FIELDS, **JAZZY}.items() if text is not None},
 }
 
 
-def test_there_are_no_constants_besides_those_of_the_table() -> None:
+def test_the_table_has_every_constant() -> None:
     enums = {kind for kind in vars(constants).values() if isinstance(kind, type)} - {IntEnum}
     assert enums == CONSTANTS.keys()
     assert enums == {kind for kind in vars(d).values() if isinstance(kind, type)} & enums
 
 
 def test_no_constant_that_jazzy_lacks_is_sent() -> None:
-    """Our nodes send Alert's tiers only with Alert, which Jazzy lacks too. Only RMF sends the missing
-    modes."""
+    """Only Alert uses the tiers, and Jazzy lacks Alert too. Only RMF sends the modes that Jazzy
+    lacks."""
     assert NOT_IN_JAZZY[d.AlertTier] == CONSTANTS[d.AlertTier].keys()
     assert not releases.JAZZY.has(d.Alert)
     ours = set(CONSTANTS[d.RobotModeValue]) - NOT_IN_JAZZY[d.RobotModeValue]
@@ -218,7 +219,7 @@ def test_every_constant_has_the_number_of_the_msg_file(enum: Any) -> None:
 
 
 @pytest.mark.parametrize("release", GOLDEN, ids=lambda release: release.name)
-def test_every_message_has_the_fields_of_the_releases_msg_file_in_their_order(
+def test_every_message_has_the_fields_of_the_msg_file_of_its_release_in_order(
     release: Release,
 ) -> None:
     ours = {

@@ -1,5 +1,5 @@
-"""Nodes of different RMF releases on one graph: which nodes hear each other, the release that `auto`
-chooses, and the faults."""
+"""Nodes of different RMF releases on one graph. The tests show which nodes hear each other, which
+release `auto` chooses, and which faults appear."""
 
 import logging
 from collections.abc import Callable, Iterator
@@ -51,7 +51,7 @@ def fleet(node: Transport) -> Iterator[Callable[[], object]]:
 
 
 @pytest.mark.parametrize(("release", "heard"), [(JAZZY, JAZZYS_FLEET), (KILTED, FLEET)])
-def test_a_message_in_a_releases_bytes_is_read_by_that_release(
+def test_a_message_in_the_bytes_of_a_release_is_read_by_that_release(
     release: Release, heard: d.FleetState
 ) -> None:
     sample = cdr.encode(d.FleetState, FLEET, release)
@@ -62,7 +62,7 @@ def test_a_message_in_a_releases_bytes_is_read_by_that_release(
 
 
 @pytest.mark.parametrize(("release", "heard"), [(JAZZY, JAZZYS_FLEET), (KILTED, FLEET)])
-def test_auto_speaks_jazzys_messages_until_a_fleet_adapter_shows_its_release(
+def test_auto_speaks_jazzy_until_a_fleet_adapter_shows_its_release(
     join_of: Joining, release: Release, heard: d.FleetState, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO)
@@ -76,7 +76,7 @@ def test_auto_speaks_jazzys_messages_until_a_fleet_adapter_shows_its_release(
     assert ("release speaks=kilted" in caplog.text) == (release is KILTED)
 
 
-def test_a_node_that_has_no_such_topic_follows_too(join_of: Joining) -> None:
+def test_a_node_without_that_topic_follows_too(join_of: Joining) -> None:
     ours = join_of("ours", None)
     with fleet(join_of("adapter", KILTED)):
         wait_until(lambda: ours.release is KILTED, "the adapter's release is known")
@@ -100,7 +100,7 @@ def test_a_publisher_of_another_release_is_named_and_counted_while_it_is_there(
     assert capfd.readouterr().err == ""
 
 
-def test_two_releases_on_one_graph_are_a_fault_and_the_first_one_is_spoken(
+def test_two_releases_on_one_graph_are_a_fault_and_the_first_release_is_spoken(
     join_of: Joining, caplog: pytest.LogCaptureFixture
 ) -> None:
     ours = join_of("ours", None)
@@ -116,7 +116,7 @@ def test_two_releases_on_one_graph_are_a_fault_and_the_first_one_is_spoken(
     assert caplog.text.count("two_releases") == 3
 
 
-def test_each_of_many_nodes_in_one_process_reads_what_the_others_speak(join_of: Joining) -> None:
+def test_many_nodes_in_one_process_read_each_other(join_of: Joining) -> None:
     watching = [join_of(f"watching_{n}", JAZZY) for n in range(6)]
     for node in watching:
         node.subscribe(topics.FLEET_STATES, lambda _: None)
@@ -130,7 +130,7 @@ def test_each_of_many_nodes_in_one_process_reads_what_the_others_speak(join_of: 
 
 
 def told(nodes: list[Transport], faults: list[tuple[str, str]]) -> Callable[[], bool]:
-    """Return a condition: each of the nodes reports these faults."""
+    """Return a condition: each of these nodes reports these faults."""
     return lambda: all(node.faults() == faults for node in nodes)
 
 
@@ -159,7 +159,7 @@ def test_our_own_daemons_are_no_evidence_of_a_release() -> None:
 
 
 def site(release: Release) -> tuple[Outlet, MemoryTransport, list[object]]:
-    """Return a node of this release, and the list of its alarms that others hear."""
+    """Return a node of this release, and the list of its alarms that another node hears."""
     network, heard = MemoryNetwork(), list[object]()
     ears = MemoryTransport(network, "ears")
     for topic in (topics.EMERGENCY_SIGNAL, topics.FIRE_ALARM_TRIGGER, topics.ALERT):
@@ -173,7 +173,7 @@ def site(release: Release) -> tuple[Outlet, MemoryTransport, list[object]]:
 def test_without_emergency_signal_the_alarm_and_its_end_go_out_on_fire_alarm_trigger() -> None:
     outlet, node, heard = site(JAZZY)
     outlet.publish(topics.EMERGENCY_SIGNAL, d.EmergencySignal((), True))
-    node.release = KILTED  # the node learns its release; the end goes out in the alarm's form
+    node.release = KILTED  # the node learns its release only after the alarm
     outlet.publish(topics.EMERGENCY_SIGNAL, d.EmergencySignal((), False))
     assert heard == [d.Bool(True), d.Bool(False)]
     outlet, _, heard = site(KILTED)
@@ -181,7 +181,7 @@ def test_without_emergency_signal_the_alarm_and_its_end_go_out_on_fire_alarm_tri
     assert heard == [d.EmergencySignal((), True)]
 
 
-def test_without_alert_it_is_a_line_in_the_log(caplog: pytest.LogCaptureFixture) -> None:
+def test_without_alert_the_alarm_is_a_line_in_the_log(caplog: pytest.LogCaptureFixture) -> None:
     outlet, _, heard = site(JAZZY)
     outlet.publish(topics.ALERT, d.Alert(title="a robot", message="cannot charge"))
     assert heard == []

@@ -13,7 +13,7 @@ SEEN_ON_JAZZY = {
     d.DoorState: "1cb9d98f19c66cbc1f9acb16faaa90c63a7b65021bd26c69958d96f0a0388bb2",
     d.ChargerState: "13638f4a1149cb44d0e56c42f41e2ea752846d25010e16de13f2d1b05f4fe9f0",
 }
-"""Type hashes announced by nodes of ROS 2 Jazzy, built from rmf_internal_msgs."""
+"""Type hashes that nodes of ROS 2 Jazzy announce. These nodes were built from rmf_internal_msgs."""
 
 COMPUTED_BY_ROSBAGS = {
     d.Time: "b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197",
@@ -43,7 +43,8 @@ COMPUTED_BY_ROSBAGS = {
     d.AlertParameter: "e9a425e5c02657274d36ceeba4f9132e02c309e7796c4f819732cc8f5f4269f3",
     d.Alert: "3da5029edcd10f458262542961e3ff75e9e20d2d028f0d5235ab672af39ebfbb",
 }
-"""Hashes of the .msg files at rmf_internal_msgs 3d4df02, from `hash_rihs01` of rosbags 0.11."""
+"""Hashes of the .msg files at rmf_internal_msgs 3d4df02. `hash_rihs01` of rosbags 0.11 computed
+them."""
 
 BUILT_INTO_JAZZY = {
     d.Header: "f49fb3ae2cf070f793645ff749683ac6b06203e41c891e17701b1cb597ce6a01",
@@ -51,7 +52,8 @@ BUILT_INTO_JAZZY = {
     d.DiagnosticStatus: "b0e3e692ea2d54a8af2f4ef1930e81556a2db55216b771f8a7d2724ed47bf0e4",
     d.DiagnosticArray: "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e",
 }
-"""Hashes in `share/<package>/msg/*.json`, installed by a build of common_interfaces 5283bd9 (5.3.5)."""
+"""Hashes from `share/<package>/msg/*.json`. A build of common_interfaces 5283bd9 (5.3.5) installed
+these files."""
 
 JAZZYS: dict[Any, str | None] = {
     d.RobotMode: "f918d799fdbf77196b097b077858ebb2efe6685ab543564b69487fe7124638e7",
@@ -61,16 +63,16 @@ JAZZYS: dict[Any, str | None] = {
     d.Alert: None,
     d.AlertParameter: None,
 }
-"""Jazzy's differing hashes. None means that Jazzy lacks the message.
+"""The hashes that differ in Jazzy. None means that Jazzy lacks the message.
 
-rosbags 0.11 computed these from the .msg files at tag 3.3.1 (a351d51). For 3.5.0 (kilted, c0f72ce)
-rosbags computes the same hashes as for 4.1.0.
+rosbags 0.11 computed these hashes from the .msg files at tag 3.3.1 (a351d51). For 3.5.0 (kilted,
+c0f72ce) rosbags computes the same hashes as for 4.1.0.
 """
 
 HASHES: dict[Any, str] = {**SEEN_ON_JAZZY, **COMPUTED_BY_ROSBAGS, **BUILT_INTO_JAZZY}
 
 
-def test_there_is_a_hash_to_compare_with_for_every_type() -> None:
+def test_every_type_has_a_hash_to_compare_with() -> None:
     assert HASHES.keys() == d.PACKAGES.keys()
 
 
@@ -79,7 +81,7 @@ def test_the_hash_of_a_type_is_the_one_that_ros_computes(message_type: Any) -> N
     assert type_hash(message_type) == "RIHS01_" + HASHES[message_type]
 
 
-def test_jazzys_hashes_are_its_own_where_its_files_differ_and_the_newest_elsewhere() -> None:
+def test_hashes_of_jazzy_differ_only_for_files_that_differ() -> None:
     jazzys: dict[Any, str | None] = {**HASHES, **JAZZYS}
     wanted = {kind: "RIHS01_" + hashed for kind, hashed in jazzys.items() if hashed is not None}
     assert {kind: type_hash(kind, JAZZY) for kind in JAZZY.messages()} == wanted

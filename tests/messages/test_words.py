@@ -1,10 +1,10 @@
-"""The words for messages that `watch`, `send` and the demo print."""
+"""The words with which `watch`, `send` and the demo print messages."""
 
 from bridges.messages import definitions as d
 from bridges.messages import stamps, words
 
 
-def test_a_lift_state_says_where_the_car_is_and_where_it_goes_its_door_and_its_mode() -> None:
+def test_a_lift_state_tells_position_destination_door_and_mode() -> None:
     state = d.LiftState(
         lift_name="Lift1",
         current_floor="L1",
@@ -35,7 +35,7 @@ def test_a_name_from_the_network_cannot_move_the_cursor() -> None:
     assert words.holder(state) == "a\\rb"
 
 
-def test_a_charger_says_its_error_its_robot_and_how_long_it_takes() -> None:
+def test_a_charger_state_tells_error_robot_and_remaining_time() -> None:
     failed = d.ChargerState(state=200, error_message="over temperature")
     charging = d.ChargerState(
         state=3,
@@ -49,7 +49,7 @@ def test_a_charger_says_its_error_its_robot_and_how_long_it_takes() -> None:
     assert words.holder(charging) == "fleet/robot (request r1)"
 
 
-def test_each_request_says_what_is_asked_and_by_whom() -> None:
+def test_each_request_tells_its_content_and_its_sender() -> None:
     asked: list[words.Requested] = [
         d.LiftRequest("Lift1", d.Time(), "fleet/robot", 1, "L3", 2),
         d.LiftRequest("Lift1", d.Time(), "fleet/robot", 0, "", 0),
@@ -66,7 +66,7 @@ def test_each_request_says_what_is_asked_and_by_whom() -> None:
     ]
 
 
-def test_seconds_and_stamps_convert_both_ways_and_never_is_zero() -> None:
+def test_seconds_and_stamps_convert_both_ways_and_the_stamp_of_never_is_zero() -> None:
     assert stamps.stamp(1700000000.25) == d.Time(1700000000, 250000000)
     assert stamps.in_seconds(d.Time(1700000000, 250000000)) == 1700000000.25
     assert stamps.stamp(-1.0) == d.Time()

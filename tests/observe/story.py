@@ -1,4 +1,4 @@
-"""Messages in virtual time, and the change that each makes in the memory of one device."""
+"""Messages in virtual time. Each message may change the memory of a device."""
 
 from dataclasses import dataclass, field
 
@@ -23,7 +23,7 @@ OPEN, CLOSED = 2, 0
 
 @dataclass
 class Story:
-    """A course of messages and time. `news` has one line for each change that a message makes."""
+    """A series of messages. `news` has one line for each change that a message makes."""
 
     graph: PlainGraph = field(default_factory=PlainGraph)
     tally: SiteTally = field(default_factory=SiteTally)
@@ -56,7 +56,7 @@ class Story:
         return self.graph.known[kind, name]
 
     def waits(self, kind: Kind, name: str) -> list[tuple[str, str, float]]:
-        """Return each waiting requester with its wish and the start of its wait."""
+        """Return each waiting requester, with its request and the start of its wait."""
         now = Moment(self.now, WALL + self.now)
         return [(one.who, one.wants, one.since.at) for one in self.device(kind, name).waits(now)]
 

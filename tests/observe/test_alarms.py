@@ -1,4 +1,5 @@
-"""The texts of `watch`, `explain` and the page about alarms, from our daemons' diagnostics."""
+"""The texts about alarms in `watch`, `explain` and the page. They come from our daemons'
+diagnostics."""
 
 from datetime import UTC, datetime
 from typing import Any
@@ -28,7 +29,7 @@ BEGAN = "2023-11-14T22:10:00Z"
 def told(
     at: float, state: str, *fleets: str, panel: Any = None, since: str = BEGAN, **daemon: Any
 ) -> Heard:
-    """Return the diagnostics in which a panel's daemon states its alarm."""
+    """Return diagnostics in which a panel's daemon states its alarm."""
     report = FleetAlarmReport(state, CAUSE if state == "alarm" else ())
     statement = alarming.statement(report, frozenset(fleets))
     status = {**daemon, "alarm": {**statement, "since": since}}

@@ -1,4 +1,5 @@
-"""The memory of all devices: its bounds, the clock, the age of messages, and two nodes of one name."""
+"""The memory of all devices: its bounds, its clock, the age of messages, and two nodes with one
+name."""
 
 import pytest
 from msgspec.structs import replace
@@ -27,7 +28,7 @@ def asked(at: float, name: str) -> Heard:
     return Heard(at, WALL + at, "adapter_lift_requests", d.LiftRequest(name, session_id=RED))
 
 
-def test_devices_heard_first_stay_until_they_are_silent_for_a_minute() -> None:
+def test_known_devices_stay_until_they_are_silent_for_a_minute() -> None:
     graph = PlainGraph()
     for number in range(2 * MOST_DEVICES):
         graph.hear(lift(number / 100, f"lift {number}"))
@@ -38,7 +39,7 @@ def test_devices_heard_first_stay_until_they_are_silent_for_a_minute() -> None:
     assert [one.id for one in graph.stated("lift")] == [*first[1:], "new"]
 
 
-def test_a_device_that_was_only_asked_for_gives_way_to_one_that_speaks() -> None:
+def test_a_device_that_only_gets_requests_gives_way_to_a_device_that_publishes() -> None:
     graph = PlainGraph()
     for number in range(2 * MOST_DEVICES):
         graph.hear(asked(0.0, f"made up {number}"))
@@ -50,7 +51,7 @@ def test_a_device_that_was_only_asked_for_gives_way_to_one_that_speaks() -> None
     assert graph.crowded == set()
 
 
-def test_kinds_share_no_room_and_a_device_without_a_name_is_none() -> None:
+def test_each_kind_has_its_own_room_and_an_empty_name_is_no_device() -> None:
     graph = PlainGraph()
     for number in range(MOST_DEVICES):
         graph.hear(lift(0.0, f"lift {number}"))
@@ -60,7 +61,7 @@ def test_kinds_share_no_room_and_a_device_without_a_name_is_none() -> None:
     assert len(graph.known) == MOST_DEVICES + 1
 
 
-def test_a_message_in_the_wrong_order_counts_as_of_now_and_a_stepped_clock_is_noted() -> None:
+def test_a_message_in_the_wrong_order_counts_as_new_and_a_stepped_clock_is_noted() -> None:
     graph = PlainGraph()
     for at, wall in ((5.0, WALL), (3.0, WALL - 2), (6.0, WALL + 1), (7.0, WALL + 3602)):
         graph.hear(Heard(at, wall, "lift_states", LIFT))
@@ -78,12 +79,12 @@ def test_a_message_in_the_wrong_order_counts_as_of_now_and_a_stepped_clock_is_no
         (-OLD_S - 1, "is from the future"),
     ],
 )
-def test_a_reading_is_old_or_ahead_by_its_stamp(age_s: float, told: str) -> None:
+def test_the_stamp_shows_whether_a_reading_is_old_or_ahead(age_s: float, told: str) -> None:
     assert reading_age(WALL - age_s, WALL) == told
     assert reading_age(0.0, WALL) == "was never read"
 
 
-def test_stamps_of_two_nodes_go_back_and_forth_and_those_of_one_do_not() -> None:
+def test_only_stamps_of_two_nodes_go_back_and_forth() -> None:
     one, two = Story(), Story()
     for _ in range(6):
         for story, behind_s in ((one, 0.0), (two, 0.0), (two, 1.0)):
@@ -95,7 +96,7 @@ def test_stamps_of_two_nodes_go_back_and_forth_and_those_of_one_do_not() -> None
     assert back == [0, 6]
 
 
-def test_the_last_words_of_fleet_adapters_are_bounded_and_an_end_is_no_robots_word() -> None:
+def test_the_known_fleet_adapters_are_bounded_and_an_end_proves_no_adapter() -> None:
     story = Story().asks(RED).passes(1).asks_door(BLUE).passes(1).ends(RED).passes(1)
     story.hear("fleet_states", d.FleetState("fleet"))
     assert {who: at.at for who, at in story.graph.spoke.items()} == {
@@ -109,7 +110,7 @@ def test_the_last_words_of_fleet_adapters_are_bounded_and_an_end_is_no_robots_wo
 
 
 @pytest.mark.parametrize("mode", [4, 2])
-def test_a_device_that_goes_offline_and_comes_back_flaps_and_one_that_changes_otherwise_does_not(
+def test_only_a_device_that_goes_offline_and_returns_flaps(
     mode: int,
 ) -> None:
     story = Story()

@@ -1,4 +1,4 @@
-"""The memory of our nodes' messages on `/diagnostics` stays within bounds."""
+"""The memory of our nodes' messages on `/diagnostics` stays within its bounds."""
 
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard
@@ -43,7 +43,7 @@ def test_a_refusal_is_news_again_after_a_minute() -> None:
     assert told(site, later, says("n: L", "L", refused_full="3")) == [("refused", "full")]
 
 
-def test_made_up_nodes_push_out_nobody_who_still_speaks() -> None:
+def test_invented_nodes_displace_no_node_that_publishes() -> None:
     site = graph()
     lift = site.known["lift", "L"]
     told(site, 10.0, *(says(f"{n}: L", "L") for n in range(MOST_NODES + 5)))
@@ -53,7 +53,7 @@ def test_made_up_nodes_push_out_nobody_who_still_speaks() -> None:
     assert "0: L" not in lift.diagnoses
 
 
-def test_a_daemon_speaks_of_itself_and_is_no_lift() -> None:
+def test_diagnostics_of_a_daemon_itself_are_no_lift() -> None:
     site = graph()
     told(site, 10.0, says("L: daemon", "L", "SIMULATED"))
     assert [*site.nodes] == ["L: daemon"]

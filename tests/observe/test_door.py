@@ -29,7 +29,7 @@ def missing(door: ObservedDoor, one: DeviceRequester) -> list[str]:
     return [f"{check.name}: {check.shown}" for check in door.checks(one) if not check.met]
 
 
-def test_door_open_misses_the_door_then_the_heartbeat() -> None:
+def test_the_phase_door_open_waits_for_the_door_and_then_for_the_heartbeat() -> None:
     story = Story().door(CLOSED).asks_door(RED)
     door = story.device("door", "ward")
     assert isinstance(door, ObservedDoor)
@@ -43,21 +43,21 @@ def test_door_open_misses_the_door_then_the_heartbeat() -> None:
     assert door.matches(one)
 
 
-def test_a_heartbeat_from_before_the_doors_first_word_counts() -> None:
+def test_a_heartbeat_before_the_first_door_state_counts() -> None:
     story = Story().lists(RED).passes(5).door(OPEN)
     door = story.device("door", "ward")
     assert isinstance(door, ObservedDoor)
     assert {who: since.at for who, since in door.holders.items()} == {RED: 0}
 
 
-def test_where_no_heartbeat_is_heard_an_open_door_is_what_was_waited_for() -> None:
+def test_without_heartbeats_an_open_door_ends_the_wait() -> None:
     story = Story().door(CLOSED).asks_door(RED).asks_door(BLUE, topic="door_requests")
     assert story.waits("door", "ward") == [(RED, "OPEN", 0), (BLUE, "OPEN", 0)]
     assert story.door(OPEN).waits("door", "ward") == []
     assert story.lists().waits("door", "ward") == [(RED, "OPEN", 0)]
 
 
-def test_a_heartbeats_made_up_holders_are_bounded() -> None:
+def test_invented_holders_in_a_heartbeat_are_bounded() -> None:
     story = Story().door(CLOSED).lists(*(f"made/up{n}" for n in range(10 * MOST_HOLDERS)))
     door = story.device("door", "ward")
     assert isinstance(door, ObservedDoor)
@@ -85,7 +85,7 @@ def test_a_robot_waits_at_a_charger_from_its_assignment_until_it_charges() -> No
     ]
 
 
-def test_who_has_a_charger_is_known_since_it_was_seen_without_a_silence() -> None:
+def test_the_memory_has_the_robot_at_a_charger_and_the_beginning_of_its_states() -> None:
     story, since = Story(), []
     for seconds in (0.0, 1.0, 2.0, UNSEEN_S + 1.0, 1.0):
         charger(story.passes(seconds), 3, "red" if story.now < 3 else "blue", "r1")

@@ -1,4 +1,5 @@
-"""The memory of a lift: requesters, holder, waits, and the unmet conditions of RequestLift."""
+"""The memory of a lift: requesters, holder, waits, and the conditions for which RequestLift still
+waits."""
 
 import pytest
 
@@ -34,14 +35,14 @@ def test_a_ride_from_its_request_to_its_end() -> None:
         (BLUE, "L1", "moving", ["session", "floor", "door"]),
     ],
 )
-def test_request_lift_misses_the_session_the_floor_or_the_door_and_looks_at_nothing_else(
+def test_the_phase_request_lift_waits_only_for_session_and_floor_and_door(
     session: str, floor: str, door: str, missing: list[str]
 ) -> None:
     checks = request_lift(session, floor, door, RED, "L2")
     assert [check.name for check in checks if not check.met] == missing
 
 
-def test_a_requester_waits_until_it_is_shown_what_it_asks_for_and_again_when_that_is_over() -> None:
+def test_a_requester_waits_until_its_request_is_shown_and_again_afterwards() -> None:
     story = Story().lift().asks(RED)
     assert story.waits("lift", "Lift1") == [(RED, "L2", 0)]
     story.passes(2).asks(RED).lift(RED, "L2", OPEN)
@@ -52,7 +53,7 @@ def test_a_requester_waits_until_it_is_shown_what_it_asks_for_and_again_when_tha
     assert story.waits("lift", "Lift1") == []
 
 
-def test_whoever_stops_asking_while_states_come_is_gone_and_waits_no_longer() -> None:
+def test_a_requester_that_stops_asking_during_states_waits_no_longer() -> None:
     story = Story().lift().asks(RED)
     for _ in range(5):
         story.passes(1).lift()
@@ -61,21 +62,21 @@ def test_whoever_stops_asking_while_states_come_is_gone_and_waits_no_longer() ->
     assert [*story.device("lift", "Lift1").requesters] == []
 
 
-def test_while_no_state_comes_nobody_repeats_itself_and_all_wait_on() -> None:
+def test_without_states_nobody_repeats_a_request_and_all_keep_waiting() -> None:
     story = Story().lift().asks(RED).passes(100)
     assert story.waits("lift", "Lift1") == [(RED, "L2", 0)]
     story.asks(RED)
     assert story.waits("lift", "Lift1") == [(RED, "L2", 0)]
 
 
-def test_a_request_that_pauses_before_any_state_came_begins_anew() -> None:
+def test_a_request_that_pauses_before_the_first_state_begins_anew() -> None:
     story = Story().asks(RED).passes(GIVEN_UP_S).asks(RED)
     assert story.waits("lift", "Lift1") == [(RED, "L2", 0)]
     story.passes(GIVEN_UP_S + 1).asks(RED)
     assert story.waits("lift", "Lift1") == [(RED, "L2", 2 * GIVEN_UP_S + 1)]
 
 
-def test_a_session_lost_without_an_end_is_over_and_its_robot_still_waits() -> None:
+def test_a_session_that_is_lost_without_an_end_is_over_and_its_robot_waits() -> None:
     story = Story().lift().passes(1).asks(RED).lift(RED).passes(1).asks(RED).lift(BLUE)
     assert story.told()[-4:] == [
         "2 lost fleet/red",
@@ -87,7 +88,7 @@ def test_a_session_lost_without_an_end_is_over_and_its_robot_still_waits() -> No
 
 
 @pytest.mark.parametrize("passed", [True, False])
-def test_the_end_of_a_holder_that_was_not_heard_asking_is_remembered(passed: bool) -> None:
+def test_the_end_of_a_holder_without_a_heard_request_is_remembered(passed: bool) -> None:
     story = Story().lift(RED).passes(1).ends(RED, passed=passed)
     lift = story.device("lift", "Lift1")
     one = lift.requesters.get(RED)
@@ -103,7 +104,7 @@ def test_an_end_before_the_first_state_is_remembered_until_the_state_shows_its_s
     assert (one.ended is not None, one.own) == (True, True)
 
 
-def test_a_robot_repeats_end_until_its_last_is_old() -> None:
+def test_a_robot_counts_as_ending_until_its_last_end_is_old() -> None:
     story = Story().lift(RED)
     for _ in range(5):
         story.passes(1).ends(RED).lift(RED)
@@ -114,7 +115,7 @@ def test_a_robot_repeats_end_until_its_last_is_old() -> None:
 
 
 def not_passed_on(story: Story) -> str:
-    """Return the requester whose requests the supervisor does not pass on."""
+    """Return the requester whose requests the supervisor withholds from the lift."""
     lift = story.device("lift", "Lift1")
     assert isinstance(lift, ObservedLift)
     one = lift.not_passed_on(story.graph.now)
@@ -122,7 +123,7 @@ def not_passed_on(story: Story) -> str:
 
 
 @pytest.mark.parametrize("ends", [True, False])
-def test_requests_of_the_holder_that_nothing_follows_are_not_passed_on(ends: bool) -> None:
+def test_requests_of_the_holder_without_an_effect_are_not_passed_on(ends: bool) -> None:
     story = Story().lift(RED).asks(RED, passed=True)
     for _ in range(5):
         story.passes(1)
@@ -138,21 +139,21 @@ def test_requests_for_a_free_lift_are_passed_on_by_a_living_supervisor() -> None
     assert not_passed_on(story.lift()) == BLUE
 
 
-def test_the_requests_of_others_are_dropped_by_a_living_supervisor_too() -> None:
+def test_a_living_supervisor_drops_requests_of_other_robots_too() -> None:
     story = Story().lift(RED)
     for _ in range(9):
         story.passes(1).asks(BLUE).lift(RED)
     assert not_passed_on(story) == ""
 
 
-def test_a_grant_without_any_request_of_a_supervisor_shows_that_its_topic_is_not_recorded() -> None:
+def test_a_grant_without_a_request_of_the_supervisor_shows_an_unrecorded_topic() -> None:
     story = Story().lift().passes(1).asks(RED)
     for _ in range(9):
         story.lift(RED).passes(1).asks(RED)
     assert not_passed_on(story) == ""
 
 
-def test_a_wish_that_was_given_up_is_remembered_and_one_that_was_met_is_not() -> None:
+def test_only_an_abandoned_wish_is_remembered() -> None:
     story = Story().lift(RED).asks(RED, "L2").lift(RED, "L2", OPEN).asks(RED, "L3").lift(RED)
     one = story.device("lift", "Lift1").requesters.get(RED)
     assert one is not None
@@ -161,7 +162,7 @@ def test_a_wish_that_was_given_up_is_remembered_and_one_that_was_met_is_not() ->
     assert (one.boarded_at, one.given_up) == ("L2", "L3")
 
 
-def test_the_supervisor_asks_for_whom_it_asked_last_and_no_stranger_becomes_a_requester() -> None:
+def test_the_last_request_of_the_supervisor_counts_and_adds_no_requester() -> None:
     story = Story().lift().asks(RED).asks(BLUE, passed=True).passes(1).asks(RED, passed=True)
     lift = story.device("lift", "Lift1")
     assert isinstance(lift, ObservedLift)
@@ -170,7 +171,7 @@ def test_the_supervisor_asks_for_whom_it_asked_last_and_no_stranger_becomes_a_re
     assert [(one.who, one.passed_on) for one in lift.requesters] == [(RED, lift.supervisor_last)]
 
 
-def test_a_flood_of_names_is_bounded_and_displaces_no_holder() -> None:
+def test_many_invented_names_are_bounded_and_displace_no_holder() -> None:
     story = Story().lift().asks(RED).lift(RED)
     for number in range(10 * MOST_REQUESTERS):
         story.asks(f"made/up{number}")
@@ -180,7 +181,7 @@ def test_a_flood_of_names_is_bounded_and_displaces_no_holder() -> None:
     assert names[-1] == f"made/up{10 * MOST_REQUESTERS - 1}"
 
 
-def test_silence_is_told_by_states_and_ends_with_the_next() -> None:
+def test_the_next_state_ends_the_silence_of_a_lift() -> None:
     story = Story().lift().passes(SILENT_S)
     lift = story.device("lift", "Lift1")
     assert not lift.is_silent(story.graph.now)

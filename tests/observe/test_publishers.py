@@ -1,4 +1,4 @@
-"""Two publishers of one device's states, and cases that only look like two."""
+"""Two publishers of one device's states, and cases that look like two publishers but are not."""
 
 from bridges.messages.heard import Heard, Sender
 from bridges.observe.all_devices import PlainGraph
@@ -12,8 +12,8 @@ A, B, C = (Sender(f"/{name}") for name in "abc")
 def publishers(
     *told: Sender | None, step_s: float = 0.5, after_s: float = 0.0
 ) -> tuple[Sender, ...]:
-    """Return the publishers that count `after_s` after these senders published the same state in
-    turn."""
+    """Let these senders publish the same state in turn. Return the publishers that count `after_s`
+    later."""
     graph, at = PlainGraph(), 0.0
     for at, sender in enumerate(told):
         graph.hear(Heard(at * step_s, WALL, "lift_states", LIFT, sender))
@@ -21,30 +21,30 @@ def publishers(
     return graph.known["lift", "Lift1"].publishers(Moment(now, WALL))
 
 
-def test_two_that_publish_in_turn_are_two_though_they_say_the_same() -> None:
+def test_two_publishers_in_turn_are_two_even_with_equal_messages() -> None:
     assert publishers(A, B, A) == (B, A)
     assert publishers(*[A, B] * 40) == (A, B)
     assert publishers(*[A, A, A, A, B] * 8) == (A, B)
     assert publishers(*[A, B, C] * 8) == (A, B, C)
 
 
-def test_a_node_that_restarts_or_a_listener_that_joins_again_is_no_second_publisher() -> None:
+def test_a_restarted_node_or_a_rejoined_listener_is_no_second_publisher() -> None:
     assert publishers(A, A, A) == (A,)
     assert publishers(A, A, B) == (B,)
     assert publishers(A, B, C) == (C,)
-    assert publishers(A, B, A, step_s=SLOWEST_S) == (A,)  # A came back after B had gone
+    assert publishers(A, B, A, step_s=SLOWEST_S) == (A,)  # A has come back, and B has gone
 
 
-def test_two_are_one_again_once_the_other_has_gone() -> None:
+def test_two_publishers_become_one_after_the_other_has_gone() -> None:
     assert publishers(A, B, A, B, *[A] * 11) == (A,)
     assert publishers(A, B, A, after_s=SLOWEST_S + 1) == ()
 
 
-def test_unknown_publishers_are_none() -> None:
+def test_unknown_publishers_do_not_count() -> None:
     assert publishers(None, None) == ()
 
 
-def test_made_up_publishers_are_bounded_and_do_not_hide_that_there_are_several() -> None:
+def test_invented_publishers_are_bounded_and_do_not_hide_a_second_publisher() -> None:
     made_up = [Sender() for _ in range(100)]
     shown = publishers(A, *made_up, A, *made_up, step_s=0.01)
     assert A in shown

@@ -1,4 +1,5 @@
-"""Counts of rides, waits, door cycles, charges and availability, from messages on the graph."""
+"""Counts of rides, waits, door cycles, charges and availability, made from the messages on the
+graph."""
 
 from msgspec.structs import replace
 
@@ -19,7 +20,8 @@ def durations(histogram: DurationHistogram) -> tuple[int, float]:
 
 
 def asks_for(story: Story, floor: str, seconds: int, shown: tuple[str, str]) -> Story:
-    """Let a robot repeat its request for this time (s). The lift shows this session and floor."""
+    """Let a robot repeat its request for `seconds`. The lift shows this session and floor in that
+    time."""
     for _ in range(seconds):
         story.asks(RED, floor).lift(*shown).passes(1)
     return story.asks(RED, floor)
@@ -29,13 +31,14 @@ FREE, HELD = ("", "L2"), (RED, "L1")
 
 
 def ride(story: Story) -> Story:
-    """Let a robot ask at L1, board after 20 s, and ask for L2. It may leave the car 8 s later."""
+    """Let a robot ask at L1, board after 20 s, and ask for L2. Another 8 s later it may leave the
+    car."""
     asks_for(story.lift(*FREE), "L1", 20, FREE).lift(RED, "L1", OPEN)
     asks_for(story, "L2", 8, HELD).lift(RED, "L2", OPEN)
     return story.ends(RED).ends(RED, passed=True).lift()
 
 
-def test_a_ride_has_one_wait_and_one_ride_whatever_the_door_does_meanwhile() -> None:
+def test_a_ride_counts_as_one_wait_and_one_ride_for_any_moves_of_the_door() -> None:
     story = ride(Story().lift(*FREE).passes(10))
     whole = counted(story, "lift", "Lift1")
     assert (durations(whole.waits), durations(whole.rides), whole.cycles) == ((1, 20), (1, 8), 2)
@@ -45,13 +48,13 @@ def test_a_ride_has_one_wait_and_one_ride_whatever_the_door_does_meanwhile() -> 
     assert durations(whole.waits) == (2, 20)
 
 
-def test_a_wait_that_began_before_we_listened_is_not_counted() -> None:
+def test_a_wait_that_began_before_the_first_message_is_not_counted() -> None:
     story = ride(Story())
     assert durations(counted(story, "lift", "Lift1").waits) == (0, 0)
     assert durations(counted(story, "lift", "Lift1").rides) == (1, 8)
 
 
-def test_a_door_counts_its_openings_and_the_wait_of_each_robot() -> None:
+def test_openings_of_a_door_and_waits_of_robots_are_counted() -> None:
     story = Story().door(CLOSED).lists().passes(5)
     story.asks_door(RED).passes(3).asks_door(RED).lists(RED).door(OPEN)
     story.passes(1).asks_door(BLUE).lists(RED, BLUE).door(OPEN).lists().passes(4).door(CLOSED)
@@ -59,9 +62,7 @@ def test_a_door_counts_its_openings_and_the_wait_of_each_robot() -> None:
     assert (durations(door.waits), door.cycles) == ((2, 3), 1)
 
 
-def test_a_charger_counts_charges_the_wait_for_each_and_the_energy_that_its_daemon_reports() -> (
-    None
-):
+def test_charges_and_their_waits_and_the_reported_energy_are_counted() -> None:
     values = [("kind", "charger"), ("volts", "24.0"), ("amps", "10.0")]
     pairs = tuple(d.KeyValue(*pair) for pair in values)
     said = d.DiagnosticStatus(0, "node: bay", "OK", "bay", pairs)
@@ -76,7 +77,7 @@ def test_a_charger_counts_charges_the_wait_for_each_and_the_energy_that_its_daem
     assert (durations(bay.waits), bay.cycles, bay.energy_j) == ((1, 5), 1, 2400.0)
 
 
-def test_time_in_service_is_time_with_states_and_a_silence_is_no_part_of_either() -> None:
+def test_time_in_service_needs_states_and_a_silence_counts_as_neither() -> None:
     serving = replace(LIFT, current_mode=d.LiftMode.MODE_AGV)
     story = Story().hear("lift_states", serving)
     for _ in range(10):
@@ -89,7 +90,7 @@ def test_time_in_service_is_time_with_states_and_a_silence_is_no_part_of_either(
     assert (lift.watched_s, lift.served_s) == (15.0, 10.0)
 
 
-def test_a_quantile_is_the_bound_of_its_bucket_and_beyond_the_last_bound_it_is_infinite() -> None:
+def test_a_quantile_is_the_bound_of_its_bucket_or_infinite() -> None:
     histogram = DurationHistogram()
     assert histogram.quantile(0.5) is None
     for duration_s in (0.5, 4.0, 4.0, 900.0):
@@ -102,14 +103,14 @@ def test_a_quantile_is_the_bound_of_its_bucket_and_beyond_the_last_bound_it_is_i
     ]
 
 
-def test_invented_names_leave_no_counts_behind() -> None:
+def test_invented_names_add_no_counts() -> None:
     story = Story(graph=PlainGraph(most=5))
     for number in range(50):
         story.passes(100).hear("lift_states", replace(LIFT, lift_name=f"made up {number}"))
     assert len(story.tally.devices) <= 6
 
 
-def test_counts_that_were_taken_out_begin_anew_and_add_up() -> None:
+def test_counts_begin_anew_after_each_read_and_add_up() -> None:
     story = ride(Story().lift(*FREE).passes(10))
     first = story.tally.take_out()["lift", "Lift1"]
     assert counted(story, "lift", "Lift1") == DeviceCounts()

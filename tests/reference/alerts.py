@@ -1,4 +1,4 @@
-"""The alert rules of deploy/prometheus/, made from the faults and their remedies."""
+"""The maker of the alert rules in deploy/prometheus/, from the faults and their remedies."""
 
 from collections.abc import Iterator
 from typing import Any, Final
@@ -177,5 +177,5 @@ def _rule(
 
 
 def _plain(text: str) -> str:
-    """Return a text without the signs that Prometheus would read as a template."""
+    """Return a text without the characters that Prometheus would read as a template."""
     return text.strip().replace("{{", "{ {")

@@ -1,7 +1,7 @@
 """The unsafe control actions of `hazards.toml`.
 
-`python -m tests.reference.hazards [ID …]` removes each guard in a copy of the tree, and runs the test
-of that row. The test must fail.
+`python -m tests.reference.hazards [ID …]` removes each guard in a copy of the tree. Then it runs the
+test of that row, which must fail.
 """
 
 import re
@@ -30,10 +30,10 @@ class Cut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class UnsafeAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One row: an action with its guard and its test. With `gap` the row gives the reason for having
-    neither.
+    """One row: an unsafe action with its guard and its test. A row without guard and test has a reason
+    in `gap`.
 
-    `also` lists further guards. Each alone would suffice, so a cut removes all of them together.
+    `also` lists further guards. Each guard alone would suffice, so a cut removes all of them together.
     """
 
     id: str
@@ -49,7 +49,7 @@ class UnsafeAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def cuts(self) -> list[Cut]:
-        """Return every change that removes this row's guards."""
+        """Return the changes that remove all guards of this row."""
         return [Cut(str(self.file), self.cut, self.put), *self.also]
 
     @property
@@ -84,8 +84,10 @@ def _row(row: UnsafeAction) -> str:
 
 
 def fails_without(row: UnsafeAction, tree: Path) -> bool:
-    """Return whether the row's test passes with the row's guard, and fails if the guard is removed.
-    `tree`: a copy of the repository."""
+    """Return whether the row's test passes with the row's guard, and fails without the guard.
+
+    `tree` is a copy of the repository.
+    """
     whole = {tree / one.file: (tree / one.file).read_text() for one in row.cuts}
     passes = _exit_code(row.test, tree) == 0
     for one in row.cuts:

@@ -29,7 +29,7 @@ DECISIONS: Final = DOCS / "explanation" / "decisions"
 
 
 def commands() -> str:
-    """Return the page of subcommands with their options, from the parsers."""
+    """Return the page of subcommands with their options, made from the parsers."""
     whole = next(_subparsers(cli.whole_parser()))
     told = "".join(_command(f"rmf-bridge {name}", whole[name]) for name in cli.COMMANDS)
     rows = (

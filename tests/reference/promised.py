@@ -1,7 +1,7 @@
-"""The names on which users build: YAML keys, commands, options, exit codes, JSON, topics and faults.
+"""The names on which users rely: YAML keys, commands, options, exit codes, JSON, topics and faults.
 
-`promised.txt` has one name a line. Within a major version lines are only added. `make reference` adds
-new lines.
+`promised.txt` has one name in each line. Within a major version no line is removed. `make reference`
+adds new lines.
 """
 
 import argparse
@@ -29,7 +29,8 @@ JSON: Final = {
     "status": DaemonStatus,
     "watch": BoardRow,
 }
-"""The struct that each command prints with `--json`. `judge`, `replay` and `log` are not listed."""
+"""The struct that each command prints with `--json`. The list leaves out `judge`, `replay` and
+`log`."""
 FILE: Final = Path(__file__).with_suffix(".txt")
 
 
@@ -52,11 +53,11 @@ def present() -> set[str]:
 def _fields(shape: type) -> Iterator[str]:
     schema = msgspec.json.schema(shape)
     found = _keys(schema, schema, ())
-    return (path for path in found if not path.endswith(".headings"))  # leads to a row's keys
+    return (path for path in found if not path.endswith(".headings"))  # leads to the keys of a row
 
 
 def _keys(node: Any, root: Any, path: tuple[str, ...]) -> Iterator[str]:
-    """Yield the path of each key; `*` stands for a name that the user chooses."""
+    """Yield the path of each key. `*` stands for a name that the user chooses."""
     if isinstance(node, list):
         for one in node:
             yield from _keys(one, root, path)

@@ -13,12 +13,12 @@ from tests.reference.hazards import PAGE, ROOT, UnsafeAction, actions, page
 ROWS = actions()
 WAYS = ("given", "not_given", "timing", "duration")
 NO_COMMANDS = {"door.between_pulses", "dispenser.guid", "dispenser.item"}
-"""Fields that drive nothing. They give the driver the reason for an ended hold, or a start's
-content."""
+"""Fields of outputs that drive nothing. They tell the driver why a hold ended, or what a start
+dispenses."""
 
 
 def test_the_page_has_the_table() -> None:
-    """`make reference` renews the page."""
+    """If this test fails, run `make reference`."""
     assert PAGE.read_text() == page()
 
 
@@ -39,7 +39,7 @@ def test_each_row_has_its_own_id() -> None:
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.id)
-def test_a_row_names_a_guard_and_a_test_that_exist_or_says_that_there_is_a_gap(
+def test_a_row_names_an_existing_guard_and_test_or_states_a_gap(
     row: UnsafeAction,
 ) -> None:
     if row.gap:

@@ -1,4 +1,4 @@
-"""Files that the documentation names exist."""
+"""The files that the documentation names exist."""
 
 import re
 from pathlib import Path, PurePath
@@ -26,8 +26,8 @@ THERE = [
     if "__pycache__" not in path.parts
 ]
 PATH = re.compile(r"`([\w.-]+(?:/[\w.-]+)*(?:/|\.(?:py|md|yaml|dbc)))`")
-"""A file or a folder in a text. A path with `<kind>` or `*` stands for many files and is not
-checked."""
+"""A file or a folder in a text. The tests skip a path with `<kind>` or `*`, which stands for many
+files."""
 WAYS = ("a request", "an edge", "a register", "a frame", "a YAML")
 
 
@@ -43,7 +43,7 @@ def test_every_file_that_is_named_exists(page: str) -> None:
 
 
 def test_each_program_that_a_page_names_by_its_folder_exists() -> None:
-    """Decisions count too, because they name a moved file by its present place."""
+    """The test covers decisions too. An old decision must name a moved file by its present place."""
     programs = [path for path in THERE if path.suffix == ".py"]
     lost = [
         f"{page.name}: {found}"

@@ -1,4 +1,4 @@
-"""A class name has one meaning: at most 5 % of the product's classes share their name."""
+"""A class name has one meaning. At most 5 % of the product's classes may share a name."""
 
 import ast
 from collections import Counter
@@ -12,7 +12,7 @@ MOST: Final = 0.05
 
 
 def classes() -> Iterator[str]:
-    """Yield the name of each class at the top of a module."""
+    """Yield the name of each class at the top level of a module."""
     for room in ROOMS:
         for file in sorted((ROOT / room).rglob("*.py")):
             for node in ast.parse(file.read_text()).body:

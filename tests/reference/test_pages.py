@@ -15,8 +15,8 @@ ROOT = DOCS.parent
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_a_generated_page_is_what_the_program_makes(page: str) -> None:
-    """`make reference` renews the page."""
+def test_a_generated_page_equals_the_output_of_the_program(page: str) -> None:
+    """If this test fails, run `make reference`."""
     assert (DOCS / page).read_text() == PAGES[page]()
 
 
@@ -25,7 +25,7 @@ def test_each_command_has_its_exit_codes() -> None:
 
 
 @pytest.mark.parametrize("command", cli.COMMANDS)
-def test_each_exit_code_that_a_command_names_is_told(command: str) -> None:
+def test_each_exit_code_of_a_command_is_documented(command: str) -> None:
     source = Path(cli._module(command).__file__).read_text()
     named = {getattr(os, name) for name in re.findall(r"os\.(EX_[A-Z]+)", source)}
     named |= {int(code) for code in re.findall(r"return (\d+)$", source, re.M)}
@@ -33,7 +33,7 @@ def test_each_exit_code_that_a_command_names_is_told(command: str) -> None:
 
 
 def tracked(pattern: str) -> Iterator[Path]:
-    """Yield the files in git, without built files."""
+    """Yield the files in git except generated files."""
     for path in sorted(ROOT.rglob(pattern)):
         if not {".venv", ".venv-ros", "build", "dist"} & set(path.relative_to(ROOT).parts):
             yield path
@@ -43,8 +43,8 @@ PAGE = re.compile(r"\bdocs/[\w./-]+\.(?:md|svg|png)\b")
 
 
 @pytest.mark.parametrize("pattern", ["*.py", "*.md", "*.yaml", "*.service", "*.toml", "*.xml"])
-def test_each_page_of_docs_that_a_text_names_is_there(pattern: str) -> None:
-    """`make docs` checks the links within docs/."""
+def test_each_page_of_docs_that_a_text_names_exists(pattern: str) -> None:
+    """`make docs` checks only the links within docs/."""
     wrong = {
         f"{path.relative_to(ROOT)}: {page}"
         for path in tracked(pattern)

@@ -1,4 +1,5 @@
-"""A promised name stays for a whole major version. A renamed name stays readable."""
+"""A promised name stays for a whole major version. After a change of name the old name can still be
+read."""
 
 import re
 from fnmatch import fnmatch
@@ -13,18 +14,18 @@ PAGE = Path(__file__).parents[2] / "docs/reference/promises.md"
 
 
 def test_every_promised_name_is_there() -> None:
-    """A key with a new name gets a row in `bridges/settings/renamed_keys.py`."""
+    """If a key gets a new name, add a row to `bridges/settings/renamed_keys.py`."""
     renamed = [f"key {row.was}*" for row in RENAMED]
     lost = set(promised()) - present()
     assert [line for line in sorted(lost) if not any(fnmatch(line, was) for was in renamed)] == []
 
 
 def test_every_name_of_this_version_is_promised() -> None:
-    """`make reference` adds new names."""
+    """If this test fails, run `make reference`."""
     assert present() - set(promised()) == set()
 
 
-def test_what_is_called_experimental_exists() -> None:
+def test_every_experimental_name_exists() -> None:
     section = PAGE.read_text().partition("\n## Experimental\n")[2].partition("\n## ")[0]
     named = re.findall(r"^\| `([\w: ]+)`", section, re.M)
     assert named

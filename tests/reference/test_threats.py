@@ -1,4 +1,4 @@
-"""Each line of the threat model names an existing test, or states a gap."""
+"""Each line of the threat model names an existing test, or states that there is a gap."""
 
 import re
 from pathlib import Path
@@ -29,7 +29,7 @@ def test_each_wire_has_its_rows() -> None:
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row[2:60])
-def test_a_row_names_a_test_that_exists_or_a_gap(row: str) -> None:
+def test_a_row_names_an_existing_test_or_a_gap(row: str) -> None:
     _, _, stops, proof, _ = row.split("|")
     assert ("**gap:**" in stops) == (proof.strip() == "–")
     assert proof.strip() == "–" or TEST.search(proof)

@@ -1,3 +1,2 @@
-"""The rollout on two machines: Debian in containers, each with systemd as process 1. `make
-test-rollout`.
-"""
+"""A rollout to two machines (`make test-rollout`). The machines are containers of Debian with
+systemd."""

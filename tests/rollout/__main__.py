@@ -1,5 +1,6 @@
-"""`make test-rollout` rolls versions out to two booted machines, and prints a line for each check. As
-root. Exit code 1: a check failed; 69: none ran.
+"""`make test-rollout` rolls versions out to two booted machines, and prints a line for each check.
+
+The command must run as root. The exit code is 1 if a check failed, and 69 if no check ran.
 """
 
 import json
@@ -23,7 +24,7 @@ ROOT: Final = Path(__file__).parents[2]
 WORK: Final = ROOT / "build/rollout"
 BIN: Final = ROOT / ".venv/bin"
 INSIDE: Final = "RMF_ROLLOUT_INSIDE"
-"""Set in the process that has a network of its own, with the loopback interface only."""
+"""A variable that is set in the process with its own network. That network has only loopback."""
 ENV: Final = os.environ | {
     "PATH": f"{BIN}:{os.environ['PATH']}",
     "GNUPGHOME": str(WORK / "gpg"),
@@ -38,7 +39,7 @@ FIRST, SECOND = PORTS
 
 
 def main() -> int:
-    """Build what needs the network, then run in a network of its own."""
+    """Build everything that needs the network. Then run the checks in a network of their own."""
     if os.geteuid() != 0:
         print("containers need root: sudo make test-rollout", file=sys.stderr)
         return os.EX_UNAVAILABLE
@@ -51,7 +52,7 @@ def main() -> int:
             debian(WORK, release)
         words = ["unshare", "--net", "--mount", sys.executable, "-m", "tests.rollout"]
         return subprocess.run(words, env=os.environ | {INSIDE: "1"}).returncode
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # the containers are shut down then too
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # this exit shuts the containers down too
     sh("ip", "link", "set", "lo", "up")
     try:
         return Rollouts().run()
@@ -60,7 +61,7 @@ def main() -> int:
 
 
 def sh(*words: object, check: bool = True) -> subprocess.CompletedProcess[str]:
-    """Run a command, and return its output."""
+    """Run a command, and return its result with the output."""
     done = subprocess.run([str(word) for word in words], env=ENV, capture_output=True, text=True)
     if check and done.returncode:
         raise RuntimeError(f"{words}: {done.stdout}{done.stderr}")
@@ -68,11 +69,12 @@ def sh(*words: object, check: bool = True) -> subprocess.CompletedProcess[str]:
 
 
 VERSIONS: Final = {".1": None, ".2": broken, ".3": cut_off}
-"""Versions after the built one: one that serves, and two that fail."""
+"""The versions after the built version. One version serves, and two versions fail."""
 
 
 def repository() -> str:
-    """Make the repository; return the version of the built packages, without the system's name."""
+    """Make the package repository. Return the version of the built packages, without the system's
+    name."""
     packages = [
         deb
         for _, name in SYSTEMS.values()
@@ -106,7 +108,7 @@ def door(name: str, api_base: str) -> str:
 
 @contextmanager
 def relays() -> Iterator[dict[str, str]]:
-    """Serve a simulated relay with its door for each machine, and write the inventory's folder."""
+    """Serve a simulated relay with a door for each machine. Also write the folder of the inventory."""
     sh("rm", "-rf", WORK / "site")
     bases = {}
     with ExitStack() as stack:
@@ -143,13 +145,13 @@ def relays() -> Iterator[dict[str, str]]:
 
 
 def renew(yaml: Path) -> None:
-    """Let the form name the present content of its YAML, as after another kill test."""
+    """Write the checksum of the present YAML into its form, as a new kill test does."""
     form, new = yaml.with_suffix(".md"), sha256(yaml.read_bytes()).hexdigest()
     form.write_text(re.sub("sha256 [0-9a-f]{64}", f"sha256 {new}", form.read_text()))
 
 
 class Rollouts:
-    """The rollouts, in turn, and their checks."""
+    """All rollouts with their checks, in order."""
 
     def __init__(self) -> None:
         self.failed = 0
@@ -157,7 +159,7 @@ class Rollouts:
         self.good, self.bad, self.lost = (f"{self.old}{more}" for more in VERSIONS)
 
     def run(self) -> int:
-        """Run all; return 1 if a check failed."""
+        """Run all rollouts. Return 1 if a check failed, else 0."""
         sh(BIN / "ansible-galaxy", "collection", "install", "--force", "-p", WORK / "collections",
            ROOT / "deploy/ansible")  # fmt: skip
         with relays() as bases, booted(WORK, WORK / "apt"):
@@ -199,7 +201,7 @@ class Rollouts:
         self._users()
 
     def _users(self) -> None:
-        """Each service has a user of its own, also after a power cut."""
+        """Check that each service has its own user, even after a power cut."""
         state = "/var/lib/rmf-bridge"
         owners = [
             self._on(SECOND, f"stat -c %U {state}/{name}") for name in ("door2", "door_supervisor")
@@ -257,7 +259,7 @@ class Rollouts:
         renew(yaml)
 
     def _cut_off(self) -> None:
-        """Nobody reaches the first machine in the middle of its change: for a while, or for too
+        """Cut the first machine off in the middle of its change, once for a while and once for too
         long."""
         self._on(FIRST, "echo 90 > /run/cut-off-for")
         done = self._roll("cut-off", self.lost, "-e", "rmf_bridges_reached_again_s=300")
@@ -276,7 +278,8 @@ class Rollouts:
         self._expect("every daemon serves again", *self._serving())
 
     def _new_file_refused(self, bases: dict[str, str]) -> None:
-        """A file that no daemon can serve comes with a good version: both are put back."""
+        """Roll out a good version with a file that no daemon can serve. Version and file must both go
+        back."""
         folder = WORK / f"site/machines/{FIRST}"
         new = door("door3", "http://127.0.0.1:1")
         (folder / "door3.yaml").write_text(new)

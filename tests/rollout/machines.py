@@ -1,4 +1,5 @@
-"""Two machines in containers: Debian 12 and 13 with systemd as process 1, reached by ssh."""
+"""Two machines in containers, with Debian 12 and Debian 13. systemd is process 1, and ssh reaches
+them."""
 
 import shutil
 import subprocess
@@ -20,17 +21,17 @@ PROGRAMS: Final = {
 }
 PORTS: Final = {"pi-door1": 2201, "pi-door2": 2202}
 SYSTEMS: Final = {"pi-door1": ("bookworm", "deb12"), "pi-door2": ("trixie", "deb13")}
-"""Machine -> the release of Debian, and its name in the versions of the packages."""
+"""For each machine: the release of Debian, and the name of this release in the packages' versions."""
 CGROUPS: Final = Path("/sys/fs/cgroup")
 
 
 def missing() -> list[str]:
-    """Return the packages of the missing programs."""
+    """Return the packages of the programs that are missing here."""
     return sorted({deb for program, deb in PROGRAMS.items() if not shutil.which(program)})
 
 
 def debian(trees: Path, release: str) -> None:
-    """Make the tree of the machines with this release of Debian, once."""
+    """Make the file tree of the machines with this release of Debian, unless a tree exists."""
     tree = trees / release
     if tree.exists():
         return
@@ -46,7 +47,7 @@ def debian(trees: Path, release: str) -> None:
 
 @contextmanager
 def booted(folder: Path, repository: Path) -> Iterator[None]:
-    """Boot the machines. What they write is lost at the end of the block."""
+    """Boot the machines. At the end of the block their changes are lost."""
     key = folder / "key"
     key.unlink(missing_ok=True)
     subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", key], check=True)
@@ -74,7 +75,7 @@ def _machine(name: str, folder: Path, tree: Path, repository: Path) -> Iterator[
         *("--register=no", "--keep-unit", "--console=passive", "--kill-signal=SIGRTMIN+4"),
         *(f"--bind-ro={here}:{there}" for here, there in binds.items()),
     ]
-    # Each container needs a control group of its own, because systemd inside makes its groups there.
+    # Each container needs its own control group, because its systemd makes groups below that group.
     into = " ".join(
         f"mkdir -p {each.parent}/rmf-{name}; echo $$ > {each.parent}/rmf-{name}/cgroup.procs;"
         for each in (*CGROUPS.glob("cgroup.procs"), *CGROUPS.glob("*/cgroup.procs"))
@@ -89,6 +90,6 @@ def _machine(name: str, folder: Path, tree: Path, repository: Path) -> Iterator[
         try:
             yield
         finally:
-            nspawn.terminate()  # nspawn shuts the container down in order
+            nspawn.terminate()  # so nspawn shuts the container down in good order
             nspawn.wait()
             shutil.rmtree(root, ignore_errors=True)

@@ -1,4 +1,5 @@
-"""Versions that fail: one whose daemons cannot start, and one that cuts the machine off."""
+"""Makers of versions that fail. In one version no daemon starts. Another version cuts the machine
+off."""
 
 from pathlib import Path
 from typing import Final
@@ -6,17 +7,17 @@ from typing import Final
 from tests.deb.next_version import bridges_in
 
 BROKEN: Final = 'raise SystemExit("this version cannot start")\n'
-"""The program `run` of the broken version. `check` still works, so that the package installs."""
+"""The text of the command `run` in the broken version. Its `check` works, so the package installs."""
 CUT_OFF: Final = """
 systemctl stop ssh.service
 systemd-run --on-active=$(cat /run/cut-off-for) systemctl start ssh.service
 pkill sshd
 """
-"""The end of a postinst after which nobody reaches the machine for a while."""
+"""The end of a postinst. After this script nobody reaches the machine for a while."""
 
 
 def broken(tree: Path) -> None:
-    """Let no daemon start."""
+    """Change this tree so that no daemon starts."""
     with bridges_in(tree) as bridges:
         command = bridges / "commands/run.py"
         text = command.read_text()
@@ -26,6 +27,6 @@ def broken(tree: Path) -> None:
 
 
 def cut_off(tree: Path) -> None:
-    """End every connection by ssh while the package is installed."""
+    """Change this tree so that its installation ends every ssh connection."""
     script = tree / "DEBIAN/postinst"
     script.write_text(script.read_text() + CUT_OFF)

@@ -1,2 +1,2 @@
-"""Tests of the YAML loader with the real kinds, drivers and buses, and with those of the folder
+"""Tests of the YAML loader. They use the real kinds, drivers and buses, and those of the folder
 `site/`."""

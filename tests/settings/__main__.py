@@ -1,4 +1,4 @@
-"""Prints each mistake of `mistakes.toml` with its outcome: `python -m tests.settings`."""
+"""`python -m tests.settings` prints each mistake of `mistakes.toml` with the outcome of `check`."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory

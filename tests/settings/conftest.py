@@ -1,4 +1,4 @@
-"""Fixtures that add the kinds, drivers and buses of `site/`, and give the tests a file."""
+"""Fixtures that add the kinds, drivers and buses of `site/`, and that give each test a file."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -27,5 +27,5 @@ def site() -> Iterator[None]:
 
 @pytest.fixture(scope="package")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the path of a file that tests write and load repeatedly."""
+    """Return the path of a file that tests write and load again and again."""
     return tmp_path_factory.mktemp("settings") / "gate.yaml"

@@ -1,4 +1,4 @@
-"""Reads a file for the loader's tests, from text to a Config or to the printed problems."""
+"""Functions that load a text, and return its Config or the printed problems."""
 
 from pathlib import Path
 
@@ -45,6 +45,6 @@ def config_of(path: Path, text: str) -> Config:
 
 
 def changed(old: str, new: str, text: str = RIGHT) -> str:
-    """Return the correct file with one place changed."""
+    """Return the correct file with `old` replaced by `new` at one place."""
     assert text.count(old) == 1, old
     return text.replace(old, new)

@@ -1,4 +1,4 @@
-"""An alarm in a YAML: its topic, its fleets, its sources, and the answer of `check`."""
+"""An alarm in a YAML file: its topic, fleets and sources, and the answer of `check`."""
 
 import re
 from pathlib import Path
@@ -50,7 +50,7 @@ def test_a_mistake_about_an_alarm_is_refused(tmp_path: Path, was: str, now: str,
     assert [says in one for one in found] == [True], found
 
 
-def test_named_fleets_need_a_word_on_releases_that_cannot_name_them(tmp_path: Path) -> None:
+def test_named_fleets_need_a_setting_for_releases_without_names_of_fleets(tmp_path: Path) -> None:
     [found] = problems(tmp_path, re.sub(r" *without_fleets.*\n", "", NAMED))
     assert "write without_fleets: tell_all, or without_fleets: tell_nobody" in found
 
@@ -77,7 +77,9 @@ def test_a_door_without_a_fire_input_raises_no_alarm(tmp_path: Path) -> None:
         ("tell_nobody", "under Jazzy and older an alarm stops no robot"),
     ],
 )
-def test_check_says_whom_an_alarm_stops_under_jazzy(tmp_path: Path, choice: str, note: str) -> None:
+def test_check_tells_which_robots_an_alarm_stops_under_jazzy(
+    tmp_path: Path, choice: str, note: str
+) -> None:
     file = tmp_path / "a.yaml"
     file.write_text(NAMED.replace("tell_all", choice))
     notes = findings(load(file)).notes

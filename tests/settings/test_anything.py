@@ -1,4 +1,4 @@
-"""The loader makes a Config or raises SettingsError for any content of a file."""
+"""For any content of a file the loader makes a Config or raises SettingsError."""
 
 from pathlib import Path
 
@@ -29,19 +29,19 @@ def check_config_or_settings_error(file: Path, text: str | bytes) -> None:
 
 @MANY
 @given(st.binary(max_size=200))
-def test_arbitrary_bytes_are_right_or_refused_at_their_place(file: Path, text: bytes) -> None:
+def test_any_bytes_are_accepted_or_refused_at_their_place(file: Path, text: bytes) -> None:
     check_config_or_settings_error(file, text)
 
 
 @MANY
 @given(st.lists(st.sampled_from(BITS), max_size=40).map("".join))
-def test_arbitrary_bits_of_yaml_are_right_or_refused_at_their_place(file: Path, text: str) -> None:
+def test_any_pieces_of_yaml_are_accepted_or_refused_at_their_place(file: Path, text: str) -> None:
     check_config_or_settings_error(file, text)
 
 
 @MANY
 @given(st.sampled_from([RIGHT, BAD, *(path.read_text() for path in FILES)]), st.data())
-def test_a_file_with_bits_put_in_and_taken_out_is_right_or_refused_at_its_place(
+def test_a_file_with_added_and_removed_pieces_is_accepted_or_refused_at_its_place(
     file: Path, text: str, data: st.DataObject
 ) -> None:
     for _ in range(data.draw(st.integers(1, 4))):
@@ -63,7 +63,7 @@ SECTIONS = ["kind", "driver", "rmf", "buses", "gates"]
 
 @MANY
 @given(st.dictionaries(st.sampled_from(SECTIONS), VALUES), VALUES)
-def test_arbitrary_values_in_the_place_of_sections_are_right_or_refused_at_their_place(
+def test_any_values_instead_of_sections_are_accepted_or_refused_at_their_place(
     file: Path, sections: dict[str, object], gate: object
 ) -> None:
     document = {**yaml.safe_load(RIGHT), **sections}

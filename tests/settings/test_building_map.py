@@ -1,4 +1,5 @@
-"""`rmf-bridge check FILE --building-map MAP` compares our names with RMF's, on maps of both forms."""
+"""`rmf-bridge check FILE --building-map MAP` compares our names with RMF's. Maps have one of two
+forms."""
 
 import os
 from pathlib import Path
@@ -98,7 +99,7 @@ coordinator:
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Work in a folder with maps, so that a test gives file names like a user."""
+    """Work in a folder with maps, so that a test types file names as a user does."""
     monkeypatch.chdir(tmp_path)
     Path("building.yaml").write_text(BUILDING)
     Path("graph.yaml").write_text(GRAPH)
@@ -107,7 +108,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def complaints(
     capsys: pytest.CaptureFixture[str], text: str, building: str = "building.yaml"
 ) -> list[str]:
-    """Return the complaints of `check` about the names in a device YAML."""
+    """Return the complaints of `check` about the names in this device YAML."""
     Path("device.yaml").write_text(text)
     code = main(["check", "-q", "device.yaml", "--building-map", building])
     said = capsys.readouterr().err.splitlines()
@@ -222,20 +223,22 @@ def test_a_coordinators_waypoints_and_stations_stand_on_the_map(
     ]
 
 
-def test_a_map_without_any_lift_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_tells_that_a_map_has_no_lifts(capsys: pytest.CaptureFixture[str]) -> None:
     Path("flat.yaml").write_text("levels: {L1: {vertices: []}, L2: }\nlifts: {}\n")
     assert complaints(capsys, LIFT, "flat.yaml") == [
         "device.yaml:5:3: flat.yaml has no lift 'Lift1': it has none"
     ]
 
 
-def test_a_kind_without_names_on_a_map_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_tells_that_a_file_has_no_names_to_compare_with_a_map(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     Path("device.yaml").write_text("kind: lift_supervisor\n")
     assert main(["check", "device.yaml", "--building-map", "building.yaml"]) == 0
     assert "\nthis file has no names to compare with building.yaml\n" in capsys.readouterr().out
 
 
-def test_a_file_that_is_not_a_map_is_refused_at_the_place_that_is_wrong(
+def test_a_file_that_is_no_map_is_refused_at_the_wrong_place(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     Path("device.yaml").write_text(LIFT)
@@ -247,7 +250,7 @@ def test_a_file_that_is_not_a_map_is_refused_at_the_place_that_is_wrong(
     )
 
 
-def test_everything_of_the_wrong_form_is_named_with_its_place() -> None:
+def test_each_value_of_a_wrong_form_is_named_with_its_place() -> None:
     text = (
         "levels:\n  L1:\n    vertices: 7\n    doors: {a: 1}\n  L2:\n    vertices: [8, [1, 2]]\n"
         "  [x]: {}\nlifts: [Lift1]\n"

@@ -40,7 +40,7 @@ OK
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Work in an empty folder with a wide terminal, so that a test gives file names like a user."""
+    """Work in an empty folder with a wide terminal, so that a test types file names as a user does."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "130")
 
@@ -76,7 +76,7 @@ def test_each_bus_has_its_table(capsys: pytest.CaptureFixture[str]) -> None:
     )
 
 
-def test_a_driver_without_wires_says_what_it_talks_to(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_driver_without_wires_shows_its_addresses(capsys: pytest.CaptureFixture[str]) -> None:
     Path("gate.yaml").write_text(WEB)
     assert check("gate.yaml") == 0
     assert capsys.readouterr() == (
@@ -116,7 +116,7 @@ def test_problems_go_to_stderr_with_their_number(capsys: pytest.CaptureFixture[s
     )
 
 
-def test_one_wrong_file_among_several_is_wrong(capsys: pytest.CaptureFixture[str]) -> None:
+def test_one_wrong_file_makes_the_result_wrong(capsys: pytest.CaptureFixture[str]) -> None:
     Path("gate.yaml").write_text(RIGHT)
     assert check("no.yaml", "gate.yaml") == os.EX_CONFIG
     out, err = capsys.readouterr()

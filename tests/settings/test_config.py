@@ -35,7 +35,7 @@ def gate(raw: Any) -> Any:
     return msgspec.convert(raw, named.driver_called("gate", "contact").settings, str_keys=True)
 
 
-def test_a_right_file_becomes_a_config(file: Path) -> None:
+def test_a_correct_file_becomes_a_config(file: Path) -> None:
     assert config_of(file, RIGHT) == Config(
         path=file,
         text=RIGHT.encode(),
@@ -109,7 +109,7 @@ LIMITS = st.fixed_dictionaries(
 
 @st.composite
 def gates(draw: st.DrawFn) -> dict[str, Any]:
-    """Return the raw values of a correct gate."""
+    """Draw the raw values of a correct gate."""
     names = draw(st.lists(NAMES, unique=True, max_size=9))
     lanes = draw(st.one_of(LANES, st.lists(NAMES, min_size=1)))
     lane = st.sampled_from(list(lanes))
@@ -122,7 +122,7 @@ def gates(draw: st.DrawFn) -> dict[str, Any]:
 
 
 class Quoting(yaml.SafeDumper):
-    """A YAML writer that quotes every string, also each key, and otherwise equals PyYAML's."""
+    """A YAML writer like PyYAML's, except that it quotes every string and each key."""
 
 
 Quoting.add_representer(
@@ -131,7 +131,7 @@ Quoting.add_representer(
 
 
 @pytest.mark.parametrize("flow", [True, False])
-def test_every_right_file_becomes_what_msgspec_makes_of_its_values(file: Path, flow: bool) -> None:
+def test_every_correct_file_gives_the_same_structs_as_msgspec(file: Path, flow: bool) -> None:
     @settings(max_examples=examples(60))
     @given(st.dictionaries(NAMES, gates(), min_size=1, max_size=1))
     def check(devices: dict[str, Any]) -> None:

@@ -58,7 +58,7 @@ def said(
     return code, capsys.readouterr().err.splitlines()
 
 
-def test_two_files_that_share_nothing_are_right(capsys: pytest.CaptureFixture[str]) -> None:
+def test_two_files_that_share_nothing_give_no_problem(capsys: pytest.CaptureFixture[str]) -> None:
     other = SECOND.replace("192.168.1.50", "192.168.1.51")
     assert said(capsys, DOOR, other) == (0, [])
 
@@ -87,7 +87,7 @@ def test_one_serial_port_in_two_files_is_one_error(capsys: pytest.CaptureFixture
     )
 
 
-def test_one_pin_is_found_however_it_is_spelt(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_shared_pin_is_found_in_any_spelling(capsys: pytest.CaptureFixture[str]) -> None:
     second = GPIO.replace("ward:", "lab:").replace("BCM18", "J8:12")
     second = second.replace("J8:29", "J8:32").replace("J8:31", "BCM13")
     assert said(capsys, GPIO, second) == (
@@ -97,7 +97,7 @@ def test_one_pin_is_found_however_it_is_spelt(capsys: pytest.CaptureFixture[str]
     assert said(capsys, GPIO, second, "--several-machines") == (0, [])
 
 
-def test_domains_that_differ_are_an_error(capsys: pytest.CaptureFixture[str]) -> None:
+def test_different_domains_are_an_error(capsys: pytest.CaptureFixture[str]) -> None:
     second = SECOND.replace("192.168.1.50", "192.168.1.51")
     assert said(capsys, DOOR, second.replace("domain_id: 3", "domain_id: 4")) == (
         78,
@@ -115,7 +115,7 @@ def test_domains_that_differ_are_an_error(capsys: pytest.CaptureFixture[str]) ->
     )
 
 
-def test_a_supervisor_of_a_door_that_no_file_has_is_an_error(
+def test_a_supervisor_of_a_door_without_a_file_is_an_error(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     supervisor = "kind: door_supervisor\nrmf: {domain_id: 3}\nsupervisor: {doors: [wart]}\n"
@@ -137,7 +137,7 @@ def test_a_second_supervisor_is_an_error(capsys: pytest.CaptureFixture[str]) -> 
     )
 
 
-def test_a_coordinators_station_that_no_charger_has_is_an_error(
+def test_a_station_of_the_coordinator_without_a_charger_is_an_error(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     coordinator = (CONFIG / "charger_coordinator.yaml").read_text()
@@ -150,14 +150,14 @@ def test_a_coordinators_station_that_no_charger_has_is_an_error(
 
 
 def shipped(name: str, *changes: tuple[str, str]) -> str:
-    """Return a file of config/ with these changes."""
+    """Return the text of a file in config/ with these changes."""
     text = (CONFIG / name).read_text()
     for old, new in changes:
         text = text.replace(old, new)
     return text
 
 
-def test_a_command_over_http_belongs_to_one_door_or_charger_only(
+def test_a_command_over_http_belongs_to_only_one_door_or_charger(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     other = shipped("door_http.yaml", ("side_door", "back_door"))
@@ -173,7 +173,9 @@ def test_a_command_over_http_belongs_to_one_door_or_charger_only(
     )
 
 
-def test_a_gateways_command_belongs_to_one_lift_only(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_command_of_a_gateway_belongs_to_only_one_lift(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     other = shipped("lift_gateway.yaml", ("Lift1", "Lift2"))
     code, lines = said(capsys, shipped("lift_gateway.yaml"), other, "-q")
     assert (code, [line.partition(" ")[2] for line in lines[:-1]]) == (
@@ -185,7 +187,9 @@ def test_a_gateways_command_belongs_to_one_lift_only(capsys: pytest.CaptureFixtu
     )
 
 
-def test_the_coil_of_a_modules_pulse_is_claimed_as_well(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_coil_for_the_pulse_of_a_module_is_claimed_too(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     bus = shipped("door_waveshare.yaml")
     bus = bus[bus.index("    serial:") : bus.index("doors:")]
     first = shipped("door_waveshare.yaml", (bus, "    tcp: {host: 192.168.1.50}\n\n"))

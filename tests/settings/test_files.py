@@ -1,4 +1,4 @@
-"""A file that is no device YAML gives one clear problem with its place."""
+"""For a file that is not a device YAML, the loader reports one clear problem with its place."""
 
 import os
 import socket
@@ -16,7 +16,7 @@ def why_not(path: Path) -> list[str]:
     return [str(p).removeprefix(f"{path}:") for p in error.value.problems]
 
 
-def test_a_file_that_is_not_there_is_one_problem(tmp_path: Path) -> None:
+def test_a_missing_file_is_one_problem(tmp_path: Path) -> None:
     assert why_not(tmp_path / "no.yaml") == ["1:1: cannot be read: No such file or directory"]
 
 
@@ -24,7 +24,7 @@ def test_a_folder_is_one_problem(tmp_path: Path) -> None:
     assert why_not(tmp_path) == ["1:1: cannot be read: Is a directory"]
 
 
-def test_a_pipe_a_device_and_a_socket_are_one_problem_and_no_wait(tmp_path: Path) -> None:
+def test_a_pipe_and_a_device_and_a_socket_are_one_problem_without_a_wait(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     wrong = "1:1: cannot be read: it is a pipe, a socket or a device, not a file"
     assert why_not(tmp_path / "pipe") == [wrong]
@@ -107,11 +107,11 @@ SYNTAX = {
 
 
 @pytest.mark.parametrize("text", SYNTAX)
-def test_a_mistake_in_the_syntax_keeps_its_line_and_column(file: Path, text: str) -> None:
+def test_a_syntax_mistake_is_reported_with_line_and_column(file: Path, text: str) -> None:
     assert problems_of(file, text) == [SYNTAX[text]]
 
 
-def test_tags_are_refused_wherever_they_stand_and_whatever_they_say(file: Path) -> None:
+def test_every_tag_is_refused_at_any_place(file: Path) -> None:
     text = RIGHT.replace("dds,", "!!python/object:os.system dds,").replace("[in,", "[! in,")
     refused = "a tag ('!...') is not accepted: delete it, or quote the text"
     assert problems_of(file, text) == [f"3:18: {refused}", f"8:13: {refused}"]
@@ -126,7 +126,7 @@ def test_an_alias_repeats_what_its_anchor_holds(file: Path) -> None:
 @pytest.mark.parametrize(
     "text", ["a: &x [1, *x]\n", "a: &x {b: {c: *x}}\n", "&x a: 1\n? *x\n: 2\n"]
 )
-def test_an_alias_inside_its_own_value_does_not_hang(file: Path, text: str) -> None:
+def test_an_alias_inside_its_own_value_does_not_block_the_loader(file: Path, text: str) -> None:
     assert len(problems_of(file, text)) >= 1
 
 
@@ -158,7 +158,7 @@ def test_a_deeply_nested_file_is_one_problem(file: Path, opening: str) -> None:
         ("other: 1\nlevels: {L1: {}}\n", "RMF's building map or navigation graph"),
     ],
 )
-def test_a_file_of_rmfs_is_named_as_such_with_the_option_that_takes_it(
+def test_a_file_of_rmf_is_recognised_and_the_text_names_its_option(
     file: Path, text: str, says: str
 ) -> None:
     (found,) = problems_of(file, text)
@@ -166,7 +166,7 @@ def test_a_file_of_rmfs_is_named_as_such_with_the_option_that_takes_it(
 
 
 @pytest.mark.parametrize("where", ["value", "key"])
-def test_half_of_a_character_is_refused_where_it_stands(tmp_path: Path, where: str) -> None:
+def test_half_of_a_character_is_refused_at_its_place(tmp_path: Path, where: str) -> None:
     file = tmp_path / "a.yaml"
     half = '"\\ud800"'
     text = f"kind: {half}\n" if where == "value" else f"kind: lift\n{half}: 1\n"

@@ -54,7 +54,8 @@ levels:
 
 
 class Site:
-    """The coordinator's file, RMF's fleet config, and RMF's navigation graph if a test gives one."""
+    """The coordinator's file and RMF's fleet config. RMF's navigation graph is added if a test gives
+    one."""
 
     def __init__(self, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         self._folder, self._capsys = folder, capsys
@@ -62,7 +63,7 @@ class Site:
     def check(
         self, ours: str = OURS, theirs: str = THEIRS, graph: str = "", *more: str
     ) -> tuple[int, list[str]]:
-        """Return the exit code, and each problem and warning without the folder."""
+        """Return the exit code, and each problem and warning without its folder."""
         for name, text in (("ours.yaml", ours), ("config.yaml", theirs), ("graph.yaml", graph)):
             (self._folder / name).write_text(text)
         options = ["--building-map", str(self._folder / "graph.yaml")] if graph else []
@@ -85,7 +86,9 @@ def site(
     return Site(tmp_path, capsys)
 
 
-def test_two_files_that_agree_are_right_and_the_transforms_error_is_reported(site: Site) -> None:
+def test_files_that_agree_give_no_problem_and_the_error_of_the_transform_is_reported(
+    site: Site,
+) -> None:
     assert site.check() == (0, [])
     assert (
         "config.yaml: transformation error estimate for L1: 0"
@@ -155,7 +158,7 @@ def test_two_files_that_agree_are_right_and_the_transforms_error_is_reported(sit
         ),
     ],
 )
-def test_settings_that_cannot_be_right_are_named_where_they_stand(
+def test_contradictory_settings_are_named_at_their_place(
     site: Site, old: str, new: str, problem: str
 ) -> None:
     assert THEIRS.count(old) == 1
@@ -196,7 +199,7 @@ def test_a_key_without_which_no_robot_is_charged_is_an_error(
         ("{Lift1: L9}", os.EX_CONFIG, ["'Lift1' has an unknown floor 'L9'"]),
     ],
 )
-def test_each_lift_with_an_alarm_has_a_recall_floor_in_the_fleets_configuration(
+def test_a_lift_with_an_alarm_needs_a_recall_floor_in_the_fleet_configuration(
     site: Site, levels: str, code: int, begins: list[str]
 ) -> None:
     lift = (Path(__file__).parents[2] / "config" / "lift_io_module.yaml").read_text()
@@ -260,7 +263,7 @@ def test_a_station_that_releases_a_robot_before_rmfs_recharge_soc_is_a_mismatch(
         ),
     ],
 )
-def test_a_likely_mistake_is_warned_of(site: Site, old: str, new: str, warning: str) -> None:
+def test_a_likely_mistake_gives_a_warning(site: Site, old: str, new: str, warning: str) -> None:
     assert THEIRS.count(old) == 1
     assert site.check(theirs=THEIRS.replace(old, new)) == (0, [warning])
 
@@ -293,7 +296,7 @@ def test_waypoints_are_compared_with_the_navigation_graph(site: Site) -> None:
     )
 
 
-def test_a_waypoint_in_the_robots_coordinates_is_named_with_rmfs(site: Site) -> None:
+def test_a_waypoint_in_coordinates_of_the_robot_is_named_with_those_of_rmf(site: Site) -> None:
     code, found = site.check(OURS.replace("x: 10, y: 5", "x: 4, y: -5"), THEIRS, GRAPH)
     text = "this place is on the robot's map; on RMF's map write x: 10, y: 5 (graph.yaml:6)"
     assert (code, found) == (os.EX_CONFIG, [f"ours.yaml:8:9: {text}"])
@@ -346,9 +349,9 @@ def test_the_shipped_fleet_agrees_with_the_shipped_coordinator(
 # --- the transform -----------------------------------------------------------------------------
 
 
-def test_the_transform_of_the_adapter_templates_example_and_its_mean_squared_error() -> None:
-    """The example is config.yaml of open-rmf/fleet_adapter_template. nudged 0.3.1 gave each checked
-    value."""
+def test_the_transform_of_the_adapter_template_example_has_the_expected_error() -> None:
+    """The points come from config.yaml of open-rmf/fleet_adapter_template. The expected values come
+    from nudged 0.3.1."""
     rmf = [(20.33, -3.156), (8.908, -2.57), (13.02, -3.601), (21.93, -4.124)]
     robot = [(59.0, 399.0), (57.0, 172.0), (68.0, 251.0), (75.0, 429.0)]
     found = estimate(rmf, robot)
@@ -360,7 +363,7 @@ def test_the_transform_of_the_adapter_templates_example_and_its_mean_squared_err
 
 
 def _nudged(x: list[tuple[float, float]], y: list[tuple[float, float]]) -> tuple[float, ...]:
-    """Return scale and rotation (s, r) and the translation, by the least-squares normal equations."""
+    """Return scale and rotation (s, r) and the translation, computed by least squares."""
     n = len(x)
     a1, b1 = sum(p[0] for p in x), sum(p[1] for p in x)
     c1, d1 = sum(p[0] for p in y), sum(p[1] for p in y)
@@ -377,7 +380,7 @@ def _nudged(x: list[tuple[float, float]], y: list[tuple[float, float]]) -> tuple
 
 def test_a_known_transform_is_found_and_undone() -> None:
     rmf = [(0.0, 0.0), (1.0, 0.0), (0.0, 2.0)]
-    robot = [(5.0, 5.0), (5.0, 7.0), (1.0, 5.0)]  # turned by 90 degrees, twice as large, shifted
+    robot = [(5.0, 5.0), (5.0, 7.0), (1.0, 5.0)]  # turned by 90 degrees, scaled by 2, shifted
     found = estimate(rmf, robot)
     assert cmath.isclose(found.turn, 2j, abs_tol=1e-12)
     assert cmath.isclose(found.shift, 5 + 5j, abs_tol=1e-12)
@@ -386,7 +389,7 @@ def test_a_known_transform_is_found_and_undone() -> None:
     assert math.dist(found.back((1.0, 5.0)), (0.0, 2.0)) < 1e-12
 
 
-def test_the_error_is_the_mean_of_the_squares_and_in_metres_its_root() -> None:
+def test_the_error_is_a_mean_square_and_is_shown_in_metres_as_its_root() -> None:
     found = estimate([(0.0, 0.0), (2.0, 0.0), (0.0, 0.0)], [(0.0, 2.0), (4.0, 0.0), (0.0, -2.0)])
     assert (round(found.mse, 9), round(found.error, 9)) == (
         round(8 / 3, 9),

@@ -1,5 +1,5 @@
-"""A fleet's YAML, and the two files of RMF named in it. `check` finds each mistake that would end RMF's
-adapter."""
+"""A fleet's YAML, and the two files of RMF that the YAML names. `check` finds each mistake that would
+stop RMF's adapter."""
 
 import os
 from collections.abc import Callable
@@ -24,7 +24,8 @@ Write = Callable[..., Path]
 
 @pytest.fixture
 def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
-    """Return a function that writes the shipped files with changes: (file, old text, new text)."""
+    """Return a function that writes the shipped files. Each change is a tuple (file, old text, new
+    text)."""
     monkeypatch.setattr(texts, "_texts", {})
 
     def written(*changes: tuple[str, str, str]) -> Path:
@@ -184,13 +185,13 @@ def test_the_shipped_files_are_one_site(write: Write) -> None:
         ),
     ],
 )
-def test_a_mistake_is_told_with_its_place(
+def test_a_mistake_is_reported_with_its_place(
     write: Write, change: tuple[str, str, str], says: list[str]
 ) -> None:
     assert problems(write(change)) == says
 
 
-def test_a_missing_file_is_told_at_the_key_that_names_it(write: Write) -> None:
+def test_a_missing_file_is_reported_at_the_key_that_names_it(write: Write) -> None:
     file = write((OURS, "config: fleet_tiny.yaml ", "config: fleet_huge.yaml "))
     said = problems(file)
     assert said[-1].endswith("fleet_huge.yaml cannot be read")
@@ -218,7 +219,7 @@ def test_the_older_form_and_the_demos_form_of_config_are_read(write: Write) -> N
     assert [round(t.rotation, 4) for t in site.transforms.values()] == [1.5708]
 
 
-def test_rmfs_own_transforms_are_read_and_not_given_again(write: Write) -> None:
+def test_transforms_of_rmf_are_read_and_need_no_repetition(write: Write) -> None:
     line = "  finishing_request: charge"
     own = "  transforms: {L1: {translation: [1, 2], rotation: 0.5}, L2: {scale: 2.0}}"
     file = write((CONFIG, line, f"{own}\n{line}"))
@@ -230,13 +231,13 @@ def test_rmfs_own_transforms_are_read_and_not_given_again(write: Write) -> None:
     assert (round(found.rotation, 3), found.shift) == (0.5, 1 + 2j)
 
 
-def test_the_limits_of_a_robot_hold_its_site(write: Write) -> None:
+def test_the_limits_of_a_robot_include_its_site(write: Write) -> None:
     limits = limits_of(load(write()), "AMR01", {})
     assert limits.site.graph.called("pharmacy")
     assert limits.t.stale_after_s == 5.0
 
 
-def test_check_reads_the_files_and_tells_the_transforms(
+def test_check_reads_the_files_and_prints_the_transforms(
     write: Write, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["check", str(write())]) == 0

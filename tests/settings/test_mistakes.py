@@ -1,4 +1,5 @@
-"""Mistakes that people make in a device YAML, and the first message of `check` (`mistakes.toml`)."""
+"""Mistakes that people make in a device YAML (`mistakes.toml`), and the first message of `check` for
+each."""
 
 import tomllib
 from pathlib import Path
@@ -19,11 +20,12 @@ OTHERWISE: Final = {
     "pin twice in and out": "wrong: the pin's level at boot is named before its second use",
     "host name": "accepted: a module may have a name, and doctor resolves it",
 }
-"""Mistakes that `check` treats otherwise than their author expected, each with the reason."""
+"""Mistakes for which `check` differs from the expectation of the mistake's author. Each has a
+reason."""
 
 
 def file_of(mistake: dict[str, Any], folder: Path) -> Path:
-    """Write the example with the mistake, and return the path."""
+    """Write the example with this mistake into a file, and return its path."""
     text = (CONFIG / mistake["example"]).read_text()
     for old, new in mistake.get("changes", ()):
         assert text.count(old) == 1, old
@@ -45,7 +47,7 @@ def said_of(path: Path) -> tuple[str, list[str]]:
 
 
 def unlike(mistake: dict[str, Any], folder: Path) -> str:
-    """Return how `check` differs from the expectation of the mistake's author, or ""."""
+    """Return the difference between the result of `check` and the author's expectation, or ""."""
     severity, told = said_of(file_of(mistake, folder))
     if mistake["severity"] == "none":
         return "" if severity != "error" else f"refused: {told[0]}"
@@ -60,5 +62,5 @@ def unlike(mistake: dict[str, Any], folder: Path) -> str:
 
 
 @pytest.mark.parametrize("mistake", MISTAKES, ids=lambda mistake: mistake["name"])
-def test_a_mistake_is_named_in_the_first_message(mistake: dict[str, Any], tmp_path: Path) -> None:
+def test_the_first_message_names_the_mistake(mistake: dict[str, Any], tmp_path: Path) -> None:
     assert (unlike(mistake, tmp_path) != "") == (mistake["name"] in OTHERWISE)

@@ -1,4 +1,5 @@
-"""An input's `bus:`: what is accepted, what is refused and where, and what `check` shows."""
+"""The key `bus:` of an input: accepted values, refused values with their place, and the text of
+`check`."""
 
 from pathlib import Path
 
@@ -91,7 +92,7 @@ def problems(path: Path, old: str, new: str, text: str = TWO) -> list[str]:
         (FIRE, FIRE.replace("header", "[header]"), "26:20: 'bus' is a list: write text"),
     ],
 )
-def test_a_mistake_around_the_other_bus_is_one_problem_at_its_place(
+def test_a_mistake_about_the_other_bus_is_one_problem_at_its_place(
     file: Path, old: str, new: str, problem: str
 ) -> None:
     assert problems(file, old, new) == [problem]
@@ -104,7 +105,7 @@ def test_a_mistake_around_the_other_bus_is_one_problem_at_its_place(
         ("at: input register 0\n", "at: input register 0\n        bus: line\n", "29:9"),
     ],
 )
-def test_a_map_says_that_it_is_read_from_one_bus(
+def test_the_text_for_a_map_tells_that_the_map_uses_one_bus(
     file: Path, old: str, new: str, place: str
 ) -> None:
     assert problems(file, old, new, MAPPED) == [
@@ -136,7 +137,7 @@ def test_a_bus_that_no_device_names_is_still_refused(file: Path) -> None:
 
 
 def test_a_mistyped_point_does_not_make_its_bus_unused(file: Path) -> None:
-    """The bus has this contact alone."""
+    """The mistyped contact is the only contact on its bus."""
     text = TWO
     for i in range(1, 5):
         start = text.index(f"        L{i}: {{bus: header")
@@ -170,7 +171,7 @@ def test_a_pin_that_another_file_uses_is_found_on_the_other_bus_too(
     assert pins == [f"BCM{n} of the header" for n in (4, 17, 27, 22, 23)]
 
 
-def test_a_charger_is_warned_that_a_charge_goes_on_while_the_other_bus_is_not_read(
+def test_a_warning_tells_that_a_charge_goes_on_without_the_other_bus(
     file: Path,
 ) -> None:
     text = (CONFIG / "charger_contacts.yaml").read_text()

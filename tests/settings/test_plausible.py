@@ -1,4 +1,4 @@
-"""Values that the types allow, but that no integrator intends, give an error or a warning."""
+"""Some values fit the types, but no integrator intends them. They give an error or a warning."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ TCP = "tcp: {host: 192.168.1.50}"
 
 
 def door(bus: str = TCP, rmf: str = "{}", limits: str = "{}") -> str:
-    """Return the YAML of the door with these changes."""
+    """Return the YAML of a door with this bus, RMF section and limits."""
     text = DOOR.replace(TCP, bus).replace("buses:", f"rmf: {rmf}\nbuses:")
     return f"{text}    limits: {limits}\n"
 
@@ -36,7 +36,7 @@ def warnings_of(file: Path, text: str) -> list[str]:
     return [str(w).removeprefix(f"{file}:") for w in load(file).warnings]
 
 
-def test_the_door_itself_is_right_and_warns_of_nothing(file: Path) -> None:
+def test_the_unchanged_door_gives_no_problem_and_no_warning(file: Path) -> None:
     assert warnings_of(file, door()) == []
 
 
@@ -49,7 +49,7 @@ WATCHED = door(f"{TCP}, module_watchdog: {{units: [1], profile: wago-750}}")
 LAB = BARE[BARE.index("  ward:") :].replace("ward", "lab").replace("unit 1", "unit 7")
 
 
-def test_outputs_that_nothing_drops_are_warned_of_once_for_a_bus(file: Path) -> None:
+def test_outputs_without_a_watchdog_give_one_warning_for_each_bus(file: Path) -> None:
     one = f"5:3: warning: bus 'module': unit 1 keeps its outputs {KEEPS}"
     assert warnings_of(file, BARE) == [one]
     two = f"5:3: warning: bus 'module': units 1, 7 keep their outputs {KEEPS}"
@@ -58,7 +58,7 @@ def test_outputs_that_nothing_drops_are_warned_of_once_for_a_bus(file: Path) -> 
     assert warnings_of(file, f"{flashed}    pulse: {{on_s: 0.7, every_s: 3}}\n") == []
 
 
-def test_why_a_unit_may_keep_its_outputs_is_noted(file: Path) -> None:
+def test_the_file_states_why_a_unit_may_keep_its_outputs(file: Path) -> None:
     file.write_text(door())
     assert [str(note).removeprefix(f"{file}:") for note in load(file).notes] == [
         "5:75: note: bus 'module': unit 1 has no module_watchdog: a bench"
@@ -145,23 +145,23 @@ PINS = {
 
 
 @pytest.mark.parametrize("pin", PINS)
-def test_a_pin_that_the_firmware_uses_is_warned_of_by_name(file: Path, pin: str) -> None:
+def test_a_warning_names_the_pin_that_the_firmware_uses(file: Path, pin: str) -> None:
     assert warnings_of(file, HEADER.replace("PIN", f'"{pin}"')) == [
         f"8:7: warning: 'ward': 'closed': {PINS[pin]}; {OFF}"
     ]
 
 
-def test_a_pin_that_the_firmware_does_not_use_is_not_warned_of(file: Path) -> None:
+def test_a_pin_that_is_free_of_the_firmware_gives_no_warning(file: Path) -> None:
     assert warnings_of(file, HEADER.replace("PIN", "BCM5")) == []
 
 
 @pytest.mark.parametrize("what", WARNED)
-def test_an_unlikely_setting_is_warned_of(file: Path, what: str) -> None:
+def test_an_unlikely_setting_gives_a_warning(file: Path, what: str) -> None:
     text, warning = WARNED[what]
     assert warnings_of(file, text) == [warning]
 
 
-def test_an_alarm_that_is_believed_late_is_warned_of(file: Path) -> None:
+def test_an_alarm_with_a_long_debounce_gives_a_warning(file: Path) -> None:
     fire = (
         "    outputs:",
         "      fire: {point: unit 1 discrete input 2, active: low, debounce_s: 10}",

@@ -1,4 +1,4 @@
-"""The loader reads a YAML with an earlier version's key, and warns. `migrate` rewrites the key."""
+"""The loader reads a key of an earlier version, and warns. `migrate` rewrites the key in the file."""
 
 import os
 from pathlib import Path
@@ -39,7 +39,7 @@ MAP = "".join(
 
 @pytest.fixture
 def old(tmp_path: Path) -> Path:
-    """Return a charger's file in the form of the first version, with the old name in the map."""
+    """Return a charger's file in the form of the first version, with the old key in its `map`."""
     file = tmp_path / "bay.yaml"
     file.write_text(HEAD + BAY + MAP)
     return file
@@ -70,7 +70,7 @@ def test_a_service_that_starts_logs_its_old_keys(
 ) -> None:
     monkeypatch.setenv(
         "RMF_BRIDGE_FITS", "nothing"
-    )  # a unit without drop-in: its daemon ends at once
+    )  # the unit has no drop-in, so its daemon ends at once
     assert cli.main(["run", str(old)]) == os.EX_CONFIG
     told = capsys.readouterr().err
     assert told.count("has a new name") == 1
@@ -109,7 +109,7 @@ def test_a_rewritten_file_is_not_changed_again(
         ),
     ],
 )
-def test_a_section_that_is_there_already_gets_the_key(old: Path, limits: str, becomes: str) -> None:
+def test_an_existing_section_gets_the_key(old: Path, limits: str, becomes: str) -> None:
     old.write_text(HEAD + BAY.replace("    map:", f"{limits}    map:") + MAP)
     assert becomes.replace("   # asked of the maker", "") in rewritten(old).replace(
         "   # asked of the maker", ""
@@ -130,7 +130,7 @@ def test_a_key_in_braces_is_cut_out_with_its_comma(old: Path, place: str) -> Non
     assert rewritten(old).endswith(f"    map: {{{inner}}}   # all of it\n")
 
 
-def test_both_names_at_once_are_refused_by_the_old_name(old: Path) -> None:
+def test_both_names_together_are_refused_at_the_old_name(old: Path) -> None:
     text = HEAD + BAY.replace("    map:", "    limits: {peer_internal_timeout_s: 3}\n    map:")
     wrong = "'stops_unfed_s' is the old name of 'peer_internal_timeout_s', which the file has too"
     assert problems_of(old, text + MAP) == [f"11:7: {wrong}: delete it"]
@@ -156,7 +156,7 @@ def test_a_dry_run_prints_the_difference_and_writes_nothing(
     assert old.read_bytes() == before
 
 
-def test_mode_and_link_of_the_file_stay(old: Path) -> None:
+def test_the_file_keeps_its_mode_and_its_link(old: Path) -> None:
     old.chmod(0o640)
     link = old.with_name("link.yaml")
     link.symlink_to(old)
@@ -191,7 +191,7 @@ def test_a_key_that_shares_its_line_must_be_changed_by_hand(
     assert "must be changed by hand" in capsys.readouterr().err
 
 
-def test_a_key_with_a_new_name_in_its_place_keeps_its_place(
+def test_a_key_with_only_a_new_name_keeps_its_place(
     file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     row = RenamedKey("gates.*.limits.opening_s", "gates.*.limits.open_s", "1.2.0")
@@ -212,7 +212,7 @@ def test_a_key_at_the_top_and_a_whole_section_can_be_renamed(
 
 
 @pytest.mark.parametrize("row", RENAMED, ids=lambda row: row.was)
-def test_each_row_is_of_this_major_version_or_the_one_before_and_its_new_key_exists(
+def test_each_row_is_of_this_or_the_last_major_version_and_its_new_key_exists(
     row: RenamedKey,
 ) -> None:
     assert int(row.since.split(".")[0]) >= int(__version__.split(".")[0]) - 1, "delete the row"

@@ -1,4 +1,4 @@
-"""Strings, numbers and choices that YAML could misread, or that are out of bounds."""
+"""Strings, numbers and choices that YAML could misread, or that lie outside their bounds."""
 
 from pathlib import Path
 
@@ -78,7 +78,7 @@ PLAIN = st.one_of(
 
 @settings(max_examples=examples(1500))
 @given(PLAIN)
-def test_every_text_that_pyyaml_takes_for_something_else_is_known(text: str) -> None:
+def test_every_text_that_pyyaml_misreads_is_known(text: str) -> None:
     loader = yaml.SafeLoader("")
     tag = loader.resolve(yaml.ScalarNode, text, (True, False))  # type: ignore[no-untyped-call]
     assert tag == "tag:yaml.org,2002:str" or reads_as(text) is not None
@@ -195,7 +195,7 @@ FIELDS = {
 
 
 @pytest.mark.parametrize("text", FIELDS)
-def test_every_sort_of_field_says_what_it_wants(file: Path, text: str) -> None:
+def test_every_type_of_field_describes_its_values(file: Path, text: str) -> None:
     column = 27 + text.index(":")
     assert problems_of(file, changed("tries: 2", text)) == [f"15:{column}: {FIELDS[text]}"]
 
@@ -213,12 +213,12 @@ def test_every_sort_of_field_says_what_it_wants(file: Path, text: str) -> None:
         ("even: -4", -4),
     ],
 )
-def test_every_sort_of_field_takes_what_it_wants(file: Path, text: str, value: object) -> None:
+def test_every_type_of_field_accepts_its_values(file: Path, text: str, value: object) -> None:
     limits = config_of(file, changed("tries: 2", text)).devices["north"].limits
     assert getattr(limits, text.partition(":")[0]) == value
 
 
-def test_a_choice_is_compared_as_it_is_written(file: Path) -> None:
+def test_a_misspelt_choice_is_reported_with_the_similar_choice(file: Path) -> None:
     text = RIGHT.replace("lanes: [in, out]", "lanes: {in: {side: lfet}, out: {side: 'right'}}")
     assert problems_of(file, text) == [
         "8:24: 'side' is 'lfet': write left or right (did you mean 'left'?)"

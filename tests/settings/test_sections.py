@@ -17,7 +17,7 @@ TWO_BUSES = changed(
 )
 
 
-def test_an_unknown_kind_is_reported_with_the_known_ones(file: Path) -> None:
+def test_an_unknown_kind_is_reported_with_the_known_kinds(file: Path) -> None:
     (problem,) = problems_of(file, changed("kind: gate", "kind: gait"))
     assert problem.startswith("1:7: 'kind' is 'gait': ")
     assert problem.endswith(" (did you mean 'gate'?)")
@@ -40,7 +40,7 @@ def test_while_the_kind_is_unknown_other_sections_are_still_read(file: Path) -> 
     assert found[0].startswith("1:1: unknown key 'kinds': did you mean 'kind'? known here: ")
 
 
-def test_an_unknown_driver_is_reported_with_those_of_the_kind(file: Path) -> None:
+def test_an_unknown_driver_is_reported_with_the_drivers_of_the_kind(file: Path) -> None:
     assert problems_of(file, changed("driver: contact", "driver: contakt")) == [
         "2:9: 'driver' is 'contakt': write contact or web (did you mean 'contact'?)"
     ]
@@ -96,7 +96,7 @@ BUSES = {
 
 
 @pytest.mark.parametrize("bus", BUSES)
-def test_a_bus_is_one_that_the_driver_can_stand_on(file: Path, bus: str) -> None:
+def test_a_driver_accepts_only_its_types_of_bus(file: Path, bus: str) -> None:
     assert problems_of(file, changed("header: {type: pins}", bus)) == [BUSES[bus]]
 
 
@@ -111,18 +111,18 @@ def test_every_problem_of_every_bus_is_named(file: Path) -> None:
     ]
 
 
-def test_a_device_says_its_bus_where_there_are_several(file: Path) -> None:
+def test_a_device_names_its_bus_if_there_are_several(file: Path) -> None:
     assert problems_of(file, TWO_BUSES) == ["8:3: 'north' needs 'bus': header or box"]
 
 
-def test_a_bus_that_no_device_stands_on_is_named(file: Path) -> None:
+def test_an_unused_bus_is_named(file: Path) -> None:
     text = changed("    lanes:", "    bus: header\n    lanes:", TWO_BUSES)
     assert problems_of(file, text) == [
         "6:3: no device uses the bus 'box': delete it, or name it in a device's 'bus:'"
     ]
 
 
-def test_a_device_cannot_stand_on_a_bus_that_is_not_there(file: Path) -> None:
+def test_a_device_cannot_name_a_missing_bus(file: Path) -> None:
     text = changed("    lanes:", "    bus: hedder\n    lanes:", TWO_BUSES)
     assert problems_of(file, text) == [
         "9:10: unknown bus 'hedder': did you mean 'header'? known here: header, box"
@@ -135,7 +135,7 @@ def test_a_bus_is_named_by_a_text(file: Path, bus: str, problems: str) -> None:
     assert problem.endswith(f"write {problems}")
 
 
-def test_no_bus_is_the_same_as_leaving_it_out(file: Path) -> None:
+def test_an_empty_bus_key_equals_a_missing_bus_key(file: Path) -> None:
     assert (
         config_of(file, changed("    lanes:", "    bus: ~\n    lanes:")).bus_of("north") == "header"
     )
@@ -173,7 +173,7 @@ def test_a_point_that_does_not_exist_is_reported_by_the_bus(file: Path) -> None:
     ]
 
 
-def test_points_are_judged_by_the_bus_that_the_device_stands_on(file: Path) -> None:
+def test_points_are_judged_by_the_bus_of_the_device(file: Path) -> None:
     text = changed("type: pins", "type: module, host: h")
     assert problems_of(file, text) == [
         "10:23: 'A0': write coil and its number",
@@ -182,7 +182,7 @@ def test_points_are_judged_by_the_bus_that_the_device_stands_on(file: Path) -> N
     ]
 
 
-def test_points_are_judged_in_a_device_that_is_otherwise_wrong(file: Path) -> None:
+def test_points_are_judged_even_in_a_wrong_device(file: Path) -> None:
     text = changed("{point: A0, active: high, pull: up}", "{point: 17, actve: high}")
     text = changed("pull: down", "pull: none", text)
     text = changed("{point: A2,", "{point: A1,", text)
@@ -195,7 +195,7 @@ def test_points_are_judged_in_a_device_that_is_otherwise_wrong(file: Path) -> No
     ]
 
 
-def test_without_a_bus_points_are_not_judged_but_the_rest_is(file: Path) -> None:
+def test_without_a_bus_everything_except_points_is_judged(file: Path) -> None:
     text = changed("type: pins", "type: pns")
     text = changed("{point: A0, active: high", "{point: 17, active: hgh", text)
     assert problems_of(file, text) == [
@@ -218,7 +218,7 @@ def test_a_point_serves_one_signal_of_one_device(file: Path) -> None:
     ]
 
 
-def test_a_point_that_a_yaml_alias_repeats_is_used_twice_and_refused(file: Path) -> None:
+def test_a_point_repeated_by_an_alias_is_refused(file: Path) -> None:
     text = changed("inputs:", "inputs: &i") + "  south: {lanes: [in], inputs: *i}\n"
     assert problems_of(file, text) == [
         "10:23: A0 is used by north inputs.opened on line 10: "
@@ -239,7 +239,7 @@ def test_the_same_point_of_two_buses_is_two_points(file: Path) -> None:
 
 
 @pytest.mark.parametrize("other", ["", "    limits: {tires: 1}\n"])
-def test_the_bus_says_what_is_wrong_with_an_impossible_wire(file: Path, other: str) -> None:
+def test_the_bus_reports_an_impossible_wire(file: Path, other: str) -> None:
     text = changed("    limits: {open_s: 3, tries: 2}\n", other)
     text = changed(
         "{point: A0, active: high, pull: up}", "{point: A9, active: high, pull: up}", text
@@ -262,7 +262,7 @@ def test_unsafe_wiring_is_accepted_only_for_signals_that_exist(file: Path) -> No
     ]
 
 
-def test_a_misspelt_acceptance_is_reported_beside_the_drivers_own_problem(file: Path) -> None:
+def test_a_misspelt_acceptance_is_reported_with_the_problem_of_the_driver(file: Path) -> None:
     text = changed("    limits:", "    accept_unsafe: {hald: by contract}\n    limits:")
     text = changed("tries: 2", "close_s: 9", changed("{1: in, 2: out}", "{1: yard}", text))
     assert problems_of(file, text) == [
@@ -287,18 +287,18 @@ OWN = TWO_BUSES.replace("type: module, host: h", "type: web, host: h").replace(
 )
 
 
-def test_a_device_may_have_a_driver_of_its_own(file: Path) -> None:
+def test_a_device_may_have_its_own_driver(file: Path) -> None:
     config = config_of(file, OWN)
     drivers = {name: config.driver_type(name).settings.__module__ for name in config.devices}
     assert drivers == {"south": "drivers.gate.web", "north": "drivers.gate.contact"}
     assert [bool(config.wires(name)) for name in ("south", "north")] == [False, True]
 
 
-def test_a_devices_own_driver_is_one_of_its_kind(file: Path) -> None:
+def test_the_own_driver_of_a_device_must_be_of_its_kind(file: Path) -> None:
     (problem,) = problems_of(file, OWN.replace("driver: web", "driver: wep"))
     assert problem == "8:19: 'driver' is 'wep': write contact or web (did you mean 'web'?)"
 
 
-def test_a_devices_own_driver_stands_on_its_bus(file: Path) -> None:
+def test_the_own_driver_of_a_device_uses_its_bus(file: Path) -> None:
     (problem,) = problems_of(file, OWN.replace("bus: box", "bus: header"))[1:]
     assert problem.endswith("the bus 'header' is 'pins', but the driver of 'south' needs web")

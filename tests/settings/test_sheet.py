@@ -1,4 +1,5 @@
-"""`check --json` for programs and `check --sheet` for signatures agree with the printed text."""
+"""`check --json` serves programs, and `check --sheet` serves signatures. Both agree with the printed
+text."""
 
 import json
 import os
@@ -17,7 +18,7 @@ EVIL = '"<script>alert(1)</script>&"'
 
 
 class Page(HTMLParser):
-    """A page's text, its tags, and everything that the page would load or run."""
+    """A page with its text, its tags, and everything that it would load or run."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -53,7 +54,7 @@ def sheet_of(*files: str) -> Page:
 
 
 def json_of(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, Any]:
-    """Return the exit code and the printed JSON. The command must print nothing else."""
+    """Return the exit code and the printed JSON. Fail if the command prints anything else."""
     code = main(["check", "--json", *arguments])
     out, err = capsys.readouterr()
     assert err == ""
@@ -89,20 +90,20 @@ def test_a_sheet_needs_nothing_beside_itself() -> None:
     assert not {"script", "link", "img", "iframe"} & set(page.tags)
 
 
-def test_a_files_texts_are_text_in_the_sheet_and_never_markup() -> None:
+def test_texts_of_a_file_never_become_markup_in_the_sheet() -> None:
     Path("gate.yaml").write_text(changed("{1: in, 2: out}", "{}").replace("in, out", f"in, {EVIL}"))
     page = sheet_of("gate.yaml")
     assert "script" not in page.tags
     assert any("<script>alert(1)</script>&" in cell for cell in page.cells)
 
 
-def test_there_is_no_sheet_of_a_file_that_is_wrong() -> None:
+def test_a_wrong_file_has_no_sheet() -> None:
     Path("gate.yaml").write_text(changed("tries: 2", "tries: 0"))
     assert main(["check", "-q", "--sheet", "sheet.html", "gate.yaml"]) == os.EX_CONFIG
     assert not Path("sheet.html").exists()
 
 
-def test_a_sheet_that_cannot_be_written_is_an_exit_code_of_its_own(
+def test_a_sheet_that_cannot_be_written_has_its_own_exit_code(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert main(["check", "-q", "--sheet", "no/sheet.html", LIFT]) == os.EX_CANTCREAT
@@ -111,7 +112,9 @@ def test_a_sheet_that_cannot_be_written_is_an_exit_code_of_its_own(
     )
 
 
-def test_json_says_the_same_of_a_right_file(capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_agrees_with_the_printed_text_for_a_correct_file(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     Path("gate.yaml").write_text(changed("tries: 2", "loud: true"))
     code, found = json_of(capsys, "gate.yaml")
     assert code == 0
@@ -133,7 +136,7 @@ def test_json_says_the_same_of_a_right_file(capsys: pytest.CaptureFixture[str]) 
     }
 
 
-def test_json_says_what_is_wrong(capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_has_the_problems(capsys: pytest.CaptureFixture[str]) -> None:
     Path("gate.yaml").write_text(changed("tries: 2", "tries: 0"))
     Path("right.yaml").write_text(RIGHT)
     code, found = json_of(capsys, "gate.yaml", "right.yaml")

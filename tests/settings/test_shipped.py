@@ -1,4 +1,5 @@
-"""Every shipped YAML is correct. After one spoiling change the loader names the place of the change."""
+"""Every shipped YAML is correct. After a change that spoils it, the loader names the place of the
+change."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -42,15 +43,15 @@ T = TypeVar("T")
 
 CONFIG = Path(__file__).parents[2] / "config"
 FILES = device_yamls()
-NAMES = ['"17"', "x", ""]  # as a name each may be right, or wrong in another place
+NAMES = ['"17"', "x", ""]  # each may be a valid name, or be wrong in another place
 SORTS = {"accept_unsafe": "signal", "setpoints": "setpoint", "values": "value", "when": "value"}
-"""Words for the keys of some sections. Elsewhere the word is `key`."""
+"""The loader's word for an unknown key in these sections. In all other sections the word is `key`."""
 TRAPS = ["017", "1:30", "no", "1e3", "~", "1.0", "17", "[]", *NAMES]
 
 
 @dataclass(frozen=True)
 class Place:
-    """A mapping's entry in a file's text. `parent` is the key of the mapping around the entry."""
+    """An entry of a mapping in a file's text. `parent` is the key of the whole mapping."""
 
     key: ScalarNode
     value: Node
@@ -59,7 +60,7 @@ class Place:
 
     @property
     def end(self) -> int:
-        """Return the end of the entry's text. YAML's own end of a block value is too late."""
+        """Return the end of the entry's text. The end that YAML gives for a block value is too late."""
         node = self.value
         while isinstance(node, CollectionNode) and not node.flow_style and node.value:
             last = node.value[-1]
@@ -87,7 +88,7 @@ def places(node: Node, parent: Node) -> Iterator[Place]:
 
 @dataclass(frozen=True)
 class Leaf:
-    """A scalar value, with the key of its entry and the key of the mapping around (`parent`)."""
+    """A scalar value with the key of its entry. `parent` is the key of the whole mapping."""
 
     node: ScalarNode
     key: Node
@@ -95,7 +96,7 @@ class Leaf:
 
 
 def scalars(node: Node, key: Node, parent: Node) -> Iterator[Leaf]:
-    """Yield every scalar value, but no keys."""
+    """Yield every scalar value except keys."""
     if isinstance(node, ScalarNode):
         yield Leaf(node, key, parent)
     elif isinstance(node, SequenceNode):
@@ -115,7 +116,8 @@ def spots(problems: list[str]) -> list[str]:
 
 
 def own_names(config: Path) -> set[str]:
-    """Return the freely chosen names of a file: buses, devices, and names in the kind's section."""
+    """Return the names in a file that a site can choose: buses, devices, and names in the kind's
+    section."""
     loaded = load(config)
     in_buses = (name for bus in loaded.buses.values() for name in names_in(bus))
     return {*loaded.buses, *loaded.devices, *names_in(loaded.section), *in_buses}
@@ -136,7 +138,8 @@ def some(of: Sequence[T], config: Path, turn: int) -> Sequence[T]:
 
 
 def is_own(name: str, names: set[str]) -> bool:
-    """Return whether the site chose the key. Floors and codes are `L1` and `1` in these files."""
+    """Return whether the site chose this key. Names of floors (`L1`) and codes (`1`) count as
+    chosen."""
     return name in names or name[0].isupper() or name[0].isdigit()
 
 
@@ -146,11 +149,11 @@ def config(request: pytest.FixtureRequest) -> Path:
     return path
 
 
-def test_there_are_shipped_files() -> None:
+def test_shipped_files_exist() -> None:
     assert len(FILES) >= 3
 
 
-def test_a_shipped_file_is_right_and_has_something_to_show(config: Path) -> None:
+def test_a_shipped_file_is_correct_and_has_wires_or_addresses(config: Path) -> None:
     loaded = load(config)
     shown = lines(findings(loaded), 130)
     assert len(shown) > 4
@@ -158,7 +161,7 @@ def test_a_shipped_file_is_right_and_has_something_to_show(config: Path) -> None
     assert loaded.text == config.read_bytes()
 
 
-def test_a_shipped_files_devices_are_what_msgspec_makes_of_them(config: Path) -> None:
+def test_devices_of_shipped_files_equal_the_structs_of_msgspec(config: Path) -> None:
     for settings in load(config).devices.values():
         raw = msgspec.to_builtins(settings, str_keys=True)
         assert msgspec.convert(raw, type(settings), strict=False) == settings
@@ -184,7 +187,7 @@ def leaves(wanted: Type) -> Iterator[Type]:
         yield wanted
 
 
-def test_every_field_of_every_driver_and_bus_is_of_a_sort_that_is_read() -> None:
+def test_every_field_of_every_driver_and_bus_has_a_readable_type() -> None:
     structs = [Rmf, *(named.bus_called(name).settings for name in named.bus_types())]
     for kind in kind_names():
         structs += [named.driver_called(kind, name).settings for name in named.driver_names(kind)]
@@ -196,10 +199,10 @@ def test_every_field_of_every_driver_and_bus_is_of_a_sort_that_is_read() -> None
 ANSWERS = ("values", "between_floors", "open", "closed", "moving", "stopped", "up", "down")
 """Keys whose values in an HTTP answer may be anything."""
 NAMED_FREELY = ("temperatures",)
-"""Sections with freely chosen keys."""
+"""Sections whose keys the site can choose."""
 
 
-def test_every_misspelt_key_is_found_where_it_stands(config: Path, file: Path) -> None:
+def test_every_misspelt_key_is_found_at_its_place(config: Path, file: Path) -> None:
     text = config.read_text()
     root = composed(text)
     names = own_names(config)
@@ -219,7 +222,7 @@ def test_every_misspelt_key_is_found_where_it_stands(config: Path, file: Path) -
         assert [p for p in found if p.startswith(where) and said in p], (place.key, found)
 
 
-def test_every_doubled_key_is_found_where_it_stands(config: Path, file: Path) -> None:
+def test_every_repeated_key_is_found_at_its_place(config: Path, file: Path) -> None:
     text = config.read_text()
     root = composed(text)
     for place in some(list(places(root, root)), config, 1):
@@ -236,9 +239,7 @@ def test_every_doubled_key_is_found_where_it_stands(config: Path, file: Path) ->
         ]
 
 
-def test_every_key_that_is_taken_out_leaves_a_right_file_or_is_missed(
-    config: Path, file: Path
-) -> None:
+def test_every_removed_key_leaves_a_correct_file_or_is_reported(config: Path, file: Path) -> None:
     text = config.read_text()
     root = composed(text)
     every = list(places(root, root))
@@ -257,10 +258,10 @@ def test_every_key_that_is_taken_out_leaves_a_right_file_or_is_missed(
 
 
 def is_blamed(leaf: Leaf, trap: str, found: list[str]) -> bool:
-    """Return whether one of these problems leads to this value.
+    """Return whether one of these problems leads a reader to this value.
 
-    A missing or changed number can be valid alone, but conflict with another value. The problem then
-    points at the mapping around the value, or names the value's key.
+    A missing or changed number can be valid alone, but conflict with another value. Then the problem
+    points at the mapping with the value, or names the value's key.
     """
     if at(leaf.node) in spots(found):
         return True
@@ -273,7 +274,7 @@ def is_blamed(leaf: Leaf, trap: str, found: list[str]) -> bool:
     return any(re.search(rf"(?<!\w){re.escape(name)}(?!\w)", p.partition(": ")[2]) for p in found)
 
 
-def test_every_value_that_is_a_trap_is_found_where_it_stands(config: Path, file: Path) -> None:
+def test_every_tricky_value_is_found_at_its_place(config: Path, file: Path) -> None:
     text = config.read_text()
     root = composed(text)
     accepted, values = 0, list(scalars(root, root, root))
@@ -296,7 +297,7 @@ def test_every_value_that_is_a_trap_is_found_where_it_stands(config: Path, file:
     assert accepted < 40 + 3 * coordinates + len(TRAPS) * answers, accepted
 
 
-def test_every_shipped_file_cut_anywhere_is_right_or_refused_at_its_place(
+def test_every_shipped_file_cut_at_any_place_is_accepted_or_refused_there(
     config: Path, file: Path
 ) -> None:
     text = config.read_bytes()

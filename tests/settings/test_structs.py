@@ -1,4 +1,4 @@
-"""Keys, lists and mappings that are unknown, doubled, missing, or of the wrong type."""
+"""Keys, lists and mappings that are unknown, repeated, missing, or of the wrong type."""
 
 from pathlib import Path
 
@@ -9,13 +9,13 @@ from tests.settings.reading import RIGHT, changed, config_of, problems_of
 INPUT = "point, active, pull, debounce_s, bus"
 
 
-def test_an_unknown_key_is_reported_with_the_one_that_was_meant(file: Path) -> None:
+def test_an_unknown_key_is_reported_with_the_similar_key(file: Path) -> None:
     assert problems_of(file, changed("debounce_s: 1e-2", "debonce_s: 1e-2")) == [
         f"11:52: unknown key 'debonce_s': did you mean 'debounce_s'? known here: {INPUT}"
     ]
 
 
-def test_an_unknown_key_like_no_other_is_reported_with_the_known_ones(file: Path) -> None:
+def test_an_unknown_key_without_a_similar_key_is_reported_with_the_known_keys(file: Path) -> None:
     assert problems_of(file, changed("debounce_s: 1e-2", "color: red")) == [
         f"11:52: unknown key 'color': known here: {INPUT}"
     ]
@@ -27,7 +27,7 @@ def test_a_misspelt_key_is_not_reported_as_missing_too(file: Path) -> None:
     ]
 
 
-def test_a_missing_key_is_named_where_its_parent_stands(file: Path) -> None:
+def test_a_missing_key_is_reported_at_its_parent(file: Path) -> None:
     text = changed("{point: A0, active: high, pull: up}", "{}")
     text = changed("    lanes: [in, out]\n", "", text)
     assert problems_of(file, text) == [
@@ -37,7 +37,7 @@ def test_a_missing_key_is_named_where_its_parent_stands(file: Path) -> None:
     ]
 
 
-def test_a_doubled_key_names_the_line_of_the_first(file: Path) -> None:
+def test_a_repeated_key_names_the_line_of_the_first(file: Path) -> None:
     text = changed("    outputs:\n", "    lanes: [a]\n    'lanes': [b]\n    outputs:\n")
     assert problems_of(file, text) == [
         "12:5: the key 'lanes' is already on line 8: delete one of the two",
@@ -45,13 +45,13 @@ def test_a_doubled_key_names_the_line_of_the_first(file: Path) -> None:
     ]
 
 
-def test_a_number_as_a_key_is_the_same_however_it_is_written(file: Path) -> None:
+def test_a_number_as_a_key_is_the_same_in_any_spelling(file: Path) -> None:
     assert problems_of(file, changed("{1: in, 2: out}", "{1: in, 0x1: out}")) == [
         "14:20: the key '0x1' is already on line 14: delete one of the two"
     ]
 
 
-def test_keys_are_judged_as_values_are(file: Path) -> None:
+def test_keys_follow_the_same_rules_as_values(file: Path) -> None:
     codes = '{01: in, "2": out, 16: in, x: out, [1]: in}'
     assert problems_of(file, changed("{1: in, 2: out}", codes)) == [
         "14:13: this key is written 01, which YAML may read as the number 1: "
@@ -63,7 +63,7 @@ def test_keys_are_judged_as_values_are(file: Path) -> None:
     ]
 
 
-def test_merge_keys_are_refused_with_what_to_do(file: Path) -> None:
+def test_merge_keys_are_refused_with_a_remedy(file: Path) -> None:
     text = changed("opened: {", "opened: &o {")
     text = changed("closed: {point: 1A,", "closed: {<<: *o, point: 1A,", text)
     assert problems_of(file, text) == [
@@ -92,7 +92,7 @@ def test_a_list_or_a_mapping_is_neither_text_nor_number(file: Path, text: str) -
     ]
 
 
-def test_where_a_list_or_a_mapping_may_stand_each_is_read_as_what_it_is(file: Path) -> None:
+def test_a_key_that_takes_a_list_or_a_mapping_reads_both(file: Path) -> None:
     as_mapping = changed("[in, out]", "{in: {heights: [2, 3.5]}, out: {side: right}}")
     lanes = config_of(file, as_mapping).devices["north"].lanes
     assert {n: (lane.side.value, lane.heights) for n, lane in lanes.items()} == {
@@ -129,7 +129,7 @@ def test_a_mapping_is_neither_a_list_nor_a_word(file: Path) -> None:
     ]
 
 
-def test_a_section_that_was_left_empty_is_named(file: Path) -> None:
+def test_an_empty_section_is_named(file: Path) -> None:
     assert problems_of(file, changed(" {open_s: 3, tries: 2}", "")) == [
         "15:5: 'limits' has no value: write a mapping (key: value)"
     ]
@@ -141,7 +141,7 @@ def test_an_empty_value_is_named_even_if_the_key_is_optional(file: Path) -> None
     ]
 
 
-def test_a_structs_own_problem_is_reported_at_the_place_that_it_names(file: Path) -> None:
+def test_a_problem_of_a_struct_is_reported_at_the_place_that_it_names(file: Path) -> None:
     text = changed("{1: in, 2: out}", "{1: in, 2: yard, 0x3: roof}")
     text = changed("tries: 2", "close_s: 9", text)
     assert problems_of(file, text) == [

@@ -1,4 +1,4 @@
-"""`check` describes typing mistakes in plain words with a subject, without parser's words or
+"""`check` describes typing mistakes in plain words. It names a subject, and shows no parser's words or
 patterns."""
 
 from collections.abc import Iterator
@@ -131,16 +131,16 @@ SLIPS = {
 
 
 @pytest.mark.parametrize("what", SLIPS)
-def test_a_slip_of_the_keyboard_is_named(file: Path, what: str) -> None:
+def test_a_typing_mistake_is_named(file: Path, what: str) -> None:
     text, told = SLIPS[what]
     assert problems_of(file, text) == told
 
 
-def test_a_no_break_space_that_is_meant_is_quoted(file: Path) -> None:
+def test_a_no_break_space_in_quotes_is_accepted(file: Path) -> None:
     assert problems_of(file, changed("  north:", f'  "north{NBSP}1":')) == []
 
 
-def test_a_text_that_is_not_a_number_is_not_taken_for_one() -> None:
+def test_a_text_does_not_count_as_a_number() -> None:
     texts = ("", "-", "fast", "1:30", "017", "1_000", "1.2.3", "1,2,3", "3.5", "12")
     assert [number_meant(text, whole) for text in texts for whole in (False, True)] == [""] * 20
 
@@ -165,7 +165,7 @@ doors:
 
 
 def patterns(wanted: Type, words: str = "") -> Iterator[tuple[str, str]]:
-    """Yield every pattern in a type, with the words that describe the pattern."""
+    """Yield every pattern in a type, together with the words that describe this pattern."""
     match wanted:
         case Metadata(type=inner, extra=extra):
             yield from patterns(inner, (extra or {}).get("pattern", words))
@@ -184,7 +184,7 @@ def patterns(wanted: Type, words: str = "") -> Iterator[tuple[str, str]]:
             yield from patterns(inner)
 
 
-def test_every_pattern_is_said_in_words() -> None:
+def test_every_pattern_is_described_in_words() -> None:
     structs = [Rmf, *(named.bus_called(name).settings for name in named.bus_types())]
     for name in kind_names():
         kind = kind_called(name)

@@ -1,4 +1,5 @@
-"""One file with every type of mistake. The loader reports all mistakes at once, in the file's order."""
+"""A file with every type of mistake. The loader reports all mistakes at once, in the order of the
+file."""
 
 from pathlib import Path
 

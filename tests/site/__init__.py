@@ -1,4 +1,4 @@
-"""A whole site for a day: 2 lifts, 5 doors, 3 chargers, 5 robots, and everything that can go wrong.
+"""A whole site for a day: 2 lifts, 5 doors, 3 chargers and 5 robots, with many faults.
 
 The day runs in virtual time. Drivers, cores, nodes and supervisors are those of the daemons, on the
 `memory` transport. The plants of `hal_fakes` stand behind the drivers, and stand-ins play RMF. One seed

@@ -1,7 +1,7 @@
-"""`python -m tests.site --seed 7 --hours 24`: play one day.
+"""`python -m tests.site --seed 7 --hours 24` plays one day.
 
-If a law is broken or a resource grows, the exit code is 1. The command then prints how to play the day
-again.
+If a law is broken or a resource grows, the exit code is 1. Then the command prints how to play the same
+day again.
 """
 
 import argparse
@@ -16,14 +16,14 @@ from tests.site.laws import Broken
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Play one day; return the exit code."""
+    """Play one day. Return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m tests.site", description=__doc__)
     parser.add_argument("--seed", type=int, help="seed of the day; by default random")
     parser.add_argument("--hours", type=float, default=24.0, help="simulated hours, at least 0.3")
     parser.add_argument(
         "--rmf",
         choices=SUPERVISORS,
-        help="whose supervisors run, ours or RMF's of a release; the seed decides by default",
+        help="supervisors: ours, or RMF's of a release; by default the seed decides",
     )
     parser.add_argument(
         "--kill-every",

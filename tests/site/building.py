@@ -1,8 +1,8 @@
 """The site's devices, each with its wiring, driver and plant.
 
-Lift1 is on the GPIO header, with one door contact, no motion line and a binary floor code with parity.
-Lift2 is on a Modbus module, with two door contacts, a motion line, a one-hot code and pulsed calls. An
-operator must reset the fire alarm of Lift2.
+Lift1 is on the GPIO header. It has one door contact, no motion line, and a binary floor code with
+parity. Lift2 is on a Modbus module. It has two door contacts, a motion line, a one-hot floor code, and
+pulsed calls. An operator must reset the fire alarm of Lift2.
 
 One of the five doors is on the header. Two doors are on the module, one of them with pulses. Two doors
 have register maps. The site has three charging stations.
@@ -40,15 +40,15 @@ LIFTS = ("Lift1", "Lift2")
 DOORS = ("ward", "lab", "store", "gate", "icu")
 CHARGERS = ("bay1", "bay2", "bay3")
 POLL_S = {"gpio": 0.0, "modbus": 0.05, "http": 0.5}
-"""Delay (s) until a daemon sees a change. GPIO gives an edge at once; a bus waits for the next poll."""
+"""The delay (s) until a daemon sees a change. GPIO reports an edge at once. Other buses wait for the
+next poll."""
 
 
 @dataclass(frozen=True)
 class Device:
     """One device from settings to plant.
 
-    `driver()` makes a new driver, as each new daemon does. `driver_name` is the driver's name in a
-    YAML.
+    Each new daemon makes a new driver by `driver()`. `driver_name` is the driver's name in a YAML.
     """
 
     name: str
@@ -84,7 +84,7 @@ def _wired(
     settings: Any,
     bus: str,
 ) -> Device:
-    """Return a device that is wired through contacts and relays."""
+    """Return a device that is wired with contacts and relays."""
     far = PointsFar(timeline, plant, driver.wires(settings))
     return Device(
         name,

@@ -1,8 +1,8 @@
-"""RMF's charging: a fleet adapter's reports on its robot, and the coordinator's dedicated places.
+"""RMF's charging: the reports of a fleet adapter, and the robots' dedicated places.
 
-ChargeBattery drives to the robot's dedicated place. There the robot waits in the mode CHARGING until
-the battery is full (rmf_ros2 9dedd0f, ChargeBattery.cpp). `charging_assignments` names the dedicated
-place.
+ChargeBattery drives the robot to its dedicated place. There the robot waits in the mode CHARGING until
+the battery is full (rmf_ros2 9dedd0f, ChargeBattery.cpp). The message `charging_assignments` names the
+dedicated place.
 """
 
 from bridges.kinds.charger_coordinator.settings import (
@@ -37,7 +37,8 @@ def waits_at(robot: str) -> str:
 
 
 class Charge:
-    """A fleet adapter's reports on its robot. `place` is the robot's waypoint, or "" on the road."""
+    """The reports of a fleet adapter on its robot. `place` is the robot's waypoint, or "" between
+    waypoints."""
 
     def __init__(self, robot: str, known: CoordinatorSettings) -> None:
         self.robot = robot
@@ -54,17 +55,17 @@ class Charge:
         self.task_id, self.battery = f"charge-{self._tasks}", LOW
 
     def ends(self) -> None:
-        """End the charging task. The battery is full, or RMF called the robot away."""
+        """End the charging task, because the battery is full or RMF has called the robot away."""
         self.task_id, self.battery, self.place = "", FULL, ""
 
     def hear(self, message: d.ChargingAssignments) -> None:
-        """Note the robot's dedicated place, which the coordinator may have changed."""
+        """Note the robot's dedicated place, which the coordinator can change."""
         for assignment in message.assignments:
             if assignment.robot_name == self.robot:
                 self.dedicated = assignment.waypoint_name
 
     def state(self) -> d.FleetState:
-        """Return the state of the fleet, as far as this adapter knows the fleet."""
+        """Return the state of the fleet. This adapter knows only its own robot."""
         modes = d.RobotModeValue
         at = self._waypoints.get(self.place)
         away = d.Location(x=-1000.0, y=-1000.0, level_name="L1")

@@ -1,9 +1,9 @@
-"""The daemons of the site: a node for each device, and the supervisors. Each can die and come back.
+"""The daemons of the site: a node for each device, and the supervisors. Each can die and start again.
 
-A daemon scans its device at each request, at its core's `wake_at`, and every SCAN_S. It also scans when
-a contact of its plant changes, on a polled bus one poll later. Between these instants no input changes
-and no time runs out, so a scan would only repeat the last decision. Therefore the day needs no scans at
-the real loop's 20 Hz. The tests of the cores prove that no decision changes before `wake_at`.
+A daemon scans its device at each request, at its core's `wake_at`, and every SCAN_S. A change of a
+contact also causes a scan, on a polled bus one poll later. Between these times no input changes and no
+time limit passes, so a scan would repeat the last decision. Therefore the day does without the 20 scans
+per second of the real loop. The tests of the cores prove that no decision changes before `wake_at`.
 """
 
 from collections import Counter
@@ -33,13 +33,13 @@ from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
 from workbench.rmf_model.supervisors import DoorSupervisor, LiftSupervisor
 
 SCAN_S = 0.9
-"""Time between scans (s), less than the permitted age of a state (1 s). `wake_at` gives states at 1
-Hz."""
+"""The time between scans (s). It is less than the permitted age of a state (1 s). `wake_at` causes one
+state per second."""
 LEAST_GAP_S = 0.001
 
 
 class DeviceDaemon:
-    """The daemon of one device. `wall_step_s` is the step of its wall clock (s). `node` is its name on
+    """The daemon of one device. `wall_step_s` is the error of its wall clock (s). `node` is its name on
     the graph, by default the device's name.
 
     Tests set these callbacks:
@@ -77,7 +77,7 @@ class DeviceDaemon:
         self._place: Place
 
     def start(self) -> None:
-        """Start a new daemon, which remembers only the content of `disk`."""
+        """Start a new daemon, which remembers only what is on its `disk`."""
         self.started(self)
         device, kind = self.device, self.device.kind
         self._place = Place(self._air, self.node, lambda: None)
@@ -106,8 +106,7 @@ class DeviceDaemon:
         self.scan()
 
     def kill(self) -> None:
-        """Kill the daemon. The outputs go off, through the daemon or through `rmf-bridge
-        outputs-off`."""
+        """Kill the daemon. The daemon itself or `rmf-bridge outputs-off` switches the outputs off."""
         self.alive = False
         self._alarm.set(NEVER)
         self._node.make_safe()
@@ -120,7 +119,7 @@ class DeviceDaemon:
             self.scan(OperatorReset())
 
     def scan(self, *events: Any) -> None:
-        """Scan once, with these events."""
+        """Give the core these events, and scan once."""
         if not self.alive:
             return
         now = self._timeline.now
@@ -135,7 +134,7 @@ class DeviceDaemon:
         self._alarm.set(max(due, now + LEAST_GAP_S))
 
     def advance(self) -> None:
-        """Let the plant's own time pass, from event to event."""
+        """Let the plant run up to now, from event to event."""
         plant, now = self.device.plant, self._timeline.now
         while (at := plant.next_at()) < now:
             self.looks(self, at)
@@ -149,11 +148,11 @@ class DeviceDaemon:
         self._timeline.after(self.device.poll_s, self.scan)
 
     def status(self) -> Status:
-        """Return the status as in the status file."""
+        """Return the status that the daemon writes to its status file."""
         return self._node.status()
 
     def says(self, topic: Topic[Any], message: Message) -> None:
-        """Publish this message beside the messages of the node."""
+        """Publish this message, in addition to the node's own messages."""
         self._place.publisher(topic).publish(message)
 
     def faults(self) -> list[str]:
@@ -161,7 +160,8 @@ class DeviceDaemon:
         return [fault["code"] for fault in self.status()["faults"]] if self.alive else []
 
     def _edge(self, edge: Edge) -> None:
-        """Handle an edge of the plant. The plant's own record of this edge is not needed."""
+        """Handle an edge of the plant. Remove the plant's own record of this edge, which nobody
+        needs."""
         self.device.plant.edges.clear()
         if edge.what == "relay":
             self.relayed(edge)
@@ -192,7 +192,7 @@ RIVAL = "rmf_lift_supervisor"
 
 
 class RmfsSupervisor:
-    """A stand-in for RMF's own supervisor. It replaces ours, or runs beside ours by mistake."""
+    """A stand-in for RMF's own supervisor. It replaces our supervisor, or wrongly runs beside it."""
 
     def __init__(
         self,
@@ -212,7 +212,7 @@ class RmfsSupervisor:
         air.best_effort.add(name)
 
     def start(self) -> None:
-        """Start a new supervisor, which remembers nothing and hears all retained messages."""
+        """Start a new supervisor. It remembers nothing, and hears all retained messages."""
         self._place = Place(self._air, self.name, lambda: None)
         self._party = self._made()
         self._mouths = {topic.name: self._place.publisher(topic) for topic in self._says}
@@ -221,12 +221,12 @@ class RmfsSupervisor:
             self._place.subscribe(topic, self._hear)
 
     def kill(self) -> None:
-        """Stop, and leave the graph."""
+        """Stop the supervisor, which leaves the graph."""
         self.alive = False
         self._place.close()
 
     def summary(self) -> Mapping[str, Status]:
-        """Return nothing, because RMF's supervisors show no status."""
+        """Return nothing, because RMF's supervisors have no status."""
         return {}
 
     def _hear(self, message: Any) -> None:
@@ -271,7 +271,7 @@ class GraphDaemon:
         self.node: AnyGraphNode
 
     def start(self) -> None:
-        """Start a new daemon, which remembers only its memory on disk."""
+        """Start a new daemon, which remembers only what is on its disk."""
         self._place = Place(self._air, self.name, self._round)
         kept = self._disk if self.kind.persist else None
         self.node = GraphNode(
@@ -293,11 +293,11 @@ class GraphDaemon:
         self._round()
 
     def says(self, topic: Topic[Any], message: Message) -> None:
-        """Publish this message beside the messages of the node."""
+        """Publish this message, in addition to the node's own messages."""
         self._place.publisher(topic).publish(message)
 
     def summary(self) -> Mapping[str, Status]:
-        """Return each subject's status as in the status file."""
+        """Return each subject's status, as the daemon writes it to its status file."""
         return self.node.devices()
 
     def _round(self) -> None:

@@ -1,4 +1,4 @@
-"""A day at the site: all parties, all troubles, and the laws."""
+"""A day at the site, with all parties, all troubles and the laws."""
 
 import logging
 import random as the_random
@@ -34,21 +34,23 @@ from tests.site.trouble import BY_RESET_S, Ill, Ills, Mortal, Trouble, breakable
 
 ROBOTS = ("red", "green", "blue", "white", "black")
 WIND_DOWN_S = BOUND_S + 90.0
-"""The wind-down's length (s). In the wind-down no new trouble begins, and every robot ends its tour."""
+"""The length of the wind-down (s). In this time no new trouble begins, and every robot ends its
+tour."""
 ADOPTS_S = 5.0
-"""Time (s) for RMF's restarted supervisor to end the shown session and to take the next requester.
+"""The time (s) in which RMF's restarted supervisor ends the shown session and takes the next requester.
 
-If another robot asks before the robot in the car, RMF lets the other robot in too. Only RMF can mend
-that defect.
+Another robot may ask before the robot in the car. Then RMF lets the other robot in too. Only RMF can
+mend that defect.
 """
 SWEEP_S = 45.0
-"""Time (s) before the end of the day at which every robot is at home."""
+"""The time (s) before the end of the day at which RMF's supervisors restart. Every robot is at home
+then."""
 LOOK_EVERY_S = 5.0
 HOUR_S = 3600.0
 
 
 SUPERVISORS = ("ours", "kilted", "jazzy")
-"""The supervisors of a day: ours, or RMF's own with the rules of the named release."""
+"""The possible supervisors of a day: ours, or RMF's own by the rules of this release."""
 
 
 class Site:
@@ -56,7 +58,7 @@ class Site:
 
     `rmf` is one of SUPERVISORS. Without `rmf` the seed decides. With our supervisors the seed also
     decides the release of the fleet adapters. With `kill_every_s` the only trouble is the death of
-    RMF's lift supervisor. The supervisor dies every `kill_every_s` seconds and restarts within seconds.
+    RMF's lift supervisor. The supervisor dies every `kill_every_s` seconds and restarts within 5 s.
     """
 
     def __init__(
@@ -106,7 +108,7 @@ class Site:
         return [lifts, rmfs_door_supervisor(self.timeline, self.air)]
 
     def run(self, hours: float, told: Callable[[Look], None] = lambda look: None) -> None:
-        """Run the whole day. `told` gets the resources in use after each hour."""
+        """Run the whole day. After each hour `told` gets the resources in use."""
         end = hours * HOUR_S
         the_random.seed(self.seed)  # a supervisor that meets a rival waits for a random time
         self._open()
@@ -127,7 +129,7 @@ class Site:
         self._close()
 
     def counts(self) -> dict[str, int]:
-        """Return the counts of events for the summary."""
+        """Return the counts of events in this day."""
         done: dict[str, int] = {}
         for robot in self.robots:
             for what, count in robot.done.items():
@@ -167,7 +169,7 @@ class Site:
         self.timeline.after(LOOK_EVERY_S, self._watch)
 
     def _mend_queue(self) -> None:
-        """Reset the coordinator, like a technician who has mended the failed robots and stations."""
+        """Reset the coordinator, as a technician does after the repair of robots and stations."""
         if not (self.coordinated and self.coordinator.alive):
             return
         calm = self.ills.calm_since() + BY_RESET_S < self.timeline.now
@@ -175,7 +177,7 @@ class Site:
             self.coordinator.reset()
 
     def _live(self) -> None:
-        """Let people use lifts and doors too. Their use does not count as trouble."""
+        """Let people use lifts and doors. This does not count as trouble."""
         people = self._people
         name = people.choice([*LIFTS, *DOORS])
         signal = f"hall_{people.choice(FLOORS)}" if name in LIFTS else "push"
@@ -191,7 +193,7 @@ class Site:
             robot.homing = True
 
     def _sweep(self) -> None:
-        """Restart RMF's supervisors, because they still hold devices for robots whose adapters died."""
+        """Restart RMF's supervisors. They still hold lifts and doors for robots whose adapters died."""
         for supervisor in self.supervisors:
             if isinstance(supervisor, RmfsSupervisor):
                 supervisor.kill()
@@ -208,13 +210,14 @@ class Site:
                 self.laws.require(empty, f"{supervisor.name}: {name} {waiting} at the end")
 
     def _speakers(self, topic: str) -> int:
-        """Return how many supervisors publish. Ours and a new rival count as one."""
+        """Return the number of supervisors that publish. Our supervisor and a new rival count as
+        one."""
         speaking = [end.node.name for end in self.air.memory.publishers[topic]]
         if RIVAL in speaking and self.rmf == "ours":
             return 1
         return len(speaking)
 
-    # ---- the places of the robots (`robots.Ground`)
+    # ---- the places of the robots (methods of `robots.Ground`)
 
     def may_enter_lift(self, robot: Resident, lift: str, floor: str) -> bool:
         return self.laws.lift_is_open(lift, floor)
@@ -261,7 +264,7 @@ class Site:
         return plant.battery >= 1.0
 
     def _obstruct(self, door: str) -> None:
-        """Set the light curtain, which sees robots, people and obstructions in the doorway."""
+        """Set the light curtain. It sees robots, people and obstructions in the doorway."""
         there = any(robot.doorway == door for robot in self.robots)
         there = there or self.ills.has(door, "press obstruction")
         there = there or self.timeline.now < self._people_at.get(door, 0.0)
@@ -305,7 +308,7 @@ class Site:
         return self.devices[random.choice(random.choice((LIFTS, DOORS, CHARGERS)))]
 
     def _rival(self, random: Random) -> Ill:
-        """Return a trouble that starts RMF's own lift supervisor beside ours, and stops it again."""
+        """Return a trouble: RMF's own lift supervisor runs beside ours for some time."""
         rival = rmfs_lift_supervisor(self.timeline, self.air, jazzy=self.jazzy)
 
         def begin() -> None:
@@ -319,7 +322,7 @@ class Site:
         return Ill("rival", rival.name, "rival", begin, end, most_s=40.0)
 
     def _restart_rmfs(self, random: Random) -> Ill:
-        """Return a trouble in which RMF's supervisor forgets all, and may then speak for other
+        """Return a trouble: RMF's supervisor forgets everything, and then may speak for other
         robots."""
         supervisor = random.choice([s for s in self.supervisors if isinstance(s, RmfsSupervisor)])
         devices = LIFTS if supervisor.name == RIVAL else DOORS
@@ -355,7 +358,7 @@ class Site:
         self.timeline.after(self.kill_every_s or NEVER, self._kill)
 
     def _distrust(self, devices: Sequence[str], why: str) -> None:
-        """Note that a request in a robot's name may from now on not be the robot's own wish."""
+        """Note that from now on a request in a robot's name may not be the robot's own wish."""
         for name in devices:
             self.ills.begin(name, why)
         for robot in self.robots:
@@ -427,11 +430,11 @@ class Site:
         self.daemons[device.name].look()
 
     def _restart(self, random: Random) -> Ill:
-        """Return a trouble in which a party dies and comes back with a stepped clock.
+        """Return a trouble: a party dies, and comes back with a changed clock.
 
-        Beside RMF's own door supervisor no adapter's clock steps back. The supervisor would ignore the
-        adapter's CLOSE as too old and send a heartbeat. The adapter would answer each heartbeat with
-        another CLOSE, at the speed of the wire.
+        If RMF's own door supervisor runs, no adapter's clock goes back. That supervisor would ignore
+        the adapter's CLOSE as too old, and would send a heartbeat. The adapter would answer each
+        heartbeat with another CLOSE, as fast as the network allows.
         """
         ours = [node for node in self.nodes if isinstance(node, GraphDaemon)]
         sorts: list[list[Mortal]] = [[*self.daemons.values()], [*self.robots], [*ours]]
@@ -466,7 +469,7 @@ class Site:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Log nothing, because a day's log would fill the memory of the process that captures it."""
+    """Log nothing. The log of a day would fill the memory of the process that captures it."""
     before = logging.root.manager.disable
     logging.disable(logging.CRITICAL)
     try:

@@ -1,4 +1,4 @@
-"""The growth that a day must not cause: threads, file descriptors, objects and memory, each hour."""
+"""Resources that must not grow during a day: threads, file descriptors, objects and memory."""
 
 import gc
 import os
@@ -9,14 +9,15 @@ from pathlib import Path
 
 PAGE = os.sysconf("SC_PAGE_SIZE")
 WARM_UP = 2
-"""The number of looks to skip. Caches, queues and the laws' logs first grow to their full size."""
+"""The number of hourly looks to skip. In that time caches, queues and the laws' logs reach their full
+size."""
 MOST_OBJECTS = 1.05
 MOST_MB = 4.0
 
 
 @dataclass(frozen=True)
 class Look:
-    """The resources of this test's process at one simulated hour."""
+    """The resources that this test's process uses at one simulated hour."""
 
     hour: float
     threads: int
@@ -40,8 +41,7 @@ def look(hour: float) -> Look:
 
 
 def growth(looks: Sequence[Look]) -> list[str]:
-    """Return a sentence for each resource that grew after the warm-up. The list is empty without
-    growth."""
+    """Return a sentence for each resource that grew after the warm-up."""
     if len(looks) <= WARM_UP:
         return []
     first, found = looks[WARM_UP - 1], []

@@ -1,11 +1,11 @@
-"""Laws that hold at every moment of the day. No law here reads a core's memory or a report.
+"""Laws that hold at every moment of the day. No law here uses a core's memory or a report.
 
 The laws of `rmf-bridge judge` (`workbench/judge/`) judge all messages that reach the node. The laws
-here also need the driven relays at the terminal block, and the true state of car, doors, robots and
+here also use the driven relays at the terminal block, and the true state of cars, doors, robots and
 current.
 
-A node cannot know that a sensor lies (a stuck or noisy wire). States that depend on a lying sensor are
-not judged until shortly after its repair. A cut wire is no excuse.
+A node cannot know that a sensor lies, because its wire is stuck or noisy. States that depend on a lying
+sensor are judged again only shortly after its repair. A cut wire is no excuse.
 """
 
 from collections import deque
@@ -36,25 +36,27 @@ SETTLES_S = 2.0
 STALE_S = 1.0 + AT_ONCE_S
 DEAD_TIME_S = 0.29
 GRACE_S = 3.0 + AT_ONCE_S
-"""Time (s) for which lift outputs may stay on after the session has disappeared from the states."""
+"""The time (s) for which lift outputs may stay on after the session has vanished from the states."""
 BOUND_S = 300.0
-"""The longest wait (s) of any robot after all repairs."""
+"""The longest permitted wait (s) of any robot after all repairs."""
 LATEST_S = 2.1
 LATE_S = 5.0
-"""A time (s) above the longest delay of a message. A node that is cut off may wait longer."""
+"""A time (s) above the longest delay of a message. Messages to a node that is cut off may take
+longer."""
 
 ARRIVED_S = 3.5
-"""The longest time (s) after RMF has let a robot through in which the door may still be released.
+"""The longest time (s) for which a door may be released after RMF has let a robot through.
 
-RMF lets a robot through on a state that may be older than the request. The request may still be on its
-way when an earlier CLOSE ends. The bound is a late message plus the repetition by our supervisor.
+The state that lets the robot through may be older than the robot's request. The request may arrive only
+after an earlier CLOSE has taken effect. The limit is the delay of a late message, plus the time until
+our supervisor repeats the request.
 """
 
 STATED = (d.LiftState, d.DoorState, d.ChargerState)
 NO_DWELL = "D2.people"
-"""A law that is not judged here, because the plants' doors close at once when nobody pushes."""
+"""A law that this test does not judge, because the plants' doors close at once after each push."""
 SHOWN = ("floor", "door", "motion")
-"""The groups of lines that decide whether a lift may show an open door."""
+"""The groups of lines on which the shown door of a lift depends."""
 
 
 class Broken(AssertionError):
@@ -63,13 +65,12 @@ class Broken(AssertionError):
 
 @dataclass
 class LiftTruth:
-    """The true state of one lift: when its door was last open at each floor, and the last published
-    state.
+    """The true state of one lift. `open_at` has the last time at which the door was open at each floor.
 
-    `last` is the session before, which resumes unchanged within the grace time. `offered` means that
-    the lift has shown OPEN at the session's destination. `crossing` and `inside` are the robots on the
-    threshold and in the car, with the time of their arrival. `ended` holds the time of each session's
-    last END.
+    `session` is the session in the last published state. `last` is the session before, which resumes
+    unchanged within the grace. `offered` means that the lift has shown OPEN at the session's
+    destination. `crossing` has the robots on the threshold, and `inside` the robots in the car, each
+    with its time of arrival. `ended` has the time of each session's last END.
     """
 
     open_at: dict[str, float] = field(default_factory=dict)
@@ -83,7 +84,7 @@ class LiftTruth:
 
 
 class Judges:
-    """The judges of one daemon. They apply laws about sensors only while the device has no ill."""
+    """The judges of one daemon. While the device has an ill, they do not apply laws about sensors."""
 
     def __init__(self, daemon: DeviceDaemon) -> None:
         kind = cast(JudgedKind, daemon.device.kind.name)
@@ -93,7 +94,7 @@ class Judges:
         self._sensed: Judge | None = None
 
     def hear(self, heard: Heard, well: bool) -> str:
-        """Return the laws that the message breaks, with the evidence."""
+        """Return the laws that this message breaks, with the evidence."""
         self._always.hear(heard)
         if not well:
             self._sensed = None
@@ -112,7 +113,7 @@ class Judges:
 
 
 class Laws:
-    """All laws of the site. `log` keeps the latest events for the report of a failure."""
+    """All laws of the site. `log` keeps the latest events, to report a failure."""
 
     def __init__(self, timeline: Timeline, ills: Ills) -> None:
         self.log: deque[tuple[float, str]] = deque(maxlen=600)
@@ -154,7 +155,7 @@ class Laws:
         self.log.append((self._timeline.now, what))
 
     def require(self, holds: bool, law: str) -> None:
-        """Fail with the law's text unless the law holds."""
+        """Fail with the law's text if the law does not hold."""
         self.checks += 1
         if not holds:
             raise Broken(f"at {self._timeline.now:.3f} s: {law}")
@@ -165,7 +166,7 @@ class Laws:
         self._judges[daemon.name] = Judges(daemon)
 
     def _hears(self, daemon: DeviceDaemon, topic: topics.Topic[Any], message: Any) -> None:
-        """Give the node's judges a message that reaches the node."""
+        """Give a message that has reached the node to the node's judges."""
         now = self._timeline.now
         well = self._ills.well_since(daemon.name) + LATE_S < now
         broken = self._judges[daemon.name].hear(Heard(now, EPOCH + now, topic.name, message), well)
@@ -220,7 +221,7 @@ class Laws:
             truth.session, truth.since = state.session_id, now
             others = sorted(set(truth.inside) - {state.session_id}) if state.session_id else []
             self.require(
-                not others, f"{name} is given to {state.session_id}, with {others} in the car"
+                not others, f"{name} is given to {state.session_id} while {others} is in the car"
             )
         if state.door_state != d.LiftDoor.DOOR_OPEN:
             return
@@ -245,7 +246,8 @@ class Laws:
         )
 
     def _sensed_s(self, name: str) -> float:
-        """Return the greatest age of a shown state (s). A reading counts until it is stale."""
+        """Return the greatest permitted age of a shown state (s). A reading counts until it is
+        stale."""
         return STALE_S if self._ills.since(name, "bus") <= self._timeline.now else SENSED_S
 
     def _door_state(self, name: str, state: d.DoorState) -> None:
@@ -299,7 +301,7 @@ class Laws:
             self._currents[name] = at
 
     def _relay(self, edge: Edge) -> None:
-        """Check an edge of a relay. A charger clears errors by a pulse, which is no relay here."""
+        """Check an edge of a relay. The pulse by which a charger clears errors is not a relay here."""
         name, now = edge.device, self._timeline.now
         plant = self._daemons[name].device.plant
         if isinstance(plant, ChargerPlant):
@@ -338,8 +340,10 @@ class Laws:
             self._not_onto_an_obstruction(name, plant)
 
     def _lets_nobody_go(self, name: str, crossing: dict[str, float]) -> None:
-        """Require that a healthy door stays held as long as its state tells a robot in it that it is
-        held."""
+        """Require that a healthy door stays held while a robot is in its doorway or on its threshold.
+
+        In the first ARRIVED_S of the crossing the door may still be released.
+        """
         for robot, since in crossing.items():
             well = self._ills.well_since(name) + LATE_S <= since
             just = self._timeline.now - since < ARRIVED_S
@@ -365,18 +369,18 @@ class Laws:
         sighted = not self._ills.has(name, "bus")
         sick = self._hazard_since(name) + AT_ONCE_S < now
         self.require(not (sighted and sick), f"{name} drives {sorted(on)} under a hazard")
-        # A session may be too short to be shown, and its END may be late.
+        # A session may end before a state shows it, and its END may arrive late.
         ends = [truth.since, *(at + LATEST_S for at in truth.ended.values())]
         since = max(*ends, self._ills.since_over(name, "bus", "cut off"))
         over = max(since + GRACE_S, self._on_since[name] + AT_ONCE_S) < now
         self.require(
             not (sighted and over and not truth.session),
-            f"{name} drives {sorted(on)} unrequested",
+            f"{name} drives {sorted(on)} without a request",
         )
         self.require(on == {"agv_mode_request"} or "agv_mode_request" in on, f"{name}: {on}")
 
     def _door_outputs(self, name: str) -> None:
-        """Require that a fire that releases the door also ends the hold, whoever requests the door."""
+        """Require that a fire that releases the door also ends the hold, even against a request."""
         releases = self._daemons[name].device.settings.on_fire == "release"
         sick = self._hazard_since(name) + AT_ONCE_S < self._timeline.now
         held = releases and sick and self._relays[name] and not self._ills.has(name, "bus")
@@ -404,7 +408,7 @@ class Laws:
         self._doorways[door][robot] = self._timeline.now
 
     def crossed(self, robot: str) -> None:
-        """Forget the robot's crossing, because the robot is across or its place is unknown."""
+        """Forget the robot's crossing. The robot has crossed, or its place is unknown."""
         for truth in self._lifts.values():
             truth.crossing.pop(robot, None)
         for doorway in self._doorways.values():
@@ -415,13 +419,13 @@ class Laws:
         self._lifts[lift].inside.pop(robot, None)
 
     def abandoned(self, robot: str) -> None:
-        """Forget the robot, because a request in its name may no longer be its own wish."""
+        """Forget the robot, because a request in its name may not be its own wish from now on."""
         self.crossed(robot)
         for truth in self._lifts.values():
             truth.inside.pop(robot, None)
 
     def _thresholds(self, name: str) -> None:
-        """Require the car of a healthy lift to stand open for a robot on its threshold."""
+        """Require that the car of a healthy lift stands open for each robot on its threshold."""
         truth = self._lifts[name]
         for robot, (floor, since) in truth.crossing.items():
             if self._ills.well_since(name) + LATE_S > since:
@@ -437,13 +441,13 @@ class Laws:
             self.require(open_now, f"{name} is not open for {robot} in its doorway")
 
     def lift_is_open(self, lift: str, floor: str) -> bool:
-        """Return whether the lift is truly open now."""
+        """Return whether the lift really stands open at this floor now."""
         self._daemons[lift].advance()
         self._see(self._daemons[lift], self._timeline.now)
         return self._lifts[lift].open_at.get(floor) == self._timeline.now
 
     def door_is_open(self, door: str) -> bool:
-        """Return whether the door is truly open now."""
+        """Return whether the door is really open now."""
         self._daemons[door].advance()
         self._see(self._daemons[door], self._timeline.now)
         return self._doors[door] == self._timeline.now
@@ -460,7 +464,7 @@ class Laws:
         del self._pads[charger]
         self.note(f"{robot} has left the pad of {charger}")
 
-    # ---- the longest wait, and the end
+    # ---- the longest wait, and the end of the day
 
     def waits(self, robot: str, what: str, since: float) -> None:
         """Require a robot's wait to be short enough."""
@@ -468,12 +472,12 @@ class Laws:
         waited = self._timeline.now - max(since, calm_since)
         self.require(
             waited <= BOUND_S,
-            f"{robot} waits for {what} since {since:.0f} s, and"
-            f" everything is well since {calm_since:.0f} s",
+            f"{robot} has waited for {what} since {since:.0f} s, and"
+            f" everything has been well since {calm_since:.0f} s",
         )
 
     def at_rest(self) -> None:
-        """Require at the end of the day that no output is on, and that no session or hold is left."""
+        """Require at the end of the day that no output is on, and that no session or hold remains."""
         for name, on in self._relays.items():
             self.require(not on, f"{name} drives {sorted(on)} at the end of the day")
         for name, truth in self._lifts.items():

@@ -1,12 +1,13 @@
-"""The site's graph: the `memory` transport, with a network between its ends.
+"""The site's graph: the `memory` transport, with a network between its nodes.
 
 The network keeps the promises of RELIABLE and KEEP_LAST. A reader gets the samples of one writer in
-order, and late if the network had to repeat a sample. RMF's own readers of states are best effort in
-the field on Fast DDS, so here they lose some samples. The network is harsher than DDS: all other
+order. A sample that the network had to repeat arrives late. RMF's own readers of states are best effort
+on Fast DDS in the field, so here they lose some samples. The network is harsher than DDS. All other
 readers lose a few samples too, and a few samples come twice.
 
 A node that is cut off for less than a lease gets all samples afterwards in one burst. A node that is
-cut off for longer loses all samples of that time. It then gets the messages that others retain.
+cut off for longer loses all samples of that time. Afterwards it gets the messages that other nodes
+retain.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,7 +33,7 @@ Watch = Callable[[str, Topic[Any], Message], None]
 
 @dataclass(frozen=True)
 class Weather:
-    """Probabilities that a sample is lost, that a state to RMF is lost, and that a sample is late or
+    """The probabilities for each sample: the sample is lost, is lost on its way to RMF, is late, or is
     doubled."""
 
     lost: float = 0.005
@@ -46,7 +47,8 @@ CLEAR = Weather(0.0, 0.0, 0.0, 0.0)
 
 
 class Air:
-    """The network between the nodes. `best_effort` nodes hear states as RMF does. `watch` hears all."""
+    """The network between the nodes. Nodes in `best_effort` hear states as RMF does. `watch` gets all
+    samples."""
 
     def __init__(self, timeline: Timeline, random: Random) -> None:
         self.timeline = timeline
@@ -114,7 +116,7 @@ class Air:
                 self._give_again(name, end)
 
     def _give_again(self, name: str, end: Any) -> None:
-        """Give the subscription the messages that the returned node retains."""
+        """Give the subscription the retained messages of the node that has returned."""
         for publisher in self.memory.publishers[end.topic.name]:
             if publisher.node.name == name and _wants_retained(end, publisher):
                 for message in list(publisher.retained):
@@ -139,7 +141,7 @@ class Place(MemoryTransport):
         return super().subscribe(topic, carried, others_only=others_only)
 
     def arrive(self, received: Callable[[Any], None], message: Any, sender: Sender | None) -> None:
-        """Hand the message over, unless the node has left."""
+        """Hand the message over if the node is still on the graph."""
         if not self._closed:
             self.heard_from = sender
             self._air.counts["arrived"] += 1

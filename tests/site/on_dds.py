@@ -1,7 +1,7 @@
 """The same robots in real time, on DDS. Each fleet adapter and each daemon is a node of its own.
 
-Each daemon is a process, and a test kills that process. The plants' edges, read from their control
-sockets, must keep RMF's promises to the robots.
+Each daemon is a process that a test can kill. The test reads the plants' edges from their control
+sockets. The edges must keep RMF's promises to the robots.
 """
 
 import signal
@@ -34,7 +34,7 @@ LIFT, DOOR = "Lift1", "ward_door"
 PLACES = Places(["L1", "L2"], [LIFT], [DOOR])
 PACE = 0.05
 PATIENCE_S = 240.0
-"""The longest wait (s), even after the death of a party on a busy machine."""
+"""The longest permitted wait (s), even after the death of a party on a busy machine."""
 
 
 class RealTime(Timeline):
@@ -46,12 +46,11 @@ class RealTime(Timeline):
         self._posted: SimpleQueue[Callable[[], None]] = SimpleQueue()
 
     def post(self, what: Callable[[], None]) -> None:
-        """Run this now. Any thread may call this method."""
+        """Run this in the timeline now. Any thread may call this method."""
         self._posted.put(what)
 
     def until(self, done: Callable[[], bool], check: Callable[[], None]) -> None:
-        """Let time pass until `done` is true. `check` raises an error when the wait has become
-        useless."""
+        """Let time pass until `done` is true. `check` raises an error if it is useless to wait on."""
         while not done():
             self.run(time.monotonic() - self._began)
             check()
@@ -64,7 +63,7 @@ class RealTime(Timeline):
 
 
 class DdsPlace:
-    """A node on DDS whose messages arrive in the timeline's own time."""
+    """A node on DDS. Its messages arrive at the times of the timeline."""
 
     speaks = "dds"
 
@@ -89,7 +88,7 @@ class DdsPlace:
         return self._inner.subscribe(topic, post, others_only=others_only)
 
     def sender(self) -> None:
-        """Return None. Publishers are known before their late messages arrive here."""
+        """Return None. The publisher of a late message is known before the message arrives here."""
 
     @property
     def lives(self) -> bool:
@@ -111,7 +110,8 @@ class DdsPlace:
 
 
 class RealSite:
-    """A lift, a door, both supervisors, and robots that compete for lift and door (`robots.Ground`)."""
+    """A lift, a door, both supervisors, and robots that compete for lift and door (as
+    `robots.Ground`)."""
 
     def __init__(self, directory: Path, domain: int, names: tuple[str, ...]) -> None:
         self.timeline = RealTime()
@@ -141,7 +141,8 @@ class RealSite:
             daemon.follow(lambda edge: self.timeline.post(partial(self._edge, edge)))
 
     def restart(self, party: str, how: signal.Signals) -> None:
-        """Kill a daemon with this signal, and start another. SIGKILL permits no last message."""
+        """Kill a daemon with this signal, and start another. SIGKILL permits the daemon no last
+        message."""
         daemon = self.daemons.pop(party)
         if party in ("lift", "door"):
             device = LIFT if party == "lift" else DOOR
@@ -160,7 +161,7 @@ class RealSite:
         robot.start()
 
     def check(self) -> None:
-        """Raise an error unless all daemons live and each robot's wait is short enough."""
+        """Raise an error unless all daemons are alive and each robot's wait is short enough."""
         for daemon in self.daemons.values():
             daemon.check()
         for robot in self.robots:
@@ -172,7 +173,7 @@ class RealSite:
         self.timeline.until(done, self.check)
 
     def done(self, what: str) -> int:
-        """Return how often all robots together have done this."""
+        """Return how often the robots have done this, all together."""
         return sum(robot.done[what] for robot in self.robots)
 
     def driven(self) -> list[tuple[str, str]]:

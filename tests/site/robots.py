@@ -1,8 +1,8 @@
 """Robots with an endless day. Each has its own fleet adapter by RMF's rules (`workbench.rmf_model`).
 
 A robot passes a door, rides a lift to another floor, and passes another door, again and again.
-Sometimes it goes to a charger or rests. Sometimes RMF cancels the task when the robot waits. An adapter
-that restarts knows only the place of its robot, so the robot first leaves that place.
+Sometimes it goes to a charger or rests. Sometimes RMF cancels its task during a wait. An adapter that
+restarts knows only the place of its robot, so the robot first leaves that place.
 """
 
 from collections.abc import Callable, Generator
@@ -20,15 +20,15 @@ from workbench.rmf_model.phases import DoorClose, DoorOpen, EndLiftSession, Requ
 from workbench.rmf_model.robot import Phase, RobotContext
 
 FRESH_S = 2.5
-"""The age (s) at which a charger's state is too old to permit driving onto the pad."""
+"""The age (s) above which a charger's state does not permit a robot to drive onto the pad."""
 PAD_S = 2.0
-"""The time (s) to drive from the pad's edge onto the pad, and back."""
+"""The time (s) for the drive from the pad's edge onto the pad, or back."""
 CHARGER_PATIENCE_S = 8.0
 
 
 @dataclass(frozen=True)
 class Places:
-    """The robots' destinations, by RMF's names."""
+    """The destinations of the robots, by RMF's names."""
 
     floors: list[str]
     lifts: list[str]
@@ -38,7 +38,7 @@ class Places:
 
 @dataclass(frozen=True)
 class Within:
-    """A phase that RMF cancels after the patience (s)."""
+    """A phase with a time limit (s). RMF cancels the phase after that time."""
 
     phase: Phase
     patience_s: float = NEVER
@@ -46,12 +46,12 @@ class Within:
 
 Want = Within | float
 Day = Generator[Want, bool, None]
-"""A generator that yields its next wait (a phase or seconds), and receives whether the phase was
-done."""
+"""A generator of a robot's waits. It yields a phase or a number of seconds. The answer tells whether
+the phase succeeded."""
 
 
 class Ground(Protocol):
-    """The true places of the robots, and the building's part in their passages."""
+    """The true places of the robots, and the building's reactions to the robots."""
 
     def may_enter_lift(self, robot: "Resident", lift: str, floor: str) -> bool:
         """Return whether the robot sees an open car at this floor."""
@@ -85,11 +85,11 @@ class Ground(Protocol):
 
 
 class Resident:
-    """One robot. It waits for `waits_for` from the time `since` on.
+    """One robot. Since the time `since` it waits for `waits_for`.
 
     `join(name)` gives its adapter a place on the graph. `pace` is the length of its pauses relative to
-    a real robot. Its adapter last died at `disturbed_at`. After that time a request in its name may not
-    be its own wish.
+    a real robot. `disturbed_at` is the time at which its adapter last died. After that time a request
+    in its name may not be its own wish.
     """
 
     def __init__(
@@ -200,7 +200,7 @@ class Resident:
         self._look()
 
     def _look(self) -> None:
-        """Go on with the day if the awaited event has come."""
+        """Go on with the day if the event for which the robot waits has come."""
         if self._awaits is not None and self._awaits.done:
             self._go_on(True)
         elif self._timeline.now >= self._until:
@@ -249,12 +249,13 @@ class Resident:
             yield 60.0
 
     def _pause(self, least_s: float, most_s: float) -> float:
-        """Return the duration of a drive or rest (s). The robot waits for nothing in that time."""
+        """Return the duration of a drive or a rest (s)."""
         self.waits_for = ""
         return self._pace * self._random.uniform(least_s, most_s)
 
     def _patience(self) -> float:
-        """Return the patience with a phase (s). A rare short patience makes RMF cancel the task."""
+        """Return the time limit of a phase (s). A short limit is rare, and makes RMF cancel the
+        task."""
         return self._random.uniform(0.5, 20.0) if self._random.random() < 0.04 else NEVER
 
     def _get_clear(self) -> Day:
@@ -269,7 +270,7 @@ class Resident:
             self._task.ends()
         if self.in_car:
             lift, _, target = self.in_car
-            if self._random.random() < 0.5:  # RMF sees our session in this time and ends it
+            if self._random.random() < 0.5:  # RMF may see our session meanwhile and end it
                 yield self._pause(1.0, 4.0)
             yield from self._ride_on(lift, target)
         yield self._pause(0.1, 3.0)
@@ -293,7 +294,7 @@ class Resident:
         target = self._random.choice([f for f in self._places.floors if f != self.floor])
         came = yield Within(RequestLift(lift, self.floor, inside=False), self._patience())
         if not came:
-            return  # a new task: the context ends the session after 30 s without a request
+            return  # a new task: the context ends the session after 30 s of silence
         while not self._ground.may_enter_lift(self, lift, self.floor):
             yield 0.5
         self.in_car = (lift, self.floor, target)
@@ -320,7 +321,8 @@ class Resident:
     # ---- charging by RMF's own task, with our coordinator
 
     def _charge_as_told(self) -> Day:
-        """Drive to the dedicated place, which may change, until the robot has charged."""
+        """Drive to the dedicated place until the robot has charged. The dedicated place may change
+        meanwhile."""
         assert self._task is not None
         self.waits_for, self.since = "a charger", self._timeline.now
         self._task.begins()
@@ -364,7 +366,7 @@ class Resident:
         self.done["charges"] += flowed
         return flowed
 
-    # ---- charging without a coordinator: RMF sends no such requests, so the robot sends its own
+    # ---- charging without a coordinator: the robot sends its requests, because RMF sends none
 
     def _charge(self) -> Day:
         """Try the stations until a station grants the request. Drive there, charge, and leave."""
@@ -397,7 +399,7 @@ class Resident:
         return False
 
     def _charge_at(self, charger: str, request_id: str) -> Generator[Want, bool, bool]:
-        """Charge on the pad as long as the station is ours. Return True if current has flowed."""
+        """Charge on the pad while the station shows our request. Return True if current has flowed."""
         if not self._is_ours(charger, request_id):
             return False
         yield PAD_S
@@ -419,7 +421,7 @@ class Resident:
         self._ground.off_pad(self, charger)
 
     def _cancel(self, charger: str, request_id: str) -> Day:
-        """Repeat the cancellation until the station no longer shows the request."""
+        """Repeat the cancel message until the station no longer shows the request."""
         for _ in range(5):
             self._say([(topics.CHARGER_CANCELS, d.ChargerCancel(charger, request_id))])
             yield 1.0
@@ -433,7 +435,7 @@ class Resident:
         return assigned and state is not None and state.request_id == request_id
 
     def _station(self, charger: str) -> d.ChargerState | None:
-        """Return the station's latest state if the state is fresh."""
+        """Return the station's latest state, or None if the state is too old."""
         at, state = self._stations.get(charger, (-NEVER, None))
         return state if self._timeline.now - at <= FRESH_S else None
 
@@ -443,7 +445,7 @@ class Resident:
 
 
 def _words(phase: Phase) -> str:
-    """Return the goal of a phase in words."""
+    """Return in words what a phase waits for."""
     match phase:
         case RequestLift():
             inside = " from inside" if phase.wanted.inside else ""

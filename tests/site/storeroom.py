@@ -1,8 +1,8 @@
-"""The site's dispenser: a delivery each hour, with its own troubles, on its own part of the network.
+"""The site's dispenser. It makes a delivery each hour, and has its own troubles and its own network.
 
 RMF's phase (`workbench/rmf_model/workcells.py`) must go on only when its item has left. The daemon dies
-in the middle, the conveyor jams, the PLC restarts, and messages are lost or late. Later a person comes,
-looks, and decides each delivery that is in doubt.
+during a delivery, the conveyor jams, the PLC restarts, and messages are lost or late. Later a person
+comes, looks, and decides each delivery that is in doubt.
 """
 
 from collections.abc import Callable
@@ -31,18 +31,18 @@ from workbench.rmf_model.workcells import WorkcellPhase
 NAME = "pharmacy_dispenser"
 FIRST_S, EVERY_S = 30.0, 3600.0
 COMES_S = 90.0
-"""Time (s) from the request until a person comes."""
+"""The time (s) from the request until a person comes."""
 WAITS_S = 400.0
-"""The longest time of a delivery (s)."""
+"""The longest permitted time of a delivery (s)."""
 LAWS = ("W1.numbers", "W2.lists", "W3.result", "W4.stamp")
-"""The laws that hold even when the daemon dies and results are lost."""
+"""The laws that hold even if the daemon dies and results get lost."""
 TROUBLES = ("nothing", "dies", "jam", "restart", "slow", "dies and is out of reach")
 
 Require = Callable[[bool, str], None]
 
 
 class Storeroom:
-    """The dispenser, its daemon and RMF's phase. `done` holds the deliveries by trouble."""
+    """The dispenser, its daemon and RMF's phase. `done` counts the deliveries for each trouble."""
 
     def __init__(self, timeline: Timeline, random: Random, require: Require) -> None:
         self.done: dict[str, int] = {}
@@ -64,7 +64,7 @@ class Storeroom:
         self._number = 0
 
     def open(self) -> None:
-        """Start the daemon, and let the first robot come."""
+        """Start the daemon, and let the first robot ask for its item."""
         self.daemon.start()
         self._timeline.after(FIRST_S, self._deliver)
 
@@ -109,8 +109,8 @@ class Storeroom:
         self.daemon.look()
 
     def _look(self) -> None:
-        """Let a person mend the machine, decide, and reset."""
-        self._restart()  # restart first: the mended conveyor will move the jammed item
+        """Let a person repair the machine, decide the delivery, and reset the daemon."""
+        self._restart()  # restart first, because the repaired conveyor will move the item
         self._plant.fail("conveyor", None)
         faults = self.daemon.faults()
         if "OUTCOME_UNKNOWN" in faults:
@@ -119,7 +119,7 @@ class Storeroom:
         self._timeline.after(5.0, self.daemon.reset)
 
     def _end(self) -> None:
-        """Require that the delivery is over, and that RMF has gone on only with its item."""
+        """Require that the delivery has ended, and that RMF has gone on only with its item."""
         phase, moved = self._phase, self._plant.moved - self._before
         assert phase is not None
         said = f"{phase.outcome} ({phase.why}), {moved} moved"

@@ -1,5 +1,5 @@
-"""No fault makes a daemon log the same line for ever. Each fault lasts ten minutes of virtual time,
-with waiting robots.
+"""No fault makes a daemon log the same line for ever. Each fault lasts ten minutes of virtual time, and
+robots wait meanwhile.
 
 Lifts, doors, chargers, supervisors and the coordinator are those of the daemons. Two lines count as
 equal if only their numbers differ.
@@ -21,11 +21,11 @@ from tests.workbench.explain.story import Scene
 
 SERVED = ("Lift1", "Lift2", "ward", "gate", "bay1")
 MOST = 3
-"""The most equal lines in the last five minutes, fewer than one a minute."""
+"""The most equal lines in the last five minutes. It is less than one line a minute."""
 
 
 class Hospital(Scene):
-    """A scene with all devices and nodes. One robot has requested a lift, and another robot a door."""
+    """All devices and nodes. One robot has sent a request for a lift, and another robot for a door."""
 
     def __init__(self) -> None:
         super().__init__(*SERVED, diagnoses=False)
@@ -45,7 +45,7 @@ Trouble = Callable[[Hospital, pytest.MonkeyPatch], None]
 
 
 def each(scene: Hospital, seconds: float, do: Callable[[], None]) -> None:
-    """Call `do` now, and then every `seconds` seconds."""
+    """Call `do` now, and then again every `seconds` seconds."""
 
     def again() -> None:
         do()
@@ -133,7 +133,7 @@ TROUBLES: dict[str, Trouble] = {
 
 
 CHANGES = ("hardware_that_comes_and_goes", "two_nodes_for_each_device")
-"""Faults under which facts change all the time. Under these the log's filter holds back repeats."""
+"""Faults during which facts change all the time. Then the log's filter holds repeated lines back."""
 
 
 @pytest.mark.parametrize("trouble", TROUBLES)

@@ -1,4 +1,4 @@
-"""Robots compete for one lift and one door on DDS. The test kills each daemon and one adapter once."""
+"""Robots compete for one lift and one door on DDS. The test kills each daemon once, and one adapter."""
 
 import signal
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ def site(
 
 
 @pytest.mark.long(70)
-def test_three_robots_share_a_lift_and_a_door_while_everybody_is_killed_once(
+def test_three_robots_share_a_lift_and_a_door_while_each_party_is_killed_once(
     site: RealSite,
 ) -> None:
     for robot in site.robots:

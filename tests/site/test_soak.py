@@ -1,4 +1,4 @@
-"""A short day at the site, played for a few random seeds. `make soak` plays whole days."""
+"""A short day at the site for a few random seeds. `make soak` plays whole days."""
 
 import pytest
 
@@ -9,17 +9,19 @@ from tests.site.growth import Look, growth
 from tests.site.laws import Broken
 
 SEEDS = depth([2], [1, 2, 3])
-"""Each seed has other supervisors. tests/workbench/replay/test_replay.py also plays seeds 1 and 3."""
+"""The seeds of the days. Each seed has other supervisors. tests/workbench/replay/test_replay.py also
+plays seeds 1 and 3."""
 MINUTES = depth(8, 20)
-"""The day's length (min). It exceeds the last minutes, in which robots go home (`WIND_DOWN_S`)."""
+"""The length of a day (min). It exceeds WIND_DOWN_S, the time in which the robots go home."""
 
 
 @pytest.mark.long(5)
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_site_lives_through_its_troubles(seed: int) -> None:
-    """After a failure `make soak SEED=… HOURS=0.3333` plays the day again and prints the events before.
+def test_a_site_survives_its_troubles(seed: int) -> None:
+    """After a failure, `make soak SEED=… HOURS=0.3333` plays the day again and prints the events before
+    it.
 
-    The seed chooses our supervisors, or RMF's of either release.
+    The seed chooses our supervisors, or RMF's supervisors of either release.
     """
     site = Site(seed)
     site.run(MINUTES / 60)
@@ -32,20 +34,20 @@ def test_a_site_lives_through_its_troubles(seed: int) -> None:
 
 
 @pytest.mark.long(3)
-def test_without_our_remedy_a_robot_that_rmfs_supervisor_forgets_stops_a_lift_for_good(
+def test_without_our_remedy_a_forgotten_robot_blocks_a_lift_for_ever(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """This day has the deadlock that `bridges/kinds/lift/forgotten.py` ends."""
+    """This day contains the deadlock that `bridges/kinds/lift/forgotten.py` ends."""
     monkeypatch.setattr(forgotten, "heard", lambda session, asked, now: (session, False))
     site = Site(23, "kilted")  # a day with an early deadlock
     site.trouble._draw = site._restart_rmfs
-    with pytest.raises(Broken, match=r"waits for Lift\d"):
+    with pytest.raises(Broken, match=r"has waited for Lift\d"):
         site.run(0.5)
 
 
 @pytest.mark.long(5)
 @pytest.mark.parametrize("rmf", depth(["jazzy"], ["jazzy", "kilted"]))
-def test_no_occupied_car_is_given_to_another_robot_while_rmfs_supervisor_dies_each_27_s(
+def test_no_other_robot_gets_an_occupied_car_if_the_supervisor_dies_every_27_s(
     rmf: str,
 ) -> None:
     """`make soak RMF=jazzy KILL_EVERY=27 HOURS=1.65 SEED=3` plays two hundred kills."""
@@ -55,7 +57,7 @@ def test_no_occupied_car_is_given_to_another_robot_while_rmfs_supervisor_dies_ea
 
 
 @pytest.mark.long(2)
-def test_the_same_seed_is_the_same_day() -> None:
+def test_the_same_seed_gives_the_same_day() -> None:
     days = [Site(5), Site(5)]
     for day in days:
         day.run(depth(0.03, 0.15))

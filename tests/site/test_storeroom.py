@@ -1,4 +1,4 @@
-"""The storeroom alone, for whole days. RMF goes on only with its item, whatever happens."""
+"""The storeroom alone, for whole days. In spite of all troubles RMF goes on only with its item."""
 
 import logging
 from random import Random

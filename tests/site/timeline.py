@@ -1,4 +1,4 @@
-"""Virtual time: future events, in order."""
+"""Virtual time, with a queue of future events."""
 
 import heapq
 from collections.abc import Callable
@@ -10,9 +10,9 @@ EPOCH = 1_800_000_000.0
 
 
 class Timeline:
-    """The clock of the day and its events. `now` counts seconds from the beginning of the day.
+    """The clock of the day, with its events. `now` counts seconds from the beginning of the day.
 
-    Two events at the same time happen in the order in which they were added.
+    Two events with the same time happen in the order in which they were added.
     """
 
     def __init__(self) -> None:
@@ -21,7 +21,7 @@ class Timeline:
         self._count = 0
 
     def at(self, when: float, what: Callable[[], None]) -> None:
-        """Call `what` at this time, or never at inf."""
+        """Call `what` at this time. The time inf means never."""
         if when == NEVER:
             return
         self._count += 1
@@ -32,7 +32,7 @@ class Timeline:
         self.at(self.now + seconds, what)
 
     def next_at(self) -> float:
-        """Return the time of the next event, or inf without events."""
+        """Return the time of the next event, or inf if there is no event."""
         return self._due[0][0] if self._due else NEVER
 
     def run(self, until: float) -> None:
@@ -54,7 +54,7 @@ class Alarm:
         self._number = 0
 
     def set(self, at: float) -> None:
-        """Ring at this time instead of the earlier time."""
+        """Ring at this time instead of the time set before."""
         if at == self._at:
             return
         self._at = at

@@ -1,9 +1,9 @@
-"""Troubles and their repair, from the seed alone.
+"""Troubles and their repair. Both depend on the seed alone.
 
-Trouble comes in bouts. In each bout a few parts break within a minute, and each is mended some time
-later. Then comes a calm, sometimes so long that no robot may still wait. After the repair of a wire, a
-part or a fire latch the technician resets the device (`rmf-bridge reset`). Nobody resets a device after
-restarts, cuts, lost buses or hazards that clear alone.
+Troubles come in groups. In each group a few parts break within a minute, and each part is repaired some
+time later. Then comes a calm, sometimes so long that no robot may still wait at its end. After the
+repair of a wire, a part or a fire latch the technician resets the device (`rmf-bridge reset`). Nobody
+resets a device after restarts, cuts, lost buses, or hazards that end alone.
 """
 
 from collections.abc import Callable, Iterator
@@ -23,14 +23,15 @@ WIRE_MODES: tuple[FailureMode, ...] = ("off", "stuck", "slow", "garbage", "wrong
 LIES: tuple[FailureMode, ...] = ("stuck", "slow", "garbage", "wrong")
 RESET = ", to be reset"
 BY_RESET_S = 4.0
-"""The time from a repair to a healthy device (s): hazards clear, and the technician resets."""
+"""The time (s) from a repair to a healthy device. In that time hazards end and the technician
+resets."""
 LIFT_HAZARDS = ("fire_alarm", "code_blue", "manual_mode", "earthquake")
 
 
 class Ills:
-    """The ills of each party: the start of present ills, and the end of past ills.
+    """The ills of each party: the start of each present ill, and the end of each past ill.
 
-    A `device` may be any party.
+    The argument `device` may name any party.
     """
 
     def __init__(self, timeline: Timeline) -> None:
@@ -62,7 +63,7 @@ class Ills:
         return bool(self._now.get(device))
 
     def since(self, device: str, what: str) -> float:
-        """Return the start of this ill, or inf without this ill."""
+        """Return the start of this ill. Without this ill return inf."""
         return self._now.get(device, {}).get(what, NEVER)
 
     def since_over(self, device: str, *what: str) -> float:
@@ -71,13 +72,13 @@ class Ills:
         return max(over.get(one, -NEVER) for one in what)
 
     def well_since(self, device: str) -> float:
-        """Return the end of the device's last ill, or inf during an ill."""
+        """Return the end of the device's last ill. During an ill return inf."""
         if self.any(device):
             return NEVER
         return max(self._over.get(device, {}).values(), default=-NEVER)
 
     def lying(self, device: str, settles_s: float) -> Iterator[str]:
-        """Yield the wires and parts that lie, or that lied less than `settles_s` ago."""
+        """Yield the wires and parts that lie, or that have lied in the last `settles_s` seconds."""
         for (name, what), mode in self._modes.items():
             if name != device or mode not in LIES:
                 continue
@@ -86,7 +87,7 @@ class Ills:
                 yield what
 
     def hazard_since(self, device: str) -> float:
-        """Return the time at which a hazard began on a sound wire, or inf without a hazard."""
+        """Return the time at which a hazard began on a sound wire. Without a hazard return inf."""
         now, over = self._now.get(device, {}), self._over.get(device, {})
         return min(
             (
@@ -104,11 +105,11 @@ class Ills:
         self._obstructed[device] = self._timeline.now
 
     def obstructed_since(self, device: str) -> float:
-        """Return the time at which a person stepped into the doorway, or NEVER."""
+        """Return the time at which a person stepped into the doorway. Without a person return NEVER."""
         return self._obstructed.get(device, NEVER)
 
     def calm_since(self) -> float:
-        """Return the time at which the last ill of any party ended, or inf during an ill."""
+        """Return the end of the last ill of any party. During an ill return inf."""
         return NEVER if any(self._now.values()) else self._calm_at
 
     def all(self) -> list[str]:
@@ -129,12 +130,12 @@ class Mortal(Protocol):
 
 @dataclass(frozen=True)
 class Ill:
-    """One possible trouble: the party, the ill, the functions that begin and end it, and its duration
-    (s).
+    """One possible trouble of a party. The functions `begin` and `end` start and end it. It lasts from
+    `least_s` to `most_s` (s).
 
-    `sort` is the heading for counting. `reset` is the technician's action after the repair. The
-    technician does not reset after an ill of at most `heals_s` (s), because the device then recovers
-    alone.
+    `sort` is the heading under which it is counted. `reset` is the technician's action after the
+    repair. If the ill lasted at most `heals_s` (s), the device recovers alone and the technician does
+    nothing.
     """
 
     sort: str
@@ -150,7 +151,7 @@ class Ill:
 
 
 class Trouble:
-    """Bouts of trouble. `draw` returns a trouble that may begin now."""
+    """Groups of trouble. `draw` returns a trouble that may begin now."""
 
     def __init__(
         self,
@@ -169,7 +170,7 @@ class Trouble:
         self._note = note
 
     def begin(self, until: float) -> None:
-        """Begin the first bout. More bouts follow, and all end by `until`."""
+        """Begin the first group. More groups follow. All trouble ends by `until`."""
         self.over_at = until
         self._timeline.after(self._random.uniform(20.0, 60.0), self._bout)
 
@@ -217,7 +218,8 @@ class Trouble:
             self._timeline.after(BY_RESET_S, lambda: self._reset(ill))
 
     def _reset(self, ill: Ill) -> None:
-        """Reset the device as a technician does, who waits because a silent device cannot be reset."""
+        """Reset the device as a technician does. If the device is silent, wait, because it cannot be
+        reset."""
         assert ill.reset is not None
         if self._ills.has(ill.device, "bus") or self._ills.has(ill.device, "daemon"):
             self._timeline.after(BY_RESET_S, lambda: self._reset(ill))
@@ -242,7 +244,7 @@ def breakable(device: Device) -> tuple[Breakable, Breakable]:
 
 
 def pressable(device: Device) -> list[str]:
-    """Return the building's actions on a device that count as ills."""
+    """Return the actions of people at a device that count as ills."""
     plant = device.plant
     if isinstance(plant, LiftPlant):
         return [h for h in LIFT_HAZARDS if Hazard(h) in plant.pressed]

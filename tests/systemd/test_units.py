@@ -1,4 +1,4 @@
-"""systemd itself judges the unit with the drop-in of each shipped file."""
+"""systemd itself checks the unit with the drop-in of each shipped file."""
 
 import configparser
 import re
@@ -25,8 +25,9 @@ OTHERS = (RECORDER, PAGE, EXPORTER, NOTIFY, EARLY)
 CONFIG = device_yamls()
 VERIFY = ("systemd-analyze", "verify", "--man=no")
 MOST = 2.0
-"""The limit of exposure. On systemd 252 a service on the network has 1.5; GPIO or a serial port gives
-1.7. CAN's own sockets also give 1.7, because AF_CAN counts as an exotic family (0.2)."""
+"""The highest permitted exposure. On systemd 252 a service on the network has 1.5. A service with GPIO
+or a serial port has 1.7. A service with CAN sockets has 1.7 too, because AF_CAN counts as exotic
+(0.2)."""
 
 needs_systemd = pytest.mark.skipif(
     shutil.which("systemd-analyze") is None, reason="systemd-analyze is not installed"
@@ -54,13 +55,13 @@ def exposure(folder: Path, name: str) -> float:
     )
     found = re.search(r"Overall exposure level for .*: ([0-9.]+) ", done.stdout)
     assert found, done.stdout
-    assert not done.stderr  # such as "Unknown key name"
+    assert not done.stderr  # for example "Unknown key name"
     return float(found[1])
 
 
 @needs_systemd
 @pytest.mark.parametrize("file", CONFIG, ids=lambda file: file.stem)
-def test_no_shipped_file_needs_a_service_that_is_more_exposed_than_this(
+def test_the_service_of_each_shipped_file_stays_within_the_limit_of_exposure(
     file: Path, tmp_path: Path
 ) -> None:
     score = exposure(tmp_path, system(tmp_path, file))
@@ -102,14 +103,14 @@ def test_systemd_finds_nothing_wrong_with_the_units(tmp_path: Path) -> None:
     assert (done.returncode, ours) == (0, [])
 
 
-def test_the_unit_permits_no_device_and_says_that_it_fits_nothing() -> None:
+def test_the_unit_without_a_drop_in_permits_no_device() -> None:
     lines = UNIT.read_text().splitlines()
     assert "DevicePolicy=closed" in lines
     assert not [line for line in lines if line.startswith(("DeviceAllow", "SupplementaryGroups"))]
     assert "Environment=RMF_BRIDGE_SERVICE=1 RMF_BRIDGE_FITS=nothing PYTHONUNBUFFERED=1" in lines
 
 
-def test_can_is_back_by_itself_after_a_bus_off() -> None:
+def test_can_recovers_automatically_after_a_bus_off() -> None:
     network = configparser.ConfigParser()
     network.read(FILES / "80-rmf-can0.network")
     assert dict(network["CAN"]) == {"bitrate": "250K", "restartsec": "100ms"}

@@ -1,6 +1,6 @@
-"""`python -m tests.torture --seed 7`: the table of reliability.md in ten minutes, on loopback.
+"""`python -m tests.torture --seed 7` makes the table of reliability.md in ten minutes, on loopback.
 
-The exit code is 1 if a relay stayed on, or if a daemon died of a disturbance it must survive.
+The exit code is 1 if a relay stayed on, or if a daemon died of a disturbance that it must survive.
 """
 
 import argparse
@@ -25,15 +25,15 @@ from tests.torture.wires import wires
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Torture real daemons, and print the table."""
+    """Attack real daemons, and print the table."""
     parser = argparse.ArgumentParser(prog="python -m tests.torture", description=__doc__)
-    parser.add_argument("--seed", type=int, help="one is drawn and printed if left out")
+    parser.add_argument("--seed", type=int, help="seed; by default random and printed")
     parser.add_argument("--kills", type=int, default=200)
-    parser.add_argument("--times", type=int, default=10, help="of each shortage")
-    parser.add_argument("--recordings", type=int, default=300, help="that decode and are wrong")
-    parser.add_argument("--forged-s", type=float, default=20.0, help="on each wire")
+    parser.add_argument("--times", type=int, default=10, help="number of tries of each shortage")
+    parser.add_argument("--recordings", type=int, default=300, help="number of wrong recordings")
+    parser.add_argument("--forged-s", type=float, default=20.0, help="seconds on each wire")
     options = parser.parse_args(argv)
-    # After nohup the daemons would inherit an ignored SIGHUP, and would go on ignoring SIGHUP.
+    # After nohup a daemon would inherit from this process that it ignores SIGHUP.
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
     seed = secrets.randbelow(10**6) if options.seed is None else options.seed
     began, table, failed = time.monotonic(), Table(), list[str]()

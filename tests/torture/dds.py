@@ -1,4 +1,4 @@
-"""Disturbances of DDS: names of ten megabytes, and a network that fails."""
+"""Disturbances of DDS. Names have ten megabytes, or the network fails."""
 
 import re
 import shutil
@@ -17,7 +17,7 @@ from tests.transports.joining import joining
 from tests.waiting import wait_until
 
 LIMIT_MIB = 128
-"""MemoryMax (MiB) in systemd/rmf-bridge@.service."""
+"""The memory limit (MiB) of a daemon: MemoryMax in systemd/rmf-bridge@.service."""
 FORGERS = 3
 DAEMONS = {
     "lift_dry_contact": ["--simulate"],
@@ -29,12 +29,12 @@ NAMES = {"10 MB": 10_000_000, "1 MB": 1_000_000, "60 kB": 60_000}
 LOSSES_S = (9.0, 12.0, 20.0)
 BACK_S = 3.0
 DOMAIN = 5
-"""The DDS domain of the tests, in their own network namespace."""
+"""The DDS domain of these tests, which have their own network namespace."""
 
 
 def long_names(directory: Path, each_s: float, table: Table) -> None:
-    """Forge samples on every topic that a daemon hears. Each daemon must serve, and stay below its
-    limit."""
+    """Forge samples on every topic that a daemon hears. Each daemon must go on, and stay below its
+    memory limit."""
     for shown, length in NAMES.items():
         found = [_flooded(directory / f"{one}-{length}", one, length, each_s) for one in DAEMONS]
         most_mib = max(mib for mib, _ in found)
@@ -45,7 +45,7 @@ def long_names(directory: Path, each_s: float, table: Table) -> None:
 
 
 def _flooded(directory: Path, name: str, length: int, each_s: float) -> tuple[float, int]:
-    """Return a daemon's peak memory (MiB) under forged samples, and the number of these samples."""
+    """Return a daemon's peak memory (MiB) and the number of forged samples."""
     directory.mkdir(parents=True)
     with domain_for_a_while() as domain:
         file = _on_loopback(name, directory, domain)
@@ -84,7 +84,8 @@ def _most_mib(pid: int) -> float:
 
 
 def lost_network(table: Table) -> None:
-    """Take `lo` down and up. A node with RMF's defaults must soon hear our states again."""
+    """Take the interface `lo` down and up. A node with RMF's defaults must soon hear our states
+    again."""
     inside = f"ip link set lo up && exec {sys.executable} -m tests.torture.dds"
     alone = shutil.which("unshare")
     if not alone or subprocess.run([alone, "-n", "true"], capture_output=True).returncode:

@@ -1,5 +1,5 @@
-"""Deaths and shortages of a door's daemon on a real Modbus server. The tests watch the server's
-relay."""
+"""Deaths and shortages of a door's daemon on a real Modbus server. The tests watch a relay of that
+server."""
 
 import os
 import random
@@ -24,7 +24,7 @@ PATIENCE_S = 60.0
 
 
 class Door:
-    """A Modbus module, and an RMF that asks for OPEN all the time."""
+    """A Modbus module, and a stand-in for RMF that requests OPEN all the time."""
 
     def __init__(self, directory: Path, domain: int) -> None:
         directory.mkdir()
@@ -84,7 +84,8 @@ def door(directory: Path) -> Iterator[Door]:
 
 
 def kills(directory: Path, rng: random.Random, times: int, table: Table) -> None:
-    """Kill a daemon with -9 at random moments. Every second daemon is no service, but has a guard."""
+    """Kill a daemon with -9 at random moments. Half of the daemons run as services. The others have a
+    guard."""
     pause = threading.Event()
     with door(directory) as here:
         for n in range(times):
@@ -111,7 +112,7 @@ def _released(run: Path) -> bool:
 
 
 def signals(directory: Path, table: Table) -> None:
-    """Send each signal that would end or suspend a process when the relay is on."""
+    """Send each signal that would end or suspend a process. The relay is on at that time."""
     with door(directory) as here:
         for number in sorted(ENDING - set(range(signal.SIGRTMIN + 1, signal.SIGRTMAX))):
             code = here.held().end(number)
@@ -120,7 +121,8 @@ def signals(directory: Path, table: Table) -> None:
 
 
 def shortages(directory: Path, rng: random.Random, times: int, table: Table) -> None:
-    """Let a daemon that holds a door live through each shortage, and then shut down cleanly."""
+    """Let a daemon that holds a door meet each shortage. The daemon must survive and then shut down
+    cleanly."""
     with door(directory) as here:
         running = here.held()
         hurts: dict[str, Callable[[Door, int], None]] = {

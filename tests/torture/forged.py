@@ -22,11 +22,11 @@ from tests.torture.table import Table
 SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
 SERIAL = r"/dev/serial/by-id/[^ ,}\n]*"
 LINES_MOST = 200
-"""The most lines of a daemon's log. A stranger must not be able to fill the log."""
+"""The most lines that a daemon may log under attack. A stranger must not be able to fill the log."""
 
 
 class Liar:
-    """A server that answers everything with forged bytes until it is closed. `count` is the number of
+    """A server that answers everything with forged bytes until the test closes it. `count` counts the
     answers."""
 
     def __init__(self, rng: random.Random) -> None:
@@ -45,14 +45,14 @@ class Liar:
         raise NotImplementedError
 
     def _forged(self, heard: bytes) -> bytes:
-        """Return bytes that often begin like a true answer, but never form a whole true answer."""
+        """Return bytes that often begin like a true answer, but that never form a whole true answer."""
         self.count += 1
         forged = heard[: self._rng.randrange(12)] + self._rng.randbytes(self._rng.randrange(1, 40))
         return b"HTTP/1.1 200 OK\r\n" + forged if heard.startswith(b"GET") else forged
 
 
 class TcpLiar(Liar):
-    """A forging server of Modbus TCP or HTTP."""
+    """A server of Modbus TCP or HTTP that sends forged bytes."""
 
     def __init__(self, rng: random.Random) -> None:
         self._server = socket.create_server(("127.0.0.1", 0))
@@ -83,7 +83,8 @@ class TcpLiar(Liar):
 
 
 class LineLiar(Liar):
-    """A forger at the other end of a serial line, for Modbus RTU, or for CAN through slcan."""
+    """A sender of forged bytes at the other end of a serial line. The line is for Modbus RTU or CAN
+    (slcan)."""
 
     def __init__(self, rng: random.Random) -> None:
         self._far, near = pty.openpty()
@@ -107,8 +108,8 @@ class LineLiar(Liar):
 
 
 class DatagramLiar(Liar):
-    """A forger on DDS. It sends messages that begin like RTPS to every port of the domain's first
-    processes."""
+    """A sender of forged DDS messages that begin like RTPS. It sends to every port of the domain's
+    first processes."""
 
     def __init__(self, rng: random.Random, domain: int) -> None:
         self._domain = domain
@@ -130,7 +131,7 @@ class DatagramLiar(Liar):
 
 
 def forged(directory: Path, rng: random.Random, each_s: float, table: Table) -> None:
-    """Send forged traffic for `each_s` seconds on each wire in turn."""
+    """Send forged bytes for `each_s` seconds on one wire after the other."""
     for name, begin in WIRES.items():
         here = directory / name.replace(" ", "_")
         here.mkdir(parents=True)
@@ -184,7 +185,7 @@ def _line(name: str, place: str) -> Callable[[random.Random, int], tuple[Liar, s
 
 
 def _shipped(name: str, domain: int, place: str, there: str) -> str:
-    """Return a shipped YAML on loopback whose bus points at the forger."""
+    """Return a shipped YAML on loopback. Its bus connects to the sender of forged bytes."""
     text = (ROOT / "config" / name).read_text()
     rmf = f"rmf: {{transport: dds, network: localhost, domain_id: {domain}}}\n"
     text = re.sub(r"^rmf:\n(  .*\n)*", rmf, text, flags=re.MULTILINE)

@@ -1,5 +1,5 @@
-"""Outside causes that could keep a relay on: a dead bus, waiting readers, repeated looks, planted
-links."""
+"""Causes outside a daemon that could keep a relay on: a dead bus, processes that wait for locks,
+repeated looks at a lock, planted links."""
 
 import os
 import shutil
@@ -29,7 +29,7 @@ PLANTED = 100
 
 
 def dead_bus_first(directory: Path, table: Table) -> None:
-    """Send each signal that would end or suspend a process when the bus listed first never answers."""
+    """Send each signal that would end or suspend a process. The first bus in the YAML never answers."""
     with door(directory) as here, socket.create_server(("127.0.0.1", 0)) as hole:
         module = here.module
         module.file.write_text(with_a_dead_bus_first(module.yaml, hole.getsockname()[1], 0.5))
@@ -38,13 +38,14 @@ def dead_bus_first(directory: Path, table: Table) -> None:
             code = running.end(number)
             wait_until(lambda: not here.is_on(), "the relay is off", PATIENCE_S)
             assert live_before_dead(running.log.read_text())
-            shutil.rmtree(here.run)  # no later start can verify the dead bus
+            shutil.rmtree(here.run)  # so no later start has to verify the dead bus
             then = f"exit code {code}, the live bus off before the dead one was waited for"
             table.count("such a signal, a dead bus listed first", then)
 
 
 def readers(directory: Path, times: int, table: Table) -> None:
-    """Kill a daemon with -9 when a member of its group waits for the lock of every file it can open."""
+    """Kill a daemon with -9. A process of the same group waits for the lock of every file that it can
+    open."""
     if os.geteuid() != 0:
         table.count("a group's member waits for every lock", "not tried: needs root", 0)
         return
@@ -67,7 +68,8 @@ def readers(directory: Path, times: int, table: Table) -> None:
 
 
 def looks(directory: Path, table: Table) -> None:
-    """Take the lock with one try each time, beside a process that looks without pause."""
+    """Take the lock again and again, with one try each time. Another thread looks at the lock without
+    pause."""
     places, end = Directories(directory, directory), threading.Event()
 
     def look() -> None:
@@ -86,7 +88,7 @@ def looks(directory: Path, table: Table) -> None:
 
 
 def planted(directory: Path, table: Table) -> None:
-    """Start as root although another user has planted a link in the directory's path."""
+    """Start a daemon as root. Another user has planted a link in the path of its directory."""
     if os.geteuid() != 0:
         return
     precious, shared = directory / "precious" / "run", directory / "shared"

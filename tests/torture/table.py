@@ -1,18 +1,18 @@
-"""The table of the torture: each disturbance, its number, and its result."""
+"""The table of the torture: each disturbance, its count, and its result."""
 
 import threading
 from collections import Counter
 
 
 class Table:
-    """A count of disturbances and results. Several threads may count."""
+    """A table of counts for disturbances and results. Several threads may count."""
 
     def __init__(self) -> None:
         self._counts: Counter[tuple[str, str]] = Counter()
         self._lock = threading.Lock()
 
     def count(self, injected: str, happened: str, times: int = 1) -> None:
-        """Count this disturbance and result `times` times."""
+        """Add `times` to the count of this disturbance with this result."""
         with self._lock:
             self._counts[injected, happened] += times
 

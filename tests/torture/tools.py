@@ -1,4 +1,4 @@
-"""Attacks on the page, and on the tools that read recordings."""
+"""Attacks on the web page, and on the tools that read recordings."""
 
 import random
 import threading
@@ -26,7 +26,7 @@ MOST_LINES: Final = 20
 
 
 def pages(directory: Path, rng: random.Random, table: Table) -> None:
-    """Attack the page with half requests, strange frames, and names of a megabyte on its graph."""
+    """Attack the page with half requests, with strange frames, and with names of 1 MB on its graph."""
     directory.mkdir()
     access.add_user(directory / "passwords", USER, PASSWORD)
     log = directory / "log"
@@ -60,7 +60,7 @@ def _memory(address: str, domain: int) -> float:
 
 
 def recordings(directory: Path, seed: int, times: int, table: Table) -> None:
-    """Read wrong recordings that decode, and a small file that unpacks to much data."""
+    """Read recordings with wrong content. Also read a small file that unpacks to very much data."""
     for ending, number in endings(Mutator(seed), times, directory).items():
         command, _, code = ending.partition(": ")
         table.count(f"wrong recordings, {command}", f"exit code {code}", number)

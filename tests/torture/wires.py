@@ -1,4 +1,4 @@
-"""Wires of a daemon with one wrong part: replies, routers, tokens, clocks."""
+"""Disturbances of a daemon's wires: spoiled replies, silence, routers, tokens, clocks."""
 
 import json
 import random
@@ -35,11 +35,11 @@ def wires(directory: Path, rng: random.Random, each_s: float, times: int, table:
 
 
 class Almost(TcpLiar):
-    """A fake I/O module at which the building door stands open. The fake spoils one part of each reply
-    about that door."""
+    """A fake I/O module of a building whose door is open. In each reply about the door one part is
+    wrong."""
 
     def _forged(self, heard: bytes) -> bytes:
-        if len(heard) < 12:  # too short for a request: hang up
+        if len(heard) < 12:  # hang up, because this is too short for a request
             return b""
         number, unit, function = heard[:2], heard[6:7], heard[7]
         if function != 2:
@@ -89,7 +89,7 @@ def _silences(rng: random.Random, times: int, table: Table) -> None:
         charger.awake = True
         assert {frame for _, frame in charger.scans(rng.uniform(1, 4), power=True)} == {CHARGE}
         charger.awake = False
-        charger.scans(1.5, power=True)  # the charger's last status stays fresh for 1 s
+        charger.scans(1.5, power=True)  # the last status of the charger stays fresh for 1 s
         silent = {frame for _, frame in charger.scans(rng.uniform(2, 10), power=True)}
         assert silent == {START, STOP}
         charger.bus.close()
@@ -99,7 +99,7 @@ def _silences(rng: random.Random, times: int, table: Table) -> None:
 
 @contextmanager
 def _on_zenoh(directory: Path, name: str, **env: str) -> Iterator[tuple[Daemon, Module, Path]]:
-    """Yield the daemon of a door that must stay on this machine."""
+    """Yield the daemon of a door. Its zenoh traffic must stay on this machine."""
     here = directory / name
     here.mkdir()
     with domain_for_a_while() as domain:
@@ -158,7 +158,7 @@ def _tokens(directory: Path, table: Table) -> None:
 
 
 def _past(directory: Path, table: Table) -> None:
-    """Set the clock of the daemon's process alone, because Linux refuses such a time."""
+    """Set a clock before 1970 for the daemon's process alone, because Linux refuses such a time."""
     source, library = Path(__file__).with_name("past.c"), directory / "past.so"
     subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source, "-ldl"], check=True)
     past = directory / "past"

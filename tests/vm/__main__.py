@@ -28,12 +28,13 @@ RESTARTS: dict[str, Callable[[Machine], None]] = {
 ROOT = Path(__file__).parents[2]
 CACHE = ROOT / "build/vm"
 NEXT = "next"
-"""The folder of the next version's packages, below the folder of packages (`guest/upgrades.py`)."""
+"""The folder of the next version's packages. It lies in the folder of packages
+(`guest/upgrades.py`)."""
 
 
 def main() -> int:
-    """Build what is missing, then run the checks. A whole run uses one machine for each part, all at
-    once."""
+    """Build all missing files, then run the checks. A whole run uses one machine for each part, all at
+    the same time."""
     args = _arguments()
     folder = CACHE / f"last-{args.arch}"
     folder.mkdir(parents=True, exist_ok=True)
@@ -64,7 +65,7 @@ def main() -> int:
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m tests.vm", description=__doc__)
     parser.add_argument("--arch", choices=ARCHS, default="amd64")
-    parser.add_argument("--only", choices=PARTS, default="", help="a part")
+    parser.add_argument("--only", choices=PARTS, default="", help="run only this part")
     return parser.parse_args()
 
 
@@ -90,7 +91,7 @@ def _packages(arch: str, folder: Path) -> Path:
 
 
 def _with_a_new_module(tree: Path) -> None:
-    """Let `outputs-off` need a module that the version before lacks."""
+    """Let `outputs-off` need a new module, which only the new version has."""
     with bridges_in(tree) as package:
         (package / "added.py").touch()
         command = package / "commands/outputs_off.py"
@@ -99,7 +100,7 @@ def _with_a_new_module(tree: Path) -> None:
 
 
 def _run(machine: Machine, steps: Iterable[str], log: Path) -> int:
-    """Take every step, and return the number of failed checks."""
+    """Run all steps. Return the number of failed checks."""
     failed = 0
     with log.open("w") as out:
         for step in steps:

@@ -1,12 +1,13 @@
-"""A bootable Debian. An ordinary user builds it; kernel and list of packages identify the cached image.
+"""A bootable Debian. An ordinary user can build it. Kernel and package list identify the image in the
+cache.
 
 `mmdebstrap` makes an archive of Debian, and `mke2fs -d` makes a file system from the archive. Both run
-under fakeroot, so nothing is mounted. The first RAM disk is our own (`ram_disk.py`), because a program
-of the target system makes Debian's.
+under fakeroot, so nothing is mounted. The first RAM disk is our own (`ram_disk.py`). To make Debian's
+RAM disk, the build would have to run a program of the target system.
 
 The build does not emulate installers of another architecture. Installers leave the same text in /etc
-and /var on each architecture. So the other architecture's packages are unpacked over this machine's
-tree.
+and /var on each architecture. So the build unpacks the other architecture's packages over a tree that
+this machine's installers have made.
 """
 
 import hashlib
@@ -21,7 +22,8 @@ from typing import Final
 from tests.vm.ram_disk import ram_disk
 
 KERNEL: Final = "7.3.4+deb13"
-"""A kernel of trixie-backports, which keeps old kernels. Debian 13's own kernel lacks gpio-sim."""
+"""A kernel of trixie-backports, which keeps old kernels. The kernel of Debian 13 itself lacks
+gpio-sim."""
 MIRROR: Final = "http://deb.debian.org/debian"
 SUITES: Final = ("trixie", "trixie-backports")
 SIZE: Final = "1500M"
@@ -53,11 +55,11 @@ MODULES: Final = (
     "net/9p",
     "net/can",
 )
-"""The kernel's modules in the image. All modules would take 400 MB."""
+"""The kernel modules in the image. All modules together would take 400 MB."""
 DPKG: Final = "var/lib/dpkg"
 KEPT: Final = ("--exclude=./dev", "--exclude=./etc", "--exclude=./var")
-"""Folders from this machine's installers. They stay when the other architecture's files are
-unpacked."""
+"""Options that keep these folders as this machine's installers left them, when the other architecture's
+files are unpacked."""
 LEFT_OUT: Final = ("usr/share/doc", "usr/share/locale", "usr/share/man")
 TOOLS: Final = {
     "depmod": "kmod",
@@ -66,18 +68,18 @@ TOOLS: Final = {
     "mke2fs": "e2fsprogs",
     "mmdebstrap": "mmdebstrap",
 }
-"""The package of each program."""
+"""The Debian package of each program."""
 FILES: Final = Path(__file__).parent / "root"
-"""Files copied over the tree, so that this Debian runs the checks."""
+"""Files that are copied over the tree, so that this Debian runs the checks."""
 
 
 class Unusable(Exception):
-    """An error: this machine cannot build or boot the image. The text gives the remedy."""
+    """An error if this machine cannot build or boot the image. The text gives the remedy."""
 
 
 @dataclass(frozen=True, slots=True)
 class Image:
-    """The files that QEMU boots."""
+    """The files from which QEMU boots."""
 
     kernel: Path
     ram_disk: Path
@@ -100,7 +102,7 @@ def image(arch: str, cache: Path) -> Image:
 
 
 def needed(tools: dict[str, str]) -> None:
-    """Raise Unusable with the packages of the missing tools."""
+    """Raise Unusable if a tool is missing. The error names the tools' packages."""
     path = f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin"
     missing = sorted({deb for tool, deb in tools.items() if not shutil.which(tool, path=path)})
     if missing:
@@ -121,7 +123,7 @@ def _build(arch: str, folder: Path) -> None:
             *_filled(arch, folder, log.fileno()),
             f"mkdir {tree}/dev",
             f"cp -R {FILES}/. {tree}/",
-            f"chmod -R u+rX {tree}",  # no user may read /etc/gshadow, and mke2fs does not run as root
+            f"chmod -R u+rX {tree}",  # mke2fs is not root here, and cannot read /etc/gshadow
             f"chown -R 0:0 {tree}/etc",
             f"depmod -b {tree} {KERNEL}-{arch}",
             f"mke2fs -q -t ext4 -L root -d {tree} {folder}/root.ext4 {SIZE}",
@@ -135,7 +137,7 @@ def _build(arch: str, folder: Path) -> None:
 
 
 def _filled(arch: str, folder: Path, log: int) -> list[str]:
-    """Make archives, and return the shell's lines that make the tree from the archives."""
+    """Make archives. Return the shell's lines that make the tree from these archives."""
     here = subprocess.check_output(["dpkg", "--print-architecture"], text=True).strip()
     kernel = [f"linux-{part}-{KERNEL}-{arch}" for part in ("binary", "modules")]
     tree, ours, other = folder / "tree", folder / "ours.tar", folder / "other.tar"
@@ -166,8 +168,8 @@ def _run(words: Iterable[str], log: int) -> None:
 
 
 def _mmdebstrap(arch: str, variant: str, packages: Iterable[str], archive: Path) -> list[str]:
-    """Return the command of mmdebstrap. For an ordinary user it needs a user namespace, and uidmap's
-    programs."""
+    """Return the command of mmdebstrap. An ordinary user needs a user namespace and the programs of
+    uidmap."""
     if os.geteuid() != 0:
         needed({"newuidmap": "uidmap"})
     return [

@@ -1,7 +1,7 @@
 """QEMU with our image: boot, run a check, cut the power. QEMU uses KVM if KVM boots here, else TCG.
 
-Under TCG the machine's clock counts instructions, one for each nanosecond (`-icount shift=0`). So times
-measured inside are those of a core of 1,000 MIPS, even on a busy host.
+Under TCG the machine's clock counts instructions, one for each nanosecond (`-icount shift=0`). So even
+on a busy host the measured times are those of a core of 1,000 MIPS.
 """
 
 import json
@@ -18,12 +18,13 @@ from tests.vm.image import Image, Unusable, needed
 PROBE_S: Final = 10.0
 BOOT_S: Final = 1800.0
 ANSWER_S: Final = 3600.0
-"""Limits (s) far above need. They are times of the host, which may be busy."""
+"""Limits (s) by the host's clock. They are far above need, because the host may be busy."""
 
 
 @dataclass(frozen=True, slots=True)
 class Arch:
-    """QEMU's options for an architecture. `tcg` are the options with counted instructions."""
+    """QEMU's options for an architecture. `tcg` has the options for a clock that counts
+    instructions."""
 
     program: str
     package: str
@@ -33,10 +34,10 @@ class Arch:
 
 
 FAST: Final = "mitigations=off"
-"""A kernel option that leaves out protection against leaks of real processors. TCG pays much for it.
+"""A kernel option for speed. It switches off the protection against leaks of real processors.
 
-Five levels of page tables, and the kernel's protection from a program's pages (SMAP), cost time too. So
-the processor for amd64 has neither.
+Five levels of page tables cost time on TCG too. SMAP, the kernel's protection from a program's pages,
+costs time as well. So the processor for amd64 has neither.
 """
 COUNTED: Final = ("-accel", "tcg", "-icount", "shift=0")
 ARCHS: Final = {
@@ -56,12 +57,13 @@ ARCHS: Final = {
     ),
 }
 ENDS_WITH_US: Final = ("setpriv", "--pdeathsig", "KILL")
-"""Words before a program, so that the kernel kills the program when its starting thread ends."""
+"""Words before a program's name. The kernel then kills the program when the thread that started it
+ends."""
 KVM: Final = ("-accel", "kvm", "-cpu", "host")
 
 
 def accelerated(arch: str, image: Image) -> bool:
-    """Return whether KVM boots this kernel here. A device that opens may still hang."""
+    """Return whether KVM boots this kernel here. Even if /dev/kvm opens, KVM may hang."""
     if not os.access("/dev/kvm", os.R_OK | os.W_OK):
         return False
     found = ARCHS[arch]
@@ -80,7 +82,7 @@ def _kernel(image: Image, words: str) -> list[str]:
 
 
 class Machine:
-    """A running machine. Its disk survives a power cut, but vanishes when the machine ends.
+    """A running machine. Its disk survives a power cut, but not the end of the machine.
 
     `shared` gives folders by their 9p tags. `folder` holds the console's log and QEMU's sockets.
     """
@@ -124,7 +126,7 @@ class Machine:
         """Wait until the machine reports that it is up. Raises Unusable."""
         self._port.settimeout(BOOT_S)
         while "booted" not in (heard := self._heard()):
-            if not heard["passed"]:  # the result of a check that ends with a restart
+            if not heard["passed"]:  # this is the result of a check that ends with a restart
                 raise Unusable(f"{heard['found']}\n{heard['log']}")
 
     def check(self, name: str) -> dict[str, Any]:
@@ -134,12 +136,12 @@ class Machine:
         return self._heard()
 
     def restarts(self, check: str) -> None:
-        """Run a check that ends with a restart of the machine. Raises Unusable if it fails."""
+        """Run a check that ends with a restart of the machine. Raises Unusable if the check fails."""
         self._port.sendall(check.encode() + b"\n")
         self.booted()
 
     def cut_power(self) -> None:
-        """Reset the machine. Data that are not yet on the disk are lost."""
+        """Reset the machine. Data that is not yet on the disk gets lost."""
         with self._connect("qmp") as qmp, qmp.makefile("rb") as answers:
             for command in ("qmp_capabilities", "system_reset"):
                 qmp.sendall(json.dumps({"execute": command}).encode())

@@ -1,4 +1,4 @@
-"""The order of the checks, which are functions in `guest/`, and the host's acts between the checks."""
+"""The order of the checks, which are functions in `guest/`. Between the checks the host acts too."""
 
 import os
 from typing import Final
@@ -8,7 +8,7 @@ REBOOT: Final = "reboot"
 CUT_OFF: Final = "upgrades.cut"
 """A check that cuts the power from inside the machine, at a random moment."""
 CUTS: Final = int(os.environ.get("CUTS", "3"))
-"""The number of power cuts. Each takes a boot and two upgrades, which is minutes of a busy host."""
+"""The number of power cuts. Each cut takes a boot and two upgrades, which is minutes on a busy host."""
 LIFT: Final = ("install.package", "install.lift")
 PARTS: Final = {
     "lift": (
@@ -71,10 +71,10 @@ PARTS: Final = {
         "upgrades.purged",
     ),
 }
-"""The checks of each part. A part runs on one machine from its first boot; a check may need earlier
-checks."""
+"""The checks of each part. A part runs on one machine from its first boot. A check may depend on
+earlier checks."""
 WHOLE: Final = ("lift", "site", "upgrade")
-"""The parts that together have every check. All parts run at the same time."""
+"""The parts that together have every check. They run at the same time."""
 ALSO: Final = {("arm64", "lift"): ("inside.demo", "inside.transport")}
 """More checks on arm64, because arm64 differs from CI's own amd64 machine."""
 NOT_ON: Final = {"arm64": ("network.late",)}

@@ -22,7 +22,7 @@ exec $b switch_root /root /sbin/init
 
 
 def ram_disk(tree: Path, kernel: str) -> bytes:
-    """Return the archive for this kernel, with files from that tree."""
+    """Return the archive for this kernel, with files from the Debian in `tree`."""
     folders = [_entry(name, 0o040755) for name in ("bin", "dev", "modules", "root")]
     busybox = _entry("bin/busybox", 0o100755, (tree / "usr/bin/busybox").read_bytes())
     modules = (
@@ -34,13 +34,13 @@ def ram_disk(tree: Path, kernel: str) -> bytes:
 
 
 def _modules(folder: Path) -> Iterator[Path]:
-    """Yield the wanted modules, each after the modules it needs."""
+    """Yield the wanted modules. Each module comes after the modules that it needs."""
     lines = (folder / "modules.dep").read_text().splitlines()
     needs = {name: rest.split() for name, _, rest in (line.partition(":") for line in lines)}
     told: set[str] = set()
     for wanted in WANTED:
         found = [name for name in needs if name.rpartition("/")[2].split(".")[0] == wanted]
-        for name in found:  # modules.dep names the farthest last; a built-in one has none
+        for name in found:  # modules.dep lists the deepest need last
             for each in (*reversed(needs[name]), name):
                 if each not in told:
                     told.add(each)

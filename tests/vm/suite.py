@@ -1,4 +1,5 @@
-"""Makes the folder of tests for the machine. They run with the libraries of the installed package."""
+"""Makes the folder of tests for the machine. The tests run with the libraries of the installed
+package."""
 
 import shutil
 import subprocess
@@ -9,13 +10,13 @@ from typing import Final
 from tests.vm.image import Unusable
 
 PYTHON: Final = "3.13"
-"""Debian 13's version of Python."""
+"""The version of Python in Debian 13."""
 NEEDED: Final = ("hypothesis", "pytest", "pytest-timeout", "trustme")
 
 
 def suite(arch: str, root: Path, folder: Path) -> Path:
-    """Return a folder with `tests`, the fakes, `config` and `pyproject.toml`. `site` in it holds the
-    test libraries.
+    """Return a folder with `tests`, the fakes, `config` and `pyproject.toml`. Its folder `site` holds
+    the libraries of the tests.
 
     Raises Unusable.
     """
@@ -30,8 +31,8 @@ def suite(arch: str, root: Path, folder: Path) -> Path:
 
 
 def _fetch(arch: str, root: Path, site: Path) -> None:
-    """Fetch the libraries with deb/wheels.py, as for the package. pip alone would judge needs by this
-    machine."""
+    """Fetch the libraries with deb/wheels.py, as for the package. pip alone would judge requirements by
+    this machine."""
     fresh = site.with_name("site.new")
     shutil.rmtree(fresh, ignore_errors=True)
     words = ["--arch", arch, "--python", PYTHON, "--target", str(fresh)]

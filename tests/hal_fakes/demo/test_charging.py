@@ -1,4 +1,4 @@
-"""The charging demo, with real processes on real DDS, and the demo's verdict."""
+"""The charging demo with real processes on real DDS, and the demo's verdict."""
 
 import os
 import signal
@@ -35,7 +35,7 @@ def demo(directory: Path) -> subprocess.Popen[str]:
 
 
 @pytest.mark.long(90)
-def test_the_scenarios_go_as_their_slides_say_with_three_daemons_on_one_graph(
+def test_the_scenarios_go_as_on_their_slides_with_three_daemons_on_one_graph(
     directory: Path,
 ) -> None:
     process = demo(directory)
@@ -66,8 +66,8 @@ def test_ctrl_c_in_the_middle_leaves_nothing_behind(directory: Path) -> None:
 
 
 def journal(*told: tuple[str, str, str]) -> Journal:
-    """Return a journal of these charges in turn, each (charger, robot, request id), with IDLE
-    between."""
+    """Return a journal of these charges, one after the other. Each charge is (charger, robot, request
+    id). Between two charges the charger is IDLE."""
     made = Journal(0.0, lambda text: None, colour=False)
     for charger, robot, request_id in told:
         value = int(d.ChargerStateValue.CHARGER_CHARGING)
@@ -81,14 +81,14 @@ OURS = "charger_coordinator/1"
 RIGHT = [(charger, who, OURS) for charger, robots in CHARGED.items() for who in robots]
 
 
-def test_a_day_in_order_has_no_problems_and_one_that_lacks_a_charge_has() -> None:
+def test_only_a_day_that_lacks_a_charge_has_a_problem() -> None:
     assert problems(journal(*RIGHT)) == []
     assert problems(journal(*RIGHT[:-1])) == [
         "charger_b charged P01 AMR02, expected P01 AMR02 AMR01"
     ]
 
 
-def test_a_charge_that_nobody_asked_for_is_a_problem() -> None:
+def test_a_charge_without_a_request_is_a_problem() -> None:
     told = [*RIGHT[:-1], ("charger_b", "AMR01", "unrequested/charger_b")]
     assert problems(journal(*told)) == ["charger_b charged for unrequested/charger_b"]
 

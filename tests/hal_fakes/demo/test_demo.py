@@ -17,7 +17,7 @@ from tests.waiting import PATIENCE_S, wait_until
 
 CONFIG = Path(__file__).parents[3] / "config"
 PATIENTLY = ("--patience", "10")
-"""Options for a busy machine, so that its slowness does not fail the demo."""
+"""Options that let the demo wait longer, because the test's machine may be busy."""
 
 
 @contextmanager
@@ -58,7 +58,7 @@ def test_a_robot_goes_through_the_door_rides_the_lift_and_charges(directory: Pat
 
 
 @pytest.mark.long(23)
-def test_a_failure_makes_it_wrong_with_the_reason_the_last_states_and_the_logs(
+def test_a_failed_demo_prints_the_reason_and_the_last_states_and_the_logs(
     directory: Path,
 ) -> None:
     with demo(directory, "--fail", "ward_door", "operator", "stuck") as process:
@@ -70,7 +70,7 @@ def test_a_failure_makes_it_wrong_with_the_reason_the_last_states_and_the_logs(
     assert running(directory) == []
 
 
-def test_a_part_that_a_plant_does_not_have_is_wrong(domain: int, directory: Path) -> None:
+def test_an_unknown_part_of_a_plant_makes_the_demo_fail(domain: int, directory: Path) -> None:
     daemon = DaemonProcess(CONFIG / "door_modbus.yaml", directory, domain)
     try:
         with pytest.raises(
@@ -81,7 +81,7 @@ def test_a_part_that_a_plant_does_not_have_is_wrong(domain: int, directory: Path
         stop_all([daemon])
 
 
-def test_a_device_that_the_demo_does_not_have_is_a_usage_error(directory: Path) -> None:
+def test_an_unknown_device_of_the_demo_is_a_usage_error(directory: Path) -> None:
     with demo(directory, "--fail", "Lift9", "car", "off") as process:
         out, _ = process.communicate()
     assert process.returncode == 2

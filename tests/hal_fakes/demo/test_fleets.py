@@ -1,4 +1,4 @@
-"""A fleet from a configuration file in the form of RMF's tutorial."""
+"""A fleet from a configuration file in the form that RMF's tutorial uses."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ TINY = Path("config/fleet_tiny.yaml")
 GRAPH = {f"wait_{n}": ("L1", 4.0, 2.0 * n) for n in (1, 2, 3)}
 
 
-def test_the_shipped_fleet_has_its_robots_at_their_places_and_its_finishing_request() -> None:
+def test_the_shipped_fleet_has_robots_with_places_and_a_finishing_request() -> None:
     fleet = tutorial_fleet(TINY, GRAPH, 1.0)
     assert (fleet.name, fleet.finishing) == ("tiny", "charge")
     assert {name: robot.dedicated for name, robot in fleet.robots.items()} == {

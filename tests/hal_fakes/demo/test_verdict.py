@@ -1,4 +1,4 @@
-"""The demo accepts only a correct day. It sees and names each possible mistake."""
+"""The demo accepts only a day without mistakes. It finds and names each possible mistake."""
 
 from collections.abc import Callable
 from typing import Any
@@ -109,7 +109,7 @@ def test_each_deviation_from_the_plan_is_named(
     assert problems(journal)[0].startswith(says)
 
 
-def test_a_demo_in_which_nothing_happened_is_wrong() -> None:
+def test_a_demo_without_events_is_wrong() -> None:
     assert len(problems(Journal(0.0, lambda _: None, colour=False))) == 6
 
 
@@ -130,7 +130,7 @@ def printed() -> tuple[Journal, list[str]]:
     return Journal(100.0, lines.append, colour=False), lines
 
 
-def test_lines_come_in_the_order_in_which_things_happened_not_in_which_they_were_heard() -> None:
+def test_lines_come_in_the_order_of_the_events() -> None:
     journal, lines = printed()
     journal.state(FREE, 100.5)
     journal.edge(Edge(100.25, "Lift1", "relay", "call_L3", True))
@@ -156,14 +156,14 @@ def test_a_repeat_is_counted_but_not_printed() -> None:
     assert journal.counts() == {"requests": 4, "states": 3}
 
 
-def test_the_journal_knows_which_relays_are_still_on() -> None:
+def test_the_journal_knows_the_relays_that_are_on() -> None:
     journal = right_day()
     assert journal.relays_on() == []
     door_held(journal)
     assert journal.relays_on() == ["ward_door hold_open"]
 
 
-def test_the_day_begins_with_the_last_state_of_each_device_and_no_edge() -> None:
+def test_the_day_begins_with_the_last_state_of_each_device_and_without_edges() -> None:
     journal = right_day()
     journal.begin_day()
     assert (journal.edges, journal.requests) == ([], [])
@@ -178,7 +178,7 @@ def test_colour_is_only_for_a_terminal() -> None:
     assert lines == ["   0.000 s  \x1b[33mrelay    Lift1       call_L3 off\x1b[0m\n"]
 
 
-def test_the_summary_says_what_was_done_and_how_much_it_took() -> None:
+def test_the_summary_has_the_counts_and_the_duration() -> None:
     journal = right_day()
     journal.legs = {"door": 4.1, "lift": 11.9}
     assert summary(DEMO, journal) == (

@@ -20,7 +20,7 @@ def at(plant: ChargerPlant, now: float) -> Reading:
 
 
 def parked(*failures: tuple[str, FailureMode]) -> ChargerPlant:
-    """Return a station with these failures. A robot comes onto its pad at 1 s."""
+    """Return a station with these failures. A robot drives onto its pad at 1 s."""
     plant = ChargerPlant("a")
     for part, mode in failures:
         plant.fail(part, mode)
@@ -35,7 +35,7 @@ def commanded(asked: bool = False, cleared: bool = True) -> ChargerPlant:
 
 
 def powered(cleared: bool = True) -> ChargerPlant:
-    """Return a station whose power is on when a robot comes at 1 s."""
+    """Return a station with its power on. A robot drives onto its pad at 1 s."""
     plant = commanded(cleared=cleared)
     plant.press("robot", True, 1.0)
     plant.drive("power", True, 1.0)
@@ -47,7 +47,7 @@ def test_a_plant_has_every_part_of_its_protocol() -> None:
     assert (plant.name, plant.edges, plant.next_at()) == ("charger_a", [], NEVER)
 
 
-def test_a_robot_is_charged_until_it_is_full_and_then_left_alone() -> None:
+def test_a_robot_is_charged_until_it_is_full_and_not_longer() -> None:
     plant = parked()
     assert states(plant, 1000.0) == [
         (1.0, "handshake"),
@@ -59,7 +59,7 @@ def test_a_robot_is_charged_until_it_is_full_and_then_left_alone() -> None:
     assert (plant.battery, plant.pressed["robot"]) == (1.0, True)
 
 
-def test_a_robot_that_leaves_is_disconnected_and_the_next_one_starts_afresh() -> None:
+def test_a_robot_that_leaves_is_disconnected_and_the_next_robot_starts_afresh() -> None:
     plant = parked()
     plant.press("robot", False, 10.0)
     assert plant.battery == 0.0
@@ -75,7 +75,7 @@ def test_a_robot_that_leaves_is_disconnected_and_the_next_one_starts_afresh() ->
     ]
 
 
-def test_the_handshake_shows_how_far_it_is() -> None:
+def test_the_handshake_shows_its_progress() -> None:
     reading = at(parked(), 2.0)
     assert (reading.activity, reading.progress) == (Activity.HANDSHAKE, 0.5)
 
@@ -100,7 +100,7 @@ def test_the_pad_rises_to_a_robot_and_sinks_when_it_leaves() -> None:
         ("wrong", [20.0, 8.0, 20.0, 60.0]),
     ],
 )
-def test_a_pad_that_fails_when_it_is_up_moves_as_it_fails_and_is_mended(
+def test_a_raised_pad_moves_when_it_fails_and_when_it_is_repaired(
     mode: FailureMode, gaps: list[float]
 ) -> None:
     plant = parked()
@@ -123,7 +123,7 @@ def test_a_pad_that_fails_when_it_is_up_moves_as_it_fails_and_is_mended(
         ("transmitter_fault", "transmitter fault"),
     ],
 )
-def test_an_error_stays_until_it_is_cleared_after_its_cause_has_gone(cause: str, text: str) -> None:
+def test_an_error_stays_until_a_clearing_after_the_end_of_its_cause(cause: str, text: str) -> None:
     plant = parked()
     plant.press(cause, True, 5.0)
     assert (plant.reading().error_text, plant.pressed[cause]) == (text, True)
@@ -147,7 +147,7 @@ def test_an_error_stays_until_it_is_cleared_after_its_cause_has_gone(cause: str,
 
 
 @pytest.mark.parametrize("cause", ["foreign_object", "transmitter_fault"])
-def test_an_error_that_nothing_clears_is_over_when_its_cause_is_gone_and_power_is_off(
+def test_an_error_without_a_clearing_ends_with_its_cause_and_the_power_off(
     cause: str,
 ) -> None:
     plant = powered(cleared=False)
@@ -159,14 +159,14 @@ def test_an_error_that_nothing_clears_is_over_when_its_cause_is_gone_and_power_i
     assert at(plant, 14.0).activity is Activity.IDLE
 
 
-def test_a_clearing_without_an_error_and_a_cause_without_a_robot_change_nothing() -> None:
+def test_a_clearing_without_an_error_changes_nothing_and_a_cause_without_a_robot_neither() -> None:
     plant = ChargerPlant("a")
     plant.press("foreign_object", True, 1.0)
     plant.drive("clear_error", True, 2.0)
     assert states(plant, 100.0) == []
 
 
-def test_a_robot_that_comes_while_something_is_wrong_is_not_charged() -> None:
+def test_a_robot_that_comes_to_a_faulty_station_is_not_charged() -> None:
     plant = ChargerPlant("a")
     plant.press("foreign_object", True, 1.0)
     plant.press("robot", True, 2.0)
@@ -174,7 +174,7 @@ def test_a_robot_that_comes_while_something_is_wrong_is_not_charged() -> None:
 
 
 @pytest.mark.parametrize("mode", ["off", "stuck", "slow", "garbage", "wrong"])
-def test_a_thermometer_that_fails_lets_nobody_charge(mode: FailureMode) -> None:
+def test_a_broken_thermometer_prevents_every_charge(mode: FailureMode) -> None:
     assert states(parked(("thermometer", mode)), 60.0) == [(1.0, "error")]
 
 
@@ -188,7 +188,7 @@ def test_a_thermometer_that_fails_lets_nobody_charge(mode: FailureMode) -> None:
         ("garbage", [(1.0, "handshake"), (3.0, "charging"), (4.0, "error")]),
     ],
 )
-def test_the_robots_receiver_fails_in_five_ways(
+def test_the_receiver_of_the_robot_fails_in_five_ways(
     mode: FailureMode, history: list[tuple[float, str]]
 ) -> None:
     assert states(parked(("receiver", mode)), 25.0) == history
@@ -212,7 +212,7 @@ def test_a_part_that_fails_ends_in_its_error(failure: tuple[str, FailureMode], s
     assert (reading.activity, reading.faults) == (Activity.ERROR, frozenset({shown}))
 
 
-def test_a_station_that_is_too_hot_says_when_it_will_have_cooled_and_is_well_then() -> None:
+def test_a_hot_station_tells_its_cooling_time_and_then_recovers() -> None:
     plant = ChargerPlant("a", cleared=False)
     plant.fail("fan", "off")
     plant.press("robot", True, 1.0)
@@ -233,7 +233,7 @@ def test_a_station_that_recovers_serves_the_robot_on_its_pad_without_another_eve
     assert [state for _, state in states(plant, 8.0)][-2:] == ["idle", "handshake"]
 
 
-def test_a_fault_of_the_robot_is_over_when_it_leaves() -> None:
+def test_a_fault_of_the_robot_ends_when_the_robot_leaves() -> None:
     plant = parked(("receiver", "wrong"))
     plant.press("robot", False, 10.0)
     assert states(plant, 20.0)[1:] == [(3.0, "error"), (10.0, "idle")]
@@ -247,7 +247,7 @@ def test_a_handshake_that_hangs_shows_no_progress_and_a_mended_receiver_is_recog
     assert states(silent, 60.0) == [(50.0, "handshake"), (52.0, "charging")]
 
 
-def test_a_station_that_is_commanded_charges_while_it_is_told_to() -> None:
+def test_a_commanded_station_charges_while_the_command_lasts() -> None:
     plant = commanded()
     plant.press("tiny/AMR02", True, 1.0)
     assert states(plant, 5.0) == []
@@ -275,7 +275,7 @@ def test_power_switched_off_during_the_handshake_ends_it() -> None:
     assert states(plant, 20.0) == [(2.0, "handshake"), (3.0, "idle")]
 
 
-def test_the_station_sees_the_receiver_of_the_last_arrival_and_none_when_it_is_silent() -> None:
+def test_the_station_sees_the_receiver_of_the_last_robot_unless_the_receiver_is_silent() -> None:
     plant = commanded()
     seen = []
     for robot, here in (
@@ -294,7 +294,7 @@ def test_the_station_sees_the_receiver_of_the_last_arrival_and_none_when_it_is_s
     assert plant.reading().receiver == ""
 
 
-def test_a_battery_fills_and_the_station_says_how_long_it_takes() -> None:
+def test_a_battery_fills_and_the_station_tells_the_remaining_time() -> None:
     plant = parked()
     readings = []
     for now in (2.0, 3.0, 21.0, 39.5):
@@ -326,7 +326,7 @@ def test_a_battery_keeps_its_level_when_the_power_goes() -> None:
         ("wrong", (Activity.IDLE, 1.0, 0.0)),
     ],
 )
-def test_a_battery_that_fails_shows_in_the_reading(
+def test_a_broken_battery_shows_in_the_reading(
     mode: FailureMode, at_60: tuple[Activity, float, float]
 ) -> None:
     reading = at(parked(("battery", mode)), 60.0)
@@ -366,7 +366,7 @@ def ranges(plant: ChargerPlant) -> list[str]:
     return [at(plant, now).range_result for now in (5.1, 6.0)]
 
 
-def test_a_range_check_shows_that_it_is_under_way_and_then_its_result() -> None:
+def test_a_range_check_shows_its_progress_and_then_its_result() -> None:
     assert ranges(parked()) == ["ongoing", "in"]
     assert ranges(parked(("receiver", "off"))) == ["ongoing", "failed"]
     badly = parked()

@@ -40,7 +40,7 @@ def test_a_door_opens_while_it_is_held_and_closes_by_itself_afterwards() -> None
     assert door.next_at() == float("inf")
 
 
-def test_somebody_in_the_doorway_makes_the_door_reverse_half_way() -> None:
+def test_a_person_in_the_doorway_makes_the_door_reverse_half_way() -> None:
     door = plant()
     door.drive("hold_open", True, 0.0)
     door.drive("hold_open", False, 5.0)
@@ -57,14 +57,14 @@ def test_somebody_in_the_doorway_makes_the_door_reverse_half_way() -> None:
     ]
 
 
-def test_nobody_in_the_doorway_of_a_closed_door_opens_it() -> None:
+def test_a_person_in_the_doorway_of_a_closed_door_does_not_open_it() -> None:
     door = plant()
     door.press("obstruction", True, 1.0)
     door.advance(60.0)
     assert edges(door) == [(1.0, "obstruction", True)]
 
 
-def test_a_push_opens_it_without_a_relay() -> None:
+def test_a_push_opens_the_door_without_a_relay() -> None:
     door = plant()
     door.press("push", True, 1.0)
     door.press("push", False, 4.0)
@@ -84,7 +84,7 @@ def test_a_fire_only_closes_a_contact() -> None:
 
 
 @pytest.mark.parametrize("mode", ["off", "stuck"])
-def test_a_dead_operator_stands_still_until_it_is_mended(mode: str) -> None:
+def test_a_dead_operator_stands_still_until_its_repair(mode: str) -> None:
     door = plant()
     door.drive("hold_open", True, 0.0)
     door.advance(1.0)
@@ -112,7 +112,7 @@ def test_a_confused_operator_stops_half_way() -> None:
     assert (door.position, door.next_at()) == (0.5, float("inf"))
 
 
-def test_an_operator_wired_the_wrong_way_round_opens_when_it_is_released() -> None:
+def test_an_operator_with_wrong_wires_opens_when_it_is_released() -> None:
     door = plant()
     door.advance(0.0)
     door.fail("operator", "wrong")
@@ -128,7 +128,7 @@ def test_an_operator_wired_the_wrong_way_round_opens_when_it_is_released() -> No
     ]
 
 
-def test_an_unknown_press_or_failure_is_refused_with_those_that_exist() -> None:
+def test_an_unknown_press_or_failure_is_refused_with_the_known_names() -> None:
     with pytest.raises(ValueError, match="no 'bell' to press; there are fire, obstruction, push"):
         plant().press("bell", True, 0.0)
     with pytest.raises(ValueError, match=r"there are closed, fire, hold_open, .*, server, unit"):
@@ -141,7 +141,7 @@ def test_a_door_on_pins_has_no_module_to_fail() -> None:
         door.fail("server", "off")
 
 
-def test_an_operator_for_pulses_waits_for_the_next_one() -> None:
+def test_an_operator_for_pulses_waits_for_the_next_pulse() -> None:
     pulsed = settings(pulse={"on_s": 0.5, "every_s": 3.0})
     door = build("door", pulsed, wires(pulsed))
     for second in range(0, 30, 3):

@@ -1,4 +1,4 @@
-"""The lift plant: whole histories of its terminal block in virtual time."""
+"""The lift plant. Tests compare whole histories of its terminal block in virtual time."""
 
 from collections.abc import Callable
 from typing import Any
@@ -25,7 +25,7 @@ def in_agv_mode(**changes: Any) -> LiftPlant:
     return plant
 
 
-def test_it_starts_at_the_lowest_landing_with_its_door_closed() -> None:
+def test_a_lift_starts_at_the_lowest_landing_with_its_door_closed() -> None:
     plant = lift()
     now = {s: plant.sense(s) for s in ("floor_B1", "floor_G", "door_opened", "door_closed")}
     assert (now, plant.edges, plant.next_at()) == (
@@ -106,7 +106,7 @@ def test_calls_and_door_relays_do_nothing_outside_agv_mode() -> None:
     assert history(plant) == [(1.0, "call_G", True), (1.0, "door_open", True)]
 
 
-def test_peoples_calls_come_first_and_are_ignored_in_agv_mode() -> None:
+def test_calls_of_people_come_first_but_are_ignored_in_agv_mode() -> None:
     plant = lift()
     plant.press("hall_G", True, 0.0)
     plant.drive("agv_mode_request", True, 0.1)
@@ -125,7 +125,7 @@ def test_peoples_calls_come_first_and_are_ignored_in_agv_mode() -> None:
     ]
 
 
-def test_fire_takes_the_car_to_the_lowest_landing_and_opens() -> None:
+def test_a_fire_takes_the_car_to_the_lowest_landing_and_opens_its_door() -> None:
     plant = in_agv_mode()
     plant.drive("call_1", True, 1.0)
     plant.press("fire_alarm", True, 2.0)
@@ -157,7 +157,7 @@ def test_fire_takes_the_car_to_the_lowest_landing_and_opens() -> None:
     ]
 
 
-def test_a_car_that_is_at_the_recall_landing_stays_though_its_door_does_not_open() -> None:
+def test_a_car_at_the_recall_landing_stays_even_if_its_door_does_not_open() -> None:
     plant = in_agv_mode()
     plant.fail("door_operator", "stuck")
     plant.press("fire_alarm", True, 1.0)
@@ -179,7 +179,7 @@ CLOSES = [(6.05, "door_opened", False), (7.05, "door_closed", True)]
         ("manual_mode", CLOSES),
     ],
 )
-def test_a_hazard_stops_the_car_at_the_next_landing_and_lets_whoever_is_inside_out(
+def test_a_hazard_stops_the_car_at_the_next_landing_and_lets_people_out(
     hazard: str, then: list[tuple[float, str, bool]]
 ) -> None:
     plant = in_agv_mode(inputs=inputs(**{hazard: line(40)}))
@@ -233,7 +233,7 @@ def test_an_obstructed_door_opens_again() -> None:
     ]
 
 
-def test_at_a_landing_with_two_doors_the_relay_chooses() -> None:
+def test_at_a_landing_with_two_doors_the_relay_chooses_the_door() -> None:
     plant = in_agv_mode(**REAR)
     plant.drive("call_G", True, 1.0)
     plant.drive("call_G", False, 4.0)
@@ -259,7 +259,7 @@ def test_a_lift_may_be_called_by_a_code() -> None:
     assert plant.car.floor == 2
 
 
-def test_lines_that_count_only_in_agv_mode_are_off_outside_it() -> None:
+def test_lines_that_are_valid_only_in_agv_mode_are_off_in_other_modes() -> None:
     only = {"valid_when": "agv_mode"}
     wired = inputs(
         door_opened=line(2, **only), door_closed=line(3, **only), stopped=line(40, **only)
@@ -414,7 +414,7 @@ def test_a_door_operator_that_is_wired_wrongly_closes_when_it_should_open() -> N
     ]
 
 
-def test_a_controller_that_is_stuck_keeps_agv_mode() -> None:
+def test_a_stuck_controller_keeps_agv_mode() -> None:
     plant = in_agv_mode()
     plant.fail("controller", "stuck")
     plant.drive("agv_mode_request", False, 1.0)
@@ -424,7 +424,7 @@ def test_a_controller_that_is_stuck_keeps_agv_mode() -> None:
     assert (kept, plant.sense("agv_mode")) == (True, False)
 
 
-def test_a_car_that_stuck_half_way_goes_on_when_it_is_mended() -> None:
+def test_a_car_that_is_stuck_half_way_goes_on_after_its_repair() -> None:
     plant = in_agv_mode()
     plant.drive("call_G", True, 1.0)
     plant.advance(2.0)
@@ -445,7 +445,7 @@ def broken(do: Callable[[LiftPlant], None]) -> str:
     return str(refused.value)
 
 
-def test_an_unknown_part_or_signal_is_named_with_those_that_exist() -> None:
+def test_an_unknown_part_or_signal_is_refused_with_the_known_names() -> None:
     assert broken(lambda p: p.press("fire", True, 0.0)) == (
         "lift has no 'fire' to press; there are fire_alarm, hall_B1, hall_G, hall_1, obstruction"
     )
@@ -472,7 +472,7 @@ def test_every_edge_is_reported_as_it_happens() -> None:
     ]
 
 
-def test_a_contact_that_sticks_before_anything_moved_keeps_its_first_state() -> None:
+def test_a_contact_that_sticks_before_the_first_movement_keeps_its_first_state() -> None:
     plant = build("Lift1", shipped())
     plant.fail("floor_bit0", "stuck")
     plant.advance(1.0)

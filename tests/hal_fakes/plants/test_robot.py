@@ -1,4 +1,4 @@
-"""The simulated robot drives, turns, drains its battery, charges, rides, and fails as its table
+"""The simulated robot drives, turns, drains its battery, charges and rides. It fails as its table
 says."""
 
 import msgspec
@@ -32,7 +32,7 @@ def after(plant: RobotPlant, seconds: float) -> Pose:
     return Pose(at.map, round(at.x, 3), round(at.y, 3), round(at.yaw, 3))
 
 
-def test_it_drives_straight_and_reports_the_order_when_it_has_arrived() -> None:
+def test_a_robot_drives_straight_and_reports_the_order_at_its_arrival() -> None:
     plant = robot()
     order(plant, "go", CHARGER)
     assert after(plant, 5.0) == Pose("L1", 5 * SPEED, 0.0)
@@ -41,7 +41,7 @@ def test_it_drives_straight_and_reports_the_order_when_it_has_arrived() -> None:
     assert (plant.reading().moving, plant.reading().completed) == (False, "7")
 
 
-def test_it_drains_while_it_drives_and_charges_at_a_charger() -> None:
+def test_a_robot_drains_during_a_drive_and_charges_at_a_charger() -> None:
     plant = robot()
     order(plant, "go", CHARGER)
     after(plant, 9.0)
@@ -80,7 +80,7 @@ def test_localiser_and_battery_fail_as_the_table_says() -> None:
     assert (plant.reading().at.x, plant.reading().battery) == (500.0, -0.03)
 
 
-def test_a_lost_robots_last_report_is_repeated_and_a_liars_order_is_done_at_once() -> None:
+def test_a_lost_robot_repeats_its_report_and_a_lying_robot_reports_its_order_done() -> None:
     plant = robot()
     plant.press("lost", True, plant.now)
     before = plant.reading()

@@ -1,4 +1,4 @@
-"""Stories of one alarm panel in virtual time. They show which causes of an alarm the core reports."""
+"""Stories of one alarm panel in virtual time. They test which causes the core reports, and when."""
 
 from typing import Any
 
@@ -18,13 +18,13 @@ LIMITS = PanelLimits(
 )
 
 STEP_S = 0.125
-"""A power of two, so that sums of times stay exact."""
+"""The time (s) between two readings. It is a power of two, so sums of times stay exact."""
 
 
 class Panel:
-    """A panel that is read every STEP_S.
+    """A panel that the core reads every STEP_S.
 
-    `told` has (s, present causes, seen, drill), with one entry for each change.
+    `told` gets an entry (s, present causes, seen, drill) at each change.
     """
 
     def __init__(self) -> None:
@@ -63,7 +63,7 @@ def test_a_source_is_active_after_its_debounce_and_over_after_it_was_clear() -> 
     panel = Panel().until(1.0)
     panel.on["fire"] = True
     panel.until(1.25)
-    panel.on["fire"] = False  # a bounce
+    panel.on["fire"] = False  # the contact bounces
     panel.until(2.0)
     panel.on["fire"] = True
     panel.until(3.0)
@@ -172,9 +172,9 @@ def test_a_key_that_is_on_at_the_start_begins_no_drill() -> None:
 
 
 def test_no_history_hides_a_lasting_cause_or_makes_a_drill_last() -> None:
-    """All histories of five readings, or of seven in `make deep`, 0.375 s or 6 s apart.
+    """Try all histories of five readings, or of seven readings in `make deep`.
 
-    Each history is checked by rules that do not use the core's code.
+    Readings are 0.375 s or 6 s apart. The checks do not use the core's code.
     """
     moves = ("fire", "out", "key", "no key", "dead", "later")
 

@@ -1,7 +1,7 @@
 """Rules for every decision of the charger's core, in any history.
 
-The rules judge the event, the readings, the outputs and the walk's ledger. The rules ask the core's
-memory only whether a request still holds the station.
+The rules judge the event, the readings, the outputs and the walk's ledger. From the core's memory the
+rules take only one fact: whether a request still holds the station.
 """
 
 from bridges.kinds.charger.signals import Activity
@@ -28,9 +28,9 @@ def check(step: Step) -> None:
 
 
 def the_message_is_whole(step: Step) -> None:
-    """Require an error text in state ERROR, and in no other state.
+    """Require an error text in state ERROR, and no error text in any other state.
 
-    Beside each request id the message must name the robot of that request.
+    A message with a request id must also name the robot of that request.
     """
     shown = step.decision.report
     assert shown.state in set(State)
@@ -50,7 +50,7 @@ def the_message_is_whole(step: Step) -> None:
 
 
 def the_state_is_what_was_read(step: Step) -> None:
-    """Require CHARGING exactly while current flows.
+    """Require the state CHARGING if current flows. Without current the state must not be CHARGING.
 
     Require ERROR if the station is lost or faulty, or if a second node serves the same station.
     """
@@ -69,7 +69,7 @@ def the_state_is_what_was_read(step: Step) -> None:
 
 
 def power_has_a_reason(step: Step) -> None:
-    """Require a valid request and a healthy station that answers, whenever power is ordered."""
+    """Require a valid request and a healthy station that answers whenever the core orders power."""
     power, shown = step.decision.outputs.power, step.decision.report
     if power:
         assert step.ledger.granted is not None
@@ -93,7 +93,7 @@ def power_has_a_reason(step: Step) -> None:
 
 
 def nobody_else_is_energised(step: Step) -> None:
-    """Require that a station that recognises robots gives power to the requesting robot only.
+    """Require power only for the robot of the request, if the station recognises robots.
 
     The robot must be in range when the power begins.
     """
@@ -115,9 +115,9 @@ def nobody_else_is_energised(step: Step) -> None:
 
 
 def protection_lasts(step: Step) -> None:
-    """Require a clearing of errors before the end of "out of service".
+    """Require a station to stay out of service until a clearing of errors has helped.
 
-    A good reading must follow the clearing within CLEAR_S.
+    A good reading within CLEAR_S after the clearing proves that the clearing has helped.
     """
     before, after = step.before.ledger, step.ledger
     if before.out and not after.out:
@@ -130,7 +130,8 @@ def protection_lasts(step: Step) -> None:
 def requests_end_on_good_readings(step: Step) -> None:
     """Require a good reading whenever a request ends.
 
-    The exception is an operator's reset at a station that has been silent for a long time.
+    One end needs no good reading: an operator's reset at a station that has been silent for a long
+    time.
     """
     before = step.before.ledger
     if before.granted is None or step.ledger.granted == before.granted:
@@ -142,7 +143,7 @@ def requests_end_on_good_readings(step: Step) -> None:
         assert before.read_at is None or step.now - before.read_at >= silent_s
     elif step.ledger.granted is None:
         assert isinstance(step.event, Sampled)
-    else:  # the request of another robot, which the station sees on its pad
+    else:  # the station has seen another robot on its pad, and serves that robot's request
         assert step.seen
         seen = step.limits.receivers.get(step.seen.measured.receiver_id or "")
         assert seen == step.ledger.robot
@@ -150,9 +151,9 @@ def requests_end_on_good_readings(step: Step) -> None:
 
 
 def commands_are_counted(step: Step) -> None:
-    """Require at most one new command of each type in a decision.
+    """Require that a decision adds at most one command of each type.
 
-    No errors may be cleared while a second node serves the station.
+    No command may clear errors while a second node serves the same station.
     """
     before, outputs = step.before.memory, step.decision.outputs
     assert outputs.clear_errors - before.clear_errors in (0, 1)
@@ -164,8 +165,8 @@ def commands_are_counted(step: Step) -> None:
 def a_request_that_waits_has_a_reason(step: Step) -> None:
     """Require a reason for each waiting request.
 
-    A request that holds the station waits in two states: ASSIGNED and ERROR. In CHARGING the request
-    waits too, if the core forbids the power.
+    A request that holds the station waits in the states ASSIGNED and ERROR. The request also waits in
+    CHARGING if the core forbids the power.
     """
     shown, seen = step.decision.report, step.seen
     may_not = step.decision.outputs.power is False and seen and seen.activity is Activity.CHARGING
@@ -188,6 +189,6 @@ def _rivalled(step: Step) -> bool:
 
 
 def _going_on(step: Step) -> bool:
-    """Has current flowed for this request?"""
+    """Has current already flowed for this request?"""
     holder = step.decision.memory.holder
     return holder is not None and holder.started

@@ -1,4 +1,5 @@
-"""A station that recognises the robot on its pad and can be switched, at the beginning of a story."""
+"""The first part of a story. The station recognises the robot on its pad, and the core can switch
+it."""
 
 from msgspec.structs import replace
 
@@ -25,7 +26,7 @@ def story(limits: ChargerLimits = FULL) -> Story:
 
 
 def docked() -> Story:
-    """Return a story at 5 s. AMR01 asked at 1 s, then docked, and has charged since 4 s."""
+    """Return a story at 5 s. AMR01 sent its request at 1 s, then docked, and has charged since 4 s."""
     return (
         story().event(AMR1).sees((A.IDLE, NOBODY, 2), (A.HANDSHAKE, ONE, 1), (A.CHARGING, ONE, 1))
     )

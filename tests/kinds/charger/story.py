@@ -1,4 +1,4 @@
-"""Stories for the charger's core: a station that is polled once a second, in virtual time."""
+"""Stories for the charger's core in virtual time. The core reads the station once a second."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -23,16 +23,16 @@ from bridges.kinds.shared.decision import IoFailed, OperatorReset, RivalSeen, Sa
 
 DURATIONS = ChargerDurations(misses=3, start_timeout_s=60.0, released_s=2.0)
 LIMITS = ChargerLimits(DURATIONS, can_stop=False)
-"""A station that can only be observed."""
+"""The limits of a station that the core can only observe."""
 RECEIVERS = {"rx-1": robot("tiny/AMR01"), "rx-2": robot("tiny/AMR02")}
 
 
 FULL = ChargerLimits(DURATIONS, RECEIVERS)
-"""A station that sees the robot on its pad, and can be stopped."""
+"""The limits of a station that recognises the robot on its pad and that the core can stop."""
 
 
 def observed(**durations: Any) -> ChargerLimits:
-    """Return the limits of a station that can only be observed, with these durations changed."""
+    """Return the limits of a station that the core can only observe, with these durations changed."""
     return ChargerLimits(ChargerDurations(**durations), can_stop=False)
 
 
@@ -67,8 +67,8 @@ CANCEL_1 = Cancelled("req-1")
 class Story:
     """A core with its memory, in virtual time.
 
-    `told` has (time, state, request id or error), with one entry for each change. `powered` has the
-    core's decision about power after each poll by `sees`.
+    `told` gets an entry (time, state, request id or error) at each change. `powered` has the core's
+    decision about power after each poll by `sees`.
     """
 
     limits: ChargerLimits = LIMITS
@@ -98,7 +98,7 @@ class Story:
         return self
 
     def polls(self, script: str) -> "Story":
-        """Poll once a second. With `idle 3, charging 2`, three polls read idle, then two polls read
+        """Poll once a second. `idle 3, charging 2` means three polls that read idle and two that read
         charging."""
         for part in script.split(","):
             word, count = part.split()

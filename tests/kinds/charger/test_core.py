@@ -33,7 +33,7 @@ from tests.kinds.charger.story import (
 # ---- CHARGER-1: the states
 
 
-def test_a_scheduled_charge_goes_through_every_state_and_ends_idle() -> None:
+def test_a_scheduled_charge_passes_every_state_and_ends_idle() -> None:
     story = Story().polls("idle 2").event(AMR1)
     story.polls("idle 10, handshake 3, charging 60, stopping 2, released 3, idle 4")
     assert story.told == [
@@ -56,7 +56,7 @@ def test_an_ad_hoc_request_of_a_robot_already_in_the_handshake_is_granted() -> N
     ]
 
 
-def test_every_state_but_idle_names_the_robot_and_its_request() -> None:
+def test_every_state_except_idle_names_the_robot_and_its_request() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("idle 1")
     assert story.report == ChargerReport(
         read_at=1.0,
@@ -68,7 +68,7 @@ def test_every_state_but_idle_names_the_robot_and_its_request() -> None:
     )
 
 
-def test_time_to_full_and_measurements_are_reported_but_are_not_news() -> None:
+def test_time_to_full_and_measurements_are_reported_but_cause_no_message() -> None:
     story = Story().polls("idle 1").event(AMR1)
     reports = []
     for volts in (48.0, 48.5):
@@ -126,12 +126,12 @@ def test_a_second_robot_is_refused_while_the_first_has_the_station(doing: str) -
     assert [reason for _, reason in story.refused] == ["charger occupied"]
 
 
-def test_a_second_request_of_the_same_robot_is_refused_while_the_first_stands() -> None:
+def test_a_second_request_of_the_same_robot_is_refused_during_the_first() -> None:
     story = Story().polls("idle 1").event(AMR1).event(ChargeRequested("req-3", "tiny", "AMR01"))
     assert story.refused == [(1.0, "charger occupied")]
 
 
-def test_a_late_repeat_of_a_request_that_is_over_does_not_start_it_again() -> None:
+def test_a_late_repeat_of_a_finished_request_starts_nothing() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("charging 2, idle 4").event(AMR1)
     assert story.told[-1] == (5.0, "IDLE", "")
     assert story.refused == [(7.0, "request is over")]
@@ -147,7 +147,7 @@ def test_only_the_last_few_requests_are_remembered() -> None:
 
 
 @pytest.mark.parametrize("before", ["hot 1", "odd 1", "silent 3", "silent 1"])
-def test_a_station_in_error_or_not_read_yet_takes_no_request(before: str) -> None:
+def test_a_station_that_is_in_error_or_unread_takes_no_request(before: str) -> None:
     story = Story().polls(before).event(AMR1)
     assert [reason for _, reason in story.refused] == ["charger in error"]
     assert story.memory.holder is None
@@ -156,7 +156,7 @@ def test_a_station_in_error_or_not_read_yet_takes_no_request(before: str) -> Non
 # ---- CHARGER-3: the start timeout
 
 
-def test_a_request_that_does_not_charge_in_its_time_is_released_with_a_fault() -> None:
+def test_a_request_without_a_charge_in_time_is_released_with_a_fault() -> None:
     asked = ChargeRequested("req-1", "tiny", "AMR01", start_timeout_s=5.0)
     story = Story().polls("idle 1").event(asked).polls("idle 10")
     assert story.told == [
@@ -168,17 +168,17 @@ def test_a_request_that_does_not_charge_in_its_time_is_released_with_a_fault() -
     assert story.faults == ["START_TIMEOUT: tiny/AMR01 did not start to charge in time"]
 
 
-def test_a_start_timeout_of_zero_means_the_configured_one() -> None:
+def test_a_start_timeout_of_zero_means_the_configured_timeout() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("handshake 62")
     assert story.told[-1] == (61.0, "RELEASED", "req-1")
 
 
-def test_charging_that_has_started_is_not_timed_out() -> None:
+def test_a_charge_that_has_started_has_no_timeout() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("charging 600")
     assert story.told[-1] == (1.0, "CHARGING", "req-1")
 
 
-def test_a_coupling_lost_and_sought_again_gets_its_whole_start_timeout_again() -> None:
+def test_a_coupling_that_is_lost_and_sought_again_gets_its_whole_start_timeout() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("charging 100, handshake 59, charging 1")
     story.polls("handshake 61, idle 3")
     assert story.told[2:] == [
@@ -200,7 +200,9 @@ def test_a_cancel_before_charging_releases_the_station() -> None:
     assert story.faults == []
 
 
-def test_a_cancel_while_charging_takes_the_power_and_shows_charging_until_it_stops() -> None:
+def test_a_cancel_during_a_charge_ends_the_power_and_shows_charging_until_the_current_ends() -> (
+    None
+):
     story = Story().polls("idle 1").event(AMR1).polls("charging 2")
     assert story.outputs.power is True
     story.event(CANCEL_1)
@@ -224,7 +226,7 @@ def test_a_cancel_during_the_restart_delay_only_keeps_the_power_off() -> None:
     assert story.outputs.power is False
 
 
-def test_a_second_cancel_changes_nothing_before_and_after_the_end() -> None:
+def test_a_second_cancel_changes_nothing() -> None:
     story = Story().polls("idle 1").event(AMR1).all([CANCEL_1, CANCEL_1]).polls("idle 4")
     story.event(CANCEL_1)
     assert story.told[-1] == (3.0, "IDLE", "")
@@ -250,7 +252,7 @@ def test_a_robot_that_charges_after_its_request_has_ended_is_shown_charging_with
     ]
 
 
-def test_a_cancelled_charge_is_not_waited_for_again_when_the_coupling_is_lost() -> None:
+def test_after_a_cancel_a_lost_coupling_is_not_waited_for() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("charging 1").event(CANCEL_1)
     story.polls("handshake 3")
     assert story.told[3:] == [(2.0, "RELEASED", "req-1"), (4.0, "IDLE", "")]
@@ -265,7 +267,7 @@ def test_released_is_shown_for_its_full_time_after_the_reading_that_shows_it() -
 # ---- CHARGER-6: faults
 
 
-def test_an_error_is_shown_in_the_stations_words_and_the_power_is_off() -> None:
+def test_an_error_is_shown_in_the_words_of_the_station_with_power_off() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("charging 1, hot 1")
     assert story.report == ChargerReport(
         read_at=2.0,
@@ -279,7 +281,7 @@ def test_an_error_is_shown_in_the_stations_words_and_the_power_is_off() -> None:
     assert story.outputs == ChargerOutputs(power=False)
 
 
-def test_after_an_error_the_request_is_over_and_the_station_idle_again() -> None:
+def test_an_error_ends_the_request_and_the_station_becomes_idle() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("charging 1, hot 3, idle 3")
     assert story.told[3:] == [
         (2.0, "ERROR", "over temperature"),
@@ -288,7 +290,7 @@ def test_after_an_error_the_request_is_over_and_the_station_idle_again() -> None
     ]
 
 
-def test_an_error_before_charging_ends_the_request_too() -> None:
+def test_an_error_before_a_charge_ends_the_request_too() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("hot 1, idle 3")
     assert story.told[2:] == [
         (1.0, "ERROR", "over temperature"),
@@ -307,7 +309,7 @@ def test_a_ramp_down_after_an_error_is_not_another_fault() -> None:
     assert story.faults == ["CHARGER_ERROR: over temperature"]
 
 
-def test_after_an_error_there_is_no_power_until_a_new_request() -> None:
+def test_after_an_error_only_a_new_request_gives_power() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("hot 1, handshake 2, charging 1")
     assert story.told[2:] == [
         (1.0, "ERROR", "over temperature"),
@@ -329,7 +331,7 @@ def test_an_unknown_vendor_state_is_an_error_with_its_number() -> None:
     assert story.faults[0] == "UNKNOWN_VENDOR_STATE: unknown vendor state 99"
 
 
-def test_an_error_without_a_text_names_the_vendors_number() -> None:
+def test_an_error_without_a_text_names_the_number_of_the_vendor() -> None:
     story = Story().event(Sampled(ChargerSample(Activity.ERROR, 238)))
     assert story.told == [(0.0, "ERROR", "the charger reports an error (vendor state 238)")]
 
@@ -341,7 +343,7 @@ def test_errors_are_never_cleared_without_an_operator_by_default() -> None:
     assert Story().polls("hot 7200").outputs == ChargerOutputs(power=False)
 
 
-def test_an_operators_reset_clears_an_error_once() -> None:
+def test_a_reset_of_an_operator_clears_an_error_once() -> None:
     story = Story().polls("hot 1").event(RESET)
     assert story.outputs == ChargerOutputs(power=False, clear_errors=1)
     assert story.polls("hot 60").outputs == ChargerOutputs(power=False, clear_errors=1)
@@ -361,7 +363,7 @@ def test_a_reset_with_no_error_to_clear_is_refused() -> None:
     assert story.outputs.clear_errors == 0
 
 
-def test_errors_are_cleared_by_themselves_at_the_configured_rate() -> None:
+def test_errors_are_cleared_automatically_at_the_configured_rate() -> None:
     story = Story(observed(clear_errors_per_h=4))
     cleared_at = []
     for second in range(7200):
@@ -389,7 +391,7 @@ def test_an_unknown_state_is_not_cleared() -> None:
 # ---- CHARGER-7: not reachable
 
 
-def test_a_station_that_was_never_read_is_in_error_and_nothing_is_driven() -> None:
+def test_a_station_that_was_never_read_is_in_error_with_all_outputs_off() -> None:
     story = Story().event(SILENT)
     assert story.report == ChargerReport(
         read_at=None,
@@ -400,7 +402,7 @@ def test_a_station_that_was_never_read_is_in_error_and_nothing_is_driven() -> No
     assert story.outputs == ChargerOutputs(power=None)
 
 
-def test_before_the_first_reading_the_error_says_that_there_was_none() -> None:
+def test_before_the_first_reading_the_error_tells_that_the_station_was_not_read() -> None:
     story = Story().event(AMR1)
     assert story.faults == ["CHARGER_UNREACHABLE: not read yet"]
 
@@ -426,9 +428,7 @@ def test_missed_polls_count_only_when_they_follow_one_another() -> None:
     assert story.told[-1] == (1.0, "ASSIGNED", "req-1")
 
 
-def test_a_lost_station_stays_occupied_past_its_start_timeout_and_shows_what_it_does_when_back() -> (
-    None
-):
+def test_a_lost_station_stays_occupied_after_its_start_timeout() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("silent 500").event(AMR2)
     assert story.refused == [(501.0, "charger in error")]
     story.polls("charging 2")
@@ -438,7 +438,7 @@ def test_a_lost_station_stays_occupied_past_its_start_timeout_and_shows_what_it_
     ]
 
 
-def test_a_charge_that_ended_unseen_is_released_when_the_station_is_back() -> None:
+def test_a_charge_that_ended_without_a_reading_is_released_when_the_station_is_back() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("charging 1, silent 100, idle 3")
     assert story.told[3:] == [
         (4.0, "ERROR", "Charger unreachable"),
@@ -447,16 +447,16 @@ def test_a_charge_that_ended_unseen_is_released_when_the_station_is_back() -> No
     ]
 
 
-def test_a_start_timeout_that_passed_unseen_is_reported_when_the_station_is_back() -> None:
+def test_a_start_timeout_that_passed_without_a_reading_is_reported_later() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("silent 100, idle 3")
     assert story.told[3:] == [(101.0, "RELEASED", "req-1"), (103.0, "IDLE", "")]
     assert story.faults[-1] == "START_TIMEOUT: tiny/AMR01 did not start to charge in time"
 
 
-# ---- CHARGER-8: nobody asked
+# ---- CHARGER-8: charges without a request
 
 
-def test_a_restart_while_charging_adopts_the_charge_and_leaves_the_power_alone() -> None:
+def test_a_restart_during_a_charge_adopts_the_charge_and_leaves_the_power_unchanged() -> None:
     story = Story().polls("charging 3")
     assert story.report == ChargerReport(
         read_at=2.0,
@@ -473,7 +473,7 @@ def test_a_restart_while_charging_adopts_the_charge_and_leaves_the_power_alone()
     assert story.outputs == ChargerOutputs(power=False)
 
 
-def test_unrequested_charging_is_not_credited_to_the_next_robot_that_asks() -> None:
+def test_a_charge_without_a_request_does_not_count_for_the_next_robot_that_asks() -> None:
     story = Story().polls("charging 1").event(AMR2)
     assert story.refused == [(1.0, "charger occupied")]
     assert story.report is not None
@@ -498,7 +498,7 @@ def test_a_second_node_for_the_same_charger_stops_everything_until_it_is_silent_
     ]
 
 
-def test_of_two_nodes_for_a_charger_neither_clears_an_error() -> None:
+def test_two_nodes_for_one_charger_clear_no_error() -> None:
     story = Story(observed(clear_errors_per_h=60)).event(RIVAL).polls("hot 4")
     assert story.outputs.clear_errors == 0
     assert [fault.split(":")[0] for fault in story.faults] == [
@@ -508,7 +508,7 @@ def test_of_two_nodes_for_a_charger_neither_clears_an_error() -> None:
     ]
 
 
-def test_the_core_asks_to_be_woken_when_the_rival_is_due_to_be_gone() -> None:
+def test_the_core_wakes_when_the_rival_counts_as_gone() -> None:
     seen = core.decide(ChargerMemory(), RIVAL, 7.0, LIMITS)
     later = core.decide(seen.memory, IDLE, 12.0, LIMITS)
     assert (seen.wake_at, later.wake_at) == (12.0, float("inf"))

@@ -1,4 +1,4 @@
-"""Properties of the charger's core over long histories, and the pace of clearing errors."""
+"""Properties of the charger's core over long histories, and how often the core clears errors."""
 
 import itertools
 

@@ -57,7 +57,7 @@ def test_a_malformed_request_is_refused_by_name(changes: dict[str, object], kind
     assert refusal.value.kind == kind
 
 
-def test_a_charge_that_nobody_asked_for_is_cancelled_by_its_published_id() -> None:
+def test_a_charge_without_a_request_is_cancelled_by_its_published_id() -> None:
     accept = KIND.requests[CHARGER_CANCELS]
     ours = ChargerCancel("charger_a", "unrequested/charger_a")
     theirs = ChargerCancel("charger_a", "unrequested/charger_b")
@@ -79,7 +79,7 @@ def test_a_name_of_256_letters_of_any_script_is_taken() -> None:
     )
 
 
-def test_a_charging_station_is_reported_as_rmf_reads_it() -> None:
+def test_a_charging_station_is_reported_in_the_form_that_rmf_reads() -> None:
     shown = ChargerReport(
         read_at=1.0,
         state=ChargerStateValue.CHARGER_CHARGING,
@@ -101,7 +101,7 @@ def test_a_charging_station_is_reported_as_rmf_reads_it() -> None:
 
 
 @pytest.mark.parametrize("state", ChargerStateValue)
-def test_every_state_but_idle_has_a_request_id_even_if_nobody_asked(
+def test_every_state_except_idle_has_a_request_id_even_without_a_request(
     state: ChargerStateValue,
 ) -> None:
     message = messages.state_message("charger_a", SETTINGS, ChargerReport(1.0, state), Time())

@@ -1,5 +1,4 @@
-"""ChargerState's error_message names the robot on the pad, and a reader gets that name back
-unchanged."""
+"""ChargerState's error_message names the robot on the pad. A reader gets exactly that name back."""
 
 import pytest
 from hypothesis import given, settings
@@ -53,7 +52,7 @@ def test_names_of_any_script_are_readable_in_an_error() -> None:
     "text",
     ["", "station: fan", "wrong docking: AMR01", "unknown receiver a b", "unknown receiver 1, 2"],
 )
-def test_a_text_of_another_form_names_no_robot(text: str) -> None:
+def test_an_error_text_of_another_form_names_no_robot(text: str) -> None:
     assert misplaced_in(text) is None
 
 
@@ -61,6 +60,6 @@ def test_a_text_of_another_form_names_no_robot(text: str) -> None:
     "words",
     ["wrong docking: a/b is not assigned here", "Charger unreachable", "unknown receiver 1"],
 )
-def test_a_stations_own_words_are_not_taken_for_the_daemons(words: str) -> None:
+def test_the_words_of_a_station_do_not_count_as_words_of_the_daemon(words: str) -> None:
     told = error_text(ChargerSample(Activity.ERROR, 9, words))
     assert (told, diagnosis(told)) == (f"the charger says: {words}", FaultCause.UNCLEAR)

@@ -55,7 +55,7 @@ class Idle:
 
 @dataclass
 class Station:
-    """A charger's node that is scanned once a second. `said` has the node's messages."""
+    """A charger's node that scans once a second. `said` has the node's messages."""
 
     now: float = 0.0
     said: list[tuple[str, Any]] = field(default_factory=list)
@@ -86,16 +86,14 @@ class Station:
         return [(m.state, m.request_id) for m in found]
 
 
-def test_a_robot_that_asks_for_an_occupied_charger_learns_who_has_it_and_the_state_is_unchanged() -> (
-    None
-):
+def test_a_robot_that_asks_for_an_occupied_charger_learns_the_name_of_the_other_robot() -> None:
     it = Station().hears().hears(FIRST).hears(SECOND).hears()
     assert it.refusals() == [REFUSED]
     assert it.states() == [(1, ""), (2, "req-1"), (2, "req-1"), (2, "req-1")]
     assert REFUSED.text == "charger occupied: tiny/AMR01 has it (request req-1)"
 
 
-def test_a_refusal_is_a_status_whose_values_are_its_fields() -> None:
+def test_a_refusal_is_a_diagnostic_status_with_one_value_for_each_field() -> None:
     it = Station().hears().hears(FIRST).hears(SECOND)
     assert [m for topic, m in it.said if topic == "charger_refusals"] == [
         DiagnosticStatus(
@@ -117,17 +115,17 @@ def test_a_refusal_is_a_status_whose_values_are_its_fields() -> None:
     ]
 
 
-def test_a_granted_request_its_repeat_and_a_cancel_are_not_answered() -> None:
+def test_a_granted_request_and_its_repeat_and_a_cancel_get_no_answer() -> None:
     it = Station().hears().hears(FIRST).hears(FIRST).hears(ChargerCancel("a", "nobody"))
     assert it.refusals() == []
 
 
-def test_every_repeat_of_a_refused_request_is_answered_as_the_first_answer_may_be_lost() -> None:
+def test_every_repeat_of_a_refused_request_is_answered_because_an_answer_may_be_lost() -> None:
     it = Station().hears().hears(FIRST).hears(SECOND).hears(SECOND)
     assert it.refusals() == [REFUSED, REFUSED]
 
 
-def test_a_malformed_request_is_answered_by_the_next_scan_with_what_is_wrong_about_it() -> None:
+def test_the_next_scan_answers_a_malformed_request_with_its_mistake() -> None:
     it = Station().hears().hears(replace(FIRST, start_timeout=Duration(-1)))
     long = replace(FIRST, robot_name="x" * 5000)
     it.hears(long)
@@ -151,7 +149,7 @@ def test_a_flood_of_requests_causes_no_flood_of_answers() -> None:
     assert len(it.refusals()) == 100
 
 
-def test_an_answer_that_has_to_wait_is_a_reason_to_wake() -> None:
+def test_an_answer_that_must_wait_wakes_the_loop() -> None:
     it = Station().hears().hears(FIRST).hears(SECOND, after_s=0.01).hears(SECOND, after_s=0.0)
     assert (it.refusals(), round(it.node.wake_at, 3)) == ([REFUSED], 2.1)
     it.now = it.node.wake_at
@@ -172,7 +170,7 @@ def test_the_last_refusal_is_in_the_status_and_in_diagnostics() -> None:
     assert values["refused charger occupied"] == "1"
 
 
-def test_a_status_that_is_not_a_refusal_is_not_read_as_one() -> None:
+def test_a_status_without_a_refusal_is_not_read_as_a_refusal() -> None:
     message = REFUSED.message()
     others = [replace(message, name="x"), replace(message, values=()), DiagnosticStatus()]
     assert [read(status) for status in (message, *others)] == [REFUSED, None, None, None]

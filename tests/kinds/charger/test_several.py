@@ -17,7 +17,8 @@ from tests.transports.memory import MemoryNetwork, MemoryTransport
 from tests.waiting import wait_until
 
 TIMEOUT_S = 0.5
-"""The timeout (s) of the bad station. The sound stations have a longer timeout, for a busy machine."""
+"""The timeout (s) of the faulty station. The other stations have a longer timeout, because the test's
+machine may be busy."""
 
 
 def silent(caller: Caller) -> None:
@@ -60,7 +61,7 @@ def told(states: list[ChargerState], name: str) -> list[tuple[int, str]]:
 
 
 @pytest.mark.parametrize("bad", [silent, trickles], ids=["silent", "trickling"])
-def test_a_dead_station_is_shown_as_such_and_the_others_are_read_on_time(
+def test_a_dead_station_is_shown_as_dead_and_other_stations_are_read_on_time(
     tmp_path: Path, bad: Callable[[Caller], None]
 ) -> None:
     sound = always(answer(b'{"state": 5}'))

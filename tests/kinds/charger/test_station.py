@@ -1,4 +1,4 @@
-"""A station that recognises the robot on its pad and can be switched.
+"""A station that recognises the robot on its pad. The core can switch its power.
 
 The stories play the five situations of a shared charger, in virtual time, with one poll a second.
 """
@@ -29,7 +29,7 @@ from tests.kinds.charger.story import (
 # ---- CHARGER-1, CHARGER-5: scheduled
 
 
-def test_a_scheduled_charge_goes_through_every_state_with_its_robot_and_request_filled_in() -> None:
+def test_a_scheduled_charge_names_robot_and_request_in_every_state() -> None:
     it = story().event(AMR1)
     it.sees((A.IDLE, NOBODY, 5), (A.IDLE, ONE, 1), (A.HANDSHAKE, ONE, 2), in_range=None)
     it.sees((A.CHARGING, ONE, 1), battery_percent=40.0, time_to_full_s=3600.0)
@@ -54,9 +54,7 @@ def test_a_scheduled_charge_goes_through_every_state_with_its_robot_and_request_
     assert it.faults == []
 
 
-def test_power_is_given_when_the_right_receiver_is_seen_and_taken_when_the_battery_is_full() -> (
-    None
-):
+def test_power_is_on_from_the_sight_of_the_right_receiver_to_the_full_battery() -> None:
     it = story().event(AMR1)
     it.sees((A.IDLE, NOBODY, 2), (A.IDLE, ONE, 1), (A.HANDSHAKE, ONE, 1), (A.CHARGING, ONE, 1))
     it.sees((A.CHARGING, ONE, 1), battery_percent=100.0)
@@ -81,7 +79,7 @@ def test_a_released_station_is_not_free_before_the_pad_is_clear() -> None:
     assert it.told[-2:] == [(105.0, "IDLE", ""), (106.0, "ASSIGNED", "req-2")]
 
 
-def test_a_robot_still_on_the_pad_may_ask_again_once_released_was_shown() -> None:
+def test_a_robot_on_the_pad_may_ask_again_after_released_was_shown() -> None:
     it = docked().sees((A.IDLE, ONE, 1))
     it.event(ChargeRequested("req-9", "tiny", "AMR01")).sees((A.IDLE, ONE, 2))
     it.event(ChargeRequested("req-9", "tiny", "AMR01")).sees((A.CHARGING, ONE, 1)).event(AMR1)
@@ -89,7 +87,7 @@ def test_a_robot_still_on_the_pad_may_ask_again_once_released_was_shown() -> Non
     assert it.refused == [(6.0, "charger occupied"), (9.0, "request is over")]
 
 
-def test_a_receiver_that_is_lost_from_sight_while_current_flows_keeps_its_power() -> None:
+def test_a_receiver_that_is_lost_from_sight_during_a_charge_keeps_its_power() -> None:
     it = docked().sees((A.CHARGING, NOBODY, 2))
     assert it.outputs.power is True
 
@@ -97,10 +95,10 @@ def test_a_receiver_that_is_lost_from_sight_while_current_flows_keeps_its_power(
 # ---- CHARGER-5: the range
 
 
-def test_nothing_is_energised_before_a_check_of_the_range_that_was_asked_for_says_yes() -> None:
+def test_power_waits_for_a_check_of_the_range_that_the_core_has_ordered() -> None:
     it = story().event(AMR1).sees((A.IDLE, NOBODY, 1), in_range=True)
     assert it.outputs == ChargerOutputs(power=False)
-    it.sees((A.IDLE, ONE, 1), in_range=True)  # older than the core's first check
+    it.sees((A.IDLE, ONE, 1), in_range=True)  # before the core has ordered a check
     assert it.outputs == ChargerOutputs(power=False, range_checks=1)
     it.sees((A.IDLE, ONE, 1), in_range=False)
     assert it.outputs == ChargerOutputs(power=False, range_checks=1)
@@ -108,7 +106,7 @@ def test_nothing_is_energised_before_a_check_of_the_range_that_was_asked_for_say
     assert it.outputs == ChargerOutputs(power=True, range_checks=1)
 
 
-def test_a_robot_out_of_range_is_looked_for_every_five_seconds_until_its_time_is_up() -> None:
+def test_the_range_is_checked_every_five_seconds_until_the_start_timeout() -> None:
     it = story().event(AMR1)
     asked = []
     for _ in range(70):
@@ -121,12 +119,12 @@ def test_a_robot_out_of_range_is_looked_for_every_five_seconds_until_its_time_is
     assert True not in it.powered
 
 
-def test_a_range_that_is_lost_while_current_flows_is_the_stations_own_affair() -> None:
+def test_a_range_that_is_lost_during_a_charge_changes_nothing() -> None:
     it = docked().sees((A.CHARGING, ONE, 1), in_range=False)
     assert it.outputs == ChargerOutputs(power=True)
 
 
-def test_a_coupling_that_is_sought_again_is_checked_again() -> None:
+def test_a_coupling_that_is_sought_again_needs_a_new_check_of_the_range() -> None:
     it = story().event(AMR1).sees((A.IDLE, ONE, 2), in_range=True)
     it.sees((A.CHARGING, ONE, 1), in_range=True).sees((A.HANDSHAKE, ONE, 1), in_range=True)
     assert it.outputs == ChargerOutputs(power=False, range_checks=2)
@@ -155,7 +153,7 @@ def test_the_start_timeout_of_an_ad_hoc_request_counts_from_its_acceptance() -> 
     assert it.faults[-1] == "START_TIMEOUT: tiny/AMR01 did not start to charge in time"
 
 
-def test_where_the_site_says_so_a_known_robot_is_charged_without_a_request() -> None:
+def test_with_the_setting_a_known_robot_is_charged_without_a_request() -> None:
     serves = replace(FULL, unrequested="serve_known")
     it = story(serves).sees((A.IDLE, ONE, 1), (A.HANDSHAKE, ONE, 1), (A.CHARGING, ONE, 2))
     it.sees((A.IDLE, ONE, 5), (A.IDLE, NOBODY, 2))
@@ -169,7 +167,7 @@ def test_where_the_site_says_so_a_known_robot_is_charged_without_a_request() -> 
     assert it.powered == [False, True, True, True, True] + [False] * 7
 
 
-def test_a_robot_that_is_served_without_a_request_may_ask_be_cancelled_and_leave() -> None:
+def test_a_robot_served_without_a_request_may_send_request_and_cancel_and_may_leave() -> None:
     serves = replace(FULL, unrequested="serve_known")
     asks = story(serves).sees((A.IDLE, ONE, 1)).event(AMR2).event(AMR1)
     assert (asks.told[-1], asks.refused) == (
@@ -191,7 +189,7 @@ def test_a_station_at_fault_or_a_stranger_is_not_served_without_a_request() -> N
     assert it.memory.holder is None
 
 
-def test_a_robot_served_without_a_request_gets_no_more_power_once_it_has_left() -> None:
+def test_a_robot_served_without_a_request_gets_no_more_power_after_it_has_left() -> None:
     it = story(SERVING).sees((A.HANDSHAKE, ONE, 1), (A.CHARGING, ONE, 1), (A.IDLE, NOBODY, 1))
     it.sees((A.CHARGING, ONE, 1))
     assert it.powered == [False, True, True, False, False]
@@ -209,7 +207,7 @@ def test_robots_served_without_a_request_push_no_ended_request_out_of_memory() -
 # ---- CHARGER-2: stacked
 
 
-def test_a_second_robot_is_not_granted_while_the_first_is_on_the_pad_finished_or_not() -> None:
+def test_a_second_robot_is_not_granted_until_the_first_has_left_the_pad() -> None:
     it = docked().event(AMR2).sees((A.CHARGING, ONE, 1), (A.IDLE, ONE, 5)).event(AMR2)
     assert it.refused == [(5.0, "charger occupied"), (11.0, "charger occupied")]
     assert it.report is not None
@@ -258,7 +256,7 @@ def test_the_right_station_stays_assigned_until_its_start_timeout() -> None:
     ]
 
 
-def test_an_intruder_pauses_the_start_timeout_of_the_request_that_waits() -> None:
+def test_a_wrong_robot_on_the_pad_pauses_the_start_timeout() -> None:
     it = story().event(AMR1)
     it.sees((A.IDLE, NOBODY, 10), (A.IDLE, TWO, 100), (A.IDLE, NOBODY, 55))
     assert it.told[2:] == [
@@ -283,7 +281,7 @@ def test_an_unknown_receiver_is_refused_with_its_number() -> None:
     ]
 
 
-def test_a_robot_that_drives_onto_the_pad_as_the_first_one_leaves_is_refused() -> None:
+def test_a_robot_that_replaces_the_first_robot_on_the_pad_is_refused() -> None:
     it = docked().sees((A.CHARGING, TWO, 3), (A.IDLE, TWO, 3), (A.IDLE, NOBODY, 1))
     assert it.powered[5:] == [False] * 7
     assert it.told[3:] == [
@@ -297,9 +295,7 @@ def test_a_robot_without_a_receiver_here_is_not_granted() -> None:
     assert it.refused == [(1.0, "robot has no receiver here")]
 
 
-def test_a_station_that_does_not_say_whom_it_sees_charges_nobody_where_receivers_are_given() -> (
-    None
-):
+def test_a_station_that_names_no_receiver_charges_nobody_if_the_yaml_has_receivers() -> None:
     it = Story(FULL).polls("idle 1").event(AMR1).polls("charging 1")
     assert it.told == [
         (0.0, "ERROR", "the YAML has receivers, but the charger does not say which one it sees")
@@ -307,14 +303,14 @@ def test_a_station_that_does_not_say_whom_it_sees_charges_nobody_where_receivers
     assert it.outputs.power is False
 
 
-def test_a_stranger_pauses_the_start_timeout_too_and_ends_a_charge_that_it_replaces() -> None:
+def test_an_unknown_receiver_pauses_the_start_timeout_and_ends_a_charge() -> None:
     waits = story().event(AMR1).sees((A.IDLE, "4711", 100), (A.IDLE, NOBODY, 1))
     assert waits.told[-1] == (101.0, "ASSIGNED", "req-1")
     charged = docked().sees((A.CHARGING, "4711", 4), (A.IDLE, NOBODY, 1))
     assert charged.told[-1] == (9.0, "IDLE", "")
 
 
-def test_a_robot_that_another_has_displaced_gets_no_more_power_for_that_request() -> None:
+def test_a_displaced_robot_gets_no_more_power_for_its_request() -> None:
     it = (
         story().event(AMR1).sees((A.HANDSHAKE, ONE, 1), (A.CHARGING, ONE, 1), (A.HANDSHAKE, TWO, 1))
     )
@@ -323,7 +319,7 @@ def test_a_robot_that_another_has_displaced_gets_no_more_power_for_that_request(
     assert still_charging(it) == ["STILL_CHARGING: req-1: left"]
 
 
-def test_a_robot_that_left_full_is_still_full_when_another_has_come() -> None:
+def test_a_robot_that_left_full_counts_as_full_after_another_robot_came() -> None:
     it = (
         story()
         .event(AMR1)
@@ -346,7 +342,7 @@ def test_each_refusal_has_its_own_fault() -> None:
     ]
 
 
-# ---- CHARGER-5: a pad that the station moves
+# ---- CHARGER-5: a station that moves its pad
 
 
 def test_nothing_is_energised_before_the_pad_is_at_its_height_and_the_robot_in_range() -> None:
@@ -356,7 +352,7 @@ def test_nothing_is_energised_before_the_pad_is_at_its_height_and_the_robot_in_r
     assert it.powered[1:] == [False, False, False, True]
 
 
-def test_without_these_signals_nothing_is_asked_of_the_pad() -> None:
+def test_a_station_without_pad_signals_needs_no_pad() -> None:
     assert story().event(AMR1).sees((A.IDLE, ONE, 1)).powered[1:] == [True]
 
 
@@ -380,13 +376,13 @@ def test_a_pad_that_sinks_when_no_current_flows_is_not_a_fault() -> None:
     assert [line[1] for line in it.told[1:]] == ["ASSIGNED", "CHARGING", "RELEASED", "IDLE"]
 
 
-def test_a_pad_that_is_down_asks_for_no_check_of_the_range() -> None:
+def test_no_check_of_the_range_is_ordered_for_a_pad_that_is_down() -> None:
     it = story().event(AMR1).sees((A.IDLE, ONE, 3), at_height=False, in_range=False)
     assert it.outputs.range_checks == 0
     assert it.sees((A.IDLE, ONE, 1), at_height=True, in_range=False).outputs.range_checks == 1
 
 
-def test_a_range_that_is_lost_under_power_takes_the_power_away_without_a_fault() -> None:
+def test_a_range_that_is_lost_under_power_ends_the_power_without_a_fault() -> None:
     it = story().event(AMR1).sees((A.IDLE, ONE, 1), (A.CHARGING, ONE, 1), range_ok=True)
     it.sees((A.CHARGING, ONE, 1), (A.IDLE, ONE, 1), range_ok=False)
     assert it.powered[1:] == [True, True, False, False]

@@ -37,7 +37,7 @@ def at_fault(text: str, side: str = "", receiver: str = ONE) -> Sampled[ChargerS
 
 
 @pytest.mark.parametrize("side", ["station", ""])
-def test_a_station_at_fault_loses_its_power_first_and_is_out_of_service_until_cleared_and_seen_well(
+def test_a_station_at_fault_is_out_of_service_until_a_clearing_has_helped(
     side: str,
 ) -> None:
     it = docked().event(at_fault("over temperature", side))
@@ -54,7 +54,7 @@ def test_a_station_at_fault_loses_its_power_first_and_is_out_of_service_until_cl
     assert it.told[-2:] == [(7205.0, "IDLE", ""), (7206.0, "ASSIGNED", "req-2")]
 
 
-def test_a_fault_of_the_robots_side_leaves_the_station_in_service() -> None:
+def test_a_fault_on_the_side_of_the_robot_leaves_the_station_in_service() -> None:
     it = (
         story()
         .event(AMR1)
@@ -67,7 +67,7 @@ def test_a_fault_of_the_robots_side_leaves_the_station_in_service() -> None:
     assert it.event(AMR2).told[-1] == (7.0, "ASSIGNED", "req-2")
 
 
-def test_a_waiting_request_survives_an_intruders_fault_but_not_the_stations() -> None:
+def test_a_waiting_request_survives_the_fault_of_a_wrong_robot_but_not_of_the_station() -> None:
     theirs = story().event(AMR1).event(at_fault("handshake timeout", "robot", TWO))
     theirs.sees((A.IDLE, NOBODY, 1))
     assert theirs.told[-1] == (1.0, "ASSIGNED", "req-1")
@@ -76,7 +76,7 @@ def test_a_waiting_request_survives_an_intruders_fault_but_not_the_stations() ->
     assert ours.told[-2:] == [(1.0, "RELEASED", "req-1"), (3.0, "IDLE", "")]
 
 
-def test_the_side_at_fault_is_not_named_twice() -> None:
+def test_the_text_names_the_side_at_fault_once() -> None:
     it = story().event(at_fault("station: fan stuck", "station"))
     assert it.told[-1] == (1.0, "ERROR", "station: fan stuck")
     assert it.faults == [
@@ -102,7 +102,7 @@ def test_a_clearing_that_failed_does_not_count_later() -> None:
     assert it.told[-1] == (45.0, "ERROR", "out of service after: station: fan stuck")
 
 
-def test_a_good_reading_proves_a_clearing_up_to_its_last_instant() -> None:
+def test_a_good_reading_proves_a_clearing_until_the_end_of_its_time() -> None:
     def shown_after(later_s: float) -> str:
         it = story().event(Sampled(ChargerSample(A.ERROR, 9, "fan", side="station"))).event(RESET)
         it.now += later_s
@@ -113,7 +113,7 @@ def test_a_good_reading_proves_a_clearing_up_to_its_last_instant() -> None:
     assert shown_after(CLEARED_WITHIN_S + 0.001) == "ERROR"
 
 
-def test_a_clearing_is_not_verified_by_a_station_that_still_charges_or_is_not_known() -> None:
+def test_a_station_that_charges_or_is_unknown_proves_no_clearing() -> None:
     it = docked().event(at_fault("fan stuck")).sees((A.CHARGING, ONE, 1)).event(RESET)
     it.sees((A.CHARGING, ONE, 1), (A.STOPPING, ONE, 1), (A.UNKNOWN, ONE, 1))
     assert it.memory.protection == "fan stuck"
@@ -121,7 +121,7 @@ def test_a_clearing_is_not_verified_by_a_station_that_still_charges_or_is_not_kn
     assert it.memory.protection == ""
 
 
-def test_the_request_under_way_when_a_station_fails_is_over_and_can_be_cancelled() -> None:
+def test_a_fault_of_the_station_ends_the_request_which_can_then_be_cancelled() -> None:
     it = docked().event(at_fault("fan stuck")).event(CANCEL_1)
     it.sees((A.IDLE, NOBODY, 4))
     assert it.report is not None
@@ -148,7 +148,7 @@ def test_a_station_that_goes_on_charging_when_told_to_stop_is_out_of_service() -
     assert slow.memory.protection == ""
 
 
-def test_commands_that_fail_again_and_again_are_an_error() -> None:
+def test_repeated_failures_of_commands_are_an_error() -> None:
     it = docked().event(CANCEL_1)
     for _ in range(3):
         it.sees((A.CHARGING, ONE, 1)).event(WriteFailed("status 500"))
@@ -164,12 +164,12 @@ def test_commands_that_fail_again_and_again_are_an_error() -> None:
 # ---- CHARGER-4, CHARGER-7: cancel and unreachable
 
 
-def test_a_cancel_while_the_station_is_lost_takes_the_power_as_soon_as_it_is_heard() -> None:
+def test_a_cancel_for_a_lost_station_ends_the_power_as_soon_as_the_station_answers() -> None:
     it = docked().all([SILENT] * 3).event(CANCEL_1)
     assert it.outputs == ChargerOutputs(power=False)
 
 
-def test_an_operator_frees_a_lost_station_only_when_it_must_have_switched_off_by_itself() -> None:
+def test_a_reset_frees_a_lost_station_only_after_its_own_switch_off_time() -> None:
     limits = replace(FULL, t=ChargerDurations(peer_internal_timeout_s=15.0))
     it = story(limits).event(AMR1).sees((A.CHARGING, ONE, 1)).all([SILENT] * 3)
     it.now = 15.9
@@ -187,9 +187,7 @@ def test_an_operator_frees_a_lost_station_only_when_it_must_have_switched_off_by
 # ---- CHARGER-8: restart
 
 
-def test_a_restart_while_charging_adopts_the_charge_and_its_robot_and_leaves_the_power_alone() -> (
-    None
-):
+def test_a_restart_during_a_charge_adopts_charge_and_robot_and_keeps_the_power() -> None:
     it = Story(FULL).sees((A.CHARGING, ONE, 2))
     assert it.powered == [None, None]
     assert it.report == ChargerReport(
@@ -207,12 +205,12 @@ def test_a_restart_while_charging_adopts_the_charge_and_its_robot_and_leaves_the
     assert it.told[-1] == (2.0, "CHARGING", "req-1")
 
 
-def test_a_restart_while_a_stranger_charges_does_not_leave_it_alone() -> None:
+def test_a_restart_during_the_charge_of_a_stranger_ends_the_charge() -> None:
     it = Story(FULL).sees((A.CHARGING, "4711", 1))
     assert (it.powered, it.told) == ([False], [(0.0, "ERROR", "unknown receiver 4711")])
 
 
-def test_charging_that_begins_while_we_watch_and_that_nobody_asked_for_is_stopped() -> None:
+def test_a_charge_that_begins_without_a_request_is_stopped() -> None:
     it = story().sees((A.CHARGING, ONE, 1))
     assert it.powered == [False, False]
     unseen = Story(ChargerLimits(DURATIONS)).polls("idle 1, charging 1")
@@ -221,12 +219,12 @@ def test_charging_that_begins_while_we_watch_and_that_nobody_asked_for_is_stoppe
     assert serves.outputs.power is None
 
 
-def test_a_charge_that_ran_while_the_station_was_lost_is_adopted_too() -> None:
+def test_a_charge_that_began_at_a_lost_station_is_adopted() -> None:
     it = story().all([SILENT] * 3).sees((A.CHARGING, ONE, 1))
     assert it.powered[-1] is None
 
 
-def test_an_adopted_charge_that_is_asked_for_or_served_goes_on_whatever_its_range_says() -> None:
+def test_an_adopted_charge_goes_on_for_any_reading_of_its_range() -> None:
     asked = Story(FULL).sees((A.CHARGING, ONE, 1), in_range=False).event(AMR1)
     assert (asked.outputs.power, asked.memory.adopted) == (True, False)
     serves = replace(FULL, unrequested="serve_known")
@@ -234,7 +232,7 @@ def test_an_adopted_charge_that_is_asked_for_or_served_goes_on_whatever_its_rang
     assert (served.outputs.power, served.memory.adopted) == (True, False)
 
 
-def test_a_station_that_is_lost_shows_the_robot_it_charged_last_and_no_other() -> None:
+def test_a_lost_station_shows_only_the_robot_that_it_charged_last() -> None:
     adopted = Story(FULL).sees((A.CHARGING, ONE, 1))
     refused = story().sees((A.IDLE, ONE, 1))
     for it, robot in ((docked(), "AMR01"), (adopted, "AMR01"), (refused, "")):
@@ -250,7 +248,7 @@ def test_each_receiver_belongs_to_the_robot_that_the_yaml_names() -> None:
     }
 
 
-def test_another_receiver_is_news_and_another_age_is_not() -> None:
+def test_another_receiver_causes_a_message_and_another_age_does_not() -> None:
     report = story().event(AMR1).sees((A.HANDSHAKE, ONE, 1)).report
     assert report is not None
     assert replace(report, read_at=99.0).news() == report.news()

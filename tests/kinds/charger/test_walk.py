@@ -58,7 +58,7 @@ def test_each_stage_of_a_charge_is_what_its_name_says() -> None:
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_a_chargers_rules_hold_within_some_steps_of_the_start(site: str) -> None:
+def test_the_rules_of_a_charger_hold_within_some_steps_of_the_start(site: str) -> None:
     found = walker(SITES[site]).walk([World()], depth(3, 4), check)
     assert len(found) > depth(1000, 5000)
 
@@ -79,7 +79,7 @@ def test_the_rules_hold_within_some_steps_of_a_stage_at_a_verified_station(stage
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_from_every_state_a_sound_station_comes_back_and_charges_the_robot_that_asks(
+def test_from_every_state_a_station_without_faults_recovers_and_charges_the_robot_that_asks(
     site: str,
 ) -> None:
     limits = SITES[site]
@@ -91,7 +91,8 @@ def test_from_every_state_a_sound_station_comes_back_and_charges_the_robot_that_
 
 
 def _mended(world: World, limits: ChargerLimits) -> World:
-    """Return the world after repairs: a clear pad, healthy parts that answer, and reset latches."""
+    """Return the world after all repairs: the pad is clear, all parts work and answer, no error is
+    latched."""
     world = replace(world, readable=True, writable=True)
     steps = ("idle", "the pad is clear", "in range", "gap right", "pad at height")
     then = ("A cancels", "B cancels", 32.0, "reset", 4.0)
@@ -99,7 +100,8 @@ def _mended(world: World, limits: ChargerLimits) -> World:
 
 
 def _charged(world: World, limits: ChargerLimits) -> World:
-    """Return the world in which the first robot has asked, has come, and has begun to charge."""
+    """Return the world in which the first robot has sent a request, has docked, and has begun to
+    charge."""
     asked = ChargeRequested("req-new", "tiny", "A")
     world = moved(world, lambda before: (before, [asked]), limits, check)
     world = walker(limits).path(world, "A docks", 2.0, seen=check)

@@ -3,8 +3,8 @@
 A state has the core's memory, the station with its pad, and a ledger of events. All times in a state
 are relative to now. The ledger is written without the core's code.
 
-Ages beyond every limit are made equal, and counts are left out. So two states that cannot behave
-differently count as one state.
+The walk cuts long ages to a limit and leaves counts out. So two states that must behave alike count as
+one state.
 """
 
 from collections.abc import Callable
@@ -57,11 +57,11 @@ SITES = {
 class Ledger(msgspec.Struct, frozen=True):
     """The events so far, noted without the core's conclusions. Times are relative to the state's time.
 
-    - `granted` is the last accepted request, until its end is seen.
+    - `granted` is the last accepted request, until a reading shows its end.
     - `robot` is the robot of that request.
-    - `spoiled` says that since the grant the request was cancelled or an error was read.
-    - `read_at` is the time of the last good reading, and `misses` counts the failed readings after it.
-    - `out` says that the station's own fault was read, and that no clearing has helped yet.
+    - `spoiled` says that the request was cancelled, or that an error was read after the grant.
+    - `read_at` is the time of the last good reading. `misses` counts the failed readings after it.
+    - `out` says that a reading has shown a fault of the station itself, and no clearing has helped yet.
     - `cleared_at` is the time of the last clearing.
     """
 
@@ -77,9 +77,9 @@ class Ledger(msgspec.Struct, frozen=True):
 
 
 class World(msgspec.Struct, frozen=True):
-    """The core's memory and the ledger at time 0, and the station.
+    """The station, with the core's memory and the ledger at time 0.
 
-    `readable` and `writable` say whether the station answers readings and obeys commands.
+    `readable` says whether the station answers readings. `writable` says whether it obeys commands.
     """
 
     memory: ChargerMemory = ChargerMemory()
@@ -91,7 +91,8 @@ class World(msgspec.Struct, frozen=True):
 
 
 class Step(msgspec.Struct, frozen=True):
-    """One decision of the core, with the world before it and the ledger after it."""
+    """One decision of the core, with the world before the decision and the ledger after the
+    decision."""
 
     before: World
     event: Event
@@ -253,7 +254,7 @@ def _read(ledger: Ledger, sample: ChargerSample, now: float, limits: ChargerLimi
 
 
 def _held(ledger: Ledger, decision: Any) -> Ledger:
-    """Return the ledger without its request, if the core holds no request now.
+    """Return the ledger. The ledger loses its request if the core holds no request now.
 
     Other rules judge how the request ended.
     """
@@ -273,7 +274,7 @@ def _held(ledger: Ledger, decision: Any) -> Ledger:
 def alike(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
     """Return the memory with its times relative to now.
 
-    Two memories that cannot behave differently become equal.
+    Two memories that must behave alike become equal.
     """
     holder = memory.holder
     if holder:
@@ -309,8 +310,7 @@ def _shifted(ledger: Ledger, now: float) -> Ledger:
 
 
 def _at(at: Any, now: float, oldest_s: float = OLDEST_S) -> Any:
-    """Return a time relative to now. Ages above `oldest_s` are cut to `oldest_s`, and None stays
-    None."""
+    """Return a time relative to now. Ages above `oldest_s` become `oldest_s`, and None stays None."""
     return None if at is None else max(at - now, -oldest_s)
 
 

@@ -27,7 +27,7 @@ A, B = "charger_a", "charger_b"
 
 
 class Alone(alone.Alone[SiteMemory, Event, SiteLimits, SiteReport]):
-    """The core alone. `shows` has each station's state, and `seen` has the robots that fleets show."""
+    """The core alone. `shows` has each station's state. `seen` has the robots that the fleets show."""
 
     def __init__(self) -> None:
         self.shows = {name: ChargerStateHeard(name, IDLE) for name in (A, B)}
@@ -48,7 +48,7 @@ class Alone(alone.Alone[SiteMemory, Event, SiteLimits, SiteReport]):
         return [str(fault) for fault in self.report.faults]
 
     def run(self, seconds: int) -> list[tuple[float, str]]:
-        """Let time pass, second by second. Return the messages of that time."""
+        """Let this many seconds pass, one by one. Return the messages sent in that time."""
         said = len(self.sent)
         for _ in range(seconds):
             self.now += 1.0
@@ -60,12 +60,13 @@ class Alone(alone.Alone[SiteMemory, Event, SiteLimits, SiteReport]):
         return self.sent[said:]
 
     def wants(self, who: RobotName, place: str | None = None, percent: float = 40.0) -> None:
-        """Let the fleet show, from now on, that this robot wants to charge."""
+        """Let the fleet show from now on that this robot wants to charge."""
         place = f"wait_{who.name[-1]}" if place is None else place
         self.seen[who] = Sighting(who, True, place, percent, f"task of {who.name}")
 
     def does(self, station: str, state: Any, error: str = "") -> None:
-        """Let the station show this state, with the last request that the coordinator sent to it."""
+        """Let the station show this state, together with the coordinator's last request to this
+        station."""
         grant = self.memory.grants[station]
         self.shows[station] = ChargerStateHeard(
             station, state, grant.request_id, grant.robot, error

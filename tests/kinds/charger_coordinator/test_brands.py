@@ -13,7 +13,7 @@ from tests.kinds.charger_coordinator.virtual_site import PLACES, Yard, settings,
 
 
 def yard() -> Yard:
-    """Return a yard in which both fleets run and no robot has a wish."""
+    """Return a yard in which both fleets run and no robot wants to charge."""
     site = Yard(two_brands(), finishing="charge")
     assert [what for _, what in site.run(5.0)][-4:] == [
         "B01 -> WAIT bay_1",
@@ -24,7 +24,7 @@ def yard() -> Yard:
     return site
 
 
-def test_two_brands_are_charged_at_the_same_stations_one_after_the_other() -> None:
+def test_robots_of_two_brands_are_charged_at_the_same_stations() -> None:
     site = yard()
     site.big.charge("B01", site.now)
     site.run(6.0)
@@ -54,7 +54,7 @@ def test_two_brands_are_charged_at_the_same_stations_one_after_the_other() -> No
     assert site.faults == []
 
 
-def test_a_robot_of_the_other_brand_at_the_wrong_station_is_sent_on_in_its_own_words() -> None:
+def test_a_robot_of_the_other_brand_is_sent_on_by_its_own_waypoint_names() -> None:
     site = yard()
     site.big.charge("B01", site.now)
     site.run(8.5)
@@ -68,13 +68,13 @@ def test_a_robot_of_the_other_brand_at_the_wrong_station_is_sent_on_in_its_own_w
 
 
 @pytest.mark.parametrize(("state", "error"), [(3, ""), (200, "robot: NTC")])
-def test_a_robots_own_receiver_is_not_a_station(state: int, error: str) -> None:
+def test_the_receiver_on_a_robot_is_not_a_station(state: int, error: str) -> None:
     told = d.ChargerState(charger_name="rcu_b01", state=state, error_message=error)
     heard = messages.accept_state(told, two_brands(), 0.0)
     assert heard == ReceiverHeard(RobotName("big", "B01"), error)
 
 
-def test_a_robots_own_receiver_is_never_asked_and_its_errors_are_shown() -> None:
+def test_the_receiver_on_a_robot_gets_no_request_but_its_errors_are_shown() -> None:
     site = yard()
     states: Any = site.rmf.publisher(topics.CHARGER_STATES)
     states.publish(d.ChargerState(charger_name="rcu_b01", state=1))

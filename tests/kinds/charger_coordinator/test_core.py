@@ -35,10 +35,10 @@ from tests.kinds.charger_coordinator.virtual_site import RECEIVERS
 SERVED = [CHARGING, RELEASED]
 
 
-# ---- COORDINATOR-WISHES-1, COORDINATOR-WISHES-2: who wants to be charged
+# ---- COORDINATOR-WISHES-1, COORDINATOR-WISHES-2: which robots want to be charged
 
 
-def test_a_robot_that_passes_with_the_mode_of_its_last_charge_does_not_ask_for_another() -> None:
+def test_a_passing_robot_with_the_mode_of_its_last_charge_has_no_wish() -> None:
     site_ = Alone()
     site_.seen[ONE] = Sighting(ONE, True, None, 40.0, "work")
     site_.run(5)
@@ -50,7 +50,7 @@ def test_a_robot_that_passes_with_the_mode_of_its_last_charge_does_not_ask_for_a
     assert site_.sent == []
 
 
-def test_a_robot_that_is_full_gives_its_station_up_and_comes_back_only_when_it_is_low() -> None:
+def test_a_full_robot_gives_up_its_station_until_its_battery_is_low() -> None:
     site_ = Alone()
     site_.wants(ONE)
     assert site_.run(1) == [(1.0, "charger_a: AMR01")]
@@ -67,7 +67,7 @@ def test_a_robot_that_is_full_gives_its_station_up_and_comes_back_only_when_it_i
     assert site_.run(1) == [(36.0, "charger_a: AMR01")]
 
 
-def test_a_station_that_ends_a_charge_early_is_not_asked_again_until_the_battery_is_low() -> None:
+def test_after_an_early_end_of_a_charge_only_a_low_battery_is_a_new_wish() -> None:
     site_ = Alone()
     site_.wants(ONE, "charger_a", 95.0)
     site_.run(1)
@@ -83,7 +83,7 @@ def test_a_station_that_ends_a_charge_early_is_not_asked_again_until_the_battery
 # ---- COORDINATOR-1: operators
 
 
-def test_a_full_robot_that_an_operator_asked_for_makes_room() -> None:
+def test_a_full_robot_of_an_operators_request_makes_room() -> None:
     site_ = Alone()
     site_.hears(ChargeWanted(ONE, "", "op-1", 0.0))
     site_.run(1)
@@ -101,7 +101,7 @@ def answer(site_: Alone, event: Event) -> str:
     return "".join(why for _, why in site_.refused[before:])
 
 
-def test_an_operator_may_send_a_robot_that_has_a_station_to_another_one() -> None:
+def test_an_operator_may_send_a_robot_from_its_station_to_another_station() -> None:
     site_ = Alone()
     site_.hears(ChargeWanted(ONE, "", "op-1", 0.0))
     site_.run(1)
@@ -119,7 +119,7 @@ def test_an_operator_may_send_a_robot_that_has_a_station_to_another_one() -> Non
     assert [(w.robot, w.request_id) for w in site_.memory.wishes] == [(ONE, "op-2")]
 
 
-def test_an_operators_reset_tries_faulty_robots_and_stations_that_were_passed_over() -> None:
+def test_a_reset_tries_faulty_robots_and_passed_over_stations_again() -> None:
     site_ = Alone()
     site_.shows[B] = busy(B)
     site_.wants(ONE)
@@ -144,7 +144,7 @@ def test_no_event_that_counts_is_refused() -> None:
 # ---- COORDINATOR-3: a request that no station takes
 
 
-def test_a_station_that_takes_no_request_is_passed_over_and_its_request_is_queued_last() -> None:
+def test_a_station_that_accepts_no_request_is_passed_over_and_its_robot_is_queued_last() -> None:
     site_ = Alone()
     site_.shows[B] = busy(B)
     site_.wants(ONE)
@@ -165,7 +165,7 @@ def test_a_station_that_takes_no_request_is_passed_over_and_its_request_is_queue
         (59, {ONE: (A,)}, [(61.0, "charger_b: AMR01")]),
     ],
 )
-def test_a_request_that_a_station_drops_is_made_again_until_its_robot_should_have_started(
+def test_a_dropped_request_is_repeated_until_the_start_timeout(
     after_s: int, failed: dict[RobotName, tuple[str, ...]], said: list[tuple[float, str]]
 ) -> None:
     site_ = Alone()
@@ -182,7 +182,7 @@ def test_a_request_that_a_station_drops_is_made_again_until_its_robot_should_hav
     ("state", "robot", "gone"),
     [(ERROR, TWO, True), (CHARGING, TWO, True), (CHARGING, ONE, False), (ERROR, ONE, False)],
 )
-def test_a_request_is_given_up_when_the_station_will_not_take_it(
+def test_a_request_that_a_station_does_not_accept_is_given_up(
     state: d.ChargerStateValue, robot: RobotName, gone: bool
 ) -> None:
     site_ = Alone()
@@ -222,7 +222,7 @@ def test_an_error_of_an_unknown_side_counts_until_another_station_charges_the_ro
     assert site_.memory.strikes == {}
 
 
-def test_a_robot_that_fails_at_both_stations_a_moment_after_the_charge_begins_is_faulty() -> None:
+def test_a_robot_that_fails_at_both_stations_soon_after_the_start_is_faulty() -> None:
     site_ = Alone()
     site_.wants(ONE)
     for station in (A, B):
@@ -240,7 +240,7 @@ def test_a_robot_that_fails_at_both_stations_a_moment_after_the_charge_begins_is
 # ---- COORDINATOR-5, COORDINATOR-WRONG-PAD-3: robots on wrong pads
 
 
-def test_a_strayed_robot_in_a_task_cannot_be_told_so_a_person_is_at_once() -> None:
+def test_a_person_is_told_at_once_about_a_stray_robot_in_a_task() -> None:
     site_ = Alone()
     site_.hears(ChargeWanted(ONE, "", "op-1", 0.0))
     site_.run(1)
@@ -257,7 +257,7 @@ def test_a_strayed_robot_in_a_task_cannot_be_told_so_a_person_is_at_once() -> No
     assert site_.memory.nudges == {}
 
 
-def test_a_robot_on_its_way_from_a_station_where_it_failed_is_not_astray() -> None:
+def test_a_robot_that_drives_from_a_station_where_it_failed_is_not_astray() -> None:
     site_ = Alone()
     site_.wants(ONE, "charger_a")
     site_.run(1)
@@ -273,7 +273,7 @@ def test_a_robot_on_its_way_from_a_station_where_it_failed_is_not_astray() -> No
 # ---- COORDINATOR-WISHES-4: a robot on its way
 
 
-def test_an_idle_robot_that_is_called_and_begins_a_task_is_on_its_way() -> None:
+def test_an_idle_robot_that_begins_a_task_after_its_call_is_on_its_way() -> None:
     site_ = Alone()
     site_.seen[ONE] = Sighting(ONE, False, "wait_1", 40.0, "")
     assert site_.run(1) == [(1.0, "charger_a: AMR01")]
@@ -284,7 +284,7 @@ def test_an_idle_robot_that_is_called_and_begins_a_task_is_on_its_way() -> None:
     assert site_.run(1) == [(102.0, "charger_a: cancel")]
 
 
-def test_an_idle_robot_that_is_on_the_road_when_it_has_no_station_does_not_wait_for_one() -> None:
+def test_an_idle_robot_on_the_road_does_not_wait_for_a_station() -> None:
     site_ = Alone()
     site_.shows = {A: busy(A), B: busy(B)}
     site_.seen[ONE] = Sighting(ONE, False, "wait_1", 40.0, "")
@@ -295,7 +295,7 @@ def test_an_idle_robot_that_is_on_the_road_when_it_has_no_station_does_not_wait_
     assert site_.memory.wishes == ()
 
 
-def test_a_robot_on_its_way_keeps_a_station_that_waits_for_it() -> None:
+def test_a_robot_on_its_way_keeps_its_station() -> None:
     site_ = Alone()
     site_.wants(ONE)
     site_.run(1)
@@ -303,7 +303,7 @@ def test_a_robot_on_its_way_keeps_a_station_that_waits_for_it() -> None:
     assert site_.run(200) == []
 
 
-def test_a_charge_beside_it_does_not_keep_a_request_that_nobody_takes() -> None:
+def test_a_charge_of_another_robot_does_not_keep_a_request_that_is_not_accepted() -> None:
     site_ = Alone()
     site_.wants(ONE)
     site_.run(1)
@@ -314,7 +314,7 @@ def test_a_charge_beside_it_does_not_keep_a_request_that_nobody_takes() -> None:
     assert site_.faults == ["REQUEST_NOT_TAKEN: charger_b: its daemon's log says why"]
 
 
-def test_a_robot_whose_fleet_is_not_heard_is_charged_in_no_task() -> None:
+def test_the_charge_of_a_robot_of_a_silent_fleet_belongs_to_no_task() -> None:
     site_ = Alone()
     site_.hears(ChargeWanted(ONE, "", "op-1", 0.0))
     site_.run(1)
@@ -327,7 +327,7 @@ def test_a_robot_whose_fleet_is_not_heard_is_charged_in_no_task() -> None:
 # ---- COORDINATOR-4, COORDINATOR-STATIONS-1, COORDINATOR-STATIONS-2: how a request ends
 
 
-def test_a_robot_with_one_station_is_tried_there_twice_and_no_more() -> None:
+def test_a_robot_with_one_station_is_tried_there_only_twice() -> None:
     site_ = Alone()
     site_.wants(THREE)
     for _ in range(2):
@@ -351,7 +351,7 @@ def test_a_robot_with_one_station_is_tried_there_twice_and_no_more() -> None:
         ("wait_1", [], {ONE: "task of AMR01"}),
     ],
 )
-def test_a_charge_that_an_idle_station_has_not_released_is_over_if_its_robot_has_left(
+def test_without_a_release_a_charge_ends_when_its_robot_has_left_the_idle_station(
     place: str, said: list[tuple[float, str]], served: dict[RobotName, str]
 ) -> None:
     site_ = Alone()
@@ -366,7 +366,7 @@ def test_a_charge_that_an_idle_station_has_not_released_is_over_if_its_robot_has
     assert site_.memory.served == served
 
 
-def test_a_robot_that_has_a_station_does_not_get_another_by_a_strangers_request() -> None:
+def test_the_request_of_another_node_gives_a_robot_no_second_station() -> None:
     site_ = Alone()
     site_.wants(ONE)
     site_.run(1)
@@ -377,7 +377,7 @@ def test_a_robot_that_has_a_station_does_not_get_another_by_a_strangers_request(
     assert list(site_.memory.grants) == [A]
 
 
-def test_another_nodes_request_for_our_robot_is_adopted_with_the_charge_that_it_has() -> None:
+def test_a_request_of_another_node_for_our_robot_is_adopted_with_its_charge() -> None:
     for state, started in ((ASSIGNED, False), (CHARGING, True)):
         site_ = Alone()
         site_.shows[A] = ChargerStateHeard(A, state, "somebody-1", ONE)
@@ -388,7 +388,7 @@ def test_another_nodes_request_for_our_robot_is_adopted_with_the_charge_that_it_
         assert site_.memory.wishes == (Wish(ONE, "operator"),)
 
 
-def test_another_nodes_request_gives_a_robot_that_waits_no_second_wish() -> None:
+def test_a_request_of_another_node_gives_a_waiting_robot_no_second_wish() -> None:
     site_ = Alone()
     site_.shows = {A: busy(A), B: busy(B)}
     site_.wants(ONE)
@@ -398,7 +398,7 @@ def test_another_nodes_request_gives_a_robot_that_waits_no_second_wish() -> None
     assert [(w.robot, w.by) for w in site_.memory.wishes] == [(ONE, "fleet")]
 
 
-def test_a_second_station_that_still_shows_an_earlier_request_of_ours_is_told_to_let_go() -> None:
+def test_a_second_station_with_an_earlier_request_of_ours_must_release_it() -> None:
     site_ = Alone()
     site_.wants(ONE)
     site_.run(1)
@@ -409,7 +409,7 @@ def test_a_second_station_that_still_shows_an_earlier_request_of_ours_is_told_to
     assert (site_.memory.station_of(ONE), len(site_.memory.wishes)) == (A, 1)
 
 
-def test_a_station_that_serves_somebody_else_has_let_our_robot_go() -> None:
+def test_a_station_that_serves_another_robot_has_released_our_robot() -> None:
     site_ = Alone()
     site_.wants(ONE)
     site_.run(1)
@@ -437,7 +437,7 @@ def test_a_station_whose_pad_another_robot_does_not_leave_is_given_up_after_the_
 # ---- COORDINATOR-7: rivals
 
 
-def test_a_request_that_a_rival_held_back_is_sent_afterwards() -> None:
+def test_a_request_delayed_by_a_rival_is_sent_after_the_rival_has_gone() -> None:
     site_ = Alone()
     site_.wants(ONE)
     site_.run(1)
@@ -450,7 +450,7 @@ def test_a_request_that_a_rival_held_back_is_sent_afterwards() -> None:
     assert site_.faults == []
 
 
-def test_a_request_made_before_a_rival_came_keeps_its_age_once_it_is_shown() -> None:
+def test_a_request_from_before_a_rival_keeps_its_age_when_it_is_shown() -> None:
     site_ = Alone()
     site_.wants(ONE)
     site_.run(1)
@@ -463,7 +463,7 @@ def test_a_request_made_before_a_rival_came_keeps_its_age_once_it_is_shown() -> 
     assert site_.memory.grants[A] == before
 
 
-# ---- COORDINATOR-4: what a station says
+# ---- COORDINATOR-4: the states of a station
 
 
 @pytest.mark.parametrize(
@@ -481,15 +481,15 @@ def test_a_request_made_before_a_rival_came_keeps_its_age_once_it_is_shown() -> 
         ("", FaultCause.UNCLEAR),
     ],
 )
-def test_the_side_at_fault_is_what_the_station_says(text: str, whose: FaultCause) -> None:
+def test_the_station_names_the_side_at_fault(text: str, whose: FaultCause) -> None:
     assert diagnosis(text) is whose
 
 
-def test_the_fixed_texts_of_our_own_chargers_say_nothing_against_a_robot() -> None:
+def test_the_fixed_texts_of_our_chargers_accuse_no_robot() -> None:
     assert {diagnosis(text) for text in LOST.values()} == {FaultCause.LOST}
 
 
-def test_who_stands_on_a_pad_is_read_from_its_error() -> None:
+def test_the_error_of_a_station_names_the_robot_on_its_pad() -> None:
     robots = dict.fromkeys((ONE, TWO, RobotName("tiny", "AMR0")), ())
     ours = dataclasses.replace(
         SiteLimits.of(SETTINGS), robots=robots, receivers={**RECEIVERS, "RX, 1": TWO}

@@ -1,4 +1,5 @@
-"""The coordinator's memory after a restart, and the entries that the coordinator then distrusts."""
+"""The coordinator's memory after a restart, and the stored entries that the coordinator does not
+trust."""
 
 import pytest
 from msgspec.structs import replace
@@ -17,7 +18,7 @@ from tests.kinds.charger_coordinator.alone import ONE, SETTINGS, THREE, TWO, A, 
 from tests.kinds.charger_coordinator.virtual_site import settings
 
 
-def test_a_restart_remembers_who_was_charging_and_which_robot_a_station_must_release() -> None:
+def test_a_restart_remembers_the_charging_robots_and_the_pending_releases() -> None:
     site_ = Alone()
     site_.wants(ONE)
     site_.wants(TWO)
@@ -35,7 +36,7 @@ def test_a_restart_remembers_who_was_charging_and_which_robot_a_station_must_rel
     }
 
 
-def test_names_that_the_yaml_no_longer_has_are_not_restored() -> None:
+def test_names_that_are_missing_in_the_yaml_are_not_restored() -> None:
     site_ = Alone()
     for who in (ONE, TWO, THREE):
         site_.wants(who)
@@ -95,6 +96,6 @@ def test_a_coordinator_that_remembers_nothing_keeps_an_empty_memory() -> None:
     assert (kept.wishes, dict(kept.grants), kept.count) == ((), {}, 0)
 
 
-def test_a_file_that_is_not_a_memory_is_refused_with_what_it_should_be() -> None:
+def test_a_file_that_is_no_memory_is_refused_with_the_expected_form() -> None:
     with pytest.raises(ValueError, match=r"^not a coordinator's memory: "):
         keep.restore(b"[]", SETTINGS, 0.0)

@@ -47,11 +47,11 @@ def test_a_robot_stands_at_the_nearest_place_of_its_level(
 
 
 @pytest.mark.parametrize("mode", range(12))
-def test_two_robot_modes_mean_that_it_charges(mode: int) -> None:
+def test_two_robot_modes_mean_that_the_robot_charges(mode: int) -> None:
     assert robot(0.0, 2.0, mode=mode).charges == (mode in (1, 7))
 
 
-def test_robots_that_the_yaml_does_not_name_are_passed_over() -> None:
+def test_robots_outside_the_yaml_are_ignored() -> None:
     state = d.FleetState("tiny", (d.RobotState("stranger"),))
     assert messages.accept_fleet(state, SETTINGS, 0.0).robots == ()
 
@@ -64,7 +64,7 @@ def test_a_charger_state_is_read_field_by_field() -> None:
     assert messages.accept_state(STATE, SETTINGS, 0.0) == shown
 
 
-def test_assignments_by_others_count_if_they_are_to_one_of_our_chargers() -> None:
+def test_assignments_of_other_nodes_count_if_they_name_one_of_our_chargers() -> None:
     message = d.ChargingAssignments(
         "tiny",
         (
@@ -98,7 +98,7 @@ def test_assignments_by_others_count_if_they_are_to_one_of_our_chargers() -> Non
         (messages.accept_withdrawal, d.ChargerCancel(), "empty request_id"),
     ],
 )
-def test_messages_about_other_chargers_and_robots_are_refused_by_name(
+def test_messages_about_other_chargers_and_robots_are_refused_with_their_name(
     accept: Any, message: Any, kind: str
 ) -> None:
     with pytest.raises(RequestRefused) as refused:
@@ -127,7 +127,7 @@ def test_messages_with_texts_that_are_too_long_are_dropped(
     assert refused.value.kind == f"impossible {kind}"
 
 
-def test_an_alert_is_sent_once_under_its_id_and_its_time() -> None:
+def test_an_alert_is_sent_once_with_its_id_and_its_time() -> None:
     stamped = messages.stamped(d.Alert(id="x"), d.Time(7, 0))
     assert stamped == d.Alert(id="x/7")
 
@@ -161,7 +161,7 @@ def test_an_alert_is_sent_once_under_its_id_and_its_time() -> None:
         ),
     ],
 )
-def test_a_file_that_would_lead_robots_astray_is_refused_where_it_is_wrong(
+def test_a_file_that_would_mislead_robots_is_refused_at_the_wrong_place(
     tmp_path: Path, old: str, new: str, problem: str
 ) -> None:
     text = CONFIG.read_text()
@@ -173,7 +173,7 @@ def test_a_file_that_would_lead_robots_astray_is_refused_where_it_is_wrong(
     assert problem in "\n".join(map(str, refused.value.problems))
 
 
-def test_a_charger_that_only_another_fleets_graph_has_suits_no_robot_of_this_fleet(
+def test_a_charger_outside_the_graph_of_a_fleet_suits_no_robot_of_that_fleet(
     tmp_path: Path,
 ) -> None:
     other = """    other:
@@ -187,14 +187,14 @@ def test_a_charger_that_only_another_fleets_graph_has_suits_no_robot_of_this_fle
         load(file)
 
 
-def test_a_file_without_its_section_says_what_is_missing(tmp_path: Path) -> None:
+def test_a_file_without_its_section_is_refused_with_the_missing_section(tmp_path: Path) -> None:
     file = tmp_path / "site.yaml"
     file.write_text("kind: charger_coordinator\n")
     with pytest.raises(SettingsError, match="needs 'coordinator'"):
         load(file)
 
 
-def test_a_setting_that_works_but_not_well_is_warned_of() -> None:
+def test_a_setting_that_works_badly_gives_a_warning() -> None:
     warnings = "\n".join(map(str, load(CONFIG).warnings))
     assert warnings.endswith(
         "tiny/AMR03 charges only at 'charger_b': if a charge fails there, nothing shows whether robot"

@@ -26,7 +26,7 @@ def test_the_queue_is_first_come_first_served() -> None:
     assert site_.run(1) == [(4.0, "charger_b: AMR02")]
 
 
-def test_a_station_at_which_another_robot_stands_is_not_free_though_it_says_so() -> None:
+def test_a_station_with_another_robot_on_its_pad_is_not_free() -> None:
     site_ = Alone()
     site_.shows[B] = busy(B)
     site_.seen[TWO] = Sighting(TWO, False, "charger_a", 90.0, "")
@@ -36,7 +36,7 @@ def test_a_station_at_which_another_robot_stands_is_not_free_though_it_says_so()
     assert site_.run(1) == [(11.0, "charger_a: AMR01")]
 
 
-def test_an_old_position_of_a_robot_keeps_no_station() -> None:
+def test_an_old_position_of_a_robot_occupies_no_station() -> None:
     site_ = Alone()
     site_.shows[B] = busy(B)
     site_.hears(FleetSeen((Sighting(TWO, False, "charger_a", 90.0, ""),)))
@@ -45,13 +45,13 @@ def test_an_old_position_of_a_robot_keeps_no_station() -> None:
     assert site_.run(1) == [(30.0, "charger_a: AMR01")]
 
 
-def test_a_robot_that_stands_at_a_station_gets_that_one() -> None:
+def test_a_robot_that_stands_at_a_station_gets_that_station() -> None:
     site_ = Alone()
     site_.wants(ONE, "dock_b")
     assert site_.run(1) == [(1.0, "charger_b: AMR01")]
 
 
-def test_a_dedicated_station_comes_before_the_yamls_first_and_after_where_the_robot_stands() -> (
+def test_the_place_of_the_robot_comes_before_its_dedicated_station_and_the_yaml_comes_last() -> (
     None
 ):
     for place, station in (("wait_1", "charger_b"), ("charger_a", "charger_a")):
@@ -61,7 +61,7 @@ def test_a_dedicated_station_comes_before_the_yamls_first_and_after_where_the_ro
         assert site_.run(1) == [(1.0, f"{station}: AMR01")]
 
 
-def test_a_robot_that_is_charged_unasked_where_it_stands_has_that_station() -> None:
+def test_a_robot_that_is_charged_without_a_request_has_that_station() -> None:
     site_ = Alone()
     site_.shows[A] = ChargerStateHeard(A, CHARGING, "unrequested/charger_a")
     site_.wants(ONE, "charger_a")
@@ -69,7 +69,7 @@ def test_a_robot_that_is_charged_unasked_where_it_stands_has_that_station() -> N
     assert site_.memory.station_of(ONE) == A
 
 
-def test_only_a_robot_refused_as_unasked_may_have_the_station_where_it_stands() -> None:
+def test_only_a_robot_that_was_refused_without_a_request_may_get_the_station_at_its_place() -> None:
     for request_id, said in (("unrequested/charger_a", ["charger_a: AMR01"]), ("somebody-1", [])):
         site_ = Alone()
         site_.shows[B] = busy(B)
@@ -79,7 +79,7 @@ def test_only_a_robot_refused_as_unasked_may_have_the_station_where_it_stands() 
         assert [words for _, words in site_.run(1)] == said
 
 
-def test_only_the_robot_that_stands_there_may_have_a_station_in_error() -> None:
+def test_only_the_robot_on_its_pad_may_get_a_station_in_error() -> None:
     site_ = Alone()
     text = "wrong docking: tiny/AMR02 is not assigned here"
     site_.shows = {A: ChargerStateHeard(A, ERROR, "unrequested/charger_a", TWO, text), B: busy(B)}

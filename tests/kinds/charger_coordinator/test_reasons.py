@@ -1,4 +1,4 @@
-"""The whole text of each reason for which a robot waits in the queue."""
+"""The complete texts that tell why a robot waits in the queue."""
 
 from msgspec.structs import replace
 
@@ -26,7 +26,7 @@ X, Y = RobotName("big", "X"), RobotName("big", "Y")
 
 
 def site(stations: int) -> SiteLimits:
-    """Return a site with this number of stations, all of which suit every robot."""
+    """Return a site with this number of stations. Each station suits every robot."""
     names = tuple(f"s{i + 1}" for i in range(stations))
     robots = dict.fromkeys((ONE, TWO, THREE), names)
     places: dict[str, dict[str, str]] = {name: {} for name in names}
@@ -56,7 +56,7 @@ BUSY = SiteMemory(
 )
 
 
-def test_each_waiting_robot_is_told_what_is_in_its_way_and_which_station_it_will_get() -> None:
+def test_the_report_tells_each_waiting_robot_its_obstacle_and_its_next_station() -> None:
     assert [wish.robot for wish in queued(BUSY)] == [ONE, TWO]
     why = "s1 charges big/X, s2 charges big/Y, s3 is silent, s4 is assigned to tiny/AMR03"
     assert list(reasons(BUSY, 12.0, site(6))) == [
@@ -67,7 +67,7 @@ def test_each_waiting_robot_is_told_what_is_in_its_way_and_which_station_it_will
     assert four[0] == f"tiny/AMR01 by the robot: {why}, s2 is free in 88 s"
 
 
-def test_the_station_where_it_stands_comes_first_and_its_own_robot_is_not_in_its_way() -> None:
+def test_the_station_at_the_place_of_the_robot_comes_first_and_is_not_occupied_by_it() -> None:
     last_two = {name: BUSY.stations[name] for name in ("s5", "s6")}
     stands_there = Standing(Sighting(ONE, False, "p6", 50.0, ""), 10.0)
     memory = SiteMemory(
@@ -85,7 +85,7 @@ def test_the_station_where_it_stands_comes_first_and_its_own_robot_is_not_in_its
     ]
 
 
-def test_while_it_may_not_publish_no_station_is_what_they_wait_for() -> None:
+def test_without_permission_to_publish_robots_wait_for_the_permission() -> None:
     memory = replace(BUSY, may_speak=False, passive="until rival leaves")
     assert list(reasons(memory, 12.0, site(6))) == [
         "tiny/AMR01 by the robot: until rival leaves",
@@ -94,7 +94,8 @@ def test_while_it_may_not_publish_no_station_is_what_they_wait_for() -> None:
 
 
 def said(now: float, seen: StationSeen, *robots: RobotName) -> str:
-    """Return the reason why AMR01 waits, if these robots stand on the pad of its only station."""
+    """Return the reason why AMR01 waits. These robots stand on the pad of the only station for
+    AMR01."""
     one = SiteLimits({ONE: ("s1",)}, {}, {"s1": {"tiny": "p1"}}, {}, 60.0, 100.0, 90.0, 60.0)
     there = {who: Standing(Sighting(who, False, "p1", 50.0, ""), 10.0) for who in robots}
     memory = replace(BUSY, wishes=BUSY.wishes[:1], grants={}, stations={"s1": seen}, robots=there)
@@ -102,7 +103,7 @@ def said(now: float, seen: StationSeen, *robots: RobotName) -> str:
     return text.removeprefix("tiny/AMR01 by the robot: ")
 
 
-def test_a_silent_station_and_one_where_another_robot_stands_say_so() -> None:
+def test_the_reason_names_a_silent_station_and_a_station_with_another_robot() -> None:
     assert [said(15.0, shows(IDLE)), said(12.0, shows(IDLE), TWO)] == [
         "s1 is silent",
         "tiny/AMR02 stands at s1",
@@ -132,11 +133,11 @@ def test_a_station_is_silent_five_seconds_after_its_last_state() -> None:
     assert memory.speaks("s2", 0.0) is False
 
 
-def test_the_last_eight_requests_that_are_over_are_remembered() -> None:
+def test_the_last_eight_finished_requests_are_remembered() -> None:
     memory = SiteMemory(over=tuple("abcdefgh"), wishes=(Wish(ONE, "operator", request_id="i"),))
     assert memory.without_wish(ONE) == SiteMemory(over=tuple("bcdefghi"))
 
 
-def test_the_site_follows_the_yamls_schedule() -> None:
+def test_the_site_follows_the_schedule_of_the_yaml() -> None:
     night = Charging(at="22:00", until="05:00")
     assert SiteLimits.of(settings(schedule=[night])).schedule == (night,)

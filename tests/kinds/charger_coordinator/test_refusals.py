@@ -45,7 +45,7 @@ def refused(reason: str, charger: str = "charger_a", robot: str = "tiny/AMR03") 
     return ChargerRefusal(request_id="wish-1", charger=charger, robot=robot, reason=reason)
 
 
-def test_a_wish_for_a_station_that_does_not_suit_the_robot_is_answered() -> None:
+def test_a_wish_for_an_unsuitable_station_is_answered() -> None:
     office = Office()
     office.rounds(5.0)
     office.asks(WISH)
@@ -54,7 +54,7 @@ def test_a_wish_for_a_station_that_does_not_suit_the_robot_is_answered() -> None
     assert office.node.status()["last_refusal"]["reason"] == "station does not suit the robot"
 
 
-def test_a_wish_of_a_robot_that_is_not_ours_is_answered() -> None:
+def test_a_wish_of_an_unknown_robot_is_answered() -> None:
     office = Office()
     office.rounds(5.0)
     office.asks(replace(WISH, robot_name="AMR09", charger_name=""))
@@ -63,7 +63,7 @@ def test_a_wish_of_a_robot_that_is_not_ours_is_answered() -> None:
     assert office.heard == [refused(reason, "any", "tiny/AMR09")]
 
 
-def test_a_wish_that_is_taken_is_not_answered() -> None:
+def test_an_accepted_wish_is_not_answered() -> None:
     office = Office()
     office.rounds(5.0)
     office.asks(replace(WISH, charger_name="charger_b"))
@@ -71,7 +71,7 @@ def test_a_wish_that_is_taken_is_not_answered() -> None:
     assert office.heard == []
 
 
-def test_nothing_is_answered_in_the_quiet_start_but_after_it() -> None:
+def test_a_wish_is_answered_only_after_the_quiet_start() -> None:
     office = Office()
     office.asks(WISH)
     office.rounds(2.0)

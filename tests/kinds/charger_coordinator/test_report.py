@@ -1,4 +1,5 @@
-"""The coordinator's report with its texts, and the times at which the coordinator wants to be woken."""
+"""The coordinator's report with its texts, and the times at which the loop must wake the
+coordinator."""
 
 import pytest
 
@@ -44,14 +45,16 @@ def test_the_report_names_each_station_with_its_state_and_robot() -> None:
         ("wrong docking: other/robot is not assigned here", "an unknown robot"),
     ],
 )
-def test_a_stranger_on_a_pad_is_named_as_far_as_it_is_known(error: str, who: str) -> None:
+def test_the_report_names_an_unknown_robot_on_a_pad_as_far_as_possible(
+    error: str, who: str
+) -> None:
     site_ = Alone()
     site_.shows[A] = ChargerStateHeard(A, ERROR, "unrequested/charger_a", None, error)
     site_.run(1)
     assert site_.faults == [f"WRONG_STATION: {who} stands at charger_a, but nobody requested that"]
 
 
-def test_a_fault_is_an_alert_with_its_title_its_reason_and_its_rank() -> None:
+def test_a_fault_becomes_an_alert_with_title_reason_and_tier() -> None:
     site_ = Alone()
     site_.run(1)
     alerts = []
@@ -100,7 +103,7 @@ def wakes(site_: Alone) -> float:
 # ---- COORDINATOR-REPORT-1, COORDINATOR-3: the times of waking
 
 
-def test_the_core_wakes_when_a_station_falls_silent_and_when_a_request_is_due_again() -> None:
+def test_the_core_wakes_for_a_silent_station_and_for_a_repeat_of_a_request() -> None:
     site_ = Alone()
     site_.run(1)
     assert wakes(site_) == 6.0

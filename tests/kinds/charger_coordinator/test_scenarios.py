@@ -1,8 +1,8 @@
 """The numbered charging scenarios, with every `finishing_request` and with RMF's retreat to a charger.
 
 The fleet shows its robots as RMF's adapter does (`workbench/rmf_model/fleet.py`). A robot that charges
-as its finishing request is IDLE and has no task. After its first charge a robot shows the mode CHARGING
-in every task.
+because of its finishing request is IDLE and has no task. After its first charge a robot shows the mode
+CHARGING in every task.
 """
 
 from typing import Final
@@ -28,8 +28,8 @@ def yard(finishing: Finishing, **changes: object) -> Yard:
 
 
 def home_from_work(finishing: Finishing, percent: float, jazzy: bool = False) -> Yard:
-    """Return a yard in which AMR01 has just ended its task in the ward. `percent` is its battery
-    level."""
+    """Return a yard in which AMR01 has just ended its task in the ward with this battery level
+    (`percent`)."""
     site = yard(finishing, jazzy=jazzy)
     site.fleet.works("AMR01", "ward", site.now)
     site.run(10.0)
@@ -39,7 +39,7 @@ def home_from_work(finishing: Finishing, percent: float, jazzy: bool = False) ->
 
 
 def charged_at_a(told_at: float, full_at: float, drives_s: float = 6.0) -> History:
-    """Return the history in which AMR01 is called to charger_a and charges there."""
+    """Return the history in which the coordinator calls AMR01 to charger_a, and AMR01 charges there."""
     return [
         (told_at, "charger_a <- charge AMR01"),
         (told_at, "charger_a: ASSIGNED AMR01"),
@@ -112,7 +112,7 @@ def test_0_a_robot_that_was_called_before_its_adapter_started_is_told_again(
     assert site.mode("charger_a") == "CHARGING"
 
 
-def test_0_jazzys_park_goes_to_the_charger_that_it_is_assigned_as_charge_does() -> None:
+def test_0_in_jazzy_park_goes_to_the_dedicated_charger_as_charge_does() -> None:
     site = home_from_work("park", 60.0, jazzy=True)
     assert site.run(300.0) == [*charged_at_a(16.25, 30.5), (31.5, "charger_a: IDLE")]
     robot = site.fleet.robots["AMR01"]
@@ -163,7 +163,7 @@ def test_0_a_full_robot_that_waits_for_traffic_on_its_pad_is_not_served_again(
 
 
 @pytest.mark.parametrize("knows", [True, False])
-def test_0_a_robot_that_nobody_moves_from_its_pad_is_charged_again_where_it_stands(
+def test_0_a_robot_that_stays_on_its_pad_is_charged_again_there(
     knows: bool,
 ) -> None:
     site = yard("nothing", knows=knows)
@@ -190,7 +190,7 @@ def test_0_a_robot_that_stops_at_its_place_on_a_patrol_does_not_ask(finishing: F
     assert site.run(63.0)[0] == (62.25, "charger_a <- charge AMR01")
 
 
-def test_0_a_patrol_that_begins_when_a_robot_is_called_is_not_its_drive() -> None:
+def test_0_a_patrol_that_begins_at_the_call_is_not_the_drive_to_the_charger() -> None:
     site = home_from_work("charge", 60.0)
     site.run(17.0)
     site.fleet.works("AMR01", "ward", site.now)
@@ -203,7 +203,7 @@ def test_0_a_patrol_that_begins_when_a_robot_is_called_is_not_its_drive() -> Non
 
 
 @EACH
-def test_0_a_robot_called_in_vain_gives_way_at_once_and_is_called_again_later(
+def test_0_a_robot_that_does_not_come_gives_way_at_once_and_is_called_again_later(
     finishing: Finishing,
 ) -> None:
     site = yard(finishing)
@@ -220,7 +220,7 @@ def test_0_a_robot_called_in_vain_gives_way_at_once_and_is_called_again_later(
 
 
 @EACH
-def test_1_the_schedule_calls_the_robots_that_it_names_and_is_shown(finishing: Finishing) -> None:
+def test_1_the_schedule_calls_its_robots_and_is_shown(finishing: Finishing) -> None:
     night = Charging(at="13:47", until="13:50", robots=["tiny/AMR01"], percent=95.0)
     site = yard(finishing, site=settings(schedule=[night], timezone="UTC"))
     for who in ("AMR01", "AMR02"):
@@ -247,7 +247,7 @@ def test_1_the_schedule_calls_the_robots_that_it_names_and_is_shown(finishing: F
             (27.5, "charger_a: RELEASED AMR01"),
             (28.5, "charger_a: IDLE"),
         ]
-    else:  # RMF moves a robot only with a task
+    else:  # RMF moves a robot only in a task
         assert told == [(at + 4.0, what) for at, what in CALLED_IN_VAIN[3:]]
 
 
@@ -255,7 +255,9 @@ def test_1_the_schedule_calls_the_robots_that_it_names_and_is_shown(finishing: F
 
 
 @EACH
-def test_2_a_robots_own_wish_and_an_operators_are_shown_apart(finishing: Finishing) -> None:
+def test_2_the_wish_of_a_robot_and_the_wish_of_an_operator_are_shown_apart(
+    finishing: Finishing,
+) -> None:
     site = yard(finishing)
     site.fleet.charge("AMR01", site.now)
     site.wants("AMR03")
@@ -271,7 +273,7 @@ def test_2_a_robots_own_wish_and_an_operators_are_shown_apart(finishing: Finishi
 
 
 def three_at_two(finishing: Finishing) -> Yard:
-    """Return a yard in which both stations charge a robot, and AMR02 waits for the first free
+    """Return a yard in which each of the two stations charges a robot. AMR02 waits for a free
     station."""
     site = yard(finishing)
     for who in ("AMR03", "AMR01", "AMR02"):
@@ -285,7 +287,7 @@ def three_at_two(finishing: Finishing) -> Yard:
 
 
 @pytest.mark.parametrize("finishing", ["charge", "park"])
-def test_3_a_finished_robot_is_sent_to_its_place_and_the_next_is_called(
+def test_3_a_finished_robot_is_sent_to_its_place_and_the_next_robot_is_called(
     finishing: Finishing,
 ) -> None:
     site = three_at_two(finishing)
@@ -304,7 +306,7 @@ def test_3_a_finished_robot_is_sent_to_its_place_and_the_next_is_called(
     assert site.faults == []
 
 
-def test_3_an_alert_names_a_finished_robot_that_rmf_does_not_move_and_whom_it_blocks() -> None:
+def test_3_an_alert_names_a_finished_robot_that_stays_and_the_robot_that_it_blocks() -> None:
     site = three_at_two("nothing")
     why = "RMF moves it only with a charging task (finishing_request: charge gives it one)"
     assert site.run(110.0) == [
@@ -338,7 +340,7 @@ def test_3_an_alert_names_a_finished_robot_that_rmf_does_not_move_and_whom_it_bl
     assert site.faults == []
 
 
-def test_3_a_robot_whose_charging_task_runs_is_sent_off_the_pad_that_another_waits_for() -> None:
+def test_3_a_robot_in_its_charging_task_leaves_the_pad_for_which_another_robot_waits() -> None:
     site = yard("charge")
     site.fleet.charge("AMR03", site.now)
     site.run(20.0)
@@ -361,7 +363,7 @@ def test_3_a_robot_whose_charging_task_runs_is_sent_off_the_pad_that_another_wai
     ]
 
 
-def test_3_the_queue_says_who_waits_for_what_and_how_long() -> None:
+def test_3_the_queue_tells_for_each_robot_the_reason_and_the_time_of_its_wait() -> None:
     site = three_at_two("charge")
     site.chargers["charger_a"].full_in_s = 720.0
     site.fleet.charge("AMR02", site.now)
@@ -376,7 +378,7 @@ def test_3_the_queue_says_who_waits_for_what_and_how_long() -> None:
 
 
 @EACH
-def test_4_a_robot_at_the_wrong_station_is_sent_to_its_own(finishing: Finishing) -> None:
+def test_4_a_robot_at_the_wrong_station_is_sent_to_its_own_station(finishing: Finishing) -> None:
     site = yard(finishing)
     site.fleet.charge("AMR01", site.now)
     site.run(8.5)
@@ -392,7 +394,7 @@ def test_4_a_robot_at_the_wrong_station_is_sent_to_its_own(finishing: Finishing)
 
 
 @EACH
-def test_4_where_nobody_reads_receivers_the_fleets_position_tells_who_stands_there(
+def test_4_without_receivers_the_position_from_the_fleet_tells_which_robot_stands_there(
     finishing: Finishing,
 ) -> None:
     site = yard(finishing, knows=False)
@@ -411,7 +413,7 @@ def test_4_where_nobody_reads_receivers_the_fleets_position_tells_who_stands_the
 
 @EACH
 @pytest.mark.parametrize("found", ["at the self-check", "during the charge"])
-def test_5a_at_a_faulty_station_a_robot_goes_elsewhere_and_keeps_its_good_name(
+def test_5a_a_robot_leaves_a_faulty_station_and_does_not_count_as_faulty(
     finishing: Finishing, found: str
 ) -> None:
     site = yard(finishing)
@@ -435,7 +437,7 @@ def test_5a_at_a_faulty_station_a_robot_goes_elsewhere_and_keeps_its_good_name(
 
 @EACH
 @pytest.mark.parametrize("side", ["station", ""])
-def test_5a_two_faulty_stations_leave_a_robot_that_is_charged_when_they_are_mended(
+def test_5a_after_two_faulty_stations_a_robot_is_charged_when_they_are_repaired(
     finishing: Finishing, side: str
 ) -> None:
     site = yard(finishing)
@@ -457,7 +459,7 @@ def test_5a_two_faulty_stations_leave_a_robot_that_is_charged_when_they_are_mend
 
 
 @EACH
-def test_5b_a_faulty_robot_is_tried_at_one_more_station_and_nothing_else_is_blocked(
+def test_5b_a_faulty_robot_is_tried_at_one_more_station_and_blocks_no_other(
     finishing: Finishing,
 ) -> None:
     site = yard(finishing)

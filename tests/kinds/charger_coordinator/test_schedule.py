@@ -44,7 +44,7 @@ def test_sunday_night_reaches_into_monday() -> None:
     assert [night.under_way(at("01:00", day)) for day in range(7)] == [True] + [False] * 6
 
 
-def test_a_time_that_ends_when_it_begins_lasts_a_day() -> None:
+def test_a_time_with_equal_beginning_and_end_lasts_a_day() -> None:
     days = [Charging(at=clock, until=clock) for clock in ("00:00", "12:00")]
     minutes = range(0, 24 * 60, 7)
     assert all(one.under_way(LocalTime(day, m)) for one in days for day in (0, 6) for m in minutes)
@@ -67,13 +67,13 @@ def test_a_schedule_is_for_the_robots_and_fleets_that_it_names(
     assert [target([one], who, at("12:00")) for who in (ONE, TWO)] == percents
 
 
-def test_of_several_times_the_highest_percent_counts_and_without_a_clock_none_does() -> None:
+def test_the_highest_percent_of_several_times_counts_and_without_a_clock_no_time_counts() -> None:
     two = [Charging(at="08:00", until="20:00", percent=p) for p in (90.0, 95.0)]
     assert (target(two, ONE, at("12:00")), target(two, ONE, None)) == (95.0, 0.0)
     assert target(two, ONE, at("20:00")) == 0.0
 
 
-def test_a_schedules_text_names_time_days_robots_and_percent() -> None:
+def test_the_text_of_a_schedule_names_time_days_robots_and_percent() -> None:
     night = Charging(at="22:00", until="05:00", days=["mon", "tue"], fleets=["tiny"], percent=95)
     assert [night.text(when) for when in (None, at("22:00"), at("12:00"))] == [
         "22:00-05:00 mon tue tiny to 95 %",
@@ -90,7 +90,7 @@ def test_a_schedules_text_names_time_days_robots_and_percent() -> None:
         ("Asia/Singapore", (DAYS.index("wed"), 6 * 60 + 13)),
     ],
 )
-def test_the_local_time_is_that_of_the_zone(timezone: str, local: tuple[int, int]) -> None:
+def test_the_local_time_follows_the_time_zone(timezone: str, local: tuple[int, int]) -> None:
     assert messages.local_time(1.7e9, timezone) == local
 
 
@@ -138,7 +138,7 @@ def test_every_problem_of_a_schedule_is_named_with_its_place() -> None:
     ]
 
 
-def test_minutes_count_at_both_ends_of_a_time() -> None:
+def test_a_scheduled_time_begins_and_ends_at_its_minutes() -> None:
     lunch = Charging(at="11:45", until="13:20", days=["mon"], fleets=["tiny"], robots=["big/B01"])
     times = ("11:44", "11:45", "13:19", "13:20")
     assert [lunch.under_way(at(clock)) for clock in times] == [False, True, True, False]

@@ -1,6 +1,6 @@
 """A station's state ends, fails or continues a request, and shows which side is at fault.
 
-Each test makes a memory, lets the station show a state, and compares the whole memory afterwards.
+Each test builds a memory and lets a station show a state. Then the test compares the whole memory.
 """
 
 import pytest
@@ -35,7 +35,7 @@ LOST, MISPLACED = "Charger unreachable", "wrong docking: tiny/AMR02 is not assig
 
 
 def at(who: RobotName, place: str | None, since: float = AGES_AGO) -> Standing:
-    """Return a robot without a task. `place` is the place that its fleet showed last."""
+    """Return a robot without a task. `place` is its last place in its fleet's reports."""
     return Standing(Sighting(who, False, place, 50.0, ""), 20.0, since, since)
 
 
@@ -54,13 +54,13 @@ def shows(state: int, error: str = "", since: float = 10.0, heard: float = 20.0)
 def after(memory: SiteMemory, state: int, error: str = "", request_id: str = "r1") -> SiteMemory:
     """Return the memory after charger_a has shown this state at 30 s.
 
-    The shown states themselves are left as before, so that a test sees only the conclusions.
+    The stored states of the stations stay as before, so that a test sees only the conclusions.
     """
     heard = ChargerStateHeard(A, state, request_id, ONE, error)  # type: ignore[arg-type]
     return replace(stations.heard(memory, heard, 30.0, SITE), stations=memory.stations)
 
 
-def test_a_stations_state_is_remembered_with_since_when_and_how_long_it_will_take() -> None:
+def test_the_memory_has_the_state_of_a_station_with_its_beginning_and_remaining_time() -> None:
     heard = ChargerStateHeard(B, CHARGING, "r9", TWO, "", 720.0)
     first = stations.heard(SiteMemory(), heard, 30.0, SITE)
     assert first.stations == {B: StationSeen(CHARGING, "r9", TWO, "", 30.0, 30.0, 720.0)}
@@ -73,7 +73,7 @@ def test_a_stations_state_is_remembered_with_since_when_and_how_long_it_will_tak
 # ---- COORDINATOR-STATIONS-1, COORDINATOR-STATIONS-2: how a request ends
 
 
-def test_a_request_that_the_station_shows_is_taken_and_is_begun_when_it_charges() -> None:
+def test_a_shown_request_counts_as_accepted_and_begins_with_the_charge() -> None:
     memory = site(grants={A: replace(GRANT, shown=False)})
     assert after(memory, ASSIGNED) == replace(memory, grants={A: GRANT})
     assert after(memory, CHARGING) == replace(memory, grants={A: replace(GRANT, started=True)})
@@ -90,7 +90,7 @@ def test_a_request_that_the_station_shows_is_taken_and_is_begun_when_it_charges(
         ("fleet", "dock_b", (TWO, ONE), {}),
     ],
 )
-def test_a_robot_that_was_let_go_uncharged_did_not_come_or_has_failed_where_it_stands(
+def test_a_robot_released_without_a_charge_did_not_come_or_has_failed(
     by: By,
     place: str | None,
     queue: tuple[RobotName, ...],
@@ -105,7 +105,7 @@ def test_a_robot_that_was_let_go_uncharged_did_not_come_or_has_failed_where_it_s
     )
 
 
-def test_a_charge_that_ends_is_a_wish_fulfilled() -> None:
+def test_a_charge_that_ends_fulfils_the_wish() -> None:
     memory = site(grants={A: replace(GRANT, started=True)}, strikes={ONE: (B,)})
     over = replace(GRANT, started=True, over=True)
     assert after(memory, RELEASED) == replace(
@@ -125,7 +125,7 @@ def test_a_charge_that_ends_is_a_wish_fulfilled() -> None:
         ("robot: NTC", {ONE: (B,)}, {ONE: (B, A)}, False),
     ],
 )
-def test_after_an_error_the_station_is_told_to_let_go_and_the_robot_keeps_its_place(
+def test_after_an_error_the_station_must_release_the_robot_which_keeps_its_place_in_the_queue(
     error: str,
     before: dict[RobotName, tuple[str, ...]],
     strikes: dict[RobotName, tuple[str, ...]],
@@ -141,7 +141,7 @@ def test_after_an_error_the_station_is_told_to_let_go_and_the_robot_keeps_its_pl
 
 
 @pytest.mark.parametrize("error", [LOST, MISPLACED])
-def test_a_station_that_is_not_reached_or_whose_pad_is_taken_keeps_the_request(error: str) -> None:
+def test_a_station_that_is_unreachable_or_occupied_keeps_the_request(error: str) -> None:
     assert after(site(), ERROR, error) == site()
 
 
@@ -149,7 +149,7 @@ def test_a_station_that_is_not_reached_or_whose_pad_is_taken_keeps_the_request(e
 
 
 @pytest.mark.parametrize(("state", "started"), [(ASSIGNED, False), (CHARGING, True)])
-def test_an_unnamed_charge_is_that_of_a_robot_that_waits_there_without_a_station(
+def test_a_charge_without_a_name_belongs_to_the_robot_waiting_at_the_pad(
     state: int, started: bool
 ) -> None:
     robots = {who: at(who, "charger_a") for who in (ONE, TWO)}
@@ -175,7 +175,7 @@ def test_an_unnamed_charge_is_that_of_a_robot_that_waits_there_without_a_station
         (shows(ERROR, MISPLACED), 60.0, 55.0),
     ],
 )
-def test_a_station_is_hopeless_when_it_is_silent_lost_or_blocked_for_long(
+def test_a_station_that_is_silent_or_lost_or_blocked_for_long_has_no_hope(
     seen: StationSeen | None, timeout_s: float, at_: float
 ) -> None:
     known = {B: shows(ERROR, LOST, since=1.0, heard=1.0)} | ({A: seen} if seen else {})
@@ -195,9 +195,7 @@ def test_a_robot_that_stays_away_loses_its_station_a_minute_after_its_call() -> 
     ] == [70.0, NEVER, NEVER, NEVER]
 
 
-def test_a_request_that_is_not_taken_makes_room_and_its_station_is_passed_over_for_a_while() -> (
-    None
-):
+def test_a_station_that_does_not_accept_a_request_is_passed_over_for_a_while() -> None:
     memory = site(grants={A: replace(GRANT, shown=False)}, shunned={B: 5.0})
     passed_over = replace(
         memory, grants={}, shunned={B: 5.0, A: 50.0}, wishes=(WISHES[1], WISHES[0])
@@ -209,7 +207,7 @@ def test_a_request_that_is_not_taken_makes_room_and_its_station_is_passed_over_f
 
 
 @pytest.mark.parametrize(("error", "at_"), [(LOST, 40.0), (MISPLACED, 70.0)])
-def test_a_station_without_hope_is_to_let_the_robot_go_which_keeps_its_place(
+def test_a_station_without_hope_must_release_the_robot_which_keeps_its_place_in_the_queue(
     error: str, at_: float
 ) -> None:
     robots = {ONE: at(ONE, "wait_1", 15.0)}
@@ -230,7 +228,7 @@ def test_a_robot_that_stays_away_is_given_up() -> None:
     )
 
 
-def test_a_charge_under_way_or_over_is_left_alone_and_the_next_request_is_not() -> None:
+def test_a_time_limit_ends_no_charge_but_ends_the_next_request() -> None:
     second = Grant(TWO, "r2", 10.0, 60.0)
     for first in (replace(GRANT, started=True), replace(GRANT, over=True)):
         memory = site(grants={A: first, B: second}, stations={})
@@ -250,7 +248,7 @@ def test_a_charge_under_way_or_over_is_left_alone_and_the_next_request_is_not() 
         (IDLE, "", {ONE: (A, B), TWO: (B,)}),
     ],
 )
-def test_a_station_that_names_its_own_side_has_not_been_failed_by_anybody(
+def test_an_error_on_the_side_of_the_station_accuses_no_robot(
     state: int, error: str, strikes: dict[RobotName, tuple[str, ...]]
 ) -> None:
     memory = site(grants={}, strikes={ONE: (A, B), TWO: (B,)})
@@ -270,7 +268,7 @@ def test_a_station_that_names_its_own_side_has_not_been_failed_by_anybody(
         ("over temperature", at(TWO, "wait_2", 20.0), False),
     ],
 )
-def test_a_station_that_was_mended_after_the_robot_had_gone_was_at_fault_itself(
+def test_a_station_that_recovers_after_its_robot_has_left_accuses_no_robot(
     error: str, robot: Standing, acquitted: bool
 ) -> None:
     memory = site(

@@ -1,4 +1,4 @@
-"""Whole situations of shared chargers: the coordinator works with a fleet adapter and chargers'
+"""Whole situations of shared chargers. The coordinator works with a fleet adapter and chargers'
 cores."""
 
 from typing import Any
@@ -15,7 +15,7 @@ from tests.kinds.charger_coordinator.virtual_site import Yard
 
 
 def yard(**changes: object) -> Yard:
-    """Return a yard in which all parts run and no robot has a wish yet."""
+    """Return a yard in which all parts run and no robot wants to charge yet."""
     found = Yard(**changes)  # type: ignore[arg-type]
     assert found.run(5.0) == [
         (0.25, "charger_a: IDLE"),
@@ -27,7 +27,7 @@ def yard(**changes: object) -> Yard:
     return found
 
 
-def test_a_scheduled_robot_is_called_from_its_place_charged_and_sent_on() -> None:
+def test_a_scheduled_robot_is_called_and_charged_and_sent_on() -> None:
     site = yard()
     site.fleet.charge("AMR01", site.now)
     assert site.run(30.0) == [
@@ -94,7 +94,9 @@ def test_stacked_robots_go_to_both_stations_and_the_third_waits_until_it_is_call
     ]
 
 
-def test_a_robot_that_does_not_leave_the_wrong_station_is_told_twice_and_then_a_person_is() -> None:
+def test_a_robot_that_does_not_leave_the_wrong_station_is_nudged_twice_before_a_person_is_told() -> (
+    None
+):
     site = yard()
     site.fleet.charge("AMR01", site.now)
     site.run(8.5)
@@ -136,7 +138,7 @@ def test_a_robot_at_the_wrong_station_may_stay_once_the_request_has_timed_out() 
     ]
 
 
-def test_a_failed_station_is_out_of_service_until_cleared_and_its_robot_goes_elsewhere() -> None:
+def test_a_failed_station_is_out_of_service_and_its_robot_goes_to_another() -> None:
     site = yard()
     a = site.chargers["charger_a"]
     a.broken = True
@@ -235,7 +237,7 @@ def test_a_restart_keeps_the_queue_and_touches_no_charge_under_way() -> None:
 def charges_at_a(*, by_operator: bool, knows: bool) -> Yard:
     """Return a yard in which AMR01 charges at charger_a.
 
-    At 14 s the battery has 60 %, or 65 % if an operator made the request.
+    At 14 s the battery is at 60 %, or at 65 % if an operator sent the request.
     """
     site = yard(fills=1.0, knows=knows)
     if by_operator:
@@ -250,7 +252,7 @@ def charges_at_a(*, by_operator: bool, knows: bool) -> Yard:
 
 
 AGAIN: Any = [(16.25, "charger_a: ASSIGNED AMR01"), (18.25, "charger_a: CHARGING AMR01")]
-"""The end of the history: the station can be read again and gets a request."""
+"""The end of a history in which the station answers again and gets a request."""
 REFUSED = (16.25, "charger_a: ERROR AMR01 (wrong docking: tiny/AMR01 is not assigned here)")
 
 
@@ -264,7 +266,7 @@ REFUSED = (16.25, "charger_a: ERROR AMR01 (wrong docking: tiny/AMR01 is not assi
         (False, False, [(16.25, "charger_a: CHARGING")]),
     ],
 )
-def test_a_robot_whose_chargers_daemon_restarts_during_the_charge_is_charged_to_its_end(
+def test_after_a_restart_of_the_chargers_daemon_a_robot_is_charged_to_the_end(
     knows: bool, switched_off: bool, history: list[tuple[float, str]], by_operator: bool
 ) -> None:
     site = charges_at_a(by_operator=by_operator, knows=knows)
@@ -278,7 +280,7 @@ def test_a_robot_whose_chargers_daemon_restarts_during_the_charge_is_charged_to_
 
 
 @pytest.mark.parametrize("by_operator", [False, True])
-def test_a_charge_that_is_asked_for_while_its_power_goes_off_is_begun_again(
+def test_a_charge_that_is_requested_during_the_power_down_begins_again(
     by_operator: bool,
 ) -> None:
     site = charges_at_a(by_operator=by_operator, knows=True)
@@ -308,7 +310,7 @@ def test_a_robot_on_its_way_keeps_the_charger_whose_daemon_restarts(by_operator:
     assert site.faults == []
 
 
-def test_a_charge_whose_daemon_and_coordinator_forgot_it_is_requested_and_goes_on() -> None:
+def test_a_charge_forgotten_by_daemon_and_coordinator_is_requested_and_goes_on() -> None:
     for stops_at in (16.5, None):
         site = charges_at_a(by_operator=False, knows=True)
         site.chargers["charger_a"].restarts(site.now, switched_off=False)
@@ -323,7 +325,7 @@ def test_a_charge_whose_daemon_and_coordinator_forgot_it_is_requested_and_goes_o
         assert site.faults == []
 
 
-def test_a_coordinator_that_has_lost_its_memory_takes_over_what_the_stations_show() -> None:
+def test_a_coordinator_without_memory_takes_over_the_requests_that_the_stations_show() -> None:
     site = yard(fills=1.0)
     site.fleet.charge("AMR01", site.now)
     site.run(14.0)
@@ -341,7 +343,7 @@ def test_a_coordinator_that_has_lost_its_memory_takes_over_what_the_stations_sho
 def dedicate(site: Yard, **places: str) -> Publisher[Any]:
     """Publish RMF's charging schedule, which sends each robot to its place.
 
-    A robot with a place named `wait_…` waits there instead of charging.
+    A robot with a place named `wait_…` waits at this place and does not charge.
     """
     schedule: Publisher[Any] = site.rmf.publisher(topics.CHARGING_ASSIGNMENTS)
     modes = {who: int(place.startswith("wait")) for who, place in places.items()}
@@ -350,7 +352,7 @@ def dedicate(site: Yard, **places: str) -> Publisher[Any]:
     return schedule
 
 
-def test_beside_a_charging_schedule_the_stations_that_it_dedicates_are_asked() -> None:
+def test_beside_the_charging_schedule_of_rmf_its_dedicated_stations_get_requests() -> None:
     site = yard()
     schedule = dedicate(site, AMR01="dock_b", AMR02="wait_2")
     site.run(6.0)
@@ -381,7 +383,7 @@ def test_beside_a_charging_schedule_the_stations_that_it_dedicates_are_asked() -
         end.close()
 
 
-def test_when_the_charging_schedule_has_gone_its_choice_is_remembered() -> None:
+def test_the_choice_of_a_charging_schedule_outlives_the_schedule() -> None:
     site = yard()
     schedule = dedicate(site, AMR01="dock_b")
     site.fleet.robots["AMR01"].dedicated = "wait_1"
@@ -410,7 +412,7 @@ def test_of_two_coordinators_one_serves_and_the_other_only_listens() -> None:
 # ---- COORDINATOR-3, COORDINATOR-STATIONS-4: unreachable stations
 
 
-def test_a_charge_goes_on_while_its_station_is_not_reached() -> None:
+def test_a_charge_goes_on_at_an_unreachable_station() -> None:
     site = yard(fills=1.0)
     site.fleet.charge("AMR01", site.now)
     site.run(20.0)
@@ -460,7 +462,7 @@ def test_a_station_whose_daemon_takes_no_request_is_passed_over() -> None:
 # ---- COORDINATOR-1, COORDINATOR-6: operators
 
 
-def test_an_operators_request_is_withdrawn_by_its_id_and_its_repeats_start_nothing() -> None:
+def test_a_withdrawn_request_of_an_operator_is_not_started_by_repeats() -> None:
     site = yard()
     site.wants("AMR01", "charger_b")
     site.wants("AMR01", "charger_b")

@@ -1,8 +1,8 @@
-"""Rules that hold in every history, checked in all short histories and in random long histories.
+"""Rules that hold in every history. Tests check all short histories and random long histories.
 
 The walk takes all histories of three moves, and `make deep` takes all 10^4 histories of four moves. Two
 moves are at least a second apart. Two robots and two stations behave as RMF's charger messages say.
-After the last move everything is mended. Then every robot that wants to charge must be charged.
+After the last move the test repairs everything. Then every robot that wants to charge must be charged.
 """
 
 from copy import copy
@@ -50,8 +50,8 @@ STEP_S = 1.25
 class Node:
     """A charger's daemon that obeys the rules of the charger messages.
 
-    `holder` is the id and the robot of the present request. `ends` says that this request was
-    cancelled. `on_pad` is the robot that was charging when the daemon was restarted.
+    `holder` is the present request's id and robot. `ends` says that this request was cancelled.
+    `on_pad` is the robot that was charging when the daemon restarted.
     """
 
     def __init__(self) -> None:
@@ -67,7 +67,8 @@ class Node:
         return self.state is IDLE or (self.holder is None and self.on_pad == who)
 
     def restarts(self) -> None:
-        """Restart the daemon, which forgets its request. Current flows on until the next state."""
+        """Restart the daemon, which forgets its request. The current flows on until the daemon's next
+        state."""
         self.on_pad = self.holder[1] if self.holder and self.state is CHARGING else None
         self.state = CHARGING if self.on_pad else IDLE
         self.holder, self.error, self.known = None, "", set()
@@ -109,7 +110,7 @@ class Node:
 
 
 class Ledger:
-    """The coordinator's core with two stations and two robots. Each message is checked by the rules."""
+    """The coordinator's core with two stations and two robots. The rules check each message."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -123,7 +124,7 @@ class Ledger:
         self.passes()
 
     def copy(self) -> "Ledger":
-        """Return a copy with the same history. The copy can continue in another way."""
+        """Return a copy with the same history, which can continue in another way."""
         made = copy(self)
         made.nodes = {name: copy(node) for name, node in self.nodes.items()}
         for node in made.nodes.values():
@@ -153,7 +154,8 @@ class Ledger:
         self.hears(Woken())
 
     def check_all_are_charged_in_the_end(self) -> None:
-        """Mend everything and let time pass. Fail if a robot that wants to charge is not charged."""
+        """Repair everything and let time pass. Fail if a robot that wants to charge does not get
+        charged."""
         if not self.speaks:
             self.hears(MaySpeak(True))
         before = dict(self.charged)
@@ -173,7 +175,7 @@ class Ledger:
             case d.ChargerRequest(charger_name=name):
                 node, who = self.nodes[name], RobotName(message.fleet_name, message.robot_name)
                 if message.request_id in node.known:
-                    return  # a repeated request
+                    return  # the coordinator has repeated a request
                 assert node.takes(who), "asked for a station that is not free"
                 assert who not in self._live(), "a robot that has a station asks for another"
                 assert not self.memory.faulty(who)
@@ -188,7 +190,8 @@ class Ledger:
         assert len(set(live)) == len(live), "one robot has two stations"
 
     def _live(self) -> list[RobotName]:
-        """Return the robots that have a station and were not told to leave."""
+        """Return each robot that has a station with a valid request. A cancelled or released request is
+        not valid."""
         return [
             node.holder[1]
             for node in self.nodes.values()
@@ -196,7 +199,7 @@ class Ledger:
         ]
 
     def restarts(self) -> None:
-        """Restart the coordinator, and let the quiet time after its start pass."""
+        """Restart the coordinator, and let its quiet time after the start pass."""
         memory = self.memory
         kept = keep.persist({"site": memory})
         self.memory = keep.restore(kept, SETTINGS, self.now)["site"]
@@ -242,7 +245,7 @@ def after(ledger: Ledger, move: Any) -> Ledger:
     return ledger
 
 
-def test_every_history_of_so_many_moves_ends_well() -> None:
+def test_every_short_history_ends_with_all_robots_charged() -> None:
     ledger = Ledger()
     ledger.wants[ONE] = True
     ledger.passes()
@@ -253,7 +256,7 @@ def test_every_history_of_so_many_moves_ends_well() -> None:
 
 @hypothesis_settings(max_examples=examples(150))
 @given(st.lists(st.integers(0, len(MOVES) - 1), max_size=25))
-def test_every_long_history_ends_well(history: list[int]) -> None:
+def test_every_long_history_ends_with_all_robots_charged(history: list[int]) -> None:
     ledger = Ledger()
     for move in history:
         MOVES[move](ledger)

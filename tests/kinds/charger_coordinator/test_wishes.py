@@ -1,6 +1,6 @@
 """Robots' wishes to be charged, rule by rule.
 
-Each test makes a memory, and compares it with the memory after one FleetState.
+Each test builds a memory, and compares it with the memory after one FleetState.
 """
 
 import pytest
@@ -33,7 +33,7 @@ AT_NIGHT, AT_NOON = LocalTime(0, 23 * 60), LocalTime(0, 12 * 60)
 def seen(
     place: str | None = "wait_1", percent: float = 50.0, task: str = "", charges: bool = False
 ) -> Sighting:
-    """Return AMR01 as its fleet's FleetState shows the robot."""
+    """Return AMR01 as the FleetState of its fleet shows the robot."""
     return Sighting(ONE, charges, place, percent, task)
 
 
@@ -42,7 +42,7 @@ def after(
 ) -> SiteMemory:
     """Return the memory after this sighting.
 
-    The remembered sightings are left as before, so that a test sees only the conclusions.
+    The remembered sightings stay as before, so that a test sees only the conclusions.
     """
     return replace(wishes.sighted(memory, sighting, now, site), robots=memory.robots)
 
@@ -50,7 +50,7 @@ def after(
 # ---- COORDINATOR-1: an operator's request
 
 
-def test_an_operators_request_counts_once_and_not_again_when_it_is_over() -> None:
+def test_the_request_of_an_operator_counts_only_once() -> None:
     asked = ChargeWanted(ONE, B, "op-1", 30.0)
     wish = Wish(ONE, "operator", "", False, B, "op-1", 30.0)
     taken = SiteMemory(wishes=(Wish(TWO, "fleet"), wish), strikes={TWO: (A,)})
@@ -65,7 +65,7 @@ def test_an_operators_request_counts_once_and_not_again_when_it_is_over() -> Non
     assert wishes.wanted(before, ChargeWanted(three, A, "op-2", 0.0), SITE) == unsuited
 
 
-def test_an_operators_newer_request_takes_the_robot_from_a_station_that_it_does_not_name() -> None:
+def test_a_newer_request_of_an_operator_takes_the_robot_from_another_station() -> None:
     wish = Wish(ONE, "operator", request_id="op-1")
     memory = SiteMemory(wishes=(wish, Wish(TWO, "fleet")), grants={A: CALLED})
     for station, grant in ((A, CALLED), ("", CALLED), (B, replace(CALLED, over=True))):
@@ -75,7 +75,7 @@ def test_an_operators_newer_request_takes_the_robot_from_a_station_that_it_does_
         assert changed.grants == {A: grant}
 
 
-def test_a_withdrawal_is_by_the_operators_id_or_by_the_one_that_the_station_shows() -> None:
+def test_an_operator_withdraws_a_request_by_its_own_id_or_by_the_shown_id() -> None:
     wish = Wish(ONE, "operator", request_id="op-1")
     memory = SiteMemory(wishes=(wish, Wish(TWO, "fleet")), grants={A: CALLED}, over=("op-0",))
     left = replace(memory, wishes=memory.wishes[1:], grants={A: replace(CALLED, over=True)})
@@ -88,7 +88,7 @@ def test_a_withdrawal_is_by_the_operators_id_or_by_the_one_that_the_station_show
     assert wishes.unwanted(left, "r1") == (left, "no such request")
 
 
-# ---- COORDINATOR-WISHES-5: whether a called robot came
+# ---- COORDINATOR-WISHES-5: whether a robot came after its call
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ def test_a_withdrawal_is_by_the_operators_id_or_by_the_one_that_the_station_show
         ("wait_1", 5.0, "", "operator", False),
     ],
 )
-def test_a_robot_stays_away_if_it_has_no_task_and_has_not_left_its_place_since_its_call(
+def test_a_robot_without_a_task_that_has_not_moved_since_its_call_stays_away(
     place: str | None, since: float, task: str, by: By, stays: bool
 ) -> None:
     standing = Standing(seen(place, task=task), 60.0, since, since)
@@ -118,9 +118,7 @@ def test_a_robot_that_is_not_seen_or_wants_nothing_does_not_stay_away() -> None:
         assert wishes.stays_away(memory, A, CALLED, SITE) is False
 
 
-def test_a_robot_that_did_not_come_loses_station_and_wish_and_is_not_called_for_ten_minutes() -> (
-    None
-):
+def test_a_robot_that_did_not_come_gets_no_call_for_ten_minutes() -> None:
     memory = SiteMemory(
         wishes=(Wish(TWO, "fleet"), Wish(ONE, "fleet")),
         grants={A: replace(CALLED, sent_at=60.0)},
@@ -152,7 +150,7 @@ def charged(by: By = "fleet", **changes: object) -> SiteMemory:
 
 
 @pytest.mark.parametrize("by", ["fleet", "operator"])
-def test_a_robot_that_is_full_was_served_in_its_task_and_its_failures_are_forgotten(by: By) -> None:
+def test_a_full_robot_counts_as_served_and_its_failures_are_forgotten(by: By) -> None:
     memory = charged(by)
     assert after(memory, seen("charger_a", 100.0, "t1", True), 30.0) == replace(
         memory,
@@ -164,14 +162,14 @@ def test_a_robot_that_is_full_was_served_in_its_task_and_its_failures_are_forgot
     assert after(memory, seen("charger_a", 99.9, "t1", True), 30.0) == memory
 
 
-def test_a_robot_that_the_schedule_has_charged_far_enough_was_served() -> None:
+def test_a_robot_that_the_schedule_has_charged_far_enough_counts_as_served() -> None:
     memory = charged("schedule", when=AT_NIGHT)
     enough = after(memory, seen("charger_a", 95.0, "t1", True), 30.0, SCHEDULED)
     assert (enough.served, enough.rested) == ({ONE: "t1"}, frozenset({ONE}))
     assert after(memory, seen("charger_a", 94.9, "t1", True), 30.0, SCHEDULED) == memory
 
 
-def test_a_robot_that_leaves_before_it_is_full_was_not_served() -> None:
+def test_a_robot_that_leaves_before_it_is_full_does_not_count_as_served() -> None:
     memory = charged()
     assert after(memory, seen(None, 99.0, "t2"), 30.0) == replace(
         memory,
@@ -180,7 +178,7 @@ def test_a_robot_that_leaves_before_it_is_full_was_not_served() -> None:
     )
 
 
-def test_a_charge_of_the_schedule_rests_its_robot_until_the_time_is_over() -> None:
+def test_a_robot_charged_by_the_schedule_rests_until_the_end_of_the_scheduled_time() -> None:
     memory = charged("schedule", when=AT_NIGHT)
     for site, rested in ((SCHEDULED, frozenset({ONE})), (SITE, frozenset[RobotName]())):
         assert wishes.fulfilled(memory, ONE, site).rested == rested
@@ -202,13 +200,13 @@ def test_a_charge_of_the_schedule_rests_its_robot_until_the_time_is_over() -> No
         (seen(None, percent=96.0, task="t2"), False),
     ],
 )
-def test_a_rested_robot_is_rested_until_it_works(sighting: Sighting, rests: bool) -> None:
+def test_a_robot_rests_until_its_next_task(sighting: Sighting, rests: bool) -> None:
     memory = SiteMemory(when=AT_NIGHT, rested=frozenset({ONE, TWO}))
     rested = after(memory, sighting, 30.0, SCHEDULED).rested
     assert rested == ({ONE, TWO} if rests else {TWO})
 
 
-def test_a_robot_that_is_full_enough_is_rested_only_while_the_schedule_says_so() -> None:
+def test_a_robot_that_is_full_enough_rests_only_during_the_scheduled_time() -> None:
     for when, percent, rested in (
         (AT_NIGHT, 95.0, {ONE, TWO}),
         (AT_NIGHT, 94.9, {TWO}),
@@ -230,7 +228,7 @@ def test_a_robot_that_is_full_enough_is_rested_only_while_the_schedule_says_so()
         (seen("wait_1", 95.0, "t2"), {ONE: "t1", TWO: "t9"}),
     ],
 )
-def test_a_robot_that_has_left_in_another_task_was_served_long_ago(
+def test_a_served_robot_that_left_in_another_task_is_not_remembered_as_served(
     sighting: Sighting, served: dict[RobotName, str]
 ) -> None:
     memory = SiteMemory(served={ONE: "t1", TWO: "t9"})
@@ -266,7 +264,7 @@ def test_a_task_that_begins_soon_after_the_call_is_the_drive_to_the_station(
 # ---- COORDINATOR-WISHES-1, COORDINATOR-WISHES-2, COORDINATOR-WISHES-3: how a wish begins
 
 
-def test_a_wish_begins_once_the_robot_has_stood_there_for_two_seconds() -> None:
+def test_a_wish_begins_after_the_robot_has_stood_at_the_charger_for_two_seconds() -> None:
     memory = SiteMemory(
         robots={ONE: Standing(seen(), 12.0, 11.0, 11.0)},
         served={ONE: "t0"},
@@ -286,7 +284,7 @@ def test_a_wish_begins_once_the_robot_has_stood_there_for_two_seconds() -> None:
         (seen("wait_2", 50.0, "t1", True), 9.0, 9.0),
     ],
 )
-def test_how_long_a_robot_has_stood_there_and_done_the_same_is_remembered(
+def test_the_memory_has_the_time_since_a_robot_has_stood_and_done_the_same(
     changed: Sighting, since: float, here_since: float
 ) -> None:
     memory = SiteMemory(robots={ONE: Standing(seen("wait_1", 50.0, "t1", True), 8.0, 5.0, 4.0)})
@@ -324,7 +322,7 @@ def test_how_long_a_robot_has_stood_there_and_done_the_same_is_remembered(
         (seen(percent=9.0, charges=True), {"preferred": {ONE: A}}, "fleet"),
     ],
 )
-def test_battery_task_and_schedule_say_whether_a_robot_that_stands_there_wants_to_be_charged(
+def test_battery_task_and_schedule_decide_whether_a_standing_robot_has_a_wish(
     sighting: Sighting, changes: dict[str, object], by: By | None
 ) -> None:
     before = SiteMemory(robots={ONE: Standing(sighting, 29.0)}, **changes)  # type: ignore[arg-type]
@@ -335,7 +333,7 @@ def test_battery_task_and_schedule_say_whether_a_robot_that_stands_there_wants_t
 @pytest.mark.parametrize(
     ("task", "now", "believed"), [("t1", 999.0, False), ("t2", 309.9, False), ("t2", 310.0, True)]
 )
-def test_a_served_robots_mode_is_believed_after_five_minutes_in_another_task(
+def test_the_mode_of_a_served_robot_is_believed_after_five_minutes_in_another_task(
     task: str, now: float, believed: bool
 ) -> None:
     sighting = seen("charger_a", 95.0, task, True)
@@ -367,7 +365,7 @@ def test_a_served_robots_mode_is_believed_after_five_minutes_in_another_task(
         (Wish(ONE, "schedule"), seen(percent=95.0), "", False),
     ],
 )
-def test_a_wish_lasts_while_the_robot_stands_there_so_or_drives_there(
+def test_a_wish_lasts_while_the_robot_stands_at_the_charger_or_drives_to_it(
     wish: Wish, sighting: Sighting, station: str, lasts: bool
 ) -> None:
     grants = {station: replace(CALLED, made_at=-99.0)} if station else {}
@@ -377,7 +375,7 @@ def test_a_wish_lasts_while_the_robot_stands_there_so_or_drives_there(
     )
 
 
-def test_after_its_time_a_schedules_wish_lasts_until_the_battery_is_not_low() -> None:
+def test_a_scheduled_wish_lasts_after_its_time_while_the_battery_is_low() -> None:
     memory = SiteMemory(wishes=(Wish(ONE, "schedule"),), when=AT_NOON)
     for percent, left in ((89.9, memory.wishes), (90.0, ())):
         assert after(memory, seen(percent=percent), 30.0, SCHEDULED).wishes == left

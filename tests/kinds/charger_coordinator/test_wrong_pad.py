@@ -1,4 +1,4 @@
-"""Robots on the wrong pad, rule by rule. Each test makes a memory and compares the whole result."""
+"""Robots on the wrong pad, rule by rule. Each test builds a memory and compares the whole result."""
 
 from collections.abc import Mapping
 
@@ -37,8 +37,8 @@ PAD = "wrong docking: tiny/AMR01 is not assigned here"
 def at(
     who: RobotName, place: str | None, since: float, task: str = "", heard: float = 85.0
 ) -> Standing:
-    """Return a robot that came to this waypoint at `since`. `heard` is its fleet's last word about
-    it."""
+    """Return a robot that came to this waypoint at `since`. Its fleet last showed the robot at
+    `heard`."""
     return Standing(Sighting(who, False, place, 50.0, task), heard, since, since)
 
 
@@ -58,7 +58,7 @@ def site(*robots: Standing, **changes: object) -> SiteMemory:
 
 
 def found(memory: SiteMemory, *times: float) -> list[list[OnWrongPad]]:
-    """Return the robots on wrong pads, with one list for each of these times."""
+    """Return one list for each of these times. The list has the robots on wrong pads at that time."""
     return [list(wrong_pad.found(memory, now, SITE).values()) for now in times]
 
 
@@ -68,7 +68,7 @@ EXPECTED = {A: Grant(ONE, "r1", 10.0, shown=True)}
 
 
 @pytest.mark.parametrize(("came_at", "since"), [(20.0, 22.0), (10.0, 40.0), (5.0, 40.0)])
-def test_a_robot_that_came_after_its_call_is_astray_soon_and_one_that_was_there_may_drive_off(
+def test_a_robot_that_came_after_its_call_is_astray_before_a_robot_that_stood_there(
     came_at: float, since: float
 ) -> None:
     memory = site(at(ONE, AT[B], came_at), grants=EXPECTED)
@@ -76,14 +76,12 @@ def test_a_robot_that_came_after_its_call_is_astray_soon_and_one_that_was_there_
     assert found(memory, since - 0.1, since, NEVER) == [[], [one], [one]]
 
 
-def test_a_robot_at_its_own_station_or_at_none_is_not_astray() -> None:
+def test_a_robot_at_its_own_station_or_away_from_stations_is_not_astray() -> None:
     for place in (AT[A], "wait_1", None):
         assert found(site(at(ONE, place, 20.0), grants=EXPECTED), NEVER) == [[]]
 
 
-def test_a_robot_that_was_charged_or_has_lost_its_station_is_not_astray_and_the_next_still_is() -> (
-    None
-):
+def test_only_a_robot_with_a_station_and_without_a_charge_is_astray() -> None:
     two = OnWrongPad(TWO, A, 22.0, "r2", 2, expected=B)
     for first in (replace(EXPECTED[A], started=True), replace(EXPECTED[A], over=True)):
         grants = {A: first, B: Grant(TWO, "r2", 10.0, shown=True)}
@@ -91,7 +89,7 @@ def test_a_robot_that_was_charged_or_has_lost_its_station_is_not_astray_and_the_
         assert found(memory, 50.0) == [[two]]
 
 
-def test_the_stations_own_word_for_who_is_on_its_pad_counts_at_once_and_only_in_error() -> None:
+def test_only_a_station_in_error_names_the_robot_on_its_pad() -> None:
     for state, strays in ((ERROR, [OnWrongPad(ONE, B, 15.0, "r1", 2, expected=A)]), (IDLE, [])):
         stations = {A: shows(), B: shows(state, 15.0, PAD)}
         memory = site(at(ONE, None, 12.0), grants=EXPECTED, stations=stations)
@@ -101,8 +99,8 @@ def test_the_stations_own_word_for_who_is_on_its_pad_counts_at_once_and_only_in_
 def history(
     memory: SiteMemory, *times: float
 ) -> list[tuple[float, dict[RobotName, Nudge], bool, bool]]:
-    """Return an entry for each time: (s, nudges so far, whether ONE is nudged now, whether an alarm is
-    on)."""
+    """Return a tuple for each time: the time (s), the nudges so far, whether the coordinator nudges ONE
+    now, and whether an alarm is on."""
     lines = []
     for now in times:
         memory = wrong_pad.nudged(memory, now, SITE)
@@ -116,7 +114,7 @@ def history(
 # ---- COORDINATOR-WRONG-PAD-1, COORDINATOR-WRONG-PAD-4: the nudges of a robot
 
 
-def test_a_stray_is_told_twice_for_one_request_and_then_a_person_is() -> None:
+def test_a_stray_robot_is_nudged_twice_for_one_request_and_then_a_person_is_told() -> None:
     memory = site(at(ONE, AT[B], 20.0), grants=EXPECTED)
     first, second = {ONE: Nudge("r1", 1, 22.0)}, {ONE: Nudge("r1", 2, 37.0)}
     assert history(memory, 21.9, 22.0, 22.9, 23.0, 36.9, 37.0, 37.9, 38.0, 51.9, 52.0, 99.0) == [
@@ -134,18 +132,18 @@ def test_a_stray_is_told_twice_for_one_request_and_then_a_person_is() -> None:
     ]
 
 
-def test_a_stray_is_told_again_for_a_new_request_and_the_count_lasts_on_its_way() -> None:
+def test_a_stray_robot_is_nudged_again_for_a_new_request() -> None:
     memory = site(at(ONE, AT[B], 20.0), grants=EXPECTED, nudges={ONE: Nudge("r0", 2, 21.0)})
     assert wrong_pad.nudged(memory, 22.0, SITE).nudges == {ONE: Nudge("r1", 1, 22.0)}
     left = site(at(ONE, None, 50.0), grants=EXPECTED, nudges={ONE: Nudge("r1", 1, 22.0)})
     assert wrong_pad.nudged(left, 60.0, SITE).nudges == {ONE: Nudge("r1", 1, 22.0)}
 
 
-# ---- COORDINATOR-WRONG-PAD-3, COORDINATOR-WRONG-PAD-4: robots that cannot be nudged
+# ---- COORDINATOR-WRONG-PAD-3, COORDINATOR-WRONG-PAD-4: robots that the coordinator cannot nudge
 
 
 @pytest.mark.parametrize("why", ["it works", "another node assigns", "we may not speak"])
-def test_where_no_robot_can_be_told_a_person_is_alerted_at_once(why: str) -> None:
+def test_a_person_is_alerted_at_once_if_the_robot_cannot_be_nudged(why: str) -> None:
     standing = at(ONE, AT[B], 20.0, task="work" if why == "it works" else "")
     memory = site(standing, grants=EXPECTED)
     if why == "another node assigns":
@@ -171,31 +169,31 @@ BLOCKS = OnWrongPad(TWO, A, 90.0, A, 1, waiter=ONE)
 
 
 def blocks(station: str) -> OnWrongPad:
-    """Return the finding that TWO blocks this station."""
+    """Return the finding that robot TWO blocks this station."""
     return BLOCKS._replace(station=station, why=station)
 
 
 def blocked(came_at: float = 30.0, **changes: object) -> SiteMemory:
-    """Return a memory in which TWO stands at charger_a without charging, while ONE waits for a
-    station."""
+    """Return a memory in which robot ONE waits for a station. Robot TWO stands at charger_a and does
+    not charge."""
     return site(at(TWO, AT[A], came_at), **{"wishes": WAITS, **changes})
 
 
-def test_a_robot_blocks_a_pad_a_while_after_it_came_or_the_station_let_it_go() -> None:
+def test_a_robot_blocks_a_pad_some_time_after_its_arrival_or_its_release() -> None:
     assert found(blocked(), 89.9, 90.0, NEVER) == [[], [BLOCKS], [BLOCKS]]
     later = blocked(5.0, stations={A: shows(since=30.0), B: shows()})
     assert found(later, 89.9, 90.0, NEVER) == [[], [BLOCKS], [BLOCKS]]
 
 
-def test_nobody_blocks_where_nobody_waits_or_the_waiting_robot_itself_stands() -> None:
+def test_no_robot_blocks_a_pad_for_which_no_other_robot_waits() -> None:
     for wishes in ((), (Wish(TWO, "fleet"),)):
         assert found(blocked(wishes=wishes), NEVER) == [[]]
     has_another = blocked(grants={B: Grant(ONE, "r1", 10.0, shown=True)})
     assert found(has_another, NEVER) == [[]]
 
 
-def test_waiting_robots_are_looked_for_among_all_wishes_and_their_pads_in_order() -> None:
-    """THREE is first in the queue and has its station already. ONE and TWO wait, and TWO stands on a
+def test_the_pads_of_all_waiting_robots_are_checked_in_the_order_of_the_queue() -> None:
+    """Robot THREE is first in the queue and has its station already. ONE and TWO wait. TWO stands on a
     pad."""
     memory = blocked(
         wishes=(Wish(THREE, "fleet"), Wish(TWO, "fleet"), Wish(ONE, "fleet")),
@@ -208,7 +206,7 @@ def test_waiting_robots_are_looked_for_among_all_wishes_and_their_pads_in_order(
     assert found(both, 90.0) == [[blocks(B)]]
 
 
-def test_a_station_that_serves_somebody_or_was_never_heard_is_not_blocked() -> None:
+def test_a_station_that_serves_a_robot_or_was_never_heard_is_not_blocked() -> None:
     grant = Grant(THREE, "r3", 10.0, shown=True)
     not_blocked = [
         blocked(stations={A: shows(CHARGING)}),
@@ -221,20 +219,18 @@ def test_a_station_that_serves_somebody_or_was_never_heard_is_not_blocked() -> N
     assert found(over, 90.0) == [[BLOCKS]]
 
 
-def test_of_two_robots_on_a_pad_the_one_without_a_station_blocks_it() -> None:
+def test_the_robot_without_a_station_blocks_a_pad_with_two_robots() -> None:
     grants = {B: Grant(THREE, "r3", 10.0, shown=True, started=True)}
     memory = site(at(THREE, AT[A], 0.0), at(TWO, AT[A], 30.0), wishes=WAITS, grants=grants)
     assert found(memory, 90.0) == [[BLOCKS]]
 
 
-def test_an_old_position_blocks_nothing_now_and_the_core_still_wakes_for_it() -> None:
+def test_an_old_position_blocks_no_pad_but_still_wakes_the_core() -> None:
     memory = site(at(TWO, AT[A], 30.0, heard=60.0), wishes=WAITS)
     assert found(memory, 89.9, 90.0, NEVER) == [[], [], [BLOCKS]]
 
 
-def test_a_blocking_robot_is_told_once_then_a_person_is_and_all_is_forgotten_when_it_leaves() -> (
-    None
-):
+def test_a_blocking_robot_is_nudged_once_and_then_a_person_is_told() -> None:
     memory, told = blocked(), {TWO: Nudge(A, 1, 90.0)}
     assert history(memory, 89.9, 90.0, 104.9, 105.0, 110.0) == [
         (89.9, {}, False, False),

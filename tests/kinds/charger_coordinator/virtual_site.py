@@ -42,7 +42,7 @@ BIG_GRAPH = {
     "bay_1": ("L1", 0.0, 10.0),
     "ward": ("L1", 50.0, 0.0),
 }
-"""The waypoints of the second brand, which has its own names for the same places."""
+"""The waypoints of the second brand, which gives the same places its own names."""
 PLACES = {
     "charger_a": {"tiny": "charger_a", "big": "station_1"},
     "charger_b": {"tiny": "dock_b", "big": "station_2"},
@@ -125,8 +125,8 @@ class Charger:
         self._told_at = -1.0
 
     def restarts(self, now: float, switched_off: bool = True) -> None:
-        """Restart a killed daemon. `switched_off` says that `outputs-off` switched the station off
-        meanwhile."""
+        """Restart a killed daemon. `switched_off` says that `outputs-off` has switched the station off
+        before the restart."""
         self.memory = charger.initial(self.limits, now)
         self._power = self._power and not switched_off
         self._clears, self._told, self.dead = 0, None, False
@@ -136,7 +136,7 @@ class Charger:
         self._power = False
 
     def scan(self, now: float) -> d.ChargerState | None:
-        """Read, decide and drive. Return the state if a state must be published now, otherwise None."""
+        """Read, decide and drive. Return the state if the daemon must publish now, otherwise None."""
         self._run(now)
         if self.unplugged:
             return self.decide(IoFailed("no route to host"), now)
@@ -186,7 +186,7 @@ class Charger:
 class Yard:
     """The whole yard.
 
-    `story` has (s, event) in order of time. `fills` is the charging speed (%/s).
+    `story` has (s, event) in order of time. `fills` is the charging speed (% per s).
     """
 
     def __init__(
@@ -239,7 +239,7 @@ class Yard:
         return self.world.now
 
     def run(self, until: float) -> list[tuple[float, str]]:
-        """Let time pass up to this time. Return the events of that time."""
+        """Let time pass until `until`. Return the events of that time."""
         told = len(self.story)
         self.world.run(until)
         return self.story[told:]
@@ -262,7 +262,7 @@ class Yard:
         self.wishes.publish(request)
 
     def mode(self, station: str) -> str:
-        """Return the mode in the station's last state."""
+        """Return the name of the mode in the station's last state."""
         return self._shown[station].split()[0]
 
     @property

@@ -1,4 +1,4 @@
-"""RMF's phase never counts an undelivered item as done, although the daemon dies or messages are lost.
+"""RMF's phase never counts an undelivered item as done, even if the daemon dies or messages are lost.
 
 DISPENSER-1, DISPENSER-2, DISPENSER-3, DISPENSER-7: the daemon dies at each effect of a dispensing.
 """
@@ -26,14 +26,15 @@ def told(world: World) -> str:
 
 
 def effects(jam: str = "") -> list[str]:
-    """Return every effect of a dispensing in which the daemon does not die."""
+    """Return every effect of one dispensing during which the daemon lives."""
     world = World()
     dispensed(world, jam)
     return world.effects
 
 
 def dispensed(world: World, jam: str = "", seconds: float = 12.0) -> WorkcellPhase:
-    """Let RMF ask until its phase ends or its request is in doubt. `jam` is the conveyor's failure."""
+    """Let RMF repeat its request until its phase ends or the request is in doubt. `jam` is the
+    conveyor's failure."""
     if jam:
         world.plant.fail("conveyor", "stuck")
     phase = world.ask()
@@ -41,20 +42,20 @@ def dispensed(world: World, jam: str = "", seconds: float = 12.0) -> WorkcellPha
     return phase
 
 
-def test_a_request_is_on_disk_then_listed_then_acknowledged_and_so_is_its_start() -> None:
+def test_a_request_and_its_start_are_on_disk_before_they_are_published() -> None:
     every = effects()
     asked = every.index("before the disk", every.index("after dispenser_states"))
     assert every[asked : asked + 10] == [
-        *("before the disk", "after the disk"),  # the daemon keeps the request
+        *("before the disk", "after the disk"),  # the daemon writes the request to its disk
         *("before dispenser_states", "after dispenser_states"),
         *("before dispenser_results", "after dispenser_results"),
-        *("before the disk", "after the disk"),  # the daemon keeps the start
+        *("before the disk", "after the disk"),  # the daemon writes the start to its disk
         *("before the outputs", "after the outputs"),
     ]
 
 
 @pytest.mark.parametrize("jam", ["", "stuck"])
-def test_wherever_the_daemon_dies_rmf_goes_on_only_with_the_item_and_with_one(jam: str) -> None:
+def test_wherever_the_daemon_dies_rmf_goes_on_only_with_exactly_one_item(jam: str) -> None:
     doubts = 0
     for place in range(len(effects(jam)) + 4):
         world = World(die_at=place)
@@ -65,7 +66,7 @@ def test_wherever_the_daemon_dies_rmf_goes_on_only_with_the_item_and_with_one(ja
         what = (place, world.effects[place : place + 1], said, phase.outcome, phase.why)
         assert world.plant.moved == (0 if jam else 1), what
         assert phase.outcome == ("failed" if jam else "completed"), what
-    assert doubts > 4  # deaths between start and outcome
+    assert doubts > 4  # the daemon died between the start and the outcome
 
 
 def is_over(phase: WorkcellPhase) -> Callable[[], bool]:
@@ -77,7 +78,8 @@ def losing(topic: str, first: int, last: int) -> Callable[[str, int], bool]:
 
 
 def losses(most: int) -> Iterable[tuple[str, int, int]]:
-    """Yield (topic, first, last): the messages of the topic from `first` to `last` are lost."""
+    """Yield tuples (topic, first, last). The messages number `first` to `last` of this topic are
+    lost."""
     for topic in ("dispenser_requests", "dispenser_states", "dispenser_results"):
         for first in range(most):
             for last in range(first, most):
@@ -102,7 +104,7 @@ def every_third(first: int) -> Callable[[str, int], bool]:
 
 
 def test_a_death_and_lost_messages_together_send_no_robot_off_without_its_item() -> None:
-    """Only the states after the restart could complete RMF's phase wrongly."""
+    """The states after the restart are the only messages that could complete RMF's phase wrongly."""
     for place in range(0, len(effects()) + 4, depth(3, 1)):
         for first in range(3):
             world = World(die_at=place, lose=every_third(first))

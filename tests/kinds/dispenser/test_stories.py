@@ -18,13 +18,13 @@ def over(*phases: WorkcellPhase) -> Callable[[], bool]:
 
 
 def finished(world: World, guid: str = "task", seconds: float = 20.0) -> WorkcellPhase:
-    """Let RMF ask until its phase has an outcome, for at most `seconds`."""
+    """Let RMF repeat its request until its phase has an outcome, for at most `seconds`."""
     phase = world.ask(guid)
     world.run(seconds, until=over(phase))
     return phase
 
 
-# ---- DISPENSER-1: one guid is one cycle
+# ---- DISPENSER-1: one cycle for one guid
 
 
 def test_a_dispensing_is_acknowledged_runs_once_and_succeeds() -> None:
@@ -56,7 +56,7 @@ def test_two_robots_are_served_in_turn_each_with_its_own_result() -> None:
     assert (one.outcome, other.outcome, world.plant.moved) == ("completed", "completed", 2)
 
 
-# ---- DISPENSER-2: first on disk
+# ---- DISPENSER-2: the daemon writes to its disk first
 
 
 def test_nothing_is_listed_acknowledged_or_started_while_the_disk_is_full() -> None:
@@ -81,14 +81,14 @@ def test_a_request_that_rmf_gave_up_while_its_start_was_not_on_disk_does_not_run
     world.run(5.0, until=lambda: world.state.request_guid_queue == ("task",))
     world.disk.full = "no space left on device"
     world.run(0.5)
-    phase.outcome = "failed"  # RMF's task ended for another reason
+    phase.outcome = "failed"  # RMF's task has ended for another reason
     world.run(10.0)
     world.disk.full = ""
     world.run(10.0)
     assert (world.relays(), world.plant.moved) == ([], 0)
 
 
-def test_an_outcome_that_is_not_on_disk_is_not_told() -> None:
+def test_an_outcome_is_published_only_after_it_is_on_disk() -> None:
     world = World()
     phase = world.ask()
     world.run(5.0, until=lambda: world.relays() == [True])
@@ -171,7 +171,7 @@ def test_no_cycle_starts_with_a_rival_a_fault_or_a_dead_bus() -> None:
         ("garbage", "it has stopped, and done did not come within 1 s"),
     ],
 )
-def test_a_failed_cycle_is_told_with_outputs_off_and_halts_until_a_reset(
+def test_a_failed_cycle_is_reported_with_outputs_off_and_waits_for_a_reset(
     failure: str, why: str
 ) -> None:
     world = World()
@@ -209,7 +209,7 @@ def test_a_steady_start_is_on_until_done() -> None:
     assert (phase.outcome, world.relays()) == ("completed", [True, False])
 
 
-# ---- DISPENSER-6: something fails in the middle
+# ---- DISPENSER-6: failures during a cycle
 
 
 def test_a_plc_that_restarts_in_mid_cycle_does_not_dispense_twice() -> None:
@@ -239,11 +239,11 @@ def test_after_a_failed_reading_the_start_stays_off_and_done_still_counts() -> N
     assert world.relays() == [True, False]
 
 
-# ---- DISPENSER-7: doubt
+# ---- DISPENSER-7: requests in doubt
 
 
 def doubtful(world: World) -> WorkcellPhase:
-    """Kill the daemon in mid-cycle while the machine is jammed. Return the world."""
+    """Kill the daemon in the middle of a cycle in which the machine is jammed. Return RMF's phase."""
     phase = world.ask()
     world.run(5.0, until=lambda: world.relays() == [True])
     world.run(0.25)
@@ -260,7 +260,7 @@ def doubtful(world: World) -> WorkcellPhase:
     ("verdict", "outcome", "moved"),
     [("done", "completed", 1), ("failed", "failed", 1), ("again", "completed", 2)],
 )
-def test_a_person_decides_what_became_of_a_cycle_that_the_daemon_did_not_see_end(
+def test_a_person_decides_a_cycle_whose_end_the_daemon_did_not_see(
     verdict: str, outcome: str, moved: int
 ) -> None:
     world = World()
@@ -312,8 +312,8 @@ def test_a_daemon_without_its_memory_is_offline_and_gives_no_result_until_a_pers
 
 
 def test_a_lost_memory_completes_no_request_that_the_daemon_has_acknowledged_before() -> None:
-    """The first states after the restart list no request. RMF ignores these states, because their stamp
-    is 0."""
+    """The first states after the restart list no request. RMF ignores them, because their stamp is
+    0."""
     world = World(new=False)
     world.decide("again")
     world.run(1.0)
@@ -362,7 +362,7 @@ def test_the_guid_of_a_waiting_request_with_other_items_is_refused() -> None:
 
 
 def test_the_guid_of_a_finished_request_is_in_doubt_after_a_long_silence() -> None:
-    """Guids can repeat: rmf_task_ros2 uses five random hexadecimal digits, or counts from 0 at each
+    """Guids can repeat. rmf_task_ros2 uses five random hexadecimal digits, or counts from 0 at each
     start."""
     world = World()
     finished(world)
@@ -386,7 +386,7 @@ def test_a_restart_does_not_forget_that_rmf_had_been_silent() -> None:
     assert world.faults == ["OUTCOME_UNKNOWN"]
 
 
-# ---- DISPENSER-8: forgetting
+# ---- DISPENSER-8: when the daemon forgets a request
 
 
 def test_a_request_is_forgotten_a_day_after_rmfs_last_request() -> None:
@@ -399,7 +399,7 @@ def test_a_request_is_forgotten_a_day_after_rmfs_last_request() -> None:
     assert world.plant.moved == 2
 
 
-# ---- requests that cannot be obeyed
+# ---- requests that the daemon cannot obey
 
 
 @pytest.mark.parametrize(
@@ -413,7 +413,7 @@ def test_a_request_is_forgotten_a_day_after_rmfs_last_request() -> None:
         (d.DispenserRequestItem("box", 1, "left"),),
     ],
 )
-def test_items_that_the_wiring_cannot_say_fail_at_once(items: object) -> None:
+def test_items_that_the_wiring_cannot_express_fail_at_once(items: object) -> None:
     world = World()
     phase = world.ask(items=items)
     world.run(3.0, until=over(phase))

@@ -1,4 +1,4 @@
-"""A check of every state within some steps: RMF goes on only with its item, and no item moves twice."""
+"""A check of every state within some steps. RMF goes on only with its item, and no item moves twice."""
 
 from typing import Any
 

@@ -1,7 +1,7 @@
 """A walk through all states that a dispenser and RMF's phase can reach within some steps.
 
 A state has the core's memory, the disk, the machine and RMF's phase. All times are relative to now.
-RMF's phase is written here anew, after `_get_status` of DispenseItem.cpp. Every message is newer than
+This file writes RMF's phase anew, after `_get_status` of DispenseItem.cpp. Every message is newer than
 the messages before it.
 """
 
@@ -36,8 +36,8 @@ GUID = "task"
 class Phase(msgspec.Struct, frozen=True):
     """RMF's phase.
 
-    `deaf` says that its node hears nothing. `stamped` says that the phase has heard a message with a
-    stamp. After such a message a state with the stamp 0 counts as older.
+    `deaf` says that the phase's node hears nothing. `stamped` says that the phase has heard a message
+    with a stamp. After such a message a state with the stamp 0 counts as older.
     """
 
     asks: bool = False
@@ -52,9 +52,9 @@ class World(msgspec.Struct, frozen=True):
 
     - `disk` has the bytes that outlive the daemon.
     - `works` says that the machine runs a cycle.
-    - `moved` is the number of items that left the machine.
+    - `moved` is the number of items that have left the machine.
     - `again` is the number of times that a person has ordered another cycle.
-    - `decided` says that a person has decided a doubt.
+    - `decided` says that a person has decided the request in doubt.
     """
 
     memory: WorkcellMemory
@@ -126,7 +126,7 @@ def _loses(world: World) -> tuple[World, Event | None]:
 
 
 def _decides(verdict: Any) -> Move:
-    """Return the move in which a person looks at the machine and decides.
+    """Return the move in which a person looks at the machine and gives this verdict.
 
     The person says `done` only if an item has moved, and `again` only if no item has moved.
     """
@@ -209,7 +209,8 @@ def _scanned(world: World, event: Event, now: float, seen: Callable[[Any], None]
 
 
 def _switched(world: World, *, on: bool) -> World:
-    """Drive the start output. Switching it on begins a cycle, and switching it off clears `done`."""
+    """Drive the start output. Switching the output on begins a cycle. Switching it off clears
+    `done`."""
     begins = on and not world.on and not world.works
     return replace(world, on=on, works=world.works or begins, done=world.done and on and not begins)
 
@@ -234,7 +235,8 @@ def _heard(phase: Phase, report: Any) -> Phase:
 
 
 def _shifted(value: Any, by: float) -> Any:
-    """Return a memory whose times are earlier by `by`. Ages beyond every limit are made equal."""
+    """Return the memory with its times `by` seconds earlier. Times before -LONGEST_S become
+    -LONGEST_S."""
     if isinstance(value, tuple):
         return tuple(_shifted(one, by) for one in value)
     if not isinstance(value, msgspec.Struct):

@@ -1,9 +1,9 @@
 """One dispenser in virtual time: RMF's phase, the network, the daemon's node, its disk and the machine.
 
 The daemon is the product's own `Node`, with its keeper and the driver for contacts. An effect is the
-instant before or after a write to the disk, a message, or a switched output. The daemon dies at the
-effect with the number `die_at`. Then its outputs go off, and a new daemon starts on the same disk after
-DOWN_S.
+instant before or after one of these acts: a write to the disk, a message, a switched output. The daemon
+dies at the effect with the number `die_at`. Then its outputs go off. After DOWN_S a new daemon starts
+on the same disk.
 """
 
 from collections.abc import Callable, Mapping
@@ -59,7 +59,8 @@ class Killed(BaseException):
 
 @dataclass
 class Disk:
-    """The file that outlives the daemon. `full` is the reason why writing fails, or ""."""
+    """The file that outlives the daemon. `full` is the reason why a write fails, or "" if writes
+    succeed."""
 
     content: bytes | None = None
     full: str = ""
@@ -78,7 +79,7 @@ class Disk:
 
 @dataclass
 class World:
-    """The dispenser with everything around it.
+    """The dispenser with its surroundings.
 
     `lose(topic, number)` decides whether a message is lost. `said` has every message of the daemon.
     """
@@ -105,7 +106,7 @@ class World:
         self.plant: WorkcellPlant = build(NAME, self.settings, self.table)
         self.far = PointsFar(self, self.plant, self.table)
 
-    # ---- what a story does
+    # ---- actions of a story
 
     def ask(self, guid: str = "task", items: Any = BOX) -> WorkcellPhase:
         """Begin RMF's phase with this request."""
@@ -122,7 +123,7 @@ class World:
         return self
 
     def decide(self, verdict: Any, request: str = "") -> None:
-        """Let a person decide."""
+        """Let a person decide a request in doubt."""
         self.inbox["person"] = DecidedByPerson(verdict, request)
 
     def reset(self) -> None:
@@ -130,7 +131,7 @@ class World:
         self.inbox["reset"] = OperatorReset()
 
     def rival(self) -> None:
-        """Let another node publish states of the dispenser."""
+        """Let another node publish states of this dispenser."""
         self.inbox["rival"] = RivalSeen()
 
     def kill(self) -> None:
@@ -140,7 +141,7 @@ class World:
         self.far.drive({w.point: w.level(False) for w in self.table if w.direction == "out"})
         self.starts_at = self.now + DOWN_S
 
-    # ---- what a story sees
+    # ---- results for a story
 
     @property
     def state(self) -> d.DispenserState:
@@ -232,7 +233,7 @@ class World:
 
 
 class _Mortal:
-    """A driver whose daemon may die immediately before or after each switched output."""
+    """A driver whose daemon may die right before or right after each switched output."""
 
     def __init__(self, driver: Any, around: Callable[[str], None]) -> None:
         self._driver = driver
@@ -242,7 +243,7 @@ class _Mortal:
         self.make_safe, self.close = driver.make_safe, driver.close
 
     def write(self, outputs: Any) -> None:
-        """Write the outputs. A change of the outputs is two effects: before and after the write."""
+        """Write the outputs. A change of the outputs has two effects, before and after the write."""
         changes, self._last = outputs != self._last, outputs
         if changes:
             self._around("before the outputs")

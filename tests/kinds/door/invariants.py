@@ -27,8 +27,8 @@ def check(step: Step) -> None:
 def the_hold_has_a_reason(step: Step) -> None:
     """Require a reason whenever the door is held open.
 
-    A reason is RMF's request, a fire, or an obstruction that appears while the door closes after a
-    hold.
+    A reason is RMF's request, a fire, or an obstruction. An obstruction counts only while the door
+    closes after a hold.
     """
     held, ledger = step.decision.report.hold, step.ledger
     if not _sighted(step):
@@ -51,18 +51,18 @@ def the_hold_has_a_reason(step: Step) -> None:
 
 
 def the_relay_follows_the_hold(step: Step) -> None:
-    """Require the relay to follow the hold: on all the time, or in pulses from the start of the
-    hold."""
+    """Require the relay to follow the hold. The relay is on without a break, or in pulses that begin
+    with the hold."""
     on, pulse = step.decision.outputs.hold_open, step.limits.pulse
     in_pulse = pulse is None or (step.now - step.ledger.held_since) % pulse.every_s < pulse.on_s
     assert on == (step.ledger.held and in_pulse)
 
 
 def open_is_the_truth(step: Step) -> None:
-    """Require evidence whenever OPEN is shown.
+    """Require evidence whenever the door shows OPEN.
 
-    Evidence is a fresh reading of the open contact. A door that may be estimated needs the opening time
-    instead.
+    The evidence is a fresh reading of the open contact. Without that contact the evidence is the
+    opening time, if the site permits estimates.
     """
     shown, sample = step.decision.report, step.world.sample
     if not _sighted(step):
@@ -88,8 +88,8 @@ def open_is_the_truth(step: Step) -> None:
 def a_request_that_waits_has_a_reason(step: Step) -> None:
     """Require a reason for each waiting OPEN request.
 
-    An OPEN request waits while RMF wants the door open and the door does not show OPEN. If the door is
-    not held either, there must be a fault. Before the first reading no fault is needed.
+    An OPEN request waits if RMF wants the door open and the door does not show OPEN. If such a door is
+    also not held, the rule requires a fault. Before the first reading the rule requires no fault.
     """
     shown = step.decision.report
     assert bool(shown.waits) == (step.ledger.wanted and shown.mode is not DoorModeValue.MODE_OPEN)
@@ -98,9 +98,9 @@ def a_request_that_waits_has_a_reason(step: Step) -> None:
 
 
 def hazards_are_as_read(step: Step) -> None:
-    """Require hazards as the contacts show them.
+    """Require the hazards that the contacts show.
 
-    A fire begins at once and ends with a delay. Only a fire refuses an OPEN request.
+    A fire begins at once and ends after a delay. An OPEN request is refused only because of a fire.
     """
     clear_s = step.limits.t.hazard_clear_s
     if fresh(step.ledger, step.now, step.limits):
@@ -114,8 +114,7 @@ def hazards_are_as_read(step: Step) -> None:
 
 
 def nothing_changes_before_wake_at(world: World, limits: DoorLimits) -> None:
-    """Require scans before `wake_at` to change neither outputs nor report if the inputs stay the
-    same."""
+    """Require that a scan before `wake_at` with the same inputs changes neither outputs nor report."""
     now = _scan(world, world.memory, 0.0, limits)
     until = min(now.wake_at, 1e4)
     later = _scan(world, now.memory, until * (1.0 - 1e-6), limits)
@@ -139,7 +138,7 @@ def _codes(step: Step) -> set[str]:
 
 
 def _exact(step: Step) -> bool:
-    """Return whether this step is a reading that counts at once, without debounce."""
+    """Return whether this step is a reading that counts at once, because nothing is debounced."""
     return isinstance(step.event, Sampled) and not step.limits.debounce
 
 
@@ -148,7 +147,6 @@ def _signal(step: Step, name: str) -> bool:
 
 
 def _told_otherwise(step: Step, name: str, for_s: float) -> bool:
-    """Return whether every reading of the last `for_s` seconds said that the contact is not
-    asserted."""
+    """Return whether all readings of the last `for_s` seconds showed this contact not asserted."""
     since = step.ledger.unlike[UNLIKE.index(name)]
     return since is not None and step.now >= since + for_s

@@ -1,11 +1,11 @@
-"""DOOR-2: a door whose supervisor has gone stays held open. A site may limit that time."""
+"""DOOR-2: a door without its supervisor stays held open. A site may limit the time of this hold."""
 
 from bridges.kinds.shared.decision import Attended
 from tests.kinds.door.virtual import OBSTRUCTION, Door
 
 
 def held(**limits: float) -> Door:
-    """Return a door that is held open from 1 s on, and whose supervisor goes at 20 s."""
+    """Return a door that is held open from 1 s on. Its supervisor disappears at 20 s."""
     door = Door(limits=limits, inputs={"obstruction": OBSTRUCTION})
     door.scan(Attended(True))
     door.run(1.0)
@@ -15,7 +15,7 @@ def held(**limits: float) -> Door:
     return door
 
 
-def test_by_default_a_door_stays_held_whoever_is_gone() -> None:
+def test_by_default_a_door_stays_held_without_supervisor_and_robots() -> None:
     door = held()
     door.run(4000.0)
     assert [on for _, on in door.relay] == [True]
@@ -34,7 +34,7 @@ def test_with_supervisor_lost_s_the_hold_ends_after_that_time_and_a_fault_says_w
     assert door.faults[-1][1] == ()
 
 
-def test_a_supervisor_that_is_back_in_time_changes_nothing() -> None:
+def test_a_supervisor_that_returns_in_time_changes_nothing() -> None:
     door = held(supervisor_lost_s=60.0)
     door.run(75.0)
     door.scan(Attended(True))
@@ -42,7 +42,7 @@ def test_a_supervisor_that_is_back_in_time_changes_nothing() -> None:
     assert [on for _, on in door.relay] == [True]
 
 
-def test_a_request_counts_as_a_sign_of_life_before_its_sender_is_seen_on_the_graph() -> None:
+def test_a_request_proves_a_live_supervisor_before_its_node_is_seen_on_the_graph() -> None:
     door = held(supervisor_lost_s=60.0)
     door.run(200.0)
     door.opens()

@@ -50,7 +50,7 @@ def test_before_the_first_reading_a_door_is_offline_and_nothing_is_held() -> Non
     assert decided.wake_at == math.inf
 
 
-def test_an_open_before_the_first_reading_is_kept_and_held_with_it() -> None:
+def test_an_open_before_the_first_reading_takes_effect_with_that_reading() -> None:
     core = CoreAlone()
     core.hears(OPENS)
     core.now = 1.0
@@ -70,7 +70,7 @@ def test_a_doors_position_is_unknown_before_its_contacts_have_settled() -> None:
 # ---- DOOR-1: OPEN, CLOSE and the grace
 
 
-def test_an_open_request_holds_the_door_and_its_contacts_show_how_far_it_is() -> None:
+def test_an_open_request_holds_the_door_and_its_contacts_show_its_position() -> None:
     core = CoreAlone()
     core.sees(CLOSED, until=1.0)
     core.hears(OPENS)
@@ -96,7 +96,7 @@ def test_a_thousand_open_requests_switch_the_relay_once() -> None:
     assert often.memory == once.memory
 
 
-def test_a_close_request_releases_the_hold_after_its_grace_and_repeats_do_not_prolong_it() -> None:
+def test_repeats_of_close_do_not_prolong_the_grace() -> None:
     core = CoreAlone()
     core.hears(OPENS)
     for second in range(6):
@@ -116,7 +116,7 @@ def test_an_open_within_the_grace_cancels_the_close() -> None:
     assert core.told[-1] == (0.0625, "OPEN", True)
 
 
-def test_the_grace_begins_again_with_the_close_after_that() -> None:
+def test_the_next_close_begins_a_new_grace() -> None:
     core = CoreAlone(limits(close_grace_s=2.0))
     core.hears(OPENS)
     core.sees(OPEN, until=1.0)
@@ -138,7 +138,7 @@ def test_without_grace_a_close_request_releases_the_hold_at_once() -> None:
 # ---- DOOR-3: obstructions
 
 
-def test_an_obstruction_holds_the_door_again_until_it_has_been_away_for_a_second() -> None:
+def test_an_obstruction_holds_the_door_again_and_one_second_longer() -> None:
     core = CoreAlone(limits(close_grace_s=1.0))
     clear = replace(OPEN, obstruction=False)
     core.hears(OPENS)
@@ -172,7 +172,7 @@ def test_an_obstruction_at_an_idle_door_does_not_open_it() -> None:
     assert [hold for _, _, hold in core.told] == [False, False, False]
 
 
-def test_a_hold_that_ended_at_once_still_gives_way_to_an_obstruction() -> None:
+def test_an_obstruction_also_holds_the_door_after_a_hold_that_ended_at_once() -> None:
     core = CoreAlone(limits(close_grace_s=0.0))
     core.sees(replace(OPEN, obstruction=False), until=1.0)
     core.hears(OPENS)
@@ -190,7 +190,7 @@ def test_an_obstruction_at_a_door_that_is_not_held_is_not_a_fault() -> None:
 # ---- DOOR-6, DOOR-SENSING-4: the reported position
 
 
-def test_open_and_closed_at_once_is_unknown_and_a_fault_while_it_lasts() -> None:
+def test_a_door_that_reads_open_and_closed_together_is_unknown_and_a_fault() -> None:
     core = CoreAlone()
     core.sees(BOTH, until=1.0)
     assert core.faults() == ("DOOR_CONTACTS_CONTRADICT: the door reads open and closed",)
@@ -226,7 +226,7 @@ def test_a_door_that_reverses_gets_its_whole_travel_time_again() -> None:
     ]
 
 
-def test_a_door_whose_controller_does_not_say_where_it_is_is_unknown_for_that_reason() -> None:
+def test_a_door_without_a_position_from_its_controller_is_unknown() -> None:
     core = CoreAlone()
     core.sees(OPEN, until=1.0)
     core.sees(replace(OPEN, lost="status 7 is not listed"), until=2.0)
@@ -241,7 +241,7 @@ def test_a_door_whose_controller_does_not_say_where_it_is_is_unknown_for_that_re
     ]
 
 
-def test_a_door_that_does_not_open_is_a_fault_and_stays_held() -> None:
+def test_a_door_that_does_not_open_has_a_fault_and_stays_held() -> None:
     core = CoreAlone(limits(open_timeout_s=4.0))
     core.sees(CLOSED, until=1.0)
     core.hears(OPENS)
@@ -257,10 +257,10 @@ def test_a_door_that_does_not_open_is_a_fault_and_stays_held() -> None:
     assert core.faults() == ()
 
 
-# ---- DOOR-7: a rival
+# ---- DOOR-7: a second node of the same name
 
 
-def test_a_rival_takes_the_door_offline_and_the_hold_off_until_five_quiet_seconds() -> None:
+def test_a_rival_takes_the_door_offline_until_it_is_silent_for_five_seconds() -> None:
     core = CoreAlone()
     core.hears(OPENS)
     core.sees(OPEN, until=1.0)
@@ -401,7 +401,7 @@ def test_the_core_wakes_at_the_edges_of_each_pulse() -> None:
 # ---- DOOR-SENSING-3: estimates
 
 
-def test_without_contacts_a_door_is_estimated_by_its_travel_time_and_marked_so() -> None:
+def test_without_contacts_the_position_is_estimated_from_the_travel_time_and_marked() -> None:
     core = CoreAlone(DoorLimits(t=DoorDurations(open_delay_s=4.0, travel_s=6.0), estimated=True))
     core.sees(DoorSample(), until=10.0)
     core.hears(OPENS)
@@ -492,7 +492,7 @@ def test_with_one_contact_only_the_other_end_is_estimated() -> None:
     assert (closed.report.estimated, opened.report.estimated) == (False, True)
 
 
-def test_a_missing_contact_proves_nothing_unless_estimates_are_allowed() -> None:
+def test_a_missing_contact_proves_nothing_if_estimates_are_forbidden() -> None:
     core = CoreAlone(DoorLimits())
     core.hears(OPENS)
     core.sees(DoorSample(), until=100.0)
@@ -512,7 +512,7 @@ def test_a_door_held_for_very_long_is_reported_and_stays_held() -> None:
     assert core.told[-1] == (0.0625, "OPEN", True)
 
 
-def test_the_controllers_own_errors_are_one_fault_that_moves_nothing() -> None:
+def test_an_error_of_the_controller_is_a_fault_and_moves_nothing() -> None:
     core = CoreAlone()
     core.hears(OPENS)
     core.sees(replace(OPEN, errors=("motor too hot", "bit 9")), until=1.0)
@@ -522,7 +522,7 @@ def test_the_controllers_own_errors_are_one_fault_that_moves_nothing() -> None:
     assert core.told == [(0.0, "OFFLINE", False), (0.0, "UNKNOWN", True), (0.0625, "OPEN", True)]
 
 
-def test_a_repeated_open_does_not_put_off_the_fault_of_a_door_held_too_long() -> None:
+def test_a_repeated_open_does_not_delay_the_fault_of_a_long_hold() -> None:
     core = CoreAlone(limits(max_hold_s=60.0))
     for second in range(61):
         core.hears(OPENS)
@@ -530,7 +530,7 @@ def test_a_repeated_open_does_not_put_off_the_fault_of_a_door_held_too_long() ->
     assert core.faults() == ("DOOR_OPEN_TOO_LONG: RMF has held the door for more than 60.0 s",)
 
 
-def test_a_door_counts_as_held_too_long_at_the_very_instant_for_which_the_core_wakes() -> None:
+def test_a_door_is_held_too_long_at_the_instant_for_which_the_core_wakes() -> None:
     core = CoreAlone(replace(limits(max_hold_s=0.5), debounce={}))
     core.hears(Sampled(OPEN))
     core.now = core.hears(OPENS).wake_at
@@ -542,7 +542,7 @@ def test_a_door_counts_as_held_too_long_at_the_very_instant_for_which_the_core_w
     assert core.hears(OPENS).wake_at < math.inf
 
 
-def test_a_new_reading_that_says_the_same_is_not_news() -> None:
+def test_an_unchanged_reading_is_no_news() -> None:
     core = CoreAlone()
     before, after = core.sees(OPEN, until=1.0).report, core.sees(OPEN, until=2.0).report
     assert (before.read_at, after.read_at) == (1.0, 2.0)

@@ -25,9 +25,7 @@ from tests.kinds.door.virtual import (
 )
 
 
-def test_a_door_whose_reading_is_too_old_is_offline_with_the_hold_off_and_remembers_the_request() -> (
-    None
-):
+def test_with_an_old_reading_a_door_is_offline_without_hold_but_remembers_the_request() -> None:
     core = CoreAlone()
     core.hears(OPENS)
     core.sees(OPEN, until=1.0)
@@ -57,7 +55,7 @@ def test_a_short_gap_in_the_readings_changes_nothing() -> None:
     assert core.faults() == ()
 
 
-def test_a_contact_half_seen_before_a_gap_must_be_seen_again() -> None:
+def test_after_a_gap_a_contact_must_settle_again() -> None:
     core = CoreAlone(DoorLimits(debounce={"opened": 0.5}))
     core.sees(BETWEEN, until=2.0)
     core.sees(OPEN, until=2.375)
@@ -78,7 +76,7 @@ def test_a_contact_half_seen_before_a_gap_must_be_seen_again() -> None:
         ("fire", replace(OPEN, fire=False), replace(OPEN, fire=True)),
     ],
 )
-def test_every_contact_half_seen_before_a_gap_must_be_seen_again(
+def test_after_a_gap_every_contact_must_settle_again(
     contact: str, before: DoorSample, after: DoorSample
 ) -> None:
     core = CoreAlone(DoorLimits(debounce={contact: 0.5}))
@@ -93,7 +91,7 @@ def test_every_contact_half_seen_before_a_gap_must_be_seen_again(
     assert seen == [False, False, True]
 
 
-def test_the_position_of_a_door_that_was_read_once_before_a_gap_is_still_unknown() -> None:
+def test_after_one_reading_and_a_gap_the_position_of_a_door_is_unknown() -> None:
     core = CoreAlone()
     core.hears(IoFailed("no reply"))
     core.sees(OPEN, until=0.0)
@@ -103,7 +101,7 @@ def test_the_position_of_a_door_that_was_read_once_before_a_gap_is_still_unknown
     assert core.told == [(0.0, "OFFLINE", False), (0.0, "UNKNOWN", False)]
 
 
-def test_a_missing_scan_is_a_lost_connection() -> None:
+def test_a_missing_scan_counts_as_a_lost_connection() -> None:
     core = CoreAlone()
     core.sees(OPEN, until=1.0)
     core.now = 3.0
@@ -112,7 +110,7 @@ def test_a_missing_scan_is_a_lost_connection() -> None:
     assert core.faults() == ("COMMUNICATION_LOST: no reading for 1.0 s",)
 
 
-def test_after_a_sleep_nothing_is_believed_of_the_inputs() -> None:
+def test_after_the_machine_slept_no_input_is_believed() -> None:
     core = CoreAlone()
     core.hears(OPENS)
     core.sees(OPEN, until=0.5)
@@ -142,7 +140,7 @@ def test_a_failed_write_does_not_start_the_debounce_of_a_contact_again() -> None
     assert core.told[-1] == (1.0625, "OPEN", False)
 
 
-def test_a_silence_has_its_own_reason_and_not_that_of_an_earlier_failure() -> None:
+def test_a_silence_gives_its_own_reason_and_not_an_earlier_reason() -> None:
     def silence_after(failure: Event) -> tuple[str, ...]:
         core = CoreAlone()
         core.sees(OPEN, until=1.0)
@@ -160,7 +158,7 @@ def test_a_silence_has_its_own_reason_and_not_that_of_an_earlier_failure() -> No
     assert core.faults() == (f"COMMUNICATION_LOST: no reading for {STALE_S} s",)
 
 
-def test_a_hazard_half_seen_before_a_gap_is_not_a_hazard() -> None:
+def test_a_hazard_that_has_not_settled_before_a_gap_is_no_hazard() -> None:
     core = CoreAlone(replace(limits(), on_fire="open"))
     core.hears(Sampled(replace(OPEN, fire=False, obstruction=False)))
     decided = core.hears(IoFailed("no reply"))

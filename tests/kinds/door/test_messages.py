@@ -46,7 +46,9 @@ def test_an_empty_request_closes_no_door() -> None:
 
 
 @pytest.mark.parametrize("mode", list(DoorModeValue))
-def test_the_state_is_the_reports_mode_with_the_stamp_of_its_reading(mode: DoorModeValue) -> None:
+def test_a_door_state_has_the_mode_of_the_report_and_the_stamp_of_the_reading(
+    mode: DoorModeValue,
+) -> None:
     report = DoorReport(mode=mode, read_at=12.0, hold=True)
     assert messages.state_message("ward_door", SETTINGS, report, Time(3, 4)) == DoorState(
         door_time=Time(3, 4), door_name="ward_door", current_mode=DoorMode(int(mode))

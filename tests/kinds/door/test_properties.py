@@ -28,7 +28,7 @@ LIMITS = st.builds(
 
 
 def checked(step: Step) -> None:
-    """Check that the rules hold, and that the core decides the same when it is asked again."""
+    """Check the rules. Check also that the core decides the same when it decides twice."""
     check(step)
     once = step.decision
     assert decide(step.before, step.event, step.now, step.limits) == once

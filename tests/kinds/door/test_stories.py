@@ -20,7 +20,8 @@ class Corridor:
         self._told: tuple[int, int] | None = None
 
     def robot(self, name: str, mode: DoorModeValue) -> None:
-        """Let a robot's fleet adapter ask the supervisor. The supervisor may then ask the door."""
+        """Let this robot's fleet adapter send a request to the supervisor. The supervisor may then send
+        a request to the door."""
         self._deliver(door_request("door", name, mode, self.door.now))
 
     def run(self, until: float) -> None:
@@ -73,7 +74,7 @@ def test_an_open_door_stays_open_through_ten_minutes_of_silence() -> None:
     assert door.told[-1] == (3.125, "OPEN")
 
 
-def test_a_human_at_an_idle_door_and_the_supervisors_reminders_move_no_relay() -> None:
+def test_a_person_at_an_idle_door_and_reminders_of_the_supervisor_move_no_relay() -> None:
     corridor = Corridor()
     corridor.run(1.0)
     corridor.door.plant.press("push", True, 1.0)
@@ -91,7 +92,7 @@ def test_a_human_at_an_idle_door_and_the_supervisors_reminders_move_no_relay() -
     ]
 
 
-def test_of_two_robots_the_first_to_leave_does_not_close_on_the_other() -> None:
+def test_the_first_of_two_robots_to_leave_does_not_close_the_door_on_the_other() -> None:
     corridor = Corridor()
     corridor.run(1.0)
     corridor.robot("fleet/a", OPEN)
@@ -143,7 +144,7 @@ def test_an_operator_that_closes_by_itself_is_kept_open_by_pulses() -> None:
     assert [mode for at, mode in door.told if at > 3.1] == ["MOVING", "CLOSED"]
 
 
-def test_a_thousand_opens_cost_the_relay_one_edge() -> None:
+def test_a_thousand_opens_switch_the_relay_once_through_driver_and_plant() -> None:
     door = Door()
     door.run(1.0)
     for _ in range(1000):
@@ -152,7 +153,7 @@ def test_a_thousand_opens_cost_the_relay_one_edge() -> None:
     assert door.relay == [(1.0, True)]
 
 
-# ---- DOOR-6: broken parts
+# ---- DOOR-6: parts that break
 
 
 def test_a_broken_operator_is_a_door_that_does_not_open() -> None:
@@ -235,7 +236,7 @@ def test_a_module_that_lost_its_power_gets_its_hold_back() -> None:
     assert door.told[-1][1] == "OPEN"
 
 
-def test_a_door_back_from_offline_with_a_session_is_opened_again() -> None:
+def test_a_door_that_was_offline_is_opened_again_for_its_session() -> None:
     corridor = Corridor()
     corridor.door.bus.down = "no reply"
     corridor.run(1.0)
@@ -252,7 +253,7 @@ def test_a_door_back_from_offline_with_a_session_is_opened_again() -> None:
     ]
 
 
-def test_a_daemon_restarted_under_a_robot_is_told_again_by_the_supervisor() -> None:
+def test_the_supervisor_repeats_open_to_a_daemon_that_restarted_under_a_robot() -> None:
     corridor = Corridor()
     corridor.run(1.0)
     corridor.robot("fleet/a", OPEN)
@@ -268,7 +269,7 @@ def test_a_daemon_restarted_under_a_robot_is_told_again_by_the_supervisor() -> N
 # ---- DOOR-4: fire
 
 
-def test_a_fire_releases_a_door_and_the_latch_is_gone_afterwards() -> None:
+def test_a_fire_releases_a_door_and_leaves_no_latch() -> None:
     door = Door(inputs={"fire": FIRE}, on_fire="release")
     door.run(1.0)
     door.opens()

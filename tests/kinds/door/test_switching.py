@@ -1,6 +1,6 @@
 """DOOR-1: the grace after CLOSE limits how often the relay switches.
 
-The grace may lengthen a hold, but never refuses a hold.
+The grace may make a hold longer, but never delays or refuses a hold.
 """
 
 import pytest
@@ -19,7 +19,7 @@ def held() -> CoreAlone:
     return core
 
 
-def test_open_and_close_at_any_pace_switch_no_faster_than_the_grace() -> None:
+def test_open_and_close_at_any_rate_switch_the_relay_no_faster_than_the_grace() -> None:
     core = held()
     for scan in range(80):
         core.hears(CLOSES)

@@ -42,7 +42,7 @@ def path(*steps: str | float, limits: DoorLimits = PLAIN) -> World:
 
 
 class Scan:
-    """One more scan of a state. The rules are checked, and the scan has the core's decision."""
+    """One more scan of a state, with the core's decision. The rules are checked too."""
 
     def __init__(self, world: World, limits: DoorLimits) -> None:
         self._steps: list[Step] = []
@@ -79,7 +79,7 @@ def test_each_stage_of_a_passage_is_what_its_name_says() -> None:
 
 
 def check_rules_within(steps: int, roots: list[World], limits: DoorLimits) -> int:
-    """Check every step and state, and return the number of states."""
+    """Check every step and every state. Return the number of states."""
     found = walker(limits).walk(roots, steps, check)
     for world in found:
         nothing_changes_before_wake_at(world, limits)
@@ -87,7 +87,7 @@ def check_rules_within(steps: int, roots: list[World], limits: DoorLimits) -> in
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_a_doors_rules_hold_within_some_steps_of_the_start(site: str) -> None:
+def test_the_rules_of_a_door_hold_within_some_steps_of_the_start(site: str) -> None:
     limits = SITES[site]
     assert check_rules_within(depth(2, 3), [start(limits)], limits) > depth(80, 500)
 
@@ -98,21 +98,21 @@ def test_the_rules_hold_within_some_steps_of_each_stage_of_a_passage(stage: str)
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_the_rules_hold_within_some_steps_of_all_stages_at_each_kind_of_site(site: str) -> None:
+def test_the_rules_of_a_door_hold_near_all_stages_at_each_kind_of_site(site: str) -> None:
     limits = SITES[site]
     roots = [path(*steps, limits=limits) for steps in STAGES.values()]
     assert check_rules_within(depth(1, 2), roots, limits) > depth(80, 800)
 
 
 def mended(world: World, limits: DoorLimits) -> World:
-    """Return the world after repairs: a shut door, an empty doorway, no fire, and contacts that
-    answer."""
+    """Return the world after all repairs: the door is shut, the doorway is empty, nothing burns, and
+    the contacts answer."""
     world = replace(world, sample=start(limits).sample, readable=True, writable=True)
     return path_checked(world, limits, 6.0)
 
 
 def path_checked(world: World, limits: DoorLimits, *steps: str | float) -> World:
-    """Return the world after these moves and waits (s). Each step is checked by the rules."""
+    """Return the world after these moves and waits (s). The rules check each step."""
     return walker(limits).path(world, *steps, seen=check)
 
 
@@ -123,7 +123,7 @@ def states_around_all_stages(limits: DoorLimits) -> list[World]:
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_from_every_state_a_sound_door_opens_when_asked_and_is_let_go_when_asked(
+def test_from_every_state_a_sound_door_opens_on_open_and_is_released_on_close(
     site: str,
 ) -> None:
     limits = SITES[site]
@@ -139,7 +139,7 @@ def test_from_every_state_a_sound_door_opens_when_asked_and_is_let_go_when_asked
 
 
 @pytest.mark.parametrize("site", SITES)
-def test_from_every_state_silence_never_lets_go_of_a_door_that_is_wanted_open(site: str) -> None:
+def test_from_every_state_a_wanted_door_stays_held_in_silence(site: str) -> None:
     limits = SITES[site]
     for world in states_around_all_stages(limits):
         wanted = path_checked(mended(world, limits), limits, "A opens", "at open", 200.0)

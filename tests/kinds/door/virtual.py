@@ -1,6 +1,6 @@
-"""A door in virtual time, with its core alone or with driver, wires and plant.
+"""A door in virtual time: its core alone, or its core with driver, wires and plant.
 
-The door is scanned as the daemon's loop scans it.
+The door is scanned as in the daemon's loop.
 """
 
 from typing import Any
@@ -21,7 +21,7 @@ from tests.drivers.far import PointsFar
 
 SCAN_S = 0.125
 DEBOUNCE_S = 0.0625
-"""The debounce (s), a power of two. So sums of times are exact, and tests compare histories with ==."""
+"""The debounce (s). It is a power of two, so sums of times stay exact and tests can compare with ==."""
 
 CLOSED = DoorSample(opened=False, closed=True)
 OPEN = DoorSample(opened=True, closed=False)
@@ -45,9 +45,9 @@ def word(mode: DoorModeValue) -> str:
 
 
 class CoreAlone:
-    """The core alone, which gets its events from the test.
+    """The core alone. The test gives it events.
 
-    `told` has (s, mode, hold relay), with one entry for each change of mode or relay.
+    `told` gets an entry (s, mode, hold relay) whenever the mode or the relay changes.
     """
 
     def __init__(self, limits: DoorLimits | None = None) -> None:
@@ -82,8 +82,8 @@ class CoreAlone:
 
 
 def settings(**changes: Any) -> DryContactDoorSettings:
-    """Return the settings of a door on a Modbus module, as a YAML file gives them, with these keys
-    changed."""
+    """Return the settings of a door on a Modbus module with these keys changed, as read from a YAML
+    file."""
     inputs = changes.pop("inputs", {})
     plain = {
         "inputs": {
@@ -110,7 +110,7 @@ FIRE = _input(3, "low")
 class Door:
     """The whole door.
 
-    `told` has (s, mode) as RMF hears it. `faults` has an entry for each change of the faults.
+    `told` has each (s, mode) that RMF hears. `faults` gets an entry whenever the faults change.
     """
 
     def __init__(self, **changes: Any) -> None:
@@ -153,11 +153,11 @@ class Door:
         _note(self.faults, self.now, tuple(fault.code for fault in decided.report.faults))
 
     def opens(self, requester: str = "door_supervisor") -> None:
-        """Let an OPEN arrive."""
+        """Let an OPEN request arrive."""
         self.scan(OpenRequested(requester))
 
     def closes(self, requester: str = "door_supervisor") -> None:
-        """Let a CLOSE arrive."""
+        """Let a CLOSE request arrive."""
         self.scan(CloseRequested(requester))
 
     @property

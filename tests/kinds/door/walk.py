@@ -3,8 +3,8 @@
 A state has the core's memory, the building, and a ledger of events. All times in a state are relative
 to now. The ledger follows the rules without the core's code.
 
-Ages beyond every limit are made equal. So two states that cannot behave differently count as one state.
-All durations are sums of powers of two, so no time is rounded.
+The walk cuts long ages to a limit. So two states that must behave alike count as one state. All
+durations are sums of powers of two, so no time is rounded.
 """
 
 from collections.abc import Callable
@@ -24,27 +24,28 @@ from tests.kinds.door.virtual import Decided
 from tests.walk import Walker
 
 LONG_S = 32.0
-"""The longest gap between two scans (s), if the core asks for no earlier scan. Less than
+"""The longest gap between two scans (s) if the core asks for no earlier scan. It is less than
 `stale_after_s`."""
 
 DURATIONS: dict[str, float] = {"stale_after_s": 60.0, "max_hold_s": 30.0}
-"""Changed defaults (s). A long `stale_after_s` saves scans, and `max_hold_s` turns on its alarm."""
+"""The durations (s) that differ from the defaults. A long `stale_after_s` saves scans. `max_hold_s`
+turns on the alarm for a long hold."""
 
 
 def limits_of(durations: dict[str, float] | None = None, **facts: Any) -> DoorLimits:
-    """Return limits. `durations` come before DURATIONS, and DURATIONS come before the defaults."""
+    """Return limits. `durations` have priority over DURATIONS, and DURATIONS over the defaults."""
     return DoorLimits(t=DoorDurations(**{**DURATIONS, **(durations or {})}), **facts)
 
 
 class Ledger(msgspec.Struct, frozen=True):
     """The events so far, noted without the core's conclusions. Times are relative to the state's time.
 
-    - `wanted` says that RMF has asked for an open door.
+    - `wanted` says that RMF wants the door open.
     - `ends_at` is the time at which RMF's CLOSE takes effect.
-    - `let_go` says that the reason for the hold has ended, and that no reading has said closed yet.
-    - `shut` says that the last reading says closed.
-    - `sure_since` is the time at which the hold last changed or a failure ended.
-    - `unlike` has, for each contact, the start of the readings that say "not asserted".
+    - `let_go` says that the reason for the hold has ended. A reading of the closed contact resets it.
+    - `shut` says that the last reading shows the door closed.
+    - `sure_since` is the time of the last change of the hold, or of the first reading after a failure.
+    - `unlike` has a time for each contact: since then all readings have said "not asserted".
     """
 
     held: bool = False
@@ -63,9 +64,10 @@ UNLIKE = ("opened", "obstruction", "fire")
 
 
 class World(msgspec.Struct, frozen=True):
-    """The core's memory and the ledger at time 0, and the building.
+    """The building, with the core's memory and the ledger at time 0.
 
-    `readable` and `writable` say whether the door's contacts and relays answer.
+    `readable` says whether the door's contacts answer. `writable` says whether the door's relays
+    answer.
     """
 
     memory: DoorMemory
@@ -76,7 +78,7 @@ class World(msgspec.Struct, frozen=True):
 
 
 def start(limits: DoorLimits) -> World:
-    """Return a daemon that has just started on a closed door. An estimated door has no contacts."""
+    """Return a daemon right after its start, with a closed door. An estimated door has no contacts."""
     opened, closed = (None, None) if limits.estimated else (False, True)
     return World(initial(limits, 0.0), DoorSample(opened, closed, obstruction=False, fire=False))
 
@@ -149,7 +151,8 @@ MOVES: dict[str, Move] = {
     "reset": _event(OperatorReset()),
 }
 TIMES = (0.0625, 1.0, 4.0, 16.0, 64.0)
-"""Waits (s). They lie on both sides of debounce, the hazards' end, grace, travel, opening and age."""
+"""Waits (s). They lie below and above each limit of the core: debounce, end of a hazard, grace, travel
+time, opening time, and greatest age."""
 
 
 # ---- one step
@@ -158,7 +161,8 @@ Seen = Callable[["Step"], None]
 
 
 class Step(msgspec.Struct, frozen=True):
-    """One decision at time `now`, in seconds after the state began. `ledger` includes this step."""
+    """One decision at the time `now`, in seconds after the state began. `ledger` includes this
+    decision."""
 
     before: DoorMemory
     event: Event
@@ -176,7 +180,8 @@ def moved(world: World, move: Move, limits: DoorLimits, seen: Seen) -> World:
 
 
 def waited(world: World, seconds: float, limits: DoorLimits, seen: Seen) -> World:
-    """Return the state after some time, with a scan whenever the core wants a scan."""
+    """Return the state after some time. In that time the door is scanned whenever the core wants a
+    scan."""
     now = 0.0
     world, wake_at = _scanned(world, reading(world), now, limits, seen)
     while now < seconds:
@@ -214,7 +219,7 @@ def noted(
 ) -> Ledger:
     """Return the ledger after a decision.
 
-    From the decision this function takes only the hold, the refusal and the fire.
+    This function takes only three facts from the decision: the hold, the refusal and the fire.
     """
     wanted, ends_at = _asked(ledger, event, now, bool(decision.refused), limits)
     if limits.on_fire == "release" and burns(decision):
@@ -245,19 +250,19 @@ def noted(
 
 
 def fresh(ledger: Ledger, now: float, limits: DoorLimits) -> bool:
-    """Is the last reading fresh?"""
+    """Return whether the last reading is fresh."""
     return ledger.read_at is not None and now < ledger.read_at + limits.t.stale_after_s
 
 
 def sighted(ledger: Ledger, now: float, limits: DoorLimits) -> bool:
-    """Is there a fresh reading, and no second node of this name?"""
+    """Return whether the last reading is fresh and no second node has this door's name."""
     rival_at = ledger.rival_at
     alone = rival_at is None or now >= rival_at + RIVAL_QUIET_S
     return alone and fresh(ledger, now, limits)
 
 
 def burns(decision: Decided) -> bool:
-    """Does the core report a fire?"""
+    """Return whether the core reports a fire."""
     return any(fault.code == "FIRE_ALARM" for fault in decision.report.faults)
 
 
@@ -279,7 +284,7 @@ def _asked(
 def _unlike(
     ledger: Ledger, event: Event, now: float, limits: DoorLimits
 ) -> tuple[float | None, ...]:
-    """Return for each contact the start (s) of the unbroken readings that say "not asserted"."""
+    """Return a time (s) for each contact. Since that time all readings have said "not asserted"."""
     if isinstance(event, Sampled):
         gap = not fresh(ledger, now, limits)
         said = [getattr(event.sample, signal) for signal in UNLIKE]
@@ -296,7 +301,8 @@ def _unlike(
 
 
 def shifted(memory: DoorMemory, by: float, limits: DoorLimits) -> DoorMemory:
-    """Return the same memory with every time moved by `by` seconds. Old times are cut off."""
+    """Return the same memory with every time moved by `by` seconds. Times that are too old are cut to a
+    limit."""
     t, senses = limits.t, memory.senses
     return replace(
         memory,
@@ -331,13 +337,12 @@ def _shifted(ledger: Ledger, by: float, limits: DoorLimits) -> Ledger:
 
 
 def _at(at: Any, by: float, oldest_s: float = float("inf")) -> Any:
-    """Return a time moved by `by`. Ages above `oldest_s` are cut to `oldest_s`, and None stays None."""
+    """Return a time moved by `by`. Ages above `oldest_s` become `oldest_s`, and None stays None."""
     return None if at is None else max(at + by, -oldest_s)
 
 
 def _held_since(at: float, by: float, limits: DoorLimits) -> float:
-    """Return the moved start of the hold. An old start is moved by whole pulses, to keep the pulses'
-    phase."""
+    """Return the moved start of the hold. A move by whole pulses keeps the phase of the pulses."""
     age_s, oldest_s = -(at + by), max(limits.t.travel_s, limits.t.open_timeout_s)
     if age_s <= oldest_s:
         return -age_s
@@ -345,8 +350,7 @@ def _held_since(at: float, by: float, limits: DoorLimits) -> float:
 
 
 def _settled(seen: Settled[Any] | None, by: float) -> Any:
-    """Return a contact. A settled contact loses its time, and an unsettled contact keeps its moved
-    time."""
+    """Return a contact with moved time. A settled contact needs no time, so its time is dropped."""
     if seen is None:
         return None
     return Settled(
@@ -359,8 +363,7 @@ def _settled(seen: Settled[Any] | None, by: float) -> Any:
 
 
 def alike(world: World, limits: DoorLimits) -> World:
-    """Return the world in a reduced form. Two worlds that cannot behave differently have the same
-    form."""
+    """Return the world in a reduced form. Two worlds that must behave alike have the same form."""
     return replace(
         world,
         memory=shifted(world.memory, 0.0, limits),

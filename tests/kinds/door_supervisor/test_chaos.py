@@ -1,7 +1,7 @@
-"""Robots at a door while messages are lost, late, doubled and reordered, and while parties die.
+"""Robots at a door. Messages are lost, late, doubled or reordered, and parties die.
 
-The supervisor must send no CLOSE while a robot is let in, and must not flood the network. Once the
-network is well again, every robot must get through. The door must close behind the last robot.
+The supervisor must send no CLOSE after it has let a robot in, and must not flood the network. After the
+network has recovered, every robot must get through. The door must close behind the last robot.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,7 +33,7 @@ def late(random: Random) -> Sequence[float]:
 
 
 class Storm:
-    """The site in bad conditions. The storm watches each message of our supervisor."""
+    """A site in bad conditions. The test watches each message of our supervisor."""
 
     def __init__(self, seed: int, fate: Fate, disk: Disk | None = None) -> None:
         self.random = Random(seed)
@@ -53,7 +53,7 @@ class Storm:
         self.wrong: list[tuple[float, tuple[str, ...]]] = []
 
     def rages(self) -> None:
-        """Kill a party every 2 s to 15 s, and start that party again."""
+        """Kill one party after 2 s to 15 s, start it again, and repeat until STORM_S."""
         while self.world.now < STORM_S:
             self.run(self.world.now + self.random.uniform(2.0, 15.0))
             match self.random.choice(("supervisor", "supervisor", "door", *ROBOTS)):
@@ -72,7 +72,7 @@ class Storm:
         self.run(self.world.now + CALM_S)
 
     def run(self, until: float) -> None:
-        """Run in steps of 1/16 s, to note each robot that is let in or leaves."""
+        """Run in steps of 1/16 s. At each step note the robots that are let in or leave."""
         while self.world.now < until:
             self.world.run(min(until, self.world.now + 0.0625))
 
@@ -90,7 +90,7 @@ class Storm:
     def _look(self) -> None:
         """Note each robot that is let in.
 
-        A robot without an entry in the table was misled by an earlier heartbeat.
+        A robot that is let in without an entry in the table was misled by an earlier heartbeat.
         """
         for who, walker in self.walkers.items():
             if not walker.passing:
@@ -104,7 +104,8 @@ class Storm:
 
 
 def rates(storm: Storm, topic: Any) -> list[float]:
-    """Return the gaps (s) between our supervisor's messages on this topic, restarts included."""
+    """Return the gaps (s) between our supervisor's messages on this topic. Gaps at restarts count
+    too."""
     at = [when for when, who, said, _ in storm.world.sent if (who, said) == ("supervisor", topic)]
     return [b - a for a, b in pairwise(at)]
 
@@ -139,8 +140,8 @@ class Forgetful(Disk):
 
 
 def test_the_test_notices_a_close_on_a_robot() -> None:
-    """Without the table on disk a restarted supervisor closes the door on robots. The watch must see
-    that."""
+    """A restarted supervisor without its table on disk sends CLOSE to a door with a robot in it. The
+    test must notice that CLOSE."""
     wrong = 0
     for seed in range(4):
         storm = Storm(seed, lossy, Forgetful())

@@ -1,4 +1,4 @@
-"""The door supervisor's rules, each tested alone, with all messages to the door's node."""
+"""The door supervisor's rules, each tested alone. Tests compare all messages to the door's node."""
 
 from itertools import pairwise
 
@@ -16,7 +16,7 @@ from tests.kinds.door_supervisor.alone import Alone
 # ---- DOOR-SUPERVISOR-1, DOOR-SUPERVISOR-2: holders, OPEN and CLOSE
 
 
-def test_open_goes_out_for_the_first_holder_and_close_when_the_last_one_goes() -> None:
+def test_open_is_sent_for_the_first_holder_and_close_after_the_last_holder() -> None:
     desk = Alone()
     desk.opens("a")
     desk.until(2.0)
@@ -39,7 +39,7 @@ def test_a_request_that_counts_is_not_refused() -> None:
     assert (desk.sent, desk.refused) == ([(0.0, "OPEN"), (0.5, "CLOSED")], [])
 
 
-# ---- DOOR-SUPERVISOR-3: silence
+# ---- DOOR-SUPERVISOR-3: silent parties
 
 
 def test_silence_and_time_close_nothing() -> None:
@@ -53,7 +53,7 @@ def test_silence_and_time_close_nothing() -> None:
 # ---- DOOR-SUPERVISOR-2, DOOR-SUPERVISOR-5: repeats
 
 
-def test_a_requesters_repeats_are_passed_on_at_1_hz_at_the_most() -> None:
+def test_repeats_of_a_requester_are_passed_on_at_most_once_a_second() -> None:
     desk = Alone()
     for tenth in range(35):
         desk.until(tenth / 10)
@@ -86,7 +86,7 @@ def test_states_at_10_hz_cause_reminders_at_1_hz() -> None:
 
 
 @pytest.mark.parametrize("mode", ["OFFLINE", "UNKNOWN"])
-def test_no_request_is_repeated_to_a_door_that_is_not_seen(mode: str) -> None:
+def test_no_request_is_repeated_to_a_door_in_an_unknown_state(mode: str) -> None:
     desk = Alone()
     desk.shows(mode, until=3.0)
     desk.opens()
@@ -98,7 +98,7 @@ def test_no_request_is_repeated_to_a_door_that_is_not_seen(mode: str) -> None:
     assert desk.sent == [(3.0, "OPEN"), (20.5, "CLOSED")]
 
 
-def test_a_door_back_from_offline_is_opened_again_for_its_holder() -> None:
+def test_a_door_that_was_offline_gets_open_again_for_its_holder() -> None:
     desk = Alone()
     desk.opens()
     desk.until(6.0)
@@ -108,7 +108,7 @@ def test_a_door_back_from_offline_is_opened_again_for_its_holder() -> None:
     assert desk.sent == [(0.0, "OPEN"), (20.25, "OPEN")]
 
 
-def test_open_is_repeated_for_5_s_as_the_first_may_be_lost_or_a_close_be_under_way() -> None:
+def test_open_is_repeated_for_5_s_because_a_message_may_be_lost_or_a_close_late() -> None:
     desk = Alone()
     desk.opens("b")
     desk.until(10.0)
@@ -134,7 +134,7 @@ def test_a_new_holders_open_is_sent_although_the_door_still_shows_open() -> None
     assert desk.sent == [(0.0, "OPEN"), (10.0, "CLOSED"), (10.1, "OPEN")]
 
 
-def test_quickly_changing_requests_are_sent_at_10_hz_at_most_and_the_last_one_always() -> None:
+def test_quick_changes_are_sent_at_most_at_10_hz_and_the_last_change_is_always_sent() -> None:
     desk = Alone()
     for hundredth in range(100):
         desk.until(hundredth / 100)
@@ -146,7 +146,7 @@ def test_quickly_changing_requests_are_sent_at_10_hz_at_most_and_the_last_one_al
     assert desk.sent[-1][1] == "OPEN"
 
 
-def test_a_pending_repeat_is_dropped_with_the_last_holder() -> None:
+def test_the_last_close_cancels_a_repeat_that_was_due() -> None:
     desk = Alone()
     desk.opens()
     desk.until(0.5)
@@ -157,7 +157,7 @@ def test_a_pending_repeat_is_dropped_with_the_last_holder() -> None:
     assert desk.sent == [(0.0, "OPEN"), (0.55, "CLOSED")]
 
 
-def test_a_close_while_another_holds_closes_nothing_and_drops_no_repeat() -> None:
+def test_a_close_of_one_holder_changes_nothing_for_another_holder() -> None:
     desk = Alone()
     desk.opens("a")
     desk.opens("b")
@@ -187,7 +187,7 @@ def test_a_late_close_does_not_end_the_next_visit() -> None:
     assert desk.refused == [(3.0, "stale request")]
 
 
-def test_a_late_or_doubled_open_leaves_no_holder_behind() -> None:
+def test_a_late_or_doubled_open_adds_no_holder() -> None:
     desk = Alone()
     desk.opens()
     desk.until(3.0)
@@ -206,7 +206,7 @@ def test_an_open_that_its_own_close_has_overtaken_opens_nothing() -> None:
     assert (desk.sent, desk.holders) == ([], [])
 
 
-def test_each_requester_has_a_clock_of_its_own() -> None:
+def test_the_clocks_of_requesters_are_compared_separately() -> None:
     desk = Alone()
     desk.opens("a")
     desk.opens("b", aged=50.0)
@@ -268,7 +268,7 @@ def test_late_messages_with_a_break_or_the_same_stamp_are_never_taken_for_a_cloc
     assert desk.holders == ["a"]
 
 
-def test_one_timely_request_ends_the_doubts() -> None:
+def test_one_timely_request_ends_the_doubt_about_a_clock() -> None:
     desk = Alone()
     desk.opens()
     for second in range(1, 20):
@@ -279,7 +279,7 @@ def test_one_timely_request_ends_the_doubts() -> None:
     assert desk.holders == ["a"]
 
 
-def test_a_requester_is_forgotten_a_minute_after_it_has_gone_and_holders_never_are() -> None:
+def test_a_requester_is_forgotten_after_a_minute_but_a_holder_never() -> None:
     desk = Alone()
     desk.opens("a")
     desk.opens("b")
@@ -289,7 +289,7 @@ def test_a_requester_is_forgotten_a_minute_after_it_has_gone_and_holders_never_a
     assert set(desk.memory.requesters) == {"a", "c"}
 
 
-def test_many_invented_names_are_refused_and_the_holder_is_still_heard() -> None:
+def test_many_invented_names_are_refused_but_the_holder_is_heard() -> None:
     desk = Alone()
     desk.opens("a")
     for n in range(300):
@@ -301,7 +301,7 @@ def test_many_invented_names_are_refused_and_the_holder_is_still_heard() -> None
     assert "a" not in desk.holders
 
 
-def test_a_repeat_belongs_to_the_same_visit_unless_it_comes_late() -> None:
+def test_a_repeat_in_time_belongs_to_the_same_visit() -> None:
     holder = Holder("fleet/a", since=1.0, asked_at=5.0, stamp=7, visit=3)
     late = 5.0 + VISIT_S
     assert holder.repeats(8, late) == replace(holder, asked_at=late, stamp=8)
@@ -322,7 +322,7 @@ def test_after_its_quiet_start_it_first_sends_open_for_each_holder() -> None:
     assert desk.sent == [(3.0, "OPEN")]
 
 
-def test_a_close_heard_before_it_may_speak_waits_for_a_state_that_asks_for_it() -> None:
+def test_a_close_heard_in_the_quiet_start_is_sent_after_the_next_state() -> None:
     desk = Alone(speaks=False)
     desk.opens()
     desk.shows("OPEN", until=2.0)
@@ -335,7 +335,7 @@ def test_a_close_heard_before_it_may_speak_waits_for_a_state_that_asks_for_it() 
     assert desk.sent == [(3.5, "CLOSED")]
 
 
-def test_beside_another_supervisor_it_sends_nothing_and_keeps_its_table() -> None:
+def test_beside_another_supervisor_ours_sends_nothing_and_keeps_its_table() -> None:
     desk = Alone()
     desk.opens("a")
     desk.until(1.0)
@@ -351,7 +351,7 @@ def test_beside_another_supervisor_it_sends_nothing_and_keeps_its_table() -> Non
 # ---- DOOR-SUPERVISOR-3: the report
 
 
-def test_a_door_that_one_requester_has_held_for_too_long_is_a_fault_and_nothing_else() -> None:
+def test_a_door_held_too_long_by_one_requester_causes_only_a_fault() -> None:
     desk = Alone(DoorSupervisorLimits(open_alarm_s=20.0))
     desk.opens("web")
     desk.shows("OPEN", until=15.0)
@@ -369,7 +369,7 @@ def test_a_door_that_one_requester_has_held_for_too_long_is_a_fault_and_nothing_
     assert [word for at, word in desk.sent if at < 41.0].count("CLOSED") == 0
 
 
-def test_repeats_do_not_put_off_the_alarm_but_another_visit_restarts_its_time() -> None:
+def test_repeats_do_not_delay_the_alarm_but_a_new_visit_restarts_its_time() -> None:
     desk = Alone(DoorSupervisorLimits(open_alarm_s=20.0))
     for second in range(45):
         desk.until(float(second))
@@ -378,7 +378,7 @@ def test_repeats_do_not_put_off_the_alarm_but_another_visit_restarts_its_time() 
     assert desk.faults == [(36.0, ("DOOR_HELD_OPEN: longer than 20 s by a",))]
 
 
-def test_the_alarm_needs_no_message_to_go_off() -> None:
+def test_the_alarm_for_a_long_hold_needs_no_message() -> None:
     desk = Alone(DoorSupervisorLimits(open_alarm_s=20.0))
     desk.opens()
     desk.until(100.0)
@@ -386,7 +386,7 @@ def test_the_alarm_needs_no_message_to_go_off() -> None:
     assert desk.faults == [(3.0, (silent,)), (20.0, (held, silent))]
 
 
-def test_a_held_door_whose_states_stop_is_a_fault_until_they_come_again() -> None:
+def test_a_held_door_without_states_is_a_fault() -> None:
     desk = Alone()
     desk.shows("OPEN", until=5.0)
     desk.opens()
@@ -395,7 +395,7 @@ def test_a_held_door_whose_states_stop_is_a_fault_until_they_come_again() -> Non
     assert desk.faults == [(8.0, ("DOOR_SILENT: no DoorState comes",)), (20.0, ())]
 
 
-def test_a_door_that_nobody_holds_may_be_silent_and_is_forgotten_after_a_minute() -> None:
+def test_a_silent_door_without_holders_is_forgotten_after_a_minute() -> None:
     desk = Alone()
     desk.shows("CLOSED")
     desk.until(30.0)

@@ -29,7 +29,7 @@ def refused(message: d.DoorRequest, settings: DoorSupervisorSettings = ANY) -> s
     return str(refusal.value)
 
 
-def test_open_and_close_are_taken_with_their_senders_stamp_to_the_nanosecond() -> None:
+def test_open_and_close_keep_the_stamp_of_their_sender_to_the_nanosecond() -> None:
     late = d.Time(2**31 - 1, 999_999_999)
     assert messages.accept_request(request(), ANY, 0.0) == RequesterOpens("fleet/a", 5_000_000_007)
     assert messages.accept_request(request(0, time=late), ANY, 0.0) == RequesterCloses(
@@ -64,7 +64,7 @@ def test_half_filled_and_impossible_requests_are_refused(message: d.DoorRequest,
     assert refused(message) == text
 
 
-def test_a_list_of_doors_keeps_the_others_out() -> None:
+def test_a_list_of_doors_keeps_other_doors_out() -> None:
     mine = DoorSupervisorSettings(doors=["ward", "lab"])
     assert refused(request(door="gate"), mine) == "not ours: 'gate' is not one of ward, lab"
     assert messages.accept_request(request(door="lab"), mine, 0.0) == RequesterOpens(
@@ -74,7 +74,7 @@ def test_a_list_of_doors_keeps_the_others_out() -> None:
         messages.accept_state(d.DoorState(d.Time(), "gate", d.DoorMode(2)), mine, 0.0)
 
 
-def test_a_state_is_taken_whatever_its_age_and_refused_with_a_mode_that_does_not_exist() -> None:
+def test_a_state_of_any_age_is_accepted_but_an_unknown_mode_is_refused() -> None:
     for mode in d.DoorModeValue:
         state = d.DoorState(d.Time(), "ward", d.DoorMode(int(mode)))
         assert messages.accept_state(state, ANY, 0.0) == DoorStateHeard(mode)
@@ -82,14 +82,14 @@ def test_a_state_is_taken_whatever_its_age_and_refused_with_a_mode_that_does_not
         messages.accept_state(d.DoorState(d.Time(), "ward", d.DoorMode(9)), ANY, 0.0)
 
 
-def test_what_is_sent_gets_its_stamp_at_the_time_of_sending() -> None:
+def test_a_message_gets_its_stamp_at_the_time_of_sending() -> None:
     assert messages.stamped(request(), d.Time(9, 1)) == request(time=d.Time(9, 1))
     beat = d.SupervisorHeartbeat((d.DoorSessions("ward", (d.Session(AT, "a"),)),))
     assert messages.stamped(beat, d.Time(9, 1)) == beat
     assert messages.device_name(request()) == "ward"
 
 
-def test_the_summary_says_who_holds_the_door_and_for_how_long() -> None:
+def test_the_summary_names_the_holders_of_the_door_and_the_time_of_each_hold() -> None:
     empty = DoorHoldReport(None)
     assert messages.summary(empty, 0.0) == {"mode": "-", "held_by": "-"}
     held = DoorHoldReport(1.0, d.DoorModeValue.MODE_OPEN, (("fleet/a", 2.0), ("web", 10.0)))
@@ -137,7 +137,7 @@ def test_the_heartbeat_lists_doors_and_holders_in_the_order_of_names() -> None:
     )
 
 
-def test_the_file_changes_when_holders_come_or_go_and_not_when_they_repeat_themselves() -> None:
+def test_the_file_changes_with_the_holders_and_not_with_repeats() -> None:
     memory = core.initial("ward", 0.0)
     written = []
     for second in range(10):
@@ -192,6 +192,6 @@ def test_a_table_that_is_cut_or_damaged_is_refused_as_a_whole(kept: bytes) -> No
         keep.restore(kept, ANY, 0.0)
 
 
-def test_a_file_that_is_not_a_table_is_refused_with_what_it_should_be() -> None:
+def test_a_file_that_is_no_table_is_refused_with_the_expected_form() -> None:
     with pytest.raises(ValueError, match=r"^not a table of doors and their holders: "):
         keep.restore(b"[]", DoorSupervisorSettings(), 0.0)

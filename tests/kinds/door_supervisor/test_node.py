@@ -20,7 +20,7 @@ HEARTBEAT = topics.DOOR_SUPERVISOR_HEARTBEAT
 
 
 class Graph:
-    """One network with our node. `heard` has (s, words) for each message of the node."""
+    """A network with our node. `heard` has (s, words) for each message of the node."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -67,7 +67,7 @@ class Graph:
         self.heard.append((round(self.now, 3), f"beat {' '.join(doors)}".strip()))
 
 
-def test_it_listens_during_the_quiet_start_then_speaks_with_a_heartbeat_each_second() -> None:
+def test_the_node_listens_in_its_quiet_start_and_then_sends_a_heartbeat_each_second() -> None:
     graph = Graph()
     graph.until(1.0)
     graph.asks("a", 2)
@@ -85,7 +85,7 @@ def test_it_listens_during_the_quiet_start_then_speaks_with_a_heartbeat_each_sec
     ]
 
 
-def test_a_restart_closes_nothing_and_the_next_heartbeat_lists_who_holds() -> None:
+def test_a_restart_closes_nothing_and_the_next_heartbeat_lists_the_holders() -> None:
     graph = Graph()
     graph.until(4.0)
     graph.asks("a", 2)
@@ -121,7 +121,7 @@ def test_a_table_that_cannot_be_written_is_still_published_and_damaged_entries_a
     assert graph.node.subjects == {}
 
 
-def test_a_table_that_cannot_be_saved_is_a_fault_and_tried_again_until_it_is(
+def test_a_table_that_cannot_be_saved_is_a_fault_and_is_tried_again(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     graph = Graph()
@@ -159,7 +159,7 @@ def test_nothing_is_published_before_it_is_on_disk() -> None:
     assert graph.heard[-1] == (4.1, "beat lab:b")
 
 
-def test_holders_of_made_up_doors_never_age_out_and_so_share_one_bound(
+def test_holders_of_invented_doors_share_one_bound(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(graph_node, "MAX_REQUESTERS", 3)

@@ -1,4 +1,4 @@
-"""Whole stories of a door with its daemon, robots with RMF's rules, and a supervisor between them."""
+"""Whole stories of a door with its daemon, a supervisor, and robots that follow RMF's rules."""
 
 from bridges.kinds.door_supervisor import keep
 from bridges.messages import definitions as d
@@ -18,7 +18,8 @@ A, B = "fleet/a", "fleet/b"
 
 
 class Site:
-    """One door and robots with these plans. The supervisor is ours with its disk, or RMF's."""
+    """One door, robots with these plans, and a supervisor. The supervisor is ours with its disk, or
+    RMF's."""
 
     def __init__(
         self, *plans: list[tuple[float, float]], theirs: bool = False, **changes: object
@@ -72,9 +73,7 @@ def test_a_robot_passes_a_door_through_the_supervisor() -> None:
     assert [on for _, on in site.relay] == [True, False]
 
 
-def test_a_robot_is_let_in_by_the_open_door_and_a_heartbeat_that_lists_it_and_by_nothing_else() -> (
-    None
-):
+def test_only_an_open_door_and_a_heartbeat_with_the_robots_name_let_a_robot_in() -> None:
     site = Site([(10.0, 8.0)])
     (a,) = site.walkers
     site.asks("web", d.DoorModeValue.MODE_OPEN)
@@ -113,7 +112,7 @@ def test_a_supervisor_restarted_with_a_robot_in_the_doorway_closes_nothing() -> 
     assert [round(at, 3) for at, _ in site.relay] == [10.0, 75.062]
 
 
-def test_rmfs_own_supervisor_would_have_closed_on_it() -> None:
+def test_the_supervisor_of_rmf_would_close_the_door_on_the_robot() -> None:
     site = Site([(10.0, 60.0)], theirs=True)
     site.world.run(20.0)
     site.rmfs.restart()
@@ -134,7 +133,7 @@ def test_a_supervisor_that_lost_its_memory_closes_nothing_before_its_quiet_start
     assert {word for _, word in site.words()} == {"OPEN"}
 
 
-def test_a_supervisor_and_a_door_daemon_that_restart_together_open_again_for_the_robot() -> None:
+def test_supervisor_and_door_daemon_restart_together_and_open_again_for_the_robot() -> None:
     site = Site([(10.0, 60.0)])
     site.world.run(20.0)
     site.door.restart()
@@ -154,7 +153,7 @@ def test_the_session_of_a_restarted_fleet_adapter_is_cleared_at_the_next_heartbe
     assert site.disk.kept == keep.persist({})
 
 
-def test_with_rmfs_own_supervisor_such_a_session_stays_for_ever() -> None:
+def test_with_the_supervisor_of_rmf_the_session_of_a_restarted_adapter_stays_for_ever() -> None:
     site = Site([(10.0, 60.0)], theirs=True)
     (a,) = site.walkers
     site.world.run(20.5)
@@ -163,10 +162,10 @@ def test_with_rmfs_own_supervisor_such_a_session_stays_for_ever() -> None:
     assert [on for _, on in site.relay] == [True]
 
 
-# ---- DOOR-SUPERVISOR-2: a door that was away
+# ---- DOOR-SUPERVISOR-2: a door that was offline
 
 
-def test_a_door_back_from_offline_with_an_open_session_is_opened_again() -> None:
+def test_a_door_that_was_offline_opens_again_for_an_open_session() -> None:
     site = Site([(10.0, 60.0)])
     (a,) = site.walkers
     site.door.door.bus.down = "no reply"
@@ -177,7 +176,7 @@ def test_a_door_back_from_offline_with_an_open_session_is_opened_again() -> None
     assert [(round(at), what) for at, what in a.log[1:]] == [(32, "enters")]
 
 
-def test_a_door_that_loses_power_over_a_robot_is_opened_again_without_being_asked() -> None:
+def test_after_a_power_loss_a_door_opens_again_for_the_robot_inside() -> None:
     site = Site([(10.0, 60.0)])
     site.world.run(20.0)
     site.door.restart()
@@ -207,7 +206,7 @@ def test_a_door_left_open_from_the_web_raises_an_alarm_and_stays_open() -> None:
 # ---- DOOR-SUPERVISOR-4: another supervisor
 
 
-def test_beside_another_supervisor_it_is_passive_and_takes_over_without_a_close() -> None:
+def test_our_supervisor_is_passive_beside_another_and_takes_over_without_a_close() -> None:
     site = Site([(10.0, 60.0)])
     theirs = RmfsSupervisor(site.world)
     site.world.run(30.0)
@@ -226,7 +225,7 @@ def test_beside_another_supervisor_it_is_passive_and_takes_over_without_a_close(
 SUPERVISORS = (topics.DOOR_REQUESTS, topics.DOOR_SUPERVISOR_HEARTBEAT)
 
 
-# ---- the heartbeat, and each door by itself
+# ---- the heartbeat, and several doors
 
 
 def test_the_heartbeat_goes_out_each_second_and_when_the_table_changes() -> None:
@@ -244,7 +243,7 @@ def test_the_heartbeat_goes_out_each_second_and_when_the_table_changes() -> None
         (5.0, []),
         (5.25, listed),
         (6.25, listed),
-        (6.35, listed),  # the robot has asked again
+        (6.35, listed),  # the robot has repeated its request
         (7.25, listed),
         (8.25, listed),  # the robot is inside
     ]
@@ -311,7 +310,7 @@ def test_a_robot_in_the_doorway_keeps_its_door_when_the_door_and_our_supervisor_
     assert {word for at, word in site.words() if at >= 25.0} == {"OPEN"}
 
 
-def test_beside_a_rival_restored_holders_wait_like_everything_else() -> None:
+def test_beside_a_rival_no_open_is_sent_for_restored_holders() -> None:
     site = doorway(rival=True)
     assert {who for at, who, _ in to_door(site.world) if at >= 25.0} == {"rmf_supervisor"}
 

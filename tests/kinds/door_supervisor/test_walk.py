@@ -1,4 +1,5 @@
-"""All histories to a depth, and random histories, checked by rules that do not use the core's code.
+"""All histories up to a depth, and random histories. The rules that check them do not use the core's
+code.
 
 The first walk has all 4^7 = 16384 histories of seven steps, 0.75 s apart. In these histories two
 requesters open and close, with stamps in order. The second walk has all 6^5 = 7776 histories of late
@@ -30,7 +31,8 @@ STEP_S = 0.75
 
 
 class Ledger:
-    """The table of holders by RMF's rules, if requests come in order. Each message is checked."""
+    """The table of holders by RMF's rules, if requests arrive in order. The rules check each
+    message."""
 
     def __init__(self, *, speaks: bool) -> None:
         self.memory: SupervisedDoor = core.initial("ward", 0.0)
@@ -44,7 +46,7 @@ class Ledger:
         self.hears(MaySpeak(speaks))
 
     def copy(self) -> "Ledger":
-        """Return a copy with the same history. The copy can continue in another way."""
+        """Return a copy with the same history, which can continue in another way."""
         made = copy(self)
         made.holders, made.newest, made.sent = set(self.holders), dict(self.newest), [*self.sent]
         return made
@@ -62,8 +64,8 @@ class Ledger:
         codes = [fault.code for fault in decided.report.faults]
         assert ("DOOR_HELD_OPEN" in codes) == bool(late)
         assert bool(decided.report.waits) == (bool(self.holders) and not self.speaks)
-        # A new holder's OPEN reaches the node soon. So a message is due now, or the last message was
-        # OPEN.
+        # A new holder's OPEN must reach the node soon. So the last message was OPEN, or a message is
+        # due within GAP_S.
         if self.speaks and self.holders:
             assert self.memory.sent == OPEN or self.wake_at <= self.now + GAP_S
 
@@ -165,7 +167,7 @@ def told(history: list[tuple[float, Any]]) -> Ledger:
 
 
 def _would_be_believed(ledger: Ledger, event: Any) -> bool:
-    """Would the core accept this old request?
+    """Return whether the core would accept this old request.
 
     An old stamp counts again long after the requester's last request. A clock may have been set back,
     or the core may have forgotten the requester. test_core has stories of both cases.
@@ -189,7 +191,7 @@ def test_in_every_history_the_requests_follow_the_table_and_their_pace(
 
 @settings(max_examples=examples(300))
 @given(HISTORIES)
-def test_after_every_history_a_restart_knows_exactly_who_holds_the_door(
+def test_after_every_history_a_restart_knows_the_holders_of_the_door(
     history: list[tuple[float, Any]],
 ) -> None:
     ledger = told(history)

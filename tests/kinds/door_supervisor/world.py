@@ -22,7 +22,7 @@ WARD = "ward"
 
 
 def holds(disk: Disk, who: str) -> bool:
-    """Does the table on this disk say that the requester holds the door?"""
+    """Return whether this requester holds the door, according to the table on this disk."""
     found = keep.restore(disk.kept, DoorSupervisorSettings(), 0.0) if disk.kept else {}
     return WARD in found and found[WARD].holder(who) is not None
 
@@ -69,7 +69,7 @@ class DoorDaemon:
         world.add(self, topics.DOOR_REQUESTS)
 
     def hear(self, topic: topics.Topic[Any], message: Any) -> None:
-        """Take a request, which may be for another door."""
+        """Take a request. The request may be for another door."""
         if message.door_name == self.name:
             self.door.now = self.world.now
             self.door.scan(door_messages.accept(message, self.door.settings))
@@ -103,8 +103,8 @@ class Walker:
     """A fleet adapter and its robot, which goes through the door again and again.
 
     - `log` has (s, event).
-    - `passing` says that the robot has been let in and has not sent CLOSE yet.
-    - `skew` is how far the adapter's clock is ahead (s).
+    - `passing` says that the robot has been let in and its adapter has not sent CLOSE yet.
+    - `skew` is the time (s) by which the adapter's clock is ahead.
     """
 
     def __init__(
@@ -124,19 +124,19 @@ class Walker:
         world.add(self, *RobotContext.subscribes)
 
     def hear(self, topic: topics.Topic[Any], message: Any) -> None:
-        """Apply the robot's own rules to a message, then begin the robot's next step if the step is
+        """Apply RMF's rules for robots to a message. Then begin the robot's next step if that step is
         due."""
         say(self.world, self.name, self.robot.hear(message, self.world.now + self.skew))
         self._go_on()
 
     def wake(self) -> None:
-        """Run the robot's timers, and begin the robot's next step if the step is due."""
+        """Run the robot's timers. Then begin the robot's next step if that step is due."""
         if self.world.now >= self.robot.wake_at() - self.skew:
             say(self.world, self.name, self.robot.tick(self.world.now + self.skew))
         self._go_on()
 
     def wake_at(self) -> float:
-        """Return the time of the next repeat or of the robot's next step (s)."""
+        """Return the time (s) of the robot's next repeat or next step."""
         return min(self.robot.wake_at() - self.skew, self._next_at)
 
     def restart(self) -> None:

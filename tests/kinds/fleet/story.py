@@ -1,7 +1,7 @@
-"""Stories for a robot's core: a robot that is read eight times a second, in virtual time.
+"""Stories for a robot's core in virtual time. The core reads the robot eight times a second.
 
-The site: a corridor from x 0 to x 10 on L1, with a charger at each end, a pantry in its middle and
-a lift at x 8, which goes to L2. The robot's map is RMF's, turned by a quarter and moved, in metres.
+The site is a corridor on L1 from x = 0 to x = 10 m, with a charger at each end. The pantry is in the
+middle, and a lift to L2 is at x = 8 m. The robot's map is RMF's map, turned by 90 degrees and moved.
 """
 
 from dataclasses import dataclass, field
@@ -51,12 +51,12 @@ SILENT = IoFailed("192.168.1.80:22011 refuses the connection")
 
 
 def at(x: float, y: float = 0.0, level: str = "L1", yaw: float = 0.0) -> Pose:
-    """Return a place of RMF's map on the robot's map."""
+    """Return the pose on the robot's map for this place on RMF's map."""
     return SITE.on_robots_map(Pose(level, x, y, yaw))
 
 
 def goal(x: float, y: float = 0.0, level: str = "L1", **more: Any) -> Goal:
-    """Return a goal at a place of RMF's map."""
+    """Return a goal at this place on RMF's map."""
     return Goal(at(x, y, level), **more)
 
 
@@ -66,7 +66,8 @@ DOCK_A = goal(0.0, name="charger_a", dock="dock_a")
 
 @dataclass
 class Story:
-    """One robot. `sample`: its next readings. `sent`: (time, command) whenever the command changes."""
+    """One robot. `sample` is its next reading. `sent` gets an entry (s, command) whenever the command
+    changes."""
 
     limits: RobotLimits = LIMITS
     sample: RobotSample = RobotSample(at(0.0), 0.8)
@@ -91,7 +92,7 @@ class Story:
         return self
 
     def see(self, for_s: float = 0.0, **changes: Any) -> "Story":
-        """Read this sample once, or again and again for a time."""
+        """Read this sample once. With `for_s` read it again and again for that time."""
         self.sample = replace(self.sample, **changes)
         self.take(Sampled(self.sample))
         for _ in range(round(for_s / SCAN_S)):
@@ -100,30 +101,30 @@ class Story:
         return self
 
     def silence(self, for_s: float) -> "Story":
-        """Fail to read for a time."""
+        """Let each reading fail for `for_s` seconds."""
         for _ in range(round(for_s / SCAN_S)):
             self.now += SCAN_S
             self.take(SILENT)
         return self
 
     def order(self, order: Order) -> "Story":
-        """Take an order of RMF, with the last reading."""
+        """Take an order of RMF right after a reading."""
         self.take(Sampled(self.sample))
         return self.take(order)
 
     @property
     def report(self) -> RobotReport:
-        """The last report."""
+        """Return the last report."""
         return self.reports[-1]
 
     @property
     def faults(self) -> list[str]:
-        """The codes of the present faults."""
+        """Return the codes of the present faults."""
         return [fault.code for fault in self.report.faults]
 
     @property
     def commands(self) -> list[tuple[float, str]]:
-        """(time, command) whenever the command changed, in words."""
+        """Return (s, command in words) for each change of the command."""
         return [(at_s, _words(command)) for at_s, command in self.sent]
 
 
@@ -132,5 +133,5 @@ def _words(command: RobotCommand | None) -> str:
 
 
 def driving(number: int = 1, to: Goal = PANTRY, **sample: Any) -> Story:
-    """Return the story of a robot that stands at charger_a and is told to drive."""
+    """Return the story of a robot at charger_a that RMF orders to drive to this goal."""
     return Story(sample=RobotSample(at(0.0), 0.8, **sample)).see().order(Navigate(number, to))

@@ -1,4 +1,4 @@
-"""Commands of a robot: sent, done, sent again, stopped (FLEET-1, FLEET-2, FLEET-3, FLEET-4)."""
+"""A robot's commands: when they are sent, done, repeated and stopped (FLEET-1 to FLEET-4)."""
 
 from bridges.kinds.fleet.signals import Act, Navigate, Stop
 from bridges.kinds.shared.decision import Fault, OperatorReset
@@ -23,7 +23,7 @@ def test_a_robot_that_reports_no_commands_is_done_when_it_stands_at_its_goal() -
     assert not story.faults
 
 
-def test_it_must_also_look_in_the_goals_direction() -> None:
+def test_a_robot_at_its_goal_must_also_face_in_the_right_direction() -> None:
     story = driving(7)
     story.see(2.0, at=at(5.0, yaw=1.0))
     assert story.report.finished == 0
@@ -42,7 +42,7 @@ def test_a_robot_that_lies_about_its_arrival_is_not_believed() -> None:  # FLEET
     assert story.report.finished == 7
 
 
-def test_a_completed_number_of_an_earlier_command_completes_no_later_one() -> None:
+def test_the_completed_number_of_an_earlier_command_completes_no_later_command() -> None:
     story = driving(7, completed="6", moving=False, to=goal(0.2))
     story.see(5.0)
     assert story.report.finished == 0
@@ -55,7 +55,7 @@ def test_a_goal_on_another_map_is_never_reached_by_its_numbers() -> None:
     assert story.faults == ["ROBOT_NOT_THERE"]
 
 
-def test_a_robot_that_stands_is_told_again_ever_more_seldom() -> None:  # FLEET-3
+def test_a_command_to_a_standing_robot_is_repeated_ever_more_rarely() -> None:  # FLEET-3
     story = driving(7, moving=False).see(100.0)
     assert story.commands == [
         (0.0, "navigate 7, attempt 1"),
@@ -68,7 +68,7 @@ def test_a_robot_that_stands_is_told_again_ever_more_seldom() -> None:  # FLEET-
     assert not story.report.fit
 
 
-def test_a_robot_that_drives_is_not_told_again() -> None:  # FLEET-3
+def test_no_command_is_repeated_to_a_driving_robot() -> None:  # FLEET-3
     story = driving(7, moving=True).see(60.0)
     assert story.commands == [(0.0, "navigate 7, attempt 1")]
 
@@ -176,6 +176,6 @@ def test_a_new_goal_replaces_a_stop() -> None:  # FLEET-4
     assert story.commands[-1] == (0.0, "navigate 9, attempt 1")
 
 
-def test_what_rmf_has_given_up_is_stopped() -> None:  # FLEET-11
+def test_a_command_that_rmf_has_given_up_is_stopped() -> None:  # FLEET-11
     story = Story().see(completed="", moving=True).order(Act(9, "clean")).order(Stop(10, of=9))
     assert story.commands[-1] == (0.0, "stop 10, attempt 1")

@@ -1,4 +1,4 @@
-"""Docking, wrong stations and robots that are out of service (FLEET-8, FLEET-9, FLEET-10)."""
+"""Docking, wrong stations, and robots that are out of service (FLEET-8, FLEET-9, FLEET-10)."""
 
 from typing import Any
 
@@ -32,12 +32,12 @@ def test_docking_is_done_when_the_charger_reports_a_charge_of_this_robot() -> No
     assert story.take(CHARGES).report.finished == 7
 
 
-def test_the_word_of_a_charger_that_fell_silent_does_not_count() -> None:  # FLEET-8
+def test_the_state_of_a_silent_charger_does_not_count() -> None:  # FLEET-8
     story = docking().take(CHARGES).see(4.0)
     assert story.see(at=at(0.0), moving=False).report.finished == 0
 
 
-def test_without_a_word_about_charging_docking_is_done_at_the_dock() -> None:  # FLEET-8
+def test_without_readings_of_a_charge_docking_is_done_at_the_dock() -> None:  # FLEET-8
     assert docking().see(at=at(0.0), moving=False).report.finished == 7
 
 
@@ -68,7 +68,7 @@ def test_before_the_first_dock_no_station_is_wrong() -> None:
     assert Story().see(at=at(10.0), charging=True).faults == []
 
 
-def test_a_chargers_error_is_told_at_the_robot_that_was_sent_there() -> None:
+def test_the_error_of_a_charger_is_reported_at_the_robot_that_was_sent_there() -> None:
     story = docking().take(PadHeard("charger_a", charging=False, error="foreign object"))
     assert story.report.faults == (Fault("CHARGER_REPORTS_ERROR", "charger_a: foreign object"),)
     assert story.see(4.0).faults == []

@@ -1,4 +1,5 @@
-"""Places of a robot: silence, other maps, off the graph, lift rides (FLEET-5, FLEET-6, FLEET-7)."""
+"""A robot's place after silence, on another map, off the graph and after a lift ride (FLEET-5, FLEET-6,
+FLEET-7)."""
 
 import math
 from typing import Any
@@ -93,7 +94,7 @@ def test_another_map_is_named_and_not_sent() -> None:  # FLEET-6
     assert not story.report.fit
 
 
-def test_off_the_graph_the_distance_is_told_and_the_place_is_sent() -> None:  # FLEET-6
+def test_off_the_graph_the_distance_is_reported_and_the_place_is_sent() -> None:  # FLEET-6
     story = Story().see(at=at(3.0, 4.0))
     assert story.report.at == at(3.0, 4.0)
     text = "4 m from the nearest lane"
@@ -119,7 +120,7 @@ def test_a_robot_that_finds_itself_elsewhere_on_the_new_floor_is_not_localized()
     assert story.commands[-1] == (10.0, "localize 7, attempt 2")
 
 
-def test_places_on_both_maps_are_each_others_inverse() -> None:
+def test_the_conversions_between_both_maps_are_inverse() -> None:
     place = Pose("L1", 3.0, -2.0, 0.5)
     back = SITE.on_rmfs_map(SITE.on_robots_map(place))
     assert (back.map, *(round(v, 9) for v in (back.x, back.y, back.yaw))) == ("L1", 3.0, -2.0, 0.5)

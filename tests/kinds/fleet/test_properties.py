@@ -1,5 +1,5 @@
-"""Whatever a robot says and RMF orders: no reading reaches RMF that it must not have, and no command is
-done that was not carried out."""
+"""Any readings of a robot and any orders of RMF. No stale or impossible place reaches RMF, and no
+command counts as done before the robot has carried it out."""
 
 import math
 from typing import Any
@@ -78,7 +78,7 @@ def test_rmf_gets_only_fresh_and_possible_places_and_true_ends(
             assert report.at.map in ("L1", "L2")
             assert all(map(math.isfinite, (report.at.x, report.at.y, report.at.yaw)))
         if memory.finished != before.finished:
-            is_new = isinstance(event, Navigate | Localize | Act)  # it was there already
+            is_new = isinstance(event, Navigate | Localize | Act)  # the robot already stood there
             done = event if is_new else before.command
             assert done is not None
             assert memory.finished == done.id

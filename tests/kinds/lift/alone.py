@@ -33,7 +33,7 @@ ASKED = LiftRequested("A", True, "L1")
 
 
 class Alone:
-    """A core that gets its events from the test. `decision` is its last decision."""
+    """A core without driver. The test gives it events. `decision` is the core's last decision."""
 
     def __init__(
         self, debounce: dict[str, float] | None = None, by_call: bool = False, **limits: Any

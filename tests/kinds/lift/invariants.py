@@ -39,11 +39,10 @@ def check(step: Step) -> None:
 
 
 def outputs_make_sense(step: Step) -> None:
-    """Require that no landing is called while a door is held.
+    """Require that no output calls a landing while another output holds a door.
 
-    A call and a held door both need AGV mode, a session and the right floor. On a lift whose AGV mode
-    is brought by a call, that call needs no AGV mode. That call may also be for the landing where the
-    car is.
+    A call and a held door both need AGV mode, a session and the right floor. On some lifts a call
+    brings AGV mode. There such a call needs no AGV mode, and may name the car's own landing.
     """
     driven, memory, sample = step.decision.outputs, step.decision.memory, step.world.sample
     session, grace = memory.session, memory.grace
@@ -98,9 +97,9 @@ def sessions_end_by_end_alone(step: Step) -> None:
     """Require sessions to begin and end only as the rules permit.
 
     A request begins a session of a free lift. The holder's END ends the session. The silence of a robot
-    after its supervisor's END also ends the session. No other event ends it.
+    after its supervisor's END also ends the session. No other event ends a session.
 
-    In the grace a robot that may be in the car gets the lift back. No other session gets the lift then.
+    In the grace the lift goes back to a robot that may be in the car, and to no other session.
     """
     before, after, event = _id(step.before), _id(step.decision.memory), step.event
     if before and _fell_silent(step):
@@ -134,7 +133,8 @@ def _is_asked_for(event: object, session: str) -> bool:
 
 
 def _fell_silent(step: Step) -> bool:
-    """Has the robot been silent for five seconds after the supervisor's END for its session?"""
+    """Return whether the robot has been silent for five seconds after the supervisor's END for its
+    session."""
     session = step.before.session
     assert session is not None
     disowned = session.forgotten is not None and session.forgotten.disowned
@@ -142,10 +142,10 @@ def _fell_silent(step: Step) -> bool:
 
 
 def _is_its_end(step: Step, event: object) -> bool:
-    """Is the event an END that counts?
+    """Return whether the event is an END that counts.
 
-    An END of a person counts. An END of the robot's own adapter counts where that is permitted. An END
-    of the supervisor counts if the robot has stopped asking.
+    A person's END counts. The supervisor's END counts if the robot no longer repeats its request. The
+    END of the robot's own adapter counts after a first END, or after the supervisor's END.
     """
     session = step.before.session
     assert session is not None
@@ -165,8 +165,10 @@ def _is_its_end(step: Step, event: object) -> bool:
 
 
 def open_is_the_truth(step: Step) -> None:
-    """Require that the car stands at a known floor with its door open whenever OPEN is shown. OPEN must
-    not be shown to a robot outside while the lift has a fault."""
+    """Require a car that stands at a known floor with its door open whenever the lift shows OPEN.
+
+    If the lift has a fault, it must not show OPEN to a robot outside.
+    """
     shown: LiftReport = step.decision.report
     if shown.door is not LiftDoor.DOOR_OPEN:
         return
@@ -192,8 +194,8 @@ def open_is_the_truth(step: Step) -> None:
 def a_request_that_waits_has_a_reason(step: Step) -> None:
     """Require a reason for each waiting request.
 
-    A request waits while it has the session and the lift does not show OPEN at the requested floor. A
-    worn relay that must rest is also shown as a fault.
+    A request waits if it has the session and the lift does not show OPEN at the requested floor. A worn
+    relay that must rest also requires a fault.
     """
     shown, session = step.decision.report, step.decision.memory.session
     event = step.event
@@ -226,8 +228,7 @@ def _worn(channel: Any, step: Step) -> bool:
 
 
 def nothing_changes_before_wake_at(world: World, limits: LiftLimits) -> None:
-    """Require scans before `wake_at` to change neither outputs nor report if the inputs stay the
-    same."""
+    """Require that a scan before `wake_at` with the same inputs changes neither outputs nor report."""
     now = _scan(world, world.memory, 0.0, limits)
     until = min(now.wake_at, 1e4)
     later = _scan(world, now.memory, until * (1.0 - 1e-6), limits)
@@ -244,7 +245,7 @@ def _scan(world: World, memory: LiftMemory, now: float, limits: LiftLimits) -> A
 
 
 def _sampled(step: Step) -> bool:
-    """Is this step a reading that counts at once, without debounce?"""
+    """Return whether this step is a reading that counts at once, because nothing is debounced."""
     read = step.world.readable and not isinstance(step.event, IoFailed)
     return step.exact and (read or isinstance(step.event, Sampled))
 

@@ -1,4 +1,4 @@
-"""RMF around one lift. Stand-ins for its supervisor and its fleet adapters talk to the real node."""
+"""A lift's real node, with stand-ins for RMF's supervisor and RMF's fleet adapters."""
 
 from collections.abc import Callable, Sequence
 
@@ -14,16 +14,16 @@ from workbench.rmf_model.supervisors import LiftSupervisor
 STEP_S = 0.25
 
 REPLAYED = 100
-"""The number of old requests that a new subscriber gets from a transient-local publisher."""
+"""The number of old requests that a transient-local publisher sends to a new subscriber."""
 
 
 class World:
     """The lift's node, RMF's supervisor and fleet adapters.
 
-    - `fate` gives the delays (s) of a LiftRequest to the node. An empty list loses the request, and two
-      delays double it.
+    - `fate` gives the delays (s) with which a LiftRequest reaches the node. An empty list loses the
+      request, and two delays double it.
     - `hears` decides whether RMF gets a LiftState.
-    - `adapters_first` lets the robots hear each state before the supervisor.
+    - `adapters_first` gives each state to the robots before the supervisor.
 
     By default all messages arrive at once and in order.
     """
@@ -50,15 +50,15 @@ class World:
                 self.story.request(*arrived)
 
     def asks(self, robot: RobotContext, floor: str, *, inside: bool = False) -> None:
-        """Let a robot's task begin RequestLift."""
+        """Let a robot's task begin RMF's phase RequestLift."""
         self._say(robot.begin(RequestLift("Lift1", floor, inside=inside), self._now))
 
     def releases(self, robot: RobotContext) -> None:
-        """Let a robot that has left the car begin EndLiftSession."""
+        """Let a robot that has left the car begin RMF's phase EndLiftSession."""
         self._say(robot.begin(EndLiftSession("Lift1"), self._now))
 
     def rides(self, robot: RobotContext, start: str, end: str) -> None:
-        """Play a whole ride of one robot, from request to release."""
+        """Play a whole ride of one robot, from its request to the release of the lift."""
         self.asks(robot, start)
         self.until_done(robot)
         robot.in_car = True
@@ -98,7 +98,7 @@ class World:
             self.run(self.story.now + apart_s)
 
     def asked_by(self, robot: RobotContext) -> list[LiftRequest]:
-        """Return the requests that the robot's adapter has retained."""
+        """Return the requests that the robot's adapter retains for late subscribers."""
         return self._history[robot.requester_id][-REPLAYED:]
 
     def restart_adapter(self, robot: RobotContext) -> RobotContext:

@@ -37,7 +37,7 @@ from tests.accepted import accepted
 SCAN_S = 0.05
 LEAST_GAP_S = 0.001
 WALL = 1_000_000.0
-"""The wall clock when the story begins (s since the epoch)."""
+"""The wall clock at the beginning of the story (s since the epoch)."""
 
 DEBOUNCE: dict[str, float] = {"floor": 0.08, "door": 0.03, "rear_door": 0.03}
 DEBOUNCE |= dict.fromkeys(("motion", "agv_mode", *Hazard), 0.05)
@@ -55,7 +55,8 @@ STANDING = LiftSample("L1", DoorReading.CLOSED, motion=Motion.STOPPED, agv=False
 
 
 class Building:
-    """A passive lift, whose inputs the test sets (`drivers.Driver[LiftSample, LiftOutputs]`).
+    """A lift that does nothing by itself. The test sets its inputs (`drivers.Driver[LiftSample,
+    LiftOutputs]`).
 
     `edges` has (s, output, value). `unreadable` and `unwritable` are the reasons why reading or writing
     fails, or "".
@@ -117,9 +118,9 @@ def _of(outputs: LiftOutputs, name: str) -> Any:
 
 
 class Controller(Building):
-    """A lift that works: it grants AGV mode, goes to called floors, and opens while its door is held.
+    """A lift that works. It grants AGV mode, goes to called floors, and opens its door for a hold.
 
-    A ride of one floor takes `FLOOR_S`, and in the middle of the ride no floor is shown. Opening or
+    A ride of one floor takes `FLOOR_S`. In the middle of the ride the lift shows no floor. Opening or
     closing takes `DOOR_S`.
     """
 
@@ -191,8 +192,8 @@ def words(state: LiftState) -> str:
 class Story:
     """One lift in service.
 
-    `told` has (s, LiftState) for every state that RMF heard. `hear` is called with each state. Messages
-    that `hear` puts into `incoming` arrive at once.
+    `told` has (s, LiftState) for every state that RMF heard. The story calls `hear` with each state. If
+    `hear` puts messages into `incoming`, they arrive at once.
     """
 
     def __init__(
@@ -275,7 +276,7 @@ class Story:
         self.receive(*((LIFT_REQUESTS, request) for request in requests))
 
     def receive(self, *said: tuple[Topic[Any], LiftRequest]) -> None:
-        """Let these messages arrive in one scan, each on its topic."""
+        """Let these messages arrive in one scan. Each message arrives on its topic."""
         self._scan(*accepted(self.node, self._kind, self.settings, *said))
 
     def rival(self) -> None:
@@ -337,7 +338,7 @@ class Story:
             self.receive(*arrived)
 
     def _alarm_hears(self, event: Any) -> None:
-        """Let the daemon's alarm for the fleets decide."""
+        """Let the daemon's core for fleet alarms decide."""
         limits = alarming.alarm_limits({"Lift1": self.settings})
         if limits is not None:
             made = fleet_alarm.decide(self._alarm, event, self.now, limits)
@@ -357,7 +358,8 @@ OPEN_AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
 
 
 def boarding(**inputs: object) -> Story:
-    """Return a story in which A waits at L1 and the lift stands open. `inputs` changes the reading."""
+    """Return a story in which A waits at L1 and the lift stands open there. `inputs` changes the
+    reading."""
     story = Story(Building(replace(OPEN_AT_L1, **inputs)))
     story.run(1.0)
     story.asks("A", "L1")

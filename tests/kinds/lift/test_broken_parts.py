@@ -1,7 +1,7 @@
-"""Each wire and each part of the lift breaks in turn while RMF's robots ride.
+"""Each wire and each part of the lift breaks in turn during rides of RMF's robots.
 
-Node, driver, wires and plant take part. While a part is broken a robot may wait for ever, but OPEN must
-not be shown for a closed door. After the repair the robot gives up, and the next ride completes.
+Node, driver, wires and plant take part. A robot may wait for ever at a broken part, but the lift must
+not show OPEN for a closed door. After the repair the robot gives up, and the next ride completes.
 """
 
 from dataclasses import dataclass
@@ -19,13 +19,14 @@ from tests.kinds.lift.wired import WiredStory, shipped
 from workbench.rmf_model.robot import RobotContext
 
 LATE_S = 0.3
-"""The greatest permitted age of a state (s): the debounce, a scan, and the least gap between states."""
+"""The greatest permitted age of a state (s): debounce, one scan, and the least gap between two
+states."""
 
 WIRES = [w.signal for w in wires(shipped())]
 WIRE_FAILURES: list[FailureMode] = ["off", "stuck", "wrong"]
 LIES = {("door", "wrong")}
-"""The failures that may show a false OPEN: the contact says open, and no second contact contradicts
-it."""
+"""The failures that may show a false OPEN. A broken contact says open, and no second contact
+contradicts."""
 
 BREAKS = [(w, mode) for w in WIRES for mode in WIRE_FAILURES if (w, mode) not in LIES]
 BREAKS += [(p, m) for p, modes in FAILS.items() for m in modes if p != "rear_door_operator"]
@@ -33,7 +34,8 @@ BREAKS += [(p, m) for p, modes in FAILS.items() for m in modes if p != "rear_doo
 
 @dataclass
 class Witness:
-    """A witness that looks at the real car at each state, and remembers where the car stood open."""
+    """A witness that looks at the real car at each state. The witness remembers the landing with an
+    open door."""
 
     story: WiredStory
     open_at: str | None = None
@@ -52,7 +54,7 @@ class Witness:
 
 
 def ride(broken: str, mode: FailureMode, broken_at: float) -> WiredStory:
-    """Play a ride on a lift that breaks. After the repair the robot gives up, and another robot
+    """Play a ride on a lift with this failure. After the repair the robot gives up, and another robot
     rides."""
     story = WiredStory(scan_s=0.1, agv_timeout_s=5, floor_timeout_s=10, door_timeout_s=5)
     robot, other = RobotContext("fleet/a"), RobotContext("fleet/b")

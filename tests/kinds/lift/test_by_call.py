@@ -1,4 +1,4 @@
-"""LIFT-DRIVE-2, LIFT-DRIVE-5: on this lift a call brings AGV mode, and no other output does."""
+"""LIFT-DRIVE-2, LIFT-DRIVE-5: on this lift only a call brings AGV mode. No output requests AGV mode."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -49,7 +49,7 @@ def open_at(story: Story, floor: str) -> None:
     story.until(there)
 
 
-def test_a_call_brings_agv_mode_where_the_car_stands_and_the_hold_keeps_it() -> None:
+def test_a_call_to_the_present_floor_brings_agv_mode_and_the_hold_keeps_it() -> None:
     story = simulator()
     open_at(story, "L1")
     story.run(story.now + 60.0)
@@ -78,7 +78,7 @@ def test_agv_mode_ends_with_the_hold_after_a_whole_ride() -> None:
 
 
 def called(agv: bool = True) -> tuple[Building, Story]:
-    """Return a car that stands at L1 and was called to L3. With `agv`, AGV mode has come."""
+    """Return a car at L1 that a robot has called to L3. With `agv` the lift has granted AGV mode."""
     building = Building(replace(STANDING, agv=False))
     story = Story(building, agv_mode="by_call", agv_timeout_s=5)
     story.run(1.0)
@@ -89,14 +89,14 @@ def called(agv: bool = True) -> tuple[Building, Story]:
     return building, story
 
 
-def test_a_call_that_brings_no_agv_mode_is_given_up_after_its_time() -> None:
+def test_a_call_without_agv_mode_is_given_up_after_its_time() -> None:
     _, story = called(agv=False)
     assert story.outputs.call == "L3"
     story.run(7.0)
     assert (story.outputs, story.faults) == (LiftOutputs(), ["AGV_MODE_NOT_GRANTED"])
 
 
-def test_agv_mode_that_ends_on_the_way_is_a_fault_and_is_called_for_again() -> None:
+def test_agv_mode_that_ends_on_the_way_is_a_fault_and_is_requested_by_a_new_call() -> None:
     building, story = called()
     building.set(agv=False, motion=Motion.UP, level=None)
     story.run(3.0)
@@ -123,7 +123,8 @@ def test_agv_mode_may_end_between_two_destinations() -> None:
 def calls_and_holds(
     alone: Alone, readings: Sequence[tuple[float, LiftSample]]
 ) -> list[tuple[float, str | None, Side | None]]:
-    """Return (s, called landing, held door) after each reading, while a robot repeats its request."""
+    """Return (s, called landing, held door) after each reading. A robot repeats its request at each
+    reading."""
     shown = []
     for now, reading in readings:
         outputs = alone(now, reading, ASKED).decision.outputs
@@ -131,9 +132,8 @@ def calls_and_holds(
     return shown
 
 
-def test_a_car_that_a_call_has_brought_is_not_called_again_because_its_floor_is_not_seen() -> None:
-    """With `by_call` and in AGV mode, a car is called again only if the car is seen at another
-    floor."""
+def test_a_car_that_has_come_is_not_called_again_when_its_floor_is_unknown() -> None:
+    """With `by_call` in AGV mode, the core calls a car again only after a reading at another floor."""
     alone = Alone(by_call=True)
     below = replace(CLOSED, level="L2", agv=False)
     readings = [
@@ -156,8 +156,8 @@ def test_a_car_that_a_call_has_brought_is_not_called_again_because_its_floor_is_
 
 
 def test_a_car_at_its_destination_is_called_again_when_agv_mode_has_ended_by_itself() -> None:
-    """With `by_call`: an overload ended the hold. All outputs were off, because the floor was not
-    seen."""
+    """With `by_call`. An overload ended the hold. Then all outputs were off, because no floor was
+    read."""
     alone = Alone(by_call=True)
     below, gone = replace(CLOSED, level="L2"), replace(CLOSED, level=None)
     readings = [

@@ -1,4 +1,4 @@
-"""A robot's ride on every lift of `config/`, with the driven outputs and the states for RMF."""
+"""A robot's ride on the lifts of `config/`. Tests compare the outputs and the states for RMF."""
 
 from pathlib import Path
 from typing import Any
@@ -13,13 +13,14 @@ from tests.kinds.lift.wired import GatewayBuilding, WiredStory
 
 CONFIG = Path(__file__).parents[3] / "config"
 ELSEWHERE = {"lift_supervisor.yaml", "lift_http.yaml", "lift_two_buses.yaml"}
-"""No lift; and lifts that ride in tests/runtime/test_http_lift.py and test_other_bus.py."""
+"""A file without a lift, and files whose lifts ride in tests/runtime/test_http_lift.py and
+test_other_bus.py."""
 EXAMPLES = sorted({path.name for path in CONFIG.glob("lift_*.yaml")} - ELSEWHERE)
 A = "fleet/a"
 
 
 def in_service(name: str) -> Story:
-    """Return the lift of an example in `config/`, in service."""
+    """Return the running lift of an example in `config/`."""
     settings: Any = load(CONFIG / name).devices["Lift1"]
     if isinstance(settings, dry_contact.DryContactLiftSettings):
         return WiredStory(settings)
@@ -34,12 +35,12 @@ def in_service(name: str) -> Story:
 
 
 def told(story: Story) -> list[str]:
-    """Return the states that RMF heard. States between two floors are left out."""
+    """Return the states that RMF heard, without the states between two floors."""
     return [words for _, words in story.states if "moving" not in words and "at ?" not in words]
 
 
 def asked_until_open(story: Story, floor: str) -> None:
-    """Repeat RMF's request until the door is open at the floor."""
+    """Repeat RMF's request until the door is open at this floor."""
 
     def there() -> bool:
         story.asks(A, floor)
@@ -69,7 +70,7 @@ def test_a_robot_rides_from_l1_to_l3_and_lets_go(name: str) -> None:
 
 
 def driven(story: Story) -> dict[str, bool]:
-    """Return the last value of each relay at the lift."""
+    """Return the last value of each relay at the lift's terminals."""
     plant = story.building.plant  # type: ignore[attr-defined]
     return {edge.signal: bool(edge.value) for edge in plant.edges if edge.what == "relay"}
 

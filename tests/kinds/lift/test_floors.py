@@ -29,7 +29,7 @@ def test_passing_a_floor_is_not_an_arrival() -> None:
     assert [state for _, state in story.states if "open" in state] == []
 
 
-def test_a_floor_code_that_jumps_over_a_floor_is_not_believed_until_it_comes_back() -> None:
+def test_a_floor_code_that_jumps_over_a_floor_is_not_believed() -> None:
     story = boarding()
     story.building.set(level="L3")
     story.run(5.0)
@@ -64,7 +64,7 @@ def test_an_impossible_floor_code_stays_doubted_after_time_between_floors() -> N
     assert story.faults == ["POSITION_LOST"]
 
 
-def test_a_doubted_floor_is_believed_once_the_car_really_goes_there() -> None:
+def test_a_doubted_floor_is_believed_after_the_car_has_gone_there() -> None:
     story = boarding()
     story.building.set(level="L3")
     story.run(3.0)
@@ -77,7 +77,7 @@ def test_a_doubted_floor_is_believed_once_the_car_really_goes_there() -> None:
     assert (story.faults, story.state) == ([], "AGV, open at L3, A to L1")
 
 
-def test_a_floor_that_was_not_believed_is_believed_when_the_car_really_goes_there() -> None:
+def test_a_rejected_floor_is_believed_after_the_car_has_gone_there() -> None:
     alone = Alone(stale_after_s=60.0)(0.0, AT_L1)(0.1, replace(AT_L1, level="L3"))(0.2, AT_L1)
     moving = replace(AT_L1, motion=Motion.UP)
     for now, level in ((1.0, None), (2.0, "L2"), (3.0, None), (4.0, "L3")):
@@ -107,14 +107,14 @@ def test_a_slowly_debounced_floor_code_still_belongs_to_the_last_movement() -> N
     assert (story.faults, story.state) == ([], "AGV, open at L2")
 
 
-def test_a_floor_may_change_up_to_its_debounce_after_the_cars_last_movement() -> None:
+def test_a_floor_may_change_within_its_debounce_after_the_last_movement() -> None:
     moving = replace(AT_L1, motion=Motion.UP)
     alone = Alone({"floor": 0.5}, stale_after_s=60.0)(0.0, moving)(1.0, moving)
     alone(1.1, AT_L1)(2.9, replace(AT_L1, level="L2"))(3.45, replace(AT_L1, level="L2"))
     assert (alone.decision.report.floor, alone.faults) == ("L2", ())
 
 
-def test_the_next_floor_is_believed_in_the_last_instant_in_which_a_movement_is_remembered() -> None:
+def test_the_next_floor_is_believed_until_a_movement_is_forgotten() -> None:
     alone = Alone(stale_after_s=60.0)(0.0, AT_L1)(1.0, replace(AT_L1, motion=Motion.UP))
     alone(1.0 + MOTION_MEMORY_S, replace(AT_L1, level="L2"))
     assert (alone.decision.report.floor, alone.faults) == ("L2", ())
@@ -139,7 +139,7 @@ def test_after_a_reset_the_shown_floor_is_believed_at_once() -> None:
     )
 
 
-def test_a_reset_moves_nothing_where_nothing_is_wrong() -> None:
+def test_a_reset_without_a_fault_moves_nothing() -> None:
     story = boarding()
     edges, states = list(story.edges), list(story.states)
     story.resets()
@@ -157,7 +157,7 @@ def test_without_motion_lines_the_next_floor_is_believed_but_a_jump_is_not() -> 
     assert story.faults == ["POSITION_LOST"]
 
 
-def test_a_fast_car_may_skip_the_code_of_a_floor_that_it_has_had_time_to_pass() -> None:
+def test_a_fast_car_may_skip_the_code_of_a_floor_if_its_time_suffices() -> None:
     story = boarding(door=DoorReading.CLOSED)
     story.building.set(level=None, motion=Motion.UP)
     story.run(3.0)
@@ -166,14 +166,14 @@ def test_a_fast_car_may_skip_the_code_of_a_floor_that_it_has_had_time_to_pass() 
     assert (story.faults, story.state) == ([], "AGV, closed at L3, A to L1")
 
 
-def test_a_car_may_pass_a_floor_unseen_in_exactly_its_least_travel_time() -> None:
+def test_a_car_may_pass_a_floor_unseen_in_its_least_travel_time() -> None:
     moving = replace(AT_L1, motion=Motion.UP)
     alone = Alone(stale_after_s=60.0, floor_travel_min_s=2.0)(0.0, moving)
     alone(2.0, replace(moving, level="L3"))
     assert (alone.decision.report.floor, alone.faults) == ("L3", ())
 
 
-# ---- LIFT-SENSING-4: a floor code without a meaning outside AGV mode
+# ---- LIFT-SENSING-4: a floor code that is valid only in AGV mode
 
 
 class FloorsInAgvMode(Controller):
@@ -185,7 +185,7 @@ class FloorsInAgvMode(Controller):
         return sample if sample.agv else replace(sample, level=None, floor_valid=False)
 
 
-def test_a_floor_code_is_believed_after_people_used_the_lift_while_it_meant_nothing() -> None:
+def test_a_floor_code_is_believed_after_a_time_in_which_it_was_invalid() -> None:
     lift = FloorsInAgvMode()
     story = Story(lift)
     story.run(1.0)

@@ -1,4 +1,4 @@
-"""LIFT-2: a supervisor has forgotten the robot in the car, by RMF's rules and rule by rule.
+"""LIFT-2: RMF's supervisor has forgotten the robot in the car. Tests by RMF's rules, then rule by rule.
 
 RMF's supervisor (rmf_ros2, lift_supervisor/Node.cpp) has one slot for each lift. The first session that
 asks takes the slot. The supervisor drops all requests of other sessions, even END.
@@ -32,7 +32,7 @@ def one_inside_one_waiting(
 
 
 @pytest.mark.parametrize("adapters_first", [False, True])
-def test_a_supervisor_that_restarts_and_takes_up_the_waiting_robot_locks_nobody_in(
+def test_a_restarted_supervisor_that_takes_the_waiting_robot_locks_nobody_in(
     adapters_first: bool,
 ) -> None:
     rmf, a, b = one_inside_one_waiting(adapters_first)
@@ -51,7 +51,7 @@ def test_a_supervisor_that_restarts_and_takes_up_the_waiting_robot_locks_nobody_
     assert rmf.story.faults == []
 
 
-def test_a_robot_that_still_waits_outside_is_served_too_and_then_the_other_one() -> None:
+def test_a_forgotten_robot_outside_is_served_before_the_other_robot() -> None:
     a, b = RobotContext(A), RobotContext(B)
     rmf = world(a, b)
     rmf.asks(a, "L4")
@@ -64,7 +64,7 @@ def test_a_robot_that_still_waits_outside_is_served_too_and_then_the_other_one()
     assert sessions(rmf.story) == ["", A, "", B]
 
 
-def test_an_end_that_was_lost_while_another_robot_waits_is_heard_from_its_adapter() -> None:
+def test_a_lost_end_is_heard_from_its_adapter_although_another_robot_waits() -> None:
     rmf, a, b = one_inside_one_waiting()
     lost: list[LiftRequest] = []
 
@@ -83,7 +83,8 @@ def test_an_end_that_was_lost_while_another_robot_waits_is_heard_from_its_adapte
 
 
 class Overheard:
-    """A lift that `A` holds, open at L2. `adapter` sends A's requests directly to the lift's node."""
+    """A lift that stands open at L2 and that `A` holds. `adapter` sends A's requests directly to the
+    node."""
 
     def __init__(self, building: Building | None = None) -> None:
         self.story = Story(building or Controller())
@@ -100,7 +101,7 @@ class Overheard:
         self.story.run(self.story.now + 0.2)
 
 
-def test_what_an_adapter_says_counts_only_while_the_supervisor_asks_for_somebody_else() -> None:
+def test_messages_of_an_adapter_count_only_if_the_supervisor_asks_for_another_robot() -> None:
     lift = Overheard()
     lift.adapter(AGV, "L4")
     lift.adapter(END)
@@ -131,7 +132,7 @@ def test_an_adapters_request_is_never_a_grant() -> None:
     assert lift.story.outputs == LiftOutputs()
 
 
-def test_an_end_counts_when_it_is_heard_twice_with_no_newer_request_between() -> None:
+def test_an_end_counts_when_it_is_heard_twice_without_a_newer_request() -> None:
     lift = Overheard()
     lift.story.asks(B, "L1")
     lift.adapter(END)
@@ -142,7 +143,7 @@ def test_an_end_counts_when_it_is_heard_twice_with_no_newer_request_between() ->
     assert sessions(lift.story) == ["", A, ""]
 
 
-def test_an_old_request_does_not_count_and_an_end_without_a_stamp_does() -> None:
+def test_an_old_request_does_not_count_but_an_end_without_a_stamp_counts() -> None:
     """Jazzy's fleet adapter sends an END without a stamp (RobotContext.cpp, _check_lift_state)."""
     lift = Overheard()
     lift.story.asks(B, "L1")
@@ -156,7 +157,7 @@ def test_an_old_request_does_not_count_and_an_end_without_a_stamp_does() -> None
     assert sessions(lift.story) == ["", A, ""]
 
 
-def test_the_fault_names_the_robot_that_the_supervisor_asks_for_and_not_its_silence() -> None:
+def test_the_fault_names_the_other_robot_and_no_time_of_silence() -> None:
     lift = Overheard()
     lift.story.asks(B, "L1")
     at = lift.story.now
@@ -174,7 +175,7 @@ def test_the_fault_names_the_robot_that_the_supervisor_asks_for_and_not_its_sile
     assert lift.story.outputs.hold_door is not None
 
 
-def test_the_other_robots_end_ends_the_fault() -> None:
+def test_the_end_of_the_other_robot_ends_the_fault() -> None:
     lift = Overheard()
     lift.story.asks(B, "L1")
     lift.story.run(lift.story.now + 4.0)
@@ -185,7 +186,7 @@ def test_the_other_robots_end_ends_the_fault() -> None:
     assert ons(lift.story, "call") == 1
 
 
-def test_neither_a_third_robots_end_nor_an_earlier_end_ends_the_fault() -> None:
+def test_neither_the_end_of_a_third_robot_nor_an_earlier_end_ends_the_fault() -> None:
     lift = Overheard()
     lift.story.ends(B)
     assert (lift.story.faults, sessions(lift.story)) == ([], ["", A])
@@ -197,7 +198,7 @@ def test_neither_a_third_robots_end_nor_an_earlier_end_ends_the_fault() -> None:
     assert lift.story.state.endswith("fleet/a to L4")
 
 
-def test_one_message_that_is_delivered_twice_is_heard_once() -> None:
+def test_a_message_that_is_delivered_twice_counts_once() -> None:
     lift = Overheard()
     lift.story.asks(B, "L1")
     at = WALL + lift.story.now

@@ -1,4 +1,4 @@
-"""Hazards and rival nodes take the lift away from RMF. After them RMF gets the lift back."""
+"""A hazard or a rival node takes the lift away from RMF. After its end RMF gets the lift back."""
 
 import pytest
 from msgspec.structs import replace
@@ -37,8 +37,8 @@ MODES = [
 
 
 def waiting(**options: object) -> Story:
-    """Return a story in which A waits outside at L1. The car stands closed at L1, with its door
-    held."""
+    """Return a story in which A waits outside at L1. The car stands there with its door held but
+    closed."""
     story = Story(Building(CLOSED_AT_L1), door_timeout_s=600, **options)  # type: ignore[arg-type]
     story.run(1.0)
     story.asks("A", "L1")
@@ -56,7 +56,7 @@ def inside(**options: object) -> Story:
     return story
 
 
-# ---- LIFT-5: whether the open door is shown
+# ---- LIFT-5: when the open door is shown
 
 
 @pytest.mark.parametrize(("hazard", "mode"), MODES)
@@ -78,7 +78,7 @@ def test_a_hazard_before_boarding_switches_off_within_a_scan_and_offers_no_open_
 
 
 @pytest.mark.parametrize(("hazard", "mode"), MODES)
-def test_after_boarding_the_true_door_is_shown_so_that_the_robot_gets_out(
+def test_after_boarding_the_real_door_is_shown_to_let_the_robot_out(
     hazard: Hazard, mode: str
 ) -> None:
     story = inside()
@@ -105,11 +105,11 @@ def test_after_boarding_the_true_door_is_shown_so_that_the_robot_gets_out(
     ]
 
 
-# ---- LIFT-4: a hazard that is over
+# ---- LIFT-4: a hazard that has ended
 
 
 @pytest.mark.parametrize(("hazard", "mode"), MODES)
-def test_a_hazard_that_has_cleared_leaves_no_latch(hazard: Hazard, mode: str) -> None:
+def test_a_hazard_leaves_no_latch_after_it_has_cleared(hazard: Hazard, mode: str) -> None:
     story = waiting()
     story.building.hazard(hazard)
     story.run(5.0)
@@ -125,7 +125,7 @@ def test_a_hazard_that_has_cleared_leaves_no_latch(hazard: Hazard, mode: str) ->
     assert (story.state, story.faults) == ("AGV, closed at L1, A to L1", [])
 
 
-def test_a_hazard_on_the_way_cancels_the_call_and_the_ride_resumes_afterwards() -> None:
+def test_a_hazard_during_a_ride_cancels_the_call_and_the_ride_resumes_afterwards() -> None:
     story = Story(Controller())
     story.run(1.0)
     story.asks("A", "L3")
@@ -145,7 +145,7 @@ def test_a_hazard_on_the_way_cancels_the_call_and_the_ride_resumes_afterwards() 
     assert story.state == "AGV, open at L3, A to L3"
 
 
-def test_a_pulsed_call_that_a_hazard_cut_short_is_given_again_when_it_is_over() -> None:
+def test_a_pulsed_call_is_repeated_after_the_hazard_that_cut_it_short() -> None:
     alone = Alone(stale_after_s=900.0, call_pulse_s=2.0, hazard_clear_s=1.0)
     alone(0.0, CLOSED)(1.0, LiftRequested("A", True, "L3"))
     assert alone.decision.outputs.call == "L3"
@@ -158,7 +158,7 @@ def test_a_pulsed_call_that_a_hazard_cut_short_is_given_again_when_it_is_over() 
 # ---- LIFT-SENSING-1: hazards that flicker
 
 
-def test_a_hazard_that_flickers_on_is_ignored_and_one_that_flickers_off_stays() -> None:
+def test_short_flickers_neither_begin_nor_end_a_hazard() -> None:
     story = waiting()
     story.building.hazard(Hazard.FIRE)
     story._scan()
@@ -178,7 +178,7 @@ def test_a_hazard_that_flickers_on_is_ignored_and_one_that_flickers_off_stays() 
 
 
 @pytest.mark.parametrize(("debounce_s", "clear_s"), [(0.05, 10.0), (10.0, 1.0)])
-def test_a_hazard_clears_after_the_longer_of_its_two_times(
+def test_a_hazard_clears_after_the_longer_of_its_two_delays(
     debounce_s: float, clear_s: float
 ) -> None:
     building = Building(CLOSED_AT_L1)
@@ -221,7 +221,7 @@ def test_fire_comes_before_every_other_mode() -> None:
     assert story.faults == [h.name for h in Hazard]
 
 
-# ---- LIFT-4, LIFT-DRIVE-3, LIFT-DRIVE-5: overload only delays
+# ---- LIFT-4, LIFT-DRIVE-3, LIFT-DRIVE-5: an overload only delays the ride
 
 
 def test_an_overload_keeps_the_door_held_and_only_delays_the_ride() -> None:
@@ -258,7 +258,7 @@ def test_the_time_of_an_overload_does_not_count_as_waiting() -> None:
     assert story.faults == ["RUNTIME_LIMIT_EXCEEDED"]
 
 
-def test_a_car_that_a_hazard_has_left_between_floors_is_called_again() -> None:
+def test_after_a_hazard_a_car_between_floors_is_called_again() -> None:
     story = inside()
     building = story.building
     building.hazard(Hazard.CODE_BLUE)
@@ -281,7 +281,7 @@ def test_an_overloaded_lift_is_not_offered_for_boarding() -> None:
     assert story.state == "AGV, open at L1, A to L1"
 
 
-def test_a_pulsed_call_that_an_overload_cut_short_is_given_again() -> None:
+def test_a_pulsed_call_is_repeated_after_the_overload_that_cut_it_short() -> None:
     story = Story(Building(CLOSED_AT_L1), call_pulse_s=1.0)
     story.run(1.0)
     story.asks("A", "L3")
@@ -299,7 +299,7 @@ def test_a_pulsed_call_that_an_overload_cut_short_is_given_again() -> None:
     ]
 
 
-def test_agv_mode_that_is_never_confirmed_is_waited_for_through_an_overload() -> None:
+def test_an_overload_does_not_end_the_wait_for_agv_mode() -> None:
     story = Story(Building(replace(CLOSED_AT_L1, agv=False)), agv_timeout_s=5.0)
     story.building.hazard(Hazard.OVERLOAD)
     story.run(1.0)
@@ -321,9 +321,7 @@ def test_with_automatic_reset_rmf_gets_the_lift_back_when_the_fire_is_over() -> 
     assert story.outputs == HELD
 
 
-def test_with_manual_reset_only_an_operator_gives_the_lift_back_and_only_after_the_fire_is_over() -> (
-    None
-):
+def test_with_manual_reset_only_an_operator_gives_the_lift_back_and_only_after_the_fire() -> None:
     story = waiting(fire_reset="manual")
     story.building.hazard(Hazard.FIRE)
     story.run(5.0)
@@ -366,7 +364,7 @@ def test_an_end_or_a_new_request_does_not_clear_a_fire_latch() -> None:
         ("emergency_signal", EmergencySignal((), True), EmergencySignal((), False)),
     ],
 )
-def test_the_fire_alarm_topic_hears_true_once_and_false_only_after_an_operators_reset(
+def test_the_alarm_topic_gets_true_once_and_false_only_after_a_reset(
     alarm: str, on: object, off: object
 ) -> None:
     story = waiting(alarm=alarm)
@@ -390,32 +388,30 @@ def test_the_fire_alarm_topic_hears_true_once_and_false_only_after_an_operators_
     assert story.alarms[2:] == [(110.1, on)]
 
 
-def test_a_code_blue_is_told_to_the_fleets_where_the_settings_say_so_until_an_operator_resets() -> (
-    None
-):
+def test_with_the_setting_a_code_blue_alarms_the_fleets_until_a_reset() -> None:
     story = waiting(alarm="emergency_signal", alarm_on=["fire_alarm", "code_blue"])
     on, off = EmergencySignal((), True), EmergencySignal((), False)
     story.building.hazard(Hazard.CODE_BLUE)
     story.run(5.0)
-    story.building.hazard(Hazard.CODE_BLUE, Hazard.FIRE)  # one alarm is sent, and only once
+    story.building.hazard(Hazard.CODE_BLUE, Hazard.FIRE)  # the fleets hear one alarm, and only once
     story.run(8.0)
     story.building.hazard()
     story.run(20.0)
     assert story.alarms == [(2.1, on)]
-    assert story.state.startswith("AGV")  # the lift is back, but the fleets wait for a person
+    assert story.state.startswith("AGV")  # RMF has the lift again, but the fleets wait for a person
     story.resets()
     story.run(21.0)
     assert story.alarms == [(2.1, on), (20.0, off)]
 
 
-def test_a_hazard_that_alarm_on_does_not_name_is_told_to_nobody() -> None:
+def test_a_hazard_outside_alarm_on_alarms_nobody() -> None:
     story = waiting(alarm="emergency_signal", alarm_on=["code_blue"])
     story.building.hazard(Hazard.FIRE, Hazard.EARTHQUAKE, Hazard.OVERLOAD)
     story.run(5.0)
     assert story.alarms == []
 
 
-def test_a_fire_at_the_very_first_reading_is_told_to_the_fleets() -> None:
+def test_a_fire_at_the_very_first_reading_alarms_the_fleets() -> None:
     building = Building(CLOSED_AT_L1)
     building.hazard(Hazard.FIRE)
     story = Story(building, alarm="fire_alarm_trigger")
@@ -423,7 +419,7 @@ def test_a_fire_at_the_very_first_reading_is_told_to_the_fleets() -> None:
     assert story.alarms == [(0.05, Bool(True))]
 
 
-def test_a_node_that_saw_no_fire_never_says_that_it_is_over() -> None:
+def test_a_node_without_a_fire_never_ends_an_alarm() -> None:
     story = waiting(alarm="fire_alarm_trigger")
     story.resets()
     story.building.hazard(Hazard.CODE_BLUE, Hazard.EMERGENCY)
@@ -433,7 +429,7 @@ def test_a_node_that_saw_no_fire_never_says_that_it_is_over() -> None:
     assert story.alarms == []
 
 
-def test_a_fire_is_not_told_to_the_fleets_unless_the_settings_say_so() -> None:
+def test_without_the_setting_a_fire_does_not_alarm_the_fleets() -> None:
     story = waiting()
     story.building.hazard(Hazard.FIRE)
     story.run(5.0)
@@ -441,7 +437,7 @@ def test_a_fire_is_not_told_to_the_fleets_unless_the_settings_say_so() -> None:
     assert alarm_topics(story.settings) == ()
 
 
-def test_the_alarm_goes_out_on_the_one_topic_that_was_chosen_and_is_kept_for_late_joiners() -> None:
+def test_the_alarm_is_published_on_the_chosen_topic_and_retained_for_late_joiners() -> None:
     chosen = LiftSettings(floors=["L1"], alarm="emergency_signal")
     assert alarm_topics(chosen) == (EMERGENCY_SIGNAL,)
     chosen = LiftSettings(floors=["L1"], alarm="fire_alarm_trigger")
@@ -449,7 +445,7 @@ def test_the_alarm_goes_out_on_the_one_topic_that_was_chosen_and_is_kept_for_lat
     assert {topic.publish for topic in (EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER)} == {RETAINED}
 
 
-def test_a_fire_that_can_no_longer_be_seen_is_not_shown_as_a_fact() -> None:
+def test_a_fire_is_not_shown_as_a_fact_without_readings() -> None:
     story = waiting()
     story.building.hazard(Hazard.FIRE)
     story.run(5.0)
@@ -462,7 +458,7 @@ def test_a_fire_that_can_no_longer_be_seen_is_not_shown_as_a_fact() -> None:
 
 
 @pytest.mark.parametrize("over", [False, True])
-def test_a_latched_fire_stays_latched_while_nobody_can_see_whether_it_is_over(over: bool) -> None:
+def test_a_latched_fire_stays_latched_without_readings(over: bool) -> None:
     story = waiting(fire_reset="manual", alarm="fire_alarm_trigger")
     story.building.hazard(Hazard.FIRE)
     story.run(5.0)
@@ -477,16 +473,16 @@ def test_a_latched_fire_stays_latched_while_nobody_can_see_whether_it_is_over(ov
     assert story.faults == ["FIRE_LATCHED", "INPUTS_NOT_FRESH"]
     story.building.unreadable = ""
     story.run(11.05)
-    story.resets()  # the inputs are read, but not yet debounced
+    story.resets()  # the inputs are read but not debounced yet
     story.run(20.0)
     assert story.faults == ["FIRE_LATCHED" if over else "FIRE"]
     assert story.alarms == [(2.1, Bool(True))]
 
 
-# ---- LIFT-4: a rival
+# ---- LIFT-4: a second node of the same name
 
 
-def test_a_second_node_for_this_lift_switches_it_off_until_it_is_gone() -> None:
+def test_a_second_node_for_this_lift_switches_the_outputs_off_until_that_node_is_gone() -> None:
     story = waiting()
     for second in range(3, 8):
         story.rival()

@@ -1,4 +1,4 @@
-"""Relays that may never be on together, rests between changes, and switching off without delay."""
+"""Relays that must not be on together, rests between changes, and switching off without delay."""
 
 import pytest
 from msgspec.structs import replace
@@ -18,7 +18,8 @@ def limits(**changes: float) -> LiftDurations:
 def driven(
     relays: Relays, wishes: list[tuple[float, LiftOutputs]], rules: LiftDurations
 ) -> list[str]:
-    """Return the outputs after each wish: `A` for AGV mode, then the called floor or the held door."""
+    """Return the outputs after each wish. `A` stands for AGV mode, before the called floor or the held
+    door."""
     shown = []
     for now, wish in wishes:
         relays = relays.step(wish, now, rules)
@@ -36,10 +37,10 @@ def hold(side: Side = Side.FRONT) -> LiftOutputs:
     return LiftOutputs(agv_request=True, hold_door=side)
 
 
-# ---- LIFT-DRIVE-3: never on together
+# ---- LIFT-DRIVE-3: relays that are never on together
 
 
-def test_two_calls_are_never_on_together_and_their_relays_rest_between() -> None:
+def test_two_calls_are_never_on_together_and_relays_rest_between_them() -> None:
     wishes = [(0.0, call("L1")), (1.0, call("L2")), (1.29, call("L2")), (1.3, call("L2"))]
     assert driven(Relays(), wishes, limits(min_off_s=0)) == ["A L1", "A", "A", "A L2"]
 
@@ -51,21 +52,21 @@ def test_relays_rest_between_a_call_and_a_door_command() -> None:
         "A front", "A", "A", "A L1", "A", "A", "A front"]  # fmt: skip
 
 
-def test_two_doors_are_never_commanded_together_and_their_relays_rest_between() -> None:
+def test_two_doors_are_never_held_together_and_relays_rest_between_them() -> None:
     wishes = [(0.0, hold()), (1.0, hold(Side.REAR)), (1.2, hold(Side.REAR)), (1.3, hold(Side.REAR))]
     assert driven(Relays(), wishes, limits(min_off_s=0)) == ["A front", "A", "A", "A rear"]
 
 
-# ---- LIFT-DRIVE-6: a relay rests, and off never waits
+# ---- LIFT-DRIVE-6: a relay rests, but switching off never waits
 
 
-def test_an_output_that_went_off_stays_off_for_its_time() -> None:
+def test_an_output_stays_off_for_its_least_time() -> None:
     wishes = [(0.0, call("L1")), (1.0, LiftOutputs()), (1.1, call("L1")), (2.9, call("L1")),
               (3.0, call("L1"))]  # fmt: skip
     assert driven(Relays(), wishes, limits(min_off_s=2.0)) == ["A L1", "", "", "", "A L1"]
 
 
-def test_no_call_and_no_door_command_while_the_agv_relay_has_to_rest() -> None:
+def test_a_resting_agv_relay_permits_no_call_and_no_door_command() -> None:
     wishes = [(0.0, LiftOutputs(agv_request=True)), (1.0, LiftOutputs()),
               (1.1, call("L1")), (1.5, call("L1"))]  # fmt: skip
     assert driven(Relays(), wishes, limits()) == ["A", "", "", "A L1"]
@@ -103,15 +104,15 @@ def test_the_core_wakes_when_relays_have_rested() -> None:
     assert worn.changes_at(call("L1"), 6.0, rules) == 7.0
 
 
-# ---- LIFT-DRIVE-2, LIFT-DRIVE-3: which output comes first
+# ---- LIFT-DRIVE-2, LIFT-DRIVE-3: which output is switched first
 
 
-def test_a_call_goes_before_a_door_command_when_both_are_wanted() -> None:
+def test_a_call_comes_before_a_door_command() -> None:
     both = LiftOutputs(agv_request=True, call="L1", hold_door=Side.FRONT)
     assert driven(Relays(), [(0.0, both), (9.0, both)], limits()) == ["A L1", "A L1"]
 
 
-def test_without_rest_times_a_call_still_goes_off_before_the_next_one_is_on() -> None:
+def test_without_rest_times_a_call_still_goes_off_before_the_next_call() -> None:
     story = Story(Building(replace(AT_L1, level="L4")), dead_time_s=0, min_off_s=0)
     story.run(1.0)
     story.asks("A", "L1")
@@ -126,7 +127,7 @@ def test_without_rest_times_a_call_still_goes_off_before_the_next_one_is_on() ->
     ]
 
 
-def test_at_the_end_the_door_is_let_go_before_agv_mode_and_in_a_hazard_all_at_once() -> None:
+def test_an_end_releases_the_door_before_agv_mode_and_a_hazard_releases_all_at_once() -> None:
     for hazard in (False, True):
         story = Story(Building(AT_L1), release_grace_s=2.0, dead_time_s=0.5)
         story.run(1.0)
@@ -155,7 +156,7 @@ def test_a_burst_of_changing_requests_does_not_wear_the_relays() -> None:
 
 
 @pytest.mark.parametrize("inside", [False, True])
-def test_a_door_that_is_only_open_for_its_own_dwell_time_is_not_offered(inside: bool) -> None:
+def test_a_door_that_is_open_only_for_its_dwell_time_is_not_offered(inside: bool) -> None:
     closed = replace(AT_L1, door=DoorReading.CLOSED)
     story = Story(Building(closed), max_cycles_per_min=2, request_timeout_s=99)
     story.run(1.0)
@@ -164,7 +165,7 @@ def test_a_door_that_is_only_open_for_its_own_dwell_time_is_not_offered(inside: 
         story.building.set(door=DoorReading.OPEN)
         story.until(lambda: story.state == "AGV, open at L1, A to L1")
         story.building.set(door=DoorReading.CLOSED)
-    for motion in (Motion.UP, Motion.STOPPED) * 2:  # a loose contact, so the relay must rest
+    for motion in (Motion.UP, Motion.STOPPED) * 2:  # the relay switches until it must rest
         story.run(story.now + 1.0)
         story.building.set(motion=motion)
     story.run(8.0)
@@ -176,7 +177,7 @@ def test_a_door_that_is_only_open_for_its_own_dwell_time_is_not_offered(inside: 
     assert (story.faults, story.state) == ([], "AGV, open at L1, A to L1")
 
 
-def test_a_lift_that_stands_because_a_relay_came_on_too_often_says_so() -> None:
+def test_a_lift_that_waits_for_a_worn_relay_says_so() -> None:
     story = Story(Building(replace(AT_L1, door=DoorReading.CLOSED)), max_cycles_per_min=3)
     story.run(1.0)
     for at, floor in enumerate(["L3", "L4", "L3", "L4"]):
@@ -199,7 +200,7 @@ def test_a_lift_that_stands_because_a_relay_came_on_too_often_says_so() -> None:
 # ---- LIFT-DRIVE-4: pulses
 
 
-def test_a_reset_gives_no_second_pulse_where_nothing_was_wrong() -> None:
+def test_a_reset_without_a_fault_gives_no_second_pulse() -> None:
     story = Story(Controller(), call_pulse_s=0.5)
     story.run(1.0)
     story.asks("A", "L4")

@@ -1,8 +1,8 @@
 """LIFT-2: RMF's supervisor ends a session while its robot is in the car, or leaves a robot in the car.
 
-The first stories follow RMF's own rules (rmf_ros2, lift_supervisor/Node.cpp). A starting supervisor
-sends END for the session that the lift shows. It then takes the first session that asks. A starting
-fleet adapter sends END for its robot's session (RobotContext.cpp, _check_lift_state).
+The first stories follow RMF's own rules (rmf_ros2, lift_supervisor/Node.cpp). A supervisor that starts
+sends END for the session that the lift shows. It then takes the first session that asks. A fleet
+adapter that starts sends END for its robot's session (RobotContext.cpp, _check_lift_state).
 """
 
 import pytest
@@ -41,10 +41,10 @@ def riding(
 @pytest.mark.parametrize("jazzy", [False, True])
 @pytest.mark.parametrize("adapters_first", [False, True])
 @pytest.mark.parametrize("after_s", [0.0, 0.3, 0.6, 1.1, 2.0, 3.0])
-def test_a_supervisor_that_restarts_and_ends_the_session_takes_no_lift_from_a_robot_in_the_car(
+def test_a_restarted_supervisor_takes_no_lift_from_a_robot_in_the_car(
     jazzy: bool, adapters_first: bool, after_s: float
 ) -> None:
-    """The robot keeps the lift at any moment of its ride, whichever session the supervisor takes."""
+    """The supervisor restarts at different moments of the ride. The robot keeps the lift each time."""
     rmf, a, b = riding(jazzy, adapters_first)
     rmf.run(rmf.story.now + after_s)
     edges = list(rmf.story.edges)
@@ -65,15 +65,14 @@ def test_a_supervisor_that_restarts_and_ends_the_session_takes_no_lift_from_a_ro
     rmf.until_done(b)
     assert sessions(rmf.story) == ["", A, "", B]
     granted_at = next(at for at, state in rmf.story.told if state.session_id == B)
-    assert granted_at - released_at < 6.0  # the grace of 3 s, and RMF's next request
+    assert granted_at - released_at < 6.0  # the grace of 3 s, then RMF's next request
 
 
 CALLED_AND_HELD = [("call", None), ("hold_door", "front")]
 
 
 class InMidRide(Overheard):
-    """A ride in which A was let in at L2 and now rides to L4. A's adapter has just repeated the
-    request."""
+    """A lift that let A in at L2 and now takes A to L4. A's adapter has just repeated its request."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -88,15 +87,13 @@ class InMidRide(Overheard):
         self.story.run(self.story.now + 0.2)
 
     def asks_for(self, seconds: float) -> None:
-        """Let A's adapter go on asking, once a second."""
+        """Let A's adapter repeat its request once a second."""
         for _ in range(int(seconds)):
             self.adapter(AGV, "L4")
             self.story.run(self.story.now + 0.8)
 
 
-def test_a_session_that_the_supervisor_has_ended_lasts_while_its_robot_asks_and_five_seconds() -> (
-    None
-):
+def test_an_ended_session_lasts_until_its_robot_has_been_silent_for_five_seconds() -> None:
     lift = InMidRide()
     lift.supervisor_ends()
     lift.asks_for(20.0)
@@ -109,7 +106,7 @@ def test_a_session_that_the_supervisor_has_ended_lasts_while_its_robot_asks_and_
     assert ended_at == pytest.approx(silent_since + SILENT_S, abs=0.3)
 
 
-def test_the_supervisors_request_makes_the_session_its_own_again() -> None:
+def test_a_request_of_the_supervisor_renews_the_session_it_has_ended() -> None:
     lift = InMidRide()
     lift.supervisor_ends()
     lift.story.asks(A, "L4")
@@ -118,7 +115,7 @@ def test_the_supervisors_request_makes_the_session_its_own_again() -> None:
     assert lift.story.faults == []
 
 
-def test_the_end_of_another_session_does_not_make_a_robots_silence_last() -> None:
+def test_the_end_of_another_session_does_not_end_the_session_of_a_silent_robot() -> None:
     lift = InMidRide()
     lift.supervisor_ends()
     lift.story.asks(B, "L1")
@@ -128,7 +125,7 @@ def test_the_end_of_another_session_does_not_make_a_robots_silence_last() -> Non
     assert sessions(lift.story) == ["", A, ""]
 
 
-def test_the_robots_own_end_ends_its_session_whichever_of_the_two_is_heard_first() -> None:
+def test_the_own_end_of_the_robot_ends_its_session_in_any_order_of_arrival() -> None:
     for own_first in (True, False):
         lift = InMidRide()
         lift.asks_for(20.0)
@@ -144,7 +141,7 @@ def test_the_robots_own_end_ends_its_session_whichever_of_the_two_is_heard_first
         assert sessions(lift.story)[-1] == B
 
 
-def test_an_end_that_is_passed_on_late_counts_although_the_robot_asks_again() -> None:
+def test_an_end_that_is_passed_on_late_counts_even_if_the_robot_asks_again() -> None:
     lift = InMidRide()
     lift.adapter(END)
     lift.adapter(AGV, "L4")
@@ -152,9 +149,7 @@ def test_an_end_that_is_passed_on_late_counts_although_the_robot_asks_again() ->
     assert sessions(lift.story) == ["", A, ""]
 
 
-def test_a_person_ends_the_session_of_a_robot_that_goes_on_asking_and_another_one_gets_the_lift() -> (
-    None
-):
+def test_a_person_ends_the_session_of_a_robot_that_repeats_its_request() -> None:
     lift = InMidRide()
     lift.supervisor_ends()
     lift.supervisor_ends(by_person=True)
@@ -176,14 +171,14 @@ def test_a_fire_takes_the_outputs_of_a_session_that_the_supervisor_has_ended() -
 
 
 @pytest.mark.parametrize("heard_s", [4.5, 5.5])
-def test_a_robot_is_believed_to_ask_for_five_seconds(heard_s: float) -> None:
+def test_a_request_of_a_robot_counts_for_five_seconds(heard_s: float) -> None:
     lift = InMidRide()
     lift.story.run(lift.story.now + heard_s - 0.2)
     lift.supervisor_ends()
     assert sessions(lift.story)[-1] == (A if heard_s < SILENT_S else "")
 
 
-def test_a_robot_that_waits_outside_or_was_never_heard_is_ended_as_ever() -> None:
+def test_the_session_of_a_robot_outside_or_without_adapter_ends_at_once() -> None:
     unheard = Overheard()
     unheard.story.ends(A)
     assert sessions(unheard.story) == ["", A, ""]
@@ -199,7 +194,7 @@ def test_a_robot_that_waits_outside_or_was_never_heard_is_ended_as_ever() -> Non
 
 
 @pytest.mark.parametrize("back_after_s", [1.0, 8.0, 30.0])
-def test_a_robot_whose_new_adapter_sends_end_in_mid_ride_gets_its_lift_back(
+def test_a_robot_gets_its_lift_back_after_its_new_adapter_has_sent_end(
     back_after_s: float,
 ) -> None:
     rmf, a, b = riding()
@@ -219,9 +214,7 @@ def test_a_robot_whose_new_adapter_sends_end_in_mid_ride_gets_its_lift_back(
     assert ons(rmf.story, "call") >= 3
 
 
-def test_a_lift_waits_a_minute_for_a_robot_that_was_left_in_the_car_and_its_outputs_do_not() -> (
-    None
-):
+def test_a_lift_waits_a_minute_with_outputs_off_for_a_robot_left_in_the_car() -> None:
     lift = InMidRide()
     lift.adapter(END)
     ended_at = lift.story.now
@@ -269,10 +262,10 @@ def test_a_person_who_has_looked_into_the_car_gives_the_lift_to_the_next_robot()
     assert sessions(lift.story)[-1] == B
 
 
-# ---- LIFT-2: an END that is older than its session
+# ---- LIFT-2: an END from before the session
 
 
-def test_an_end_from_before_the_session_counts_once_it_has_been_repeated_for_a_second() -> None:
+def test_an_end_from_before_the_session_counts_after_a_second_of_repeats() -> None:
     lift = Overheard()
     sent = stamp(WALL + lift.story.now)
     lift.story.ends(A)
@@ -288,7 +281,7 @@ def test_an_end_from_before_the_session_counts_once_it_has_been_repeated_for_a_s
 
 
 @pytest.mark.parametrize("sec", [0, -1])
-def test_an_end_without_a_stamp_that_a_clock_shows_counts_at_once(sec: int) -> None:
+def test_an_end_without_a_stamp_counts_at_once(sec: int) -> None:
     lift = InMidRide()
     lift.adapter(END)
     impossible = stamp(0.0)

@@ -1,4 +1,4 @@
-"""The node around the core: its publishing, its log, and failures of its driver."""
+"""The node around the core: its messages, its log, and failures of its driver."""
 
 import logging
 
@@ -55,7 +55,7 @@ def test_a_change_that_is_over_before_its_state_is_due_is_not_published() -> Non
     assert [state for at, state in story.states if at > 1.5] == ["AGV, closed at L1"]
 
 
-def test_a_states_stamp_is_when_its_inputs_were_read_and_not_when_it_was_published() -> None:
+def test_the_stamp_of_a_state_is_the_time_of_its_reading() -> None:
     story = Story(Building(OPEN_AT_L1))
     story.run(2.0)
     story.building.unreadable = "timeout"
@@ -81,7 +81,7 @@ def test_a_lift_that_was_never_read_is_offline_with_stamp_zero_and_nothing_is_wr
         )
     }
     assert story.node.ready
-    assert building.writes == 1  # the claim writes all outputs off
+    assert building.writes == 1  # the claim of the outputs writes every output off
     assert story.faults == ["INPUTS_NOT_FRESH"]
 
 
@@ -91,7 +91,7 @@ def test_no_open_door_is_shown_before_the_inputs_have_been_read() -> None:
     assert story.states == [(0.0, "OFFLINE, moving at ?"), (0.1, "AGV, open at L1")]
 
 
-def test_the_log_has_one_line_when_a_device_is_lost_and_one_when_it_is_back(
+def test_the_log_has_one_line_for_a_lost_device_and_one_for_its_return(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     story = Story(Building(OPEN_AT_L1))
@@ -106,10 +106,10 @@ def test_the_log_has_one_line_when_a_device_is_lost_and_one_when_it_is_back(
         lines = [r.getMessage().split()[0] for r in caplog.records]
         assert (lines.count("device_lost"), lines.count("device_back")) == (1, 1)
         assert (lines.count("fault"), lines.count("fault_over")) == (1, 1)
-        assert len(lines) == 6  # lost and restored are two more lines
+        assert len(lines) == 6  # two more lines: the device is lost, and it is back
 
 
-def test_a_new_daemon_finds_the_lift_in_agv_mode_and_waits_to_be_asked() -> None:
+def test_a_new_daemon_that_finds_agv_mode_waits_for_a_request() -> None:
     story = Story(Controller())
     story.run(1.0)
     story.asks("A", "L1")
@@ -122,7 +122,7 @@ def test_a_new_daemon_finds_the_lift_in_agv_mode_and_waits_to_be_asked() -> None
     assert story.edges[-2:] == [(5.0, "hold_door", None), (5.0, "agv_request", False)]
 
 
-def test_outputs_are_made_safe_and_a_failure_of_that_is_logged() -> None:
+def test_outputs_are_made_safe_and_a_failure_to_do_so_is_logged() -> None:
     story = Story(Building(OPEN_AT_L1))
     story.run(1.0)
     story.asks("A", "L1")
@@ -133,7 +133,7 @@ def test_outputs_are_made_safe_and_a_failure_of_that_is_logged() -> None:
     assert story.outputs == LiftOutputs()
 
 
-def test_a_door_whose_open_state_could_not_be_sent_has_let_nobody_in() -> None:
+def test_a_door_whose_open_state_could_not_be_published_has_let_nobody_in() -> None:
     heard, unheard = Story(Building(OPEN_AT_L1)), Story(Building(OPEN_AT_L1))
     unheard.deaf = True
     for story in (heard, unheard):

@@ -1,4 +1,4 @@
-"""Jazzy's RMF repeats some messages at every start, at every handover and in every idle second.
+"""Jazzy's RMF repeats some messages at every start, at every handover, and each second without work.
 
 The node must not warn about these repeats.
 """
@@ -19,7 +19,7 @@ def warnings(caplog: pytest.LogCaptureFixture) -> list[str]:
     return [record.message for record in caplog.records if record.levelno >= logging.WARNING]
 
 
-def test_a_start_with_a_robot_that_already_asks_warns_of_nothing(
+def test_a_start_with_a_waiting_robot_logs_no_warning(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     story = Story(Controller())
@@ -32,7 +32,7 @@ def test_a_start_with_a_robot_that_already_asks_warns_of_nothing(
     assert story.state.endswith("fleet/a to L3")
 
 
-def test_a_handover_warns_only_that_the_other_one_asked_too_early(
+def test_a_handover_warns_only_of_the_early_request(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     a, b = RobotContext(A), RobotContext(B)
@@ -47,7 +47,7 @@ def test_a_handover_warns_only_that_the_other_one_asked_too_early(
     assert set(rmf.story.node.refused) == {"released a moment ago"}
 
 
-def test_an_end_without_a_session_is_ignored_and_not_logged(
+def test_an_end_without_a_session_id_is_ignored_without_a_log_line(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     a = RobotContext(A, jazzy=True)
@@ -60,7 +60,7 @@ def test_an_end_without_a_session_is_ignored_and_not_logged(
     assert (warnings(caplog), rmf.story.node.refused) == ([], {})
 
 
-def test_an_end_without_a_session_leaves_a_held_session_alone() -> None:
+def test_an_end_without_a_session_id_ends_no_session() -> None:
     story = Story(Controller())
     story.run(1.0)
     story.asks(A, "L2")

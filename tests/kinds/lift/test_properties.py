@@ -1,4 +1,4 @@
-"""The rules hold on a debounced lift for any events in any order, and RMF recovers from a storm."""
+"""On a debounced lift the rules hold for any events in any order. RMF recovers after many failures."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,7 +25,8 @@ STORMS = settings(max_examples=examples(40))
 
 @dataclass
 class Judge:
-    """A judge of every decision of a story. `open_seen_at` is when the contact last said open (s)."""
+    """A judge of every decision of a story. `open_seen_at` is the last time (s) with an open
+    contact."""
 
     building: Building
     open_seen_at: float = -1.0
@@ -84,7 +85,7 @@ def happens(story: Story, what: Any) -> None:
 
 @FEW
 @given(st.lists(st.tuples(WAITS, HAPPENINGS), max_size=40), st.sampled_from([None, 0.4]))
-def test_the_invariants_hold_whatever_the_building_and_rmf_do(
+def test_the_invariants_hold_for_any_actions_of_building_and_rmf(
     happenings: Sequence[tuple[float, Any]], pulse_s: float | None
 ) -> None:
     story, judge = judged(Building(), call_pulse_s=pulse_s, fire_reset="manual")
@@ -96,7 +97,7 @@ def test_the_invariants_hold_whatever_the_building_and_rmf_do(
 
 @FEW
 @given(st.lists(st.tuples(WAITS, HAPPENINGS), max_size=25))
-def test_whatever_has_happened_the_lift_comes_back_and_serves(
+def test_after_any_events_the_lift_recovers_and_serves(
     happenings: Sequence[tuple[float, Any]],
 ) -> None:
     story, _ = judged(Building())
@@ -133,7 +134,7 @@ FATES = st.lists(
 
 
 def trouble(rmf: Rmf, robot: RobotContext, what: str) -> RobotContext:
-    """Restart one party, or let the building misbehave for half a second."""
+    """Restart one party, or let the building fail for half a second."""
     story = rmf.story
     if what == "supervisor":
         rmf.restart_supervisor()

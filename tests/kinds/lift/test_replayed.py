@@ -1,4 +1,4 @@
-"""RMF's supervisor hears requests of earlier rides again, by RMF's rules and rule by rule."""
+"""RMF's supervisor hears requests of earlier rides again. Tests by RMF's rules, then rule by rule."""
 
 from collections.abc import Mapping
 
@@ -17,7 +17,7 @@ OPEN_FOR_A = "AGV, open at L2, fleet/a to L2"
 
 
 def on_its_threshold(rides_before: int) -> tuple[World, RobotContext]:
-    """Return a world whose robot is entering the car at L3, after this number of earlier rides."""
+    """Return a world in which a robot enters the car at L3, after this number of earlier rides."""
     robot = RobotContext(A)
     rmf = world(robot)
     for _ in range(rides_before):
@@ -32,10 +32,11 @@ def on_its_threshold(rides_before: int) -> tuple[World, RobotContext]:
 
 
 @pytest.mark.parametrize("rides_before", [1, 2])
-def test_an_earlier_ride_that_rmf_hears_again_lets_no_door_go_while_a_robot_goes_in(
+def test_requests_of_an_earlier_ride_release_no_door_while_a_robot_enters(
     rides_before: int,
 ) -> None:
-    """`make soak SEED=7 RMF=kilted` found this case: an adapter was cut off for longer than a lease."""
+    """`make soak SEED=7 RMF=kilted` found this case. An adapter had been cut off for longer than a
+    lease."""
     rmf, robot = on_its_threshold(rides_before)
     before = list(rmf.story.edges)
     rmf.finds_again(robot)
@@ -47,7 +48,7 @@ def test_an_earlier_ride_that_rmf_hears_again_lets_no_door_go_while_a_robot_goes
     assert rmf.story.state == "AGV, open at L1, fleet/a to L1"
 
 
-def test_a_supervisor_that_restarts_and_hears_an_earlier_ride_lets_no_door_go_either() -> None:
+def test_after_a_supervisor_restart_requests_of_an_earlier_ride_release_no_door() -> None:
     rmf, robot = on_its_threshold(1)
     before = list(rmf.story.edges)
     rmf.supervisor = type(rmf.supervisor)()
@@ -57,11 +58,9 @@ def test_a_supervisor_that_restarts_and_hears_an_earlier_ride_lets_no_door_go_ei
     assert sessions(rmf.story)[-3:] == [A, "", A]
 
 
-def test_a_robot_that_is_cut_off_before_it_gets_the_lift_is_as_safe_when_it_is_found_again() -> (
-    None
-):
-    """`make soak SEED=7 RMF=kilted` found this case at 12.6 h: the robot was cut off before its
-    grant."""
+def test_a_robot_that_was_cut_off_before_its_grant_stays_safe() -> None:
+    """`make soak SEED=7 RMF=kilted` found this case after 12.6 h. The robot's adapter was cut off
+    before the robot got the lift."""
     first, robot = RobotContext(B), RobotContext(A)
     rmf = world(first, robot)
     rmf.rides(robot, "L2", "L1")
@@ -80,12 +79,13 @@ def test_a_robot_that_is_cut_off_before_it_gets_the_lift_is_as_safe_when_it_is_f
 
 
 @pytest.mark.parametrize("after_s", [2.8, 3.2], ids=["within the grace", "after it"])
-def test_an_earlier_ride_that_rmf_hears_again_shows_a_robot_no_door_that_was_let_go(
+def test_requests_of_an_earlier_ride_show_no_robot_a_released_door_as_open(
     after_s: float,
 ) -> None:
-    """RMF's real supervisor was dead when a robot's next ride began where its last ride had ended.
+    """RMF's real supervisor was dead when a robot's next ride began. The ride began at the floor where
+    the robot's last ride had ended.
 
-    The robot entered because of the state of the earlier ride, and then the door closed.
+    The lift still showed the state of the last ride, so the robot entered. Then the door closed.
     """
     lift = Overheard(Building(LiftSample("L2", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)))
     assert lift.story.state == OPEN_FOR_A
@@ -108,7 +108,7 @@ def test_an_earlier_ride_that_rmf_hears_again_shows_a_robot_no_door_that_was_let
 # ---- LIFT-REPLAYED-1, LIFT-REPLAYED-2, LIFT-REPLAYED-3: rule by rule
 
 
-def test_a_floor_that_only_the_supervisor_asks_for_counts_after_a_while() -> None:
+def test_a_floor_that_only_the_supervisor_requests_counts_after_three_seconds() -> None:
     lift = Overheard()
     lift.adapter(AGV, "L2")
     began = lift.story.now
@@ -138,7 +138,7 @@ def test_a_request_for_the_present_floor_ends_the_doubt_and_a_new_one_begins_aft
     assert ons(lift.story, "hold_door") == 1
 
 
-def test_the_robots_own_request_ends_the_doubt_at_once_whichever_comes_first() -> None:
+def test_the_own_request_of_the_robot_ends_the_doubt_in_any_order_of_arrival() -> None:
     lift = Overheard()
     lift.adapter(AGV, "L2")
     lift.story.asks(A, "L4")
@@ -148,7 +148,7 @@ def test_the_robots_own_request_ends_the_doubt_at_once_whichever_comes_first() -
     assert lift.story.state == "AGV, moving at L2, fleet/a to L4"
 
 
-def test_the_robots_own_request_counts_for_nothing_before_the_supervisor_has_passed_it_on() -> None:
+def test_the_own_request_of_the_robot_has_no_effect_before_the_supervisor_passes_it_on() -> None:
     lift = Overheard()
     lift.adapter(AGV, "L2")
     lift.adapter(AGV, "L4")
@@ -168,7 +168,7 @@ def test_a_robot_that_has_ended_or_was_never_heard_raises_no_doubt() -> None:
         assert lift.story.state == "AGV, moving at L2, fleet/a to L4"
 
 
-def test_of_more_robots_than_any_site_has_those_heard_first_are_forgotten() -> None:
+def test_among_very_many_robots_those_heard_first_are_forgotten() -> None:
     own: Mapping[str, str] = {}
     for number in range(MOST + 1):
         own = noted(own, LiftRequested(f"robot{number}", True, "L1"))

@@ -1,4 +1,4 @@
-"""One robot's ride, from the request to the end of the session: the lift's outputs and its states."""
+"""One robot's ride, from the request to the end of the session. Tests compare outputs and states."""
 
 import pytest
 from msgspec.structs import replace
@@ -112,7 +112,7 @@ def test_a_call_waits_until_the_status_input_confirms_agv_mode() -> None:
     assert story.edges == [(1.0, "agv_request", True), (5.1, "call", "L2")]
 
 
-def test_an_end_is_obeyed_whatever_its_other_fields_say_and_calls_no_car() -> None:
+def test_an_end_with_any_other_fields_is_obeyed_and_calls_no_car() -> None:
     for floor, door in (("", 0), ("L2", 2), ("attic", 7)):
         story = Story(Controller(), release_grace_s=0)
         story.run(1.0)
@@ -152,7 +152,7 @@ def test_a_repeated_request_switches_nothing() -> None:
     assert often.states == once.states
 
 
-def test_a_floor_that_is_not_served_is_refused_and_the_session_goes_on_as_it_was() -> None:
+def test_a_request_for_an_unserved_floor_is_refused_and_the_session_goes_on() -> None:
     story = Story(Controller())
     story.run(1.0)
     story.asks("A", "L3")
@@ -213,7 +213,7 @@ def test_an_open_door_in_human_mode_is_not_offered_for_boarding() -> None:
     assert story.state == "HUMAN, moving at L1, A to L1"
 
 
-def test_floors_have_any_names_and_are_never_read_by_their_last_character() -> None:
+def test_a_floor_may_have_any_name_and_its_last_character_means_nothing() -> None:
     names = ["B1", "G", "L1", "L10", "8F_r"]
     story = Story(Controller(names), floors=names)
     story.run(1.0)
@@ -225,10 +225,10 @@ def test_floors_have_any_names_and_are_never_read_by_their_last_character() -> N
     assert calls == ["L10", "B1", "8F_r", "G"]
 
 
-# ---- LIFT-3, LIFT-DRIVE-3: another destination
+# ---- LIFT-3, LIFT-DRIVE-3: a change of destination
 
 
-def test_of_two_requests_for_two_floors_in_one_scan_the_second_counts() -> None:
+def test_the_second_of_two_requests_in_one_scan_counts() -> None:
     story = Story(Controller())
     story.run(1.0)
     story.request(
@@ -259,7 +259,7 @@ def test_relays_rest_between_two_calls_when_the_destination_changes_on_the_way()
     ]
 
 
-def test_another_destination_while_the_door_is_held_lets_it_go_and_then_calls() -> None:
+def test_another_destination_first_releases_the_held_door_and_then_calls() -> None:
     story = Story(Building(at("L1", DoorReading.OPEN)))
     story.run(1.0)
     story.asks("A", "L1")
@@ -277,7 +277,7 @@ def test_another_destination_while_the_door_is_held_lets_it_go_and_then_calls() 
 # ---- LIFT-DRIVE-4: calls
 
 
-def test_a_pulsed_call_is_given_once_and_for_its_time() -> None:
+def test_a_call_by_pulse_is_given_once_for_the_length_of_a_pulse() -> None:
     story = Story(Controller(), call_pulse_s=0.7)
     story.run(1.0)
     story.asks("A", "L3")
@@ -311,7 +311,7 @@ def test_a_car_that_has_drifted_from_its_destination_is_called_again(pulse_s: fl
 # ---- LIFT-5, LIFT-SENSING-6: lifts with fewer lines
 
 
-def test_without_an_agv_status_line_agv_mode_counts_as_soon_as_it_is_requested() -> None:
+def test_without_an_agv_status_line_a_request_for_agv_mode_counts_as_agv_mode() -> None:
     story = Story(Building(replace(at("L1", DoorReading.OPEN), agv=None)))
     story.run(1.0)
     assert story.state == "HUMAN, open at L1"
@@ -337,7 +337,7 @@ def test_without_motion_lines_a_car_with_an_open_door_at_a_floor_counts_as_stand
 TWO_DOORS = {"L1": Floor(), "L2": Floor(), "L2_rear": Floor(level="L2", side=Side.REAR)}
 
 
-def test_each_of_the_two_floor_names_of_a_landing_holds_and_shows_its_own_door() -> None:
+def test_each_of_the_two_floor_names_of_a_landing_has_its_own_door() -> None:
     building = Building(replace(at("L2", agv=False), rear_door=DoorReading.CLOSED))
     story = Story(building, floors=TWO_DOORS)
     story.run(1.0)
@@ -402,7 +402,7 @@ def test_an_impossible_request_to_a_lift_is_refused_by_name(
     assert refused.value.kind == kind
 
 
-def test_a_person_reads_the_state_in_a_few_words() -> None:
+def test_the_summary_tells_the_state_in_a_few_words() -> None:
     story = Story(Building(replace(STANDING, door=DoorReading.NOT_OPEN)), door_travel_s=2.0)
     status = story.node.status()
     assert {key: status[key] for key in SUMMARY} == {

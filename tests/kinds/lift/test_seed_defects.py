@@ -1,7 +1,7 @@
-"""The twelve defects of RMF's first lift node for dry contacts. The old node fails each story.
+"""The twelve defects of RMF's first lift node for dry contacts. That node fails each story.
 
-The old node is sharp-rmf/low_level_lift 4425e25 (2020), and the letters are ours. The name of a test
-describes the behaviour of the old node.
+The old node is sharp-rmf/low_level_lift 4425e25 (2020). The letters of the defects are ours. The name
+of a test describes the behaviour of the old node.
 """
 
 import logging
@@ -18,8 +18,9 @@ from tests.kinds.lift.story import AGV, HUMAN, Building, Controller, Story
 OPEN_AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
 
 
-def test_defect_a_a_request_for_another_lift_changed_this_ones_session_and_destination() -> None:
-    """In this project the daemon's inbox sorts messages by name before a node gets them."""
+def test_defect_a_a_request_for_another_lift_changed_session_and_destination() -> None:
+    """In this project the daemon's inbox sorts messages by the lift's name. A node gets only its own
+    messages."""
     story = Story(Controller())
     story.run(1.0)
     story.asks("A", "L3")
@@ -31,7 +32,7 @@ def test_defect_a_a_request_for_another_lift_changed_this_ones_session_and_desti
     assert story.node.subject.memory == before
 
 
-def test_defect_b_agv_mode_was_never_asked_of_the_lift() -> None:
+def test_defect_b_agv_mode_was_never_requested() -> None:
     story = Story(Controller())
     story.run(1.0)
     story.asks("A", "L3")
@@ -54,7 +55,7 @@ def test_defect_c_a_call_that_timed_out_stayed_on() -> None:
     ]
 
 
-def test_defect_d_a_request_blocked_everything_until_the_car_had_come() -> None:
+def test_defect_d_a_request_blocked_the_node_until_the_car_came() -> None:
     """In this project a request takes no time. A hazard right after the request counts in the next
     scan."""
     story = Story(Controller())
@@ -67,9 +68,7 @@ def test_defect_d_a_request_blocked_everything_until_the_car_had_come() -> None:
     assert story.outputs == LiftOutputs()
 
 
-def test_defect_e_end_and_human_mode_were_alike_sessions_never_ended_and_strangers_released() -> (
-    None
-):
+def test_defect_e_sessions_never_ended_and_strangers_released_the_lift() -> None:
     story = Story(Building(OPEN_AT_L1))
     story.run(1.0)
     story.asks("A", "L1")
@@ -86,7 +85,7 @@ def test_defect_e_end_and_human_mode_were_alike_sessions_never_ended_and_strange
     assert story.state == "AGV, open at L1"
 
 
-def test_defect_f_a_release_set_the_pins_up_again_and_drove_the_door() -> None:
+def test_defect_f_a_release_set_the_pins_up_again_and_moved_the_door() -> None:
     story = Story(Building(OPEN_AT_L1))
     story.run(1.0)
     story.asks("A", "L1")
@@ -110,12 +109,12 @@ def test_defect_g_a_floor_was_the_last_character_of_its_name() -> None:
 
 
 @pytest.mark.parametrize(("level", "shown"), [(None, "?"), ("L2", "L2")])
-def test_defect_h_no_code_read_as_the_lowest_floor_and_a_passing_code_as_another(
+def test_defect_h_a_missing_or_changing_code_read_as_a_wrong_floor(
     level: str | None, shown: str
 ) -> None:
     story = Story(Building(LiftSample(level, DoorReading.CLOSED, motion=Motion.UP, agv=True)))
     story.run(1.0)
-    story.building.set(level="L3")  # the two bits of a floor code change one after the other
+    story.building.set(level="L3")  # the two bits of a floor code do not change together
     story._scan()
     story.run(1.05)
     story.building.set(level=level)
@@ -145,7 +144,7 @@ def test_defect_i_alarms_were_not_filtered_never_cleared_and_stopped_nothing() -
     assert story.state == "AGV, open at L1"
 
 
-def test_defect_j_a_door_was_open_or_closed_and_never_in_between() -> None:
+def test_defect_j_a_door_was_never_between_open_and_closed() -> None:
     story = Story(Building(OPEN_AT_L1))
     story.run(1.0)
     story.building.set(door=DoorReading.BETWEEN)
@@ -153,7 +152,7 @@ def test_defect_j_a_door_was_open_or_closed_and_never_in_between() -> None:
     assert story.state == "AGV, moving at L1"
 
 
-def test_defect_k_a_lift_already_at_its_floor_could_be_asked_for_any_floor() -> None:
+def test_defect_k_a_lift_at_its_floor_accepted_any_floor() -> None:
     for floor in ("L1", "L0", "", "L11"):
         request = LiftRequest("Lift1", Time(), "A", int(AGV), floor, 2)
         if floor == "L1":

@@ -1,4 +1,4 @@
-"""The core's trust in inputs that are broken, contradictory, stale, restless or in motion."""
+"""When the core believes inputs that are broken, contradictory, old, restless, or from a moving car."""
 
 import pytest
 from msgspec.structs import replace
@@ -56,7 +56,7 @@ def test_an_open_door_is_offered_when_every_input_confirms_it() -> None:
         ({"agv": False}, "HUMAN, moving at L1", []),
     ],
 )
-def test_an_open_door_is_not_offered_when_one_input_contradicts_it(
+def test_an_open_door_is_not_offered_against_one_contradicting_input(
     inputs: dict[str, object], state: str, faults: list[str]
 ) -> None:
     story = boarding(**inputs)
@@ -84,7 +84,7 @@ def test_motion_is_read_from_the_motion_lines(motion: Motion, told: LiftMotion) 
 # ---- LIFT-SENSING-1: debounce
 
 
-def test_a_door_contact_that_glitches_on_the_way_never_reads_as_open() -> None:
+def test_glitches_of_a_door_contact_on_the_way_never_read_as_open() -> None:
     building = Building(replace(OPEN_AT_L1, door=DoorReading.CLOSED))
     story = Story(building)
     story.run(1.0)
@@ -118,10 +118,10 @@ def test_an_open_contact_while_the_car_moves_reads_as_a_moving_door() -> None:
     assert story.edges == [(1.0, "agv_request", True), (1.0, "call", "L1")]
 
 
-# ---- LIFT-SENSING-4: lines without a meaning outside AGV mode
+# ---- LIFT-SENSING-4: lines that are valid only in AGV mode
 
 
-def test_lines_that_have_a_meaning_only_in_agv_mode_are_believed_there() -> None:
+def test_lines_that_are_valid_only_in_agv_mode_are_believed_in_agv_mode() -> None:
     building = Building(LiftSample(None, DoorReading.BETWEEN, motion=None, agv=False))
     story = Story(building)
     story.run(1.0)
@@ -148,7 +148,7 @@ def test_lines_that_have_a_meaning_only_in_agv_mode_are_believed_there() -> None
     ]
 
 
-def test_a_movement_counts_at_once_when_the_motion_lines_had_no_meaning_before() -> None:
+def test_a_movement_counts_at_once_after_invalid_motion_lines() -> None:
     building = Building(LiftSample("L1", DoorReading.OPEN, motion=None, agv=True))
     story = Story(building, debounce={"motion": 5.0})
     story.run(7.0)
@@ -185,13 +185,13 @@ def test_without_readings_the_lift_is_offline_with_outputs_off_and_still_publish
     ]
 
 
-def test_a_reading_no_longer_counts_at_the_very_instant_at_which_it_is_too_old() -> None:
+def test_a_reading_stops_counting_exactly_at_its_greatest_age() -> None:
     burning = replace(AT_L1, door=DoorReading.BOTH, hazards=frozenset({Hazard.EMERGENCY}))
     alone = Alone(stale_after_s=2.0)(0.0, burning)(2.0, IoFailed("timeout"))
     assert alone.faults == (Fault("INPUTS_NOT_FRESH", "timeout"),)
 
 
-def test_a_reading_in_the_instant_in_which_the_last_one_expires_starts_afresh() -> None:
+def test_a_reading_at_the_end_of_the_last_reading_starts_afresh() -> None:
     alone = Alone(DEBOUNCE)(0.0, AT_L1)(0.5, AT_L1)(1.5, AT_L1)
     shown = alone.decision.report
     assert (shown.mode, shown.floor, alone.faults) == (LiftMode.MODE_OFFLINE, "", ())
@@ -199,7 +199,7 @@ def test_a_reading_in_the_instant_in_which_the_last_one_expires_starts_afresh() 
     assert alone.decision.report.floor == "L1"
 
 
-def test_after_a_sleep_everything_is_forgotten_but_the_last_landing() -> None:
+def test_after_a_sleep_only_the_last_landing_is_remembered() -> None:
     alone = Alone()(0.0, AT_L1)(1.0, AT_L1)(2.0, Suspended("the machine slept"))
     assert alone.decision.refused == ""
     assert alone.faults == (Fault("INPUTS_NOT_FRESH", "the machine slept"),)
@@ -208,7 +208,7 @@ def test_after_a_sleep_everything_is_forgotten_but_the_last_landing() -> None:
     assert alone.memory.senses == type(alone.memory.senses)(position=position)
 
 
-def test_the_lift_comes_back_by_itself_when_its_readings_come_back() -> None:
+def test_the_lift_recovers_with_its_readings() -> None:
     story = boarding()
     story.building.unreadable = "no answer"
     story.run(12.0)
@@ -219,7 +219,7 @@ def test_the_lift_comes_back_by_itself_when_its_readings_come_back() -> None:
     assert story.faults == []
 
 
-def test_what_was_believed_before_the_readings_stopped_is_not_believed_afterwards() -> None:
+def test_after_a_loss_of_readings_nothing_is_believed_from_before() -> None:
     story = boarding()
     story.building.unreadable = "no answer"
     story.run(12.0)
@@ -233,7 +233,7 @@ def test_what_was_believed_before_the_readings_stopped_is_not_believed_afterward
     assert story.faults == []
 
 
-def test_an_impossible_floor_code_is_still_doubted_after_a_loss_of_readings() -> None:
+def test_an_impossible_floor_code_stays_doubted_after_a_loss_of_readings() -> None:
     story = boarding()
     story.building.set(level="L3")
     story.run(3.0)
@@ -249,7 +249,7 @@ def test_a_car_that_was_not_read_for_a_while_may_have_moved() -> None:
     story = boarding()
     story.run(9.0)
     story.building.set(level="L3")
-    story.now = 19.0  # the loop has stalled
+    story.now = 19.0  # the loop was blocked until now
     story.run(20.0)
     assert (story.faults, story.state) == ([], "AGV, open at L3, A to L1")
 
@@ -265,7 +265,7 @@ def test_a_floor_that_was_reached_in_a_short_gap_is_believed() -> None:
     assert (story.faults, story.state) == ([], "AGV, open at L2, A to L1")
 
 
-def test_a_glitch_that_a_gap_cuts_in_half_changes_nothing() -> None:
+def test_a_glitch_with_a_gap_in_its_middle_changes_nothing() -> None:
     story = boarding(door=DoorReading.CLOSED)
     story.building.set(door=DoorReading.OPEN)
     story._scan()
@@ -327,7 +327,7 @@ def test_without_any_debounce_the_first_reading_counts() -> None:
 # ---- LIFT-SENSING-5: doors with one contact
 
 
-def test_a_contact_for_open_proves_nothing_about_closed() -> None:
+def test_a_contact_for_open_does_not_prove_closed() -> None:
     story = Story(Building(replace(OPEN_AT_L1, door=DoorReading.NOT_OPEN)), door_travel_s=4.0)
     story.run(3.0)
     assert story.state == "AGV, moving at L1"
@@ -377,21 +377,21 @@ def test_of_two_doors_only_the_estimated_one_is_marked(
     assert story.node.status()["door"] == shown
 
 
-def test_an_estimated_door_that_is_not_offered_is_shown_as_moving() -> None:
+def test_an_estimated_door_is_shown_as_moving_if_it_is_not_offered() -> None:
     story = Story(Building(replace(OPEN_AT_L1, door=DoorReading.NOT_CLOSED, agv=False)))
     story.run(9.0)
     story.asks("A", "L1")
     assert story.node.status()["door"] == "moving"
 
 
-def test_a_door_that_is_not_shown_open_is_not_marked_as_estimated() -> None:
+def test_only_a_door_that_is_shown_open_is_marked_as_estimated() -> None:
     sample = replace(AT_L1, door=DoorReading.NOT_CLOSED, motion=Motion.UP)
     alone = Alone(door_travel_s=1.0, stale_after_s=60.0)(0.0, sample)(2.0, sample)
     shown = alone.decision.report
     assert (shown.door.name, shown.estimated) == ("DOOR_MOVING", False)
 
 
-def test_an_estimated_door_that_starts_to_move_is_no_longer_at_its_end() -> None:
+def test_an_estimated_door_that_starts_to_move_is_no_longer_shown_open() -> None:
     story = Story(Building(replace(OPEN_AT_L1, door=DoorReading.NOT_CLOSED)), door_travel_s=4.0)
     story.run(6.0)
     assert story.state == "AGV, open at L1"
@@ -428,7 +428,7 @@ def test_the_core_wakes_when_its_first_reading_has_settled() -> None:
     assert Alone(DEBOUNCE)(1.0, AT_L1).decision.wake_at == 1.03
 
 
-def test_the_core_wakes_when_either_door_is_estimated_to_have_arrived() -> None:
+def test_the_core_wakes_at_the_estimated_arrival_of_each_door() -> None:
     rules = Story(Building(OPEN_AT_L1), debounce={}, door_travel_s=0.7).limits
     for front, rear in (
         (DoorReading.NOT_OPEN, DoorReading.OPEN),
@@ -439,7 +439,7 @@ def test_the_core_wakes_when_either_door_is_estimated_to_have_arrived() -> None:
 
 
 @pytest.mark.parametrize("where", ["door", "rear_door"])
-def test_a_door_with_one_contact_wakes_the_core_when_it_has_come_to_its_other_end(
+def test_the_core_wakes_when_a_door_with_one_contact_reaches_its_other_end(
     where: str,
 ) -> None:
     sample = replace(AT_L1, door=DoorReading.CLOSED, rear_door=DoorReading.CLOSED)
@@ -448,7 +448,7 @@ def test_a_door_with_one_contact_wakes_the_core_when_it_has_come_to_its_other_en
     assert alone.decision.wake_at == 4.0
 
 
-def test_a_new_fault_is_news_but_a_change_of_its_words_is_not() -> None:
+def test_a_new_fault_is_news_but_a_new_text_of_it_is_not() -> None:
     rules = Story(Building(OPEN_AT_L1), debounce={}).limits
     first = decide(LiftMemory(), Sampled(OPEN_AT_L1), 0.0, rules).report
     lost = [replace(first, faults=(Fault("INPUTS_NOT_FRESH", f"timeout {i}"),)) for i in (1, 2)]

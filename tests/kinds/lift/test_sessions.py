@@ -1,4 +1,4 @@
-"""The session that holds the lift: its grant, its refresh, refusals, its END and the grace after
+"""The session that holds the lift: its grant, its repeats, refusals, its END and the grace after
 END."""
 
 from typing import Any
@@ -31,7 +31,7 @@ OPEN_AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
 
 
 def boarded() -> Story:
-    """Return a story in which a robot may be inside, because OPEN was published 3 s ago."""
+    """Return a story in which a robot may be inside, because the lift showed OPEN 3 s ago."""
     story = Story(Building(OPEN_AT_L1))
     story.run(1.0)
     story.asks("A", "L1")
@@ -43,7 +43,7 @@ def boarded() -> Story:
 # ---- LIFT-1: one session at a time
 
 
-def test_requests_of_others_change_nothing_while_a_session_is_held() -> None:
+def test_requests_of_other_robots_change_nothing_during_a_session() -> None:
     alone, beset = boarded(), boarded()
     for story in (alone, beset):
         for second in range(5, 15):
@@ -67,14 +67,14 @@ def test_a_message_names_the_lift_that_it_is_for() -> None:
 @pytest.mark.parametrize(
     "event", [EndRequested("A"), IoFailed("timeout"), OperatorReset(), RivalSeen()]
 )
-def test_an_event_that_is_not_a_request_is_not_refused(event: Any) -> None:
+def test_only_a_request_can_be_refused(event: Any) -> None:
     assert Alone()(0.0, AT_L1, event).decision.refused == ""
 
 
 # ---- LIFT-2: END and the grace after it
 
 
-def test_an_end_frees_the_lift_at_once_and_releases_outputs_in_order_after_the_grace() -> None:
+def test_an_end_frees_the_lift_and_the_outputs_go_off_after_the_grace() -> None:
     story = boarded()
     story.ends("A")
     story.run(10.0)
@@ -87,7 +87,7 @@ def test_an_end_frees_the_lift_at_once_and_releases_outputs_in_order_after_the_g
     assert story.states[-2:] == [(1.0, "AGV, open at L1, A to L1"), (4.1, "AGV, open at L1")]
 
 
-def test_the_same_session_back_within_the_grace_finds_everything_as_it_was() -> None:
+def test_a_session_that_returns_within_the_grace_finds_everything_unchanged() -> None:
     story = boarded()
     edges = list(story.edges)
     for _ in range(5):
@@ -99,14 +99,14 @@ def test_the_same_session_back_within_the_grace_finds_everything_as_it_was() -> 
     assert story.state == "AGV, open at L1, A to L1"
 
 
-def test_an_event_that_is_only_noted_is_not_refused() -> None:
+def test_an_event_without_effect_is_not_refused() -> None:
     alone = Alone(release_grace_s=2.0)(0.0, AT_L1)(0.1, WriteFailed("timeout"))
     assert alone.decision.refused == ""
     alone(0.2, AT_L1, ASKED)(1.0, AT_L1, EndRequested("A"))(1.5, ASKED)
     assert (alone.decision.refused, alone.decision.report.session) == ("", "A")
 
 
-def test_nobody_else_is_granted_a_session_within_the_grace_and_anybody_afterwards() -> None:
+def test_no_other_session_is_granted_within_the_grace() -> None:
     story = boarded()
     story.ends("A")
     story.run(6.9)
@@ -124,7 +124,7 @@ def test_nobody_else_is_granted_a_session_within_the_grace_and_anybody_afterward
     ]
 
 
-def test_anybody_may_have_the_lift_in_the_instant_in_which_the_grace_ends() -> None:
+def test_any_session_may_begin_at_the_end_of_the_grace() -> None:
     alone = Alone(release_grace_s=2.0)(0.0, AT_L1)(0.1, ASKED)(1.0, EndRequested("A"))
     alone(2.9, AT_L1)
     alone(3.0, LiftRequested("B", True, "L1"))
@@ -132,7 +132,7 @@ def test_anybody_may_have_the_lift_in_the_instant_in_which_the_grace_ends() -> N
     assert alone.decision.report.session == "B"
 
 
-def test_the_grace_ends_at_its_time_even_for_a_request_that_comes_before_the_scan() -> None:
+def test_the_grace_ends_on_time_even_for_a_request_before_the_scan() -> None:
     story = boarded()
     story.ends("A")
     story.run(6.9)
@@ -157,17 +157,17 @@ def test_a_second_end_does_not_prolong_the_grace() -> None:
     assert story.edges[-1] == (7.0, "agv_request", False)
 
 
-def test_nothing_that_was_off_is_energised_during_the_grace() -> None:
+def test_no_output_is_switched_on_during_the_grace() -> None:
     story = Story(Controller())
     story.run(1.0)
     story.asks("A", "L1")
     story.run(1.3)
-    story.ends("A")  # the car stands open in AGV mode, ready to be held, but no session asks
+    story.ends("A")  # the car stands open in AGV mode, but no session asks for it
     story.run(10.0)
     assert story.edges == [(1.0, "agv_request", True), (4.3, "agv_request", False)]
 
 
-# ---- LIFT-DRIVE-1: nothing without a session
+# ---- LIFT-DRIVE-1: no outputs without a session
 
 
 def test_a_call_is_never_energised_without_a_session() -> None:
@@ -186,7 +186,7 @@ def test_a_call_is_never_energised_without_a_session() -> None:
 # ---- LIFT-2, LIFT-DRIVE-1: what may stay on in the grace
 
 
-def test_a_pulse_cut_short_by_an_end_is_given_again_to_the_session_that_comes_back() -> None:
+def test_a_pulse_that_an_end_cut_short_is_repeated_for_the_same_session() -> None:
     story = Story(Controller(), call_pulse_s=1.0)
     story.run(1.0)
     story.asks("A", "L4")
@@ -217,7 +217,7 @@ def test_a_hazard_in_the_grace_switches_outputs_off_but_a_robot_inside_gets_its_
     assert story.outputs == LiftOutputs()
 
 
-def test_nothing_is_held_again_after_a_hazard_has_ended_the_grace() -> None:
+def test_no_output_is_held_after_a_hazard_has_ended_the_grace() -> None:
     story = boarded()
     story.ends("A")
     story.building.hazard(Hazard.CODE_BLUE)
@@ -227,7 +227,7 @@ def test_nothing_is_held_again_after_a_hazard_has_ended_the_grace() -> None:
     assert story.edges[-2:] == [(4.1, "hold_door", None), (4.1, "agv_request", False)]
 
 
-def test_agv_mode_lost_in_the_grace_lets_the_door_go() -> None:
+def test_agv_mode_that_is_lost_in_the_grace_releases_the_door() -> None:
     story = boarded()
     story.ends("A")
     story.building.set(agv=False)
@@ -243,7 +243,7 @@ def test_the_door_of_a_car_that_moves_in_the_grace_is_not_held() -> None:
     assert story.edges[2:] == [(4.1, "hold_door", None)]
 
 
-def test_agv_mode_that_ends_before_the_relay_has_rested_belongs_to_the_last_session() -> None:
+def test_agv_mode_that_ends_while_the_relay_rests_belongs_to_the_last_session() -> None:
     story = Story(Building(OPEN_AT_L1), release_grace_s=0)
     story.run(1.0)
     story.asks("A", "L1")
@@ -281,7 +281,7 @@ def test_a_session_that_never_had_agv_mode_leaves_no_grace() -> None:
         (Hazard.MANUAL, "MANUAL"),
     ],
 )
-def test_a_lift_that_is_taken_away_grants_no_session(hazard: Hazard, why: str) -> None:
+def test_no_session_is_granted_during_a_hazard(hazard: Hazard, why: str) -> None:
     story = Story()
     story.building.hazard(hazard)
     story.run(1.0)

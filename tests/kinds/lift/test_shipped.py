@@ -1,4 +1,4 @@
-"""The shipped wiring has no motion lines. Only debounce separates a glitch from a moving door."""
+"""The shipped lift has no motion lines. So only debounce tells a short glitch from a moving door."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from tests.kinds.lift.story import STANDING, Building, Story
 CONFIG = Path(__file__).parents[3] / "config" / "lift_dry_contact.yaml"
 
 
-def test_a_contact_that_bounces_for_50_ms_on_the_way_past_a_floor_is_not_an_open_door() -> None:
+def test_a_contact_that_bounces_for_50_ms_at_a_passed_floor_is_no_open_door() -> None:
     shipped = dict(debounce(load(CONFIG).devices["Lift1"]))
     building = Building(replace(STANDING, door=DoorReading.CLOSED, motion=None))
     story = Story(building, debounce=shipped)
@@ -28,7 +28,7 @@ def test_a_contact_that_bounces_for_50_ms_on_the_way_past_a_floor_is_not_an_open
     assert [state for _, state in story.states if "open" in state] == []
 
 
-def test_a_door_that_stays_open_reads_as_open_all_the_same() -> None:
+def test_a_door_that_stays_open_reads_as_open() -> None:
     shipped = dict(debounce(load(CONFIG).devices["Lift1"]))
     building = Building(replace(STANDING, door=DoorReading.CLOSED, motion=None))
     story = Story(building, debounce=shipped)

@@ -1,4 +1,5 @@
-"""Events that are late: AGV mode, the floor, the open door, RMF's next request, and an I/O answer."""
+"""Events that come too late: AGV mode, the floor, the open door, RMF's next request, and an I/O
+answer."""
 
 from itertools import pairwise
 
@@ -26,8 +27,8 @@ OFF = LiftOutputs()
 
 
 def lift(level: str, door: DoorReading, *, agv: bool, **limits: object) -> Story:
-    """Return a story with a standing car and a request for L1 at 1 s. The car is scanned twice a
-    second."""
+    """Return a story with a car that stands still and a request for L1 at 1 s. The lift is scanned
+    twice a second."""
     building = Building(LiftSample(level, door, motion=Motion.STOPPED, agv=agv))
     story = Story(building, scan_s=0.5, **limits)  # type: ignore[arg-type]
     story.run(1.0)
@@ -105,8 +106,9 @@ def test_a_latched_fault_ends_with_the_session() -> None:
     assert story.outputs == HELD
 
 
-def test_a_latched_fault_ends_with_an_end_though_the_same_session_is_back_at_once() -> None:
-    """An operator ends the session, but the fleet adapter repeats its request within a second."""
+def test_a_latched_fault_ends_with_an_end_even_if_the_session_returns_at_once() -> None:
+    """An operator ends the session. Within a second the fleet adapter repeats its request for this
+    session."""
     story = lift("L1", DoorReading.OPEN, agv=True, door_timeout_s=4.0)
     story.run(3.0)
     story.building.set(door=DoorReading.CLOSED)
@@ -116,7 +118,7 @@ def test_a_latched_fault_ends_with_an_end_though_the_same_session_is_back_at_onc
     story.run(200.5)
     story.asks("A", "L1")
     assert (story.faults, story.outputs) == ([], HELD)
-    story.building.set(agv=False, door=DoorReading.OPEN)  # the robot is still known to be inside
+    story.building.set(agv=False, door=DoorReading.OPEN)  # the core knows that the robot is inside
     story.run(202.0)
     assert story.state == "HUMAN, open at L1, A to L1"
 
@@ -155,7 +157,7 @@ def test_a_reset_during_a_retry_lets_the_request_wait_for_agv_mode_again() -> No
     assert history(reset_at=17.0) == [*before, (17.0, True, []), (22.0, False, [failed])]
 
 
-def test_in_a_fault_an_open_door_is_not_offered() -> None:
+def test_during_a_fault_an_open_door_is_not_offered() -> None:
     story = latched()
     story.building.set(door=DoorReading.OPEN)
     keep_asking(story, 210.0)
@@ -175,14 +177,14 @@ def test_a_later_try_that_succeeds_ends_the_fault_and_resets_the_count() -> None
     assert [round(b - a, 1) for a, b in pairwise(starts[2:])] == [34.0, 64.0]
 
 
-def test_the_end_of_a_wait_for_the_lift_wakes_the_core() -> None:
+def test_the_core_wakes_at_the_end_of_a_wait_for_the_lift() -> None:
     alone = Alone(stale_after_s=900.0, request_timeout_s=30.0, door_timeout_s=4.0)
     alone(0.0, CLOSED)(1.0, ASKED)
     assert alone.decision.outputs == LiftOutputs(agv_request=True, hold_door=Side.FRONT)
     assert alone.decision.wake_at == 5.0
 
 
-def test_agv_mode_lost_on_the_way_switches_outputs_off_and_is_requested_again() -> None:
+def test_agv_mode_that_is_lost_on_the_way_is_requested_again() -> None:
     story = Story(Building(LiftSample("L2", DoorReading.CLOSED, motion=Motion.STOPPED, agv=True)))
     story.run(1.0)
     story.asks("A", "L1")
@@ -213,7 +215,7 @@ def test_agv_mode_lost_with_the_robot_at_the_open_door_shows_the_true_door() -> 
 
 
 def test_the_call_stays_on_while_people_take_the_car_first() -> None:
-    """Without an AGV status line people may take the car before the robot."""
+    """Without a status line for AGV mode, people may take the car before the robot."""
     building = Building(LiftSample("L2", DoorReading.CLOSED, motion=Motion.STOPPED, agv=None))
     story = Story(building)
     story.run(1.0)
@@ -229,9 +231,7 @@ def test_the_call_stays_on_while_people_take_the_car_first() -> None:
     building.set(level="L1", motion=Motion.STOPPED)
     story.run(10.0)
     assert story.outputs == HELD
-    building.set(
-        level=None, motion=Motion.UP
-    )  # people take the car while the robot is still outside
+    building.set(level=None, motion=Motion.UP)  # people take the car before the robot enters
     story.run(12.0)
     assert story.outputs == LiftOutputs(agv_request=True)
     building.set(level="L2", motion=Motion.STOPPED)
@@ -240,10 +240,10 @@ def test_the_call_stays_on_while_people_take_the_car_first() -> None:
     assert story.faults == []
 
 
-# ---- LIFT-DRIVE-1: RMF is silent
+# ---- LIFT-DRIVE-1: a silent RMF
 
 
-def test_rmf_silent_with_the_robot_outside_lets_the_lift_go_and_keeps_the_session() -> None:
+def test_if_rmf_is_silent_with_the_robot_outside_the_session_stays_without_outputs() -> None:
     story = lift("L1", DoorReading.CLOSED, agv=True, door_timeout_s=600)
     story.run(30.5)
     assert story.outputs == HELD
@@ -260,7 +260,7 @@ def test_rmf_silent_with_the_robot_outside_lets_the_lift_go_and_keeps_the_sessio
     assert (story.outputs, story.faults) == (HELD, [])
 
 
-def test_rmf_silent_with_a_robot_inside_holds_and_warns() -> None:
+def test_if_rmf_is_silent_with_a_robot_inside_the_outputs_stay_on_with_a_warning() -> None:
     story = lift("L1", DoorReading.OPEN, agv=True)
     story.run(300.0)
     assert (story.outputs, story.faults) == (HELD, ["RMF_SILENT"])
@@ -269,7 +269,7 @@ def test_rmf_silent_with_a_robot_inside_holds_and_warns() -> None:
     assert story.faults == []
 
 
-def test_the_core_wakes_for_rmfs_silence_and_for_the_next_try() -> None:
+def test_the_core_wakes_for_a_silence_of_rmf_and_for_the_next_try() -> None:
     alone = Alone(stale_after_s=900.0, request_timeout_s=30.0)(0.0, AT_L1)(1.0, ASKED)
     assert alone.decision.wake_at == 31.0
     alone = Alone(stale_after_s=900.0, request_timeout_s=30.0, door_timeout_s=4.0)
@@ -281,7 +281,7 @@ def test_the_core_wakes_for_rmfs_silence_and_for_the_next_try() -> None:
 # ---- LIFT-4: outputs that cannot be written
 
 
-def test_outputs_that_cannot_be_written_soon_become_a_fault_with_all_outputs_off() -> None:
+def test_outputs_that_cannot_be_written_cause_a_fault_and_all_outputs_off() -> None:
     story = lift("L1", DoorReading.OPEN, agv=True)
     story.run(5.0)
     story.building.unwritable = "no answer from the relay module"
@@ -315,7 +315,7 @@ def test_a_failed_write_is_repaired_by_the_next_one() -> None:
     assert story.faults == []
 
 
-def test_inputs_are_believed_though_outputs_cannot_be_written() -> None:
+def test_inputs_are_believed_even_if_outputs_cannot_be_written() -> None:
     story = Story(Controller())
     story.run(1.0)
     story.asks("A", "L1")
@@ -334,7 +334,7 @@ def test_a_write_that_succeeds_again_leaves_no_fault_without_its_reason() -> Non
     assert alone(3.0, AT_L1).decision.report.faults == ()
 
 
-def test_unwritten_outputs_are_judged_by_their_age_when_a_request_comes() -> None:
+def test_at_a_request_unwritten_outputs_are_judged_by_their_age() -> None:
     alone = Alone(stale_after_s=2.0)(0.0, AT_L1, WriteFailed("timeout"))
     assert alone(1.0, ASKED).decision.refused == ""
     alone = Alone(stale_after_s=2.0)(0.0, AT_L1, WriteFailed("timeout"))

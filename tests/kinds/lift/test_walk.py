@@ -60,7 +60,7 @@ def test_each_stage_of_a_ride_is_what_its_name_says() -> None:
 
 
 def check_rules_around(*roots: World) -> int:
-    """Check every step and state, and return the number of states."""
+    """Check every step and every state. Return the number of states."""
     found = WALKER.walk(roots, DEPTH, check)
     for world in found:
         nothing_changes_before_wake_at(world, LIMITS)
@@ -78,7 +78,8 @@ def test_the_rules_hold_within_some_steps_of_each_stage_of_a_ride(root: str) -> 
 
 
 def mended_and_idle(world: World) -> World:
-    """Return the world after repairs: the car idle at L1, all sessions ended and all latches reset."""
+    """Return the world after all repairs. The car stands idle at L1, and no session or latch is
+    left."""
     world = replace(world, sample=IDLE, readable=True, writable=True)
     world = WALKER.path(world, 6.0, "A ends", "B ends", "reset", 9.0, seen=check)
     assert world.memory.session is None
@@ -86,7 +87,7 @@ def mended_and_idle(world: World) -> World:
 
 
 def serves(world: World) -> bool:
-    """Does a new request get AGV mode, the car and the open door?"""
+    """Return whether a new request gets AGV mode, the car and the open door."""
     world = WALKER.path(world, "B asks L1", seen=check)
     wanted = WALKER.path(world, 1.0, seen=check).memory.relays.outputs()
     sample = replace(IDLE, agv=True, door=DoorReading.OPEN, motion=Motion.STOPPED)

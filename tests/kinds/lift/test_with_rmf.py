@@ -1,5 +1,5 @@
-"""LIFT-1, LIFT-2: the node works with RMF's lift supervisor and fleet adapters, with losses and
-restarts."""
+"""LIFT-1, LIFT-2: the node works with RMF's lift supervisor and fleet adapters. Messages get lost, and
+parties restart."""
 
 import pytest
 
@@ -24,7 +24,7 @@ def ons(story: Story, output: str) -> int:
 
 
 def sessions(story: Story) -> list[str]:
-    """Return the sessions that the lift has shown, in order. "" stands for no session."""
+    """Return the sessions that the lift has shown, in order. "" means no session."""
     shown = [state.session_id for _, state in story.told]
     return [s for s, before in zip(shown, [None, *shown], strict=False) if s != before]
 
@@ -65,7 +65,7 @@ def test_a_hundred_requests_a_second_cause_no_additional_state() -> None:
 
 
 @pytest.mark.parametrize("adapters_first", [False, True])
-def test_a_robot_that_waits_is_served_after_the_one_that_rides(adapters_first: bool) -> None:
+def test_a_waiting_robot_is_served_after_the_robot_that_rides(adapters_first: bool) -> None:
     a, b = RobotContext(A), RobotContext(B)
     rmf = world(a, b, adapters_first=adapters_first)
     rmf.asks(a, "L2")
@@ -79,12 +79,12 @@ def test_a_robot_that_waits_is_served_after_the_one_that_rides(adapters_first: b
     assert sessions(rmf.story) == ["", A, "", B]
     granted_at = next(at for at, state in rmf.story.told if state.session_id == B)
     states_of_nobody = [s for at, s in rmf.story.told if released_at < at and not s.session_id]
-    assert granted_at - released_at < 5.0  # the next state, the grace of 3 s, and the next request
+    assert granted_at - released_at < 5.0  # the next state, the 3 s of grace, RMF's next request
     assert len(states_of_nobody) <= 5
 
 
 @pytest.mark.parametrize("adapters_first", [False, True])
-def test_without_grace_the_next_robot_has_the_lift_within_three_states(
+def test_without_grace_the_next_robot_gets_the_lift_within_three_states(
     adapters_first: bool,
 ) -> None:
     a, b = RobotContext(A), RobotContext(B)
@@ -102,7 +102,7 @@ def test_without_grace_the_next_robot_has_the_lift_within_three_states(
 
 
 @pytest.mark.parametrize("times", [1, 10])
-def test_a_lost_end_is_repeated_until_it_is_heard(times: int) -> None:
+def test_a_lost_end_is_repeated_until_the_node_hears_it(times: int) -> None:
     robot = RobotContext(A)
     rmf = world(robot)
     rmf.asks(robot, "L2")
@@ -135,7 +135,7 @@ def test_a_supervisor_that_restarts_with_a_robot_in_the_car_does_not_end_its_ses
     robot.in_car = True
     rmf.run(rmf.story.now + 3.0)
     edges = list(rmf.story.edges)
-    rmf.supervisor.slots.clear()  # the supervisor has restarted, and first hears a state of ours
+    rmf.supervisor.slots.clear()  # the supervisor has restarted, and first hears a lift state
     rmf.run(rmf.story.now + 20.0)
     ends = [request for request in rmf.requested if request.request_type == END]
     assert len(ends) == 1
@@ -146,7 +146,7 @@ def test_a_supervisor_that_restarts_with_a_robot_in_the_car_does_not_end_its_ses
     rmf.until_done(robot)
 
 
-def test_a_supervisor_that_restarts_on_the_way_costs_one_call_and_never_agv_mode() -> None:
+def test_a_supervisor_restart_during_a_ride_repeats_one_call_and_keeps_agv_mode() -> None:
     robot = RobotContext(A)
     rmf = world(robot)
     rmf.asks(robot, "L4")
@@ -176,7 +176,8 @@ def test_a_supervisor_that_restarts_in_a_fire_does_not_lock_the_robot_in() -> No
 
 
 def test_the_replay_of_a_hundred_old_requests_switches_agv_mode_once() -> None:
-    """RMF's transient-local adapter topic gives a starting supervisor a hundred old requests."""
+    """RMF's fleet adapters retain their requests. A supervisor that starts gets a hundred old
+    requests."""
     story = Story(Controller())
     story.run(1.0)
     old = [
@@ -207,7 +208,7 @@ def test_a_fleet_adapter_that_restarts_ends_the_session_that_it_no_longer_wants(
     assert rmf.story.outputs == LiftOutputs()
 
 
-def test_a_restarted_node_starts_dark_and_grants_the_session_from_the_next_request() -> None:
+def test_a_restarted_node_starts_with_outputs_off_and_grants_the_next_request() -> None:
     robot = RobotContext(A)
     rmf = world(robot)
     rmf.asks(robot, "L3")

@@ -1,7 +1,7 @@
 """A walk through all states that the lift's core can reach within some steps.
 
-A state has the core's memory and the building. All times in a state are relative to now. Ages beyond
-every limit are made equal. So two states that cannot behave differently count as one state.
+A state has the core's memory and the building. All times in a state are relative to now. The walk cuts
+long ages to a limit. So two states that must behave alike count as one state.
 """
 
 from collections.abc import Callable
@@ -32,15 +32,15 @@ from bridges.kinds.shared.freshness import Requester
 from tests.walk import Walker
 
 LONG_S = 55.0
-"""The longest gap between two scans (s), if the core asks for no earlier scan. Less than
+"""The longest gap between two scans (s) if the core asks for no earlier scan. It is less than
 `stale_after_s`."""
 
 
 def limits_of(
     debounce: dict[str, float] | None = None, agv_mode: Any = "requested", **changes: Any
 ) -> LiftLimits:
-    """Return the default limits, with readings that stay fresh for a minute. This saves scans of the
-    walk."""
+    """Return the default limits, but with readings that stay fresh for a minute. Fresh readings save
+    scans."""
     settings = LiftSettings(
         floors=["L1", "L2", "L3"],
         limits=LiftDurations(**{"stale_after_s": 60.0, **changes}),
@@ -52,9 +52,9 @@ def limits_of(
 
 
 class World(msgspec.Struct, frozen=True):
-    """The core's memory at time 0, and the building with its inputs.
+    """The building with its inputs, and the core's memory at time 0.
 
-    `readable` and `writable` say whether the building answers readings and obeys outputs.
+    `readable` says whether the building answers readings. `writable` says whether it obeys outputs.
     """
 
     memory: LiftMemory
@@ -169,7 +169,8 @@ def moved(world: World, move: Move, limits: LiftLimits, seen: Seen) -> World:
 
 
 def waited(world: World, seconds: float, limits: LiftLimits, seen: Seen) -> World:
-    """Return the state after some time, with a scan whenever the core wants a scan."""
+    """Return the state after some time. In that time the lift is scanned whenever the core wants a
+    scan."""
     now, wake_at = 0.0, 0.0
     while now < seconds:
         now = min(seconds, max(now + 0.001, min(wake_at, now + LONG_S)))
@@ -217,7 +218,8 @@ AGES = {
 
 
 def shifted(memory: LiftMemory, by: float) -> LiftMemory:
-    """Return the same memory with every time moved by `by` seconds. Old times are cut off."""
+    """Return the same memory with every time moved by `by` seconds. Times that are too old are cut to a
+    limit."""
     senses, session, grace = memory.senses, memory.session, memory.grace
     return replace(
         memory,
@@ -255,8 +257,7 @@ def shifted(memory: LiftMemory, by: float) -> LiftMemory:
 
 
 def _at(at: Any, by: float, kind: str = "") -> Any:
-    """Return a moved time. An age is cut to the greatest age in AGES for this `kind`. None stays
-    None."""
+    """Return a moved time. The age is at most the age in AGES for this `kind`. None stays None."""
     if at is None:
         return None
     return max(round(at + by, 6), -AGES.get(kind, 1e9))
@@ -321,7 +322,7 @@ def _channel(channel: Channel[Any], by: float) -> Any:
 
 
 def key(world: World) -> tuple[Any, ...]:
-    """Return a key. Two worlds that cannot behave differently have the same key."""
+    """Return a key of the world. Two worlds that must behave alike have the same key."""
     memory, senses = world.memory, world.memory.senses
     hazards = tuple(senses.hazards.get(h) for h in Hazard)
     return (

@@ -46,7 +46,7 @@ class Driven(Building):
 
 
 class WiredBuilding(Driven):
-    """A building whose plant is connected by single wires."""
+    """A building with a plant behind single wires."""
 
     def __init__(self, settings: DryContactLiftSettings) -> None:
         super().__init__()
@@ -55,13 +55,13 @@ class WiredBuilding(Driven):
 
     @property
     def standing_open_at(self) -> str | None:
-        """Return the landing where the car truly stands with its door truly open."""
+        """Return the landing at which the car really stands with an open door."""
         car, (door,) = self.plant.car, self.plant.doors.values()
         return f"L{car.floor + 1}" if car.standing and door.opened else None
 
 
 class GatewayBuilding(Driven):
-    """A building whose plant is behind the registers of a gateway."""
+    """A building with a plant behind a gateway's registers."""
 
     def __init__(self, settings: register.RegisterLiftSettings) -> None:
         super().__init__()
@@ -91,5 +91,5 @@ class WiredStory(Story):
         self.building.plant.fail(part, mode)
 
     def press(self, what: str, asserted: bool) -> None:
-        """Let somebody in the building assert a signal, or release it."""
+        """Let somebody in the building switch a signal on (`asserted`) or off."""
         self.building.plant.press(what, asserted, self.now)

@@ -1,4 +1,4 @@
-"""The lift supervisor's rules, each tested alone, with all messages to the lift's node."""
+"""The lift supervisor's rules, each tested alone. Tests compare all messages to the lift's node."""
 
 import math
 
@@ -17,7 +17,7 @@ from tests.kinds.lift_supervisor.alone import Alone
 # ---- LIFT-SUPERVISOR-3, LIFT-SUPERVISOR-7: one robot
 
 
-def test_a_first_request_is_sent_at_once_and_without_a_state_only_once() -> None:
+def test_without_a_state_a_first_request_is_sent_at_once_and_only_once() -> None:
     desk = Alone()
     desk.asks("a")
     desk.until(9.0)
@@ -32,7 +32,7 @@ def test_a_request_goes_to_the_node_with_every_field_that_the_adapter_filled_in(
     )
 
 
-def test_each_state_that_does_not_show_the_request_causes_a_repeat_at_1_hz_at_most() -> None:
+def test_states_without_the_request_cause_repeats_at_most_once_a_second() -> None:
     desk = Alone()
     desk.asks("a")
     for tenth in range(1, 31):
@@ -71,7 +71,7 @@ def test_a_state_that_shows_the_request_causes_no_repeat(match: LiftStateHeard) 
     assert desk.sent == [(0.0, "AGV a L3")]
 
 
-def test_the_holders_repeats_are_passed_on_at_1_hz_so_that_the_node_hears_that_rmf_lives() -> None:
+def test_repeats_of_the_holder_are_passed_on_once_a_second_as_a_sign_of_life() -> None:
     desk = Alone()
     for tenth in range(25):
         desk.until(tenth / 10)
@@ -80,9 +80,7 @@ def test_the_holders_repeats_are_passed_on_at_1_hz_so_that_the_node_hears_that_r
     assert desk.sent == [(0.0, "AGV a L3"), (1.0, "AGV a L3"), (2.0, "AGV a L3")]
 
 
-def test_a_request_that_was_sent_in_an_earlier_turn_is_repeated_a_second_later_and_no_sooner() -> (
-    None
-):
+def test_a_request_of_an_earlier_turn_is_repeated_after_exactly_a_second() -> None:
     desk = Alone()
     desk.asks("a")
     desk.until(0.3)
@@ -92,7 +90,7 @@ def test_a_request_that_was_sent_in_an_earlier_turn_is_repeated_a_second_later_a
     assert desk.sent == [(0.0, "AGV a L3"), (REPEAT_S, "AGV a L3")]
 
 
-def test_another_destination_goes_out_at_once_but_never_faster_than_10_hz() -> None:
+def test_another_destination_is_sent_at_once_but_at_most_ten_times_a_second() -> None:
     desk = Alone()
     for number in range(9):
         desk.until(number * 0.03)
@@ -106,13 +104,13 @@ def test_another_destination_goes_out_at_once_but_never_faster_than_10_hz() -> N
     ]
 
 
-def test_a_human_mode_request_is_passed_on_as_it_is() -> None:
+def test_a_human_mode_request_is_passed_on_unchanged() -> None:
     desk = Alone()
     desk.asks("web", "L1", kind=2)
     assert desk.sent == [(0.0, "HUMAN web L1")]
 
 
-def test_a_floor_that_the_lift_does_not_serve_blocks_nobody_else() -> None:
+def test_a_request_for_an_unserved_floor_blocks_nobody_else() -> None:
     desk = Alone()
     desk.shows("", floors=("L1", "L3"))
     desk.asks("a", "L2")
@@ -128,7 +126,7 @@ def test_human_mode_needs_no_served_floor() -> None:
     assert desk.sent == [(0.0, "HUMAN web")]
 
 
-def test_a_holder_that_asks_for_an_unserved_floor_keeps_its_request_and_counts_as_alive() -> None:
+def test_a_request_for_an_unserved_floor_is_a_sign_of_life_and_changes_nothing() -> None:
     desk = Alone(LiftSupervisorLimits(holder_alarm_s=20.0))
     desk.asks("a")
     for second in range(1, 30):
@@ -142,7 +140,7 @@ def test_a_holder_that_asks_for_an_unserved_floor_keeps_its_request_and_counts_a
 # ---- LIFT-SUPERVISOR-4: END
 
 
-def test_the_holders_end_is_sent_at_once_with_the_cars_floor() -> None:
+def test_the_end_of_the_holder_is_sent_at_once_with_the_floor_of_the_car() -> None:
     desk = Alone()
     desk.asks("a")
     desk.shows("a", "L2", to="L3")
@@ -151,7 +149,7 @@ def test_the_holders_end_is_sent_at_once_with_the_cars_floor() -> None:
     assert desk.sent == [(0.0, "AGV a L3"), (0.5, "END a L2")]
 
 
-def test_an_end_that_counts_is_not_refused() -> None:
+def test_no_end_that_counts_is_refused() -> None:
     desk = Alone()
     desk.asks("a")
     desk.until(1.0)
@@ -159,9 +157,7 @@ def test_an_end_that_counts_is_not_refused() -> None:
     assert (desk.sent[-1], desk.refused) == ((1.0, "END a"), [])
 
 
-def test_an_end_is_repeated_for_each_state_that_still_shows_the_session_at_1_hz_at_the_most() -> (
-    None
-):
+def test_an_end_is_repeated_at_most_once_a_second_for_states_with_the_session() -> None:
     desk = Alone()
     desk.asks("a")
     desk.ride("a")
@@ -177,11 +173,11 @@ def test_an_end_is_repeated_for_each_state_that_still_shows_the_session_at_1_hz_
     assert desk.sent == [(0.0, "AGV a L3"), *ends]
 
 
-def test_nobody_else_is_served_before_a_state_after_the_end_shows_that_it_was_obeyed() -> None:
+def test_the_next_robot_is_served_only_after_a_state_shows_that_the_end_was_obeyed() -> None:
     desk = Alone()
     desk.asks("a")
     desk.asks("b", "L1")
-    desk.shows("", "L2")  # an old state, sent before the grant
+    desk.shows("", "L2")  # an old state, from before the grant
     desk.ends("a")
     desk.until(0.1)
     for second in range(1, 4):
@@ -204,7 +200,7 @@ def test_a_state_from_before_the_end_was_sent_confirms_nothing() -> None:
     desk = Alone()
     desk.asks("a")
     desk.until(0.05)
-    desk.ends("a")  # the pause after the last message delays the END
+    desk.ends("a")  # the pause after the last message delays this END
     desk.shows("", "L1")
     desk.asks("b")
     assert desk.report.holder == "a"
@@ -213,7 +209,7 @@ def test_a_state_from_before_the_end_was_sent_confirms_nothing() -> None:
     assert desk.sent == [(0.0, "AGV a L3"), (0.1, "END a L1"), (0.3, "AGV b L3")]
 
 
-def test_a_session_that_another_lift_daemon_shows_after_the_end_confirms_it_too() -> None:
+def test_another_session_in_the_state_of_the_lift_also_confirms_the_end() -> None:
     desk = Alone()
     desk.asks("a")
     desk.ends("a")
@@ -222,7 +218,7 @@ def test_a_session_that_another_lift_daemon_shows_after_the_end_confirms_it_too(
     assert desk.report.holder == ""
 
 
-def test_an_end_from_a_robot_that_neither_has_nor_wants_the_lift_is_ignored() -> None:
+def test_an_end_of_a_robot_without_session_and_request_is_ignored() -> None:
     desk = Alone()
     desk.asks("a")
     desk.ends("b")
@@ -230,8 +226,8 @@ def test_an_end_from_a_robot_that_neither_has_nor_wants_the_lift_is_ignored() ->
     assert desk.sent == [(0.0, "AGV a L3")]
 
 
-def test_an_end_of_the_session_that_the_lift_shows_is_passed_on_whoever_waits() -> None:
-    """The lift granted the session without this supervisor. The robot or an operator now ends the
+def test_an_end_of_the_shown_session_is_passed_on_even_if_another_robot_waits() -> None:
+    """The lift granted the session without this supervisor. Now the robot or an operator ends the
     session."""
     desk = Alone()
     desk.asks("b")
@@ -243,7 +239,7 @@ def test_an_end_of_the_session_that_the_lift_shows_is_passed_on_whoever_waits() 
     assert desk.sent == [(0.0, "AGV b L3"), (0.5, "END a L2"), (0.7, "AGV b L3")]
 
 
-def test_an_end_while_another_session_is_being_ended_waits_for_its_repeat() -> None:
+def test_an_end_during_the_end_of_another_session_takes_effect_at_its_repeat() -> None:
     desk = Alone()
     desk.asks("a")
     desk.ends("a")
@@ -306,9 +302,7 @@ def test_a_place_in_the_queue_dates_from_the_first_request() -> None:
     assert desk.report.waiting == (("b", 1.0),)
 
 
-def test_a_robot_that_waits_in_silence_for_10_s_leaves_the_queue_and_comes_back_at_its_end() -> (
-    None
-):
+def test_a_robot_that_is_silent_for_10_s_leaves_the_queue_and_returns_at_its_end() -> None:
     desk = Alone()
     desk.shows("")
     for who in "abc":
@@ -341,7 +335,7 @@ def test_requesters_may_be_silent_while_the_lift_is_silent() -> None:
     assert desk.waiting == []
 
 
-def test_a_lift_that_falls_silent_is_a_fault_to_those_who_wait_and_to_nobody_else() -> None:
+def test_a_silent_lift_is_a_fault_only_if_a_robot_waits() -> None:
     desk = Alone()
     desk.shows("", mode="FIRE")
     desk.until(10.0)
@@ -360,13 +354,13 @@ def test_the_core_wakes_when_the_lift_counts_as_silent_and_says_so() -> None:
     assert desk.report.faults == (Fault("LIFT_SILENT", "no LiftState comes"),)
 
 
-def test_states_count_as_flowing_until_exactly_three_seconds_after_the_last() -> None:
+def test_a_lift_is_silent_exactly_three_seconds_after_its_last_state() -> None:
     state = LiftStateHeard("", "L1", "", 0, 2)
     memory = SupervisedLift("Lift1", 0.0, shown=state, shown_at=10.0)
     assert [memory.flows(now) for now in (13.0, 13.1)] == [True, False]
 
 
-def test_a_lift_that_was_never_heard_is_not_waited_for() -> None:
+def test_a_holder_of_a_lift_that_was_never_heard_is_ended() -> None:
     desk = Alone()
     desk.asks("a")
     desk.until(100.0)
@@ -375,7 +369,7 @@ def test_a_lift_that_was_never_heard_is_not_waited_for() -> None:
     assert core.idle(desk.memory, 60.0)
 
 
-def test_a_lift_whose_states_have_stopped_is_forgotten_unless_somebody_wants_it() -> None:
+def test_a_silent_lift_is_forgotten_if_nobody_wants_it() -> None:
     desk = Alone()
     desk.shows("")
     assert not core.idle(desk.memory, 59.0)
@@ -405,7 +399,7 @@ def test_a_robot_that_only_waits_for_a_silent_lift_is_forgotten_after_ten_minute
     assert core.idle(desk.memory, 10 * FORGOTTEN_S)
 
 
-def test_a_robot_that_ends_while_it_waits_leaves_the_queue() -> None:
+def test_a_waiting_robot_leaves_the_queue_with_its_end() -> None:
     desk = Alone()
     desk.asks("a")
     desk.asks("b")
@@ -423,7 +417,7 @@ def test_a_queue_has_a_maximum_length() -> None:
     assert desk.refused == [(0.0, "queue full")]
 
 
-def test_requesters_beyond_the_bound_are_forgotten_oldest_first() -> None:
+def test_beyond_the_bound_the_oldest_requesters_are_forgotten_first() -> None:
     desk = Alone()
     for number in range(MAX_REQUESTERS + 1):
         desk.ends(f"robot {number}")
@@ -431,7 +425,7 @@ def test_requesters_beyond_the_bound_are_forgotten_oldest_first() -> None:
     assert "robot 0" not in desk.memory.requesters
 
 
-def test_a_robot_that_waits_is_known_however_many_names_are_heard_after_it() -> None:
+def test_many_invented_names_do_not_displace_a_waiting_robot() -> None:
     desk = Alone()
     desk.asks("a")
     desk.asks("b")

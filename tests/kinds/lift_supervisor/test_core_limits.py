@@ -1,5 +1,5 @@
-"""Limits of the supervisor: hazards, the quiet time after a start, a rival supervisor, stale
-requests."""
+"""Hazards, the quiet time after a start, a rival supervisor, and stale requests limit the
+supervisor."""
 
 import pytest
 from msgspec.structs import replace
@@ -20,7 +20,7 @@ TO_L3 = Target(1, "L3", 2)
 
 
 @pytest.mark.parametrize("mode", ["FIRE", "OFFLINE"])
-def test_in_a_hazard_nobody_is_sent_and_no_queue_moves(mode: str) -> None:
+def test_in_a_hazard_no_request_is_sent_and_no_queue_moves(mode: str) -> None:
     desk = Alone()
     desk.shows("", mode=mode)
     desk.asks("a")
@@ -34,7 +34,7 @@ def test_in_a_hazard_nobody_is_sent_and_no_queue_moves(mode: str) -> None:
     assert desk.sent == [(40.0, "AGV a L3")]
 
 
-def test_in_a_hazard_a_holders_request_is_held_back_and_its_end_is_not() -> None:
+def test_in_a_hazard_a_request_of_the_holder_is_held_back_but_its_end_is_sent() -> None:
     desk = Alone()
     desk.asks("a")
     for second in range(1, 40):
@@ -48,7 +48,7 @@ def test_in_a_hazard_a_holders_request_is_held_back_and_its_end_is_not() -> None
     assert desk.sent == [(0.0, "AGV a L3"), (39.0, "END a L1"), (40.0, "END a L1")]
 
 
-def test_a_holder_not_yet_taken_when_the_hazard_came_is_sent_when_it_is_over() -> None:
+def test_a_holder_that_had_not_got_the_lift_is_sent_after_the_hazard() -> None:
     desk = Alone()
     desk.asks("a")
     for second in range(1, 40):
@@ -73,7 +73,7 @@ def test_a_holders_human_mode_is_passed_on_in_a_hazard() -> None:
 # ---- LIFT-SUPERVISOR-6: without permission to publish
 
 
-def test_after_its_quiet_start_it_continues_the_ride_that_it_finds() -> None:
+def test_after_its_quiet_start_the_supervisor_continues_the_ride_in_progress() -> None:
     desk = Alone(speaks=False)
     desk.asks("b", "L1")
     for second in (0.5, 1.5, 2.5):
@@ -87,9 +87,7 @@ def test_after_its_quiet_start_it_continues_the_ride_that_it_finds() -> None:
     assert desk.sent == [(3.0, "AGV a L3")]
 
 
-def test_a_session_shown_throughout_the_quiet_time_and_asked_for_by_nobody_is_ended_after_it() -> (
-    None
-):
+def test_after_the_quiet_start_a_session_that_nobody_requests_is_ended() -> None:
     desk = Alone(speaks=False)
     for second in (0.0, 1.0, 2.0, 3.0):
         desk.until(second)
@@ -108,9 +106,7 @@ def test_an_end_in_the_quiet_time_removes_the_robots_claim() -> None:
     assert desk.sent == []
 
 
-def test_beside_another_supervisor_it_falls_silent_and_goes_on_from_what_it_sees_afterwards() -> (
-    None
-):
+def test_beside_another_supervisor_ours_is_silent_and_afterwards_follows_the_shown_state() -> None:
     desk = Alone()
     desk.asks("a")
     desk.ride("a")
@@ -145,7 +141,7 @@ def test_requests_from_before_our_start_count_once_they_are_repeated() -> None:
     assert desk.sent == [(1.0, "AGV a L3")]
 
 
-def test_a_request_older_than_its_requesters_newest_is_stale() -> None:
+def test_a_request_older_than_the_newest_of_its_requester_is_stale() -> None:
     desk = Alone()
     desk.until(10.0)
     desk.asks("a", "L3")
@@ -165,7 +161,7 @@ def test_with_synchronised_clocks_a_young_request_from_before_our_start_counts_a
     assert desk.refused == [(0.0, "stale request"), (60.0, "stale request")]
 
 
-def test_a_request_may_be_as_old_as_our_uptime_or_as_the_yaml_says_if_clocks_agree() -> None:
+def test_with_synchronised_clocks_the_uptime_or_the_yaml_limits_the_age_of_a_request() -> None:
     memory = SupervisedLift("Lift1", started_at=100.0)
     assert memory.rules(130.0, LiftSupervisorLimits()) == Rules(30.0, future_s=FUTURE_S)
     speaks = SupervisedLift("Lift1", started_at=100.0, may_speak=True)
@@ -175,7 +171,7 @@ def test_a_request_may_be_as_old_as_our_uptime_or_as_the_yaml_says_if_clocks_agr
 
 
 def test_a_request_from_the_future_is_not_believed_in_the_quiet_time() -> None:
-    """Our clock is not set yet, so even replayed requests have stamps in the future."""
+    """Our clock is not set yet, so the stamps of old requests can lie in the future."""
     desk = Alone(speaks=False)
     desk.skew = 3600.0
     desk.asks("a")
@@ -187,7 +183,7 @@ def test_a_request_from_the_future_is_not_believed_in_the_quiet_time() -> None:
 # --- the report --------------------------------------------------------------------------------
 
 
-def test_the_report_says_who_holds_who_waits_and_since_when() -> None:
+def test_the_report_names_the_holder_and_each_waiting_robot_with_its_time() -> None:
     desk = Alone()
     assert desk.report == SupervisorReport(None)
     desk.until(1.0)

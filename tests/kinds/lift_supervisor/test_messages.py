@@ -1,4 +1,5 @@
-"""Adapters' messages become events or are refused with a reason. The status file has its content."""
+"""Adapters' messages become events, or the supervisor refuses them with a reason. A test of the status
+file follows."""
 
 import pytest
 from msgspec.structs import replace
@@ -14,7 +15,7 @@ ANY = LiftSupervisorSettings()
 AGV = LiftRequest("Lift1", Time(100, 500_000_000), "fleet/a", 1, "L3", 2)
 
 
-def test_an_adapters_request_is_what_it_asks_with_its_stamp_and_age() -> None:
+def test_the_request_of_an_adapter_becomes_an_event_with_stamp_and_age() -> None:
     asked = RideRequested("fleet/a", Target(1, "L3", 2), 100.5, 0.5)
     assert messages.accept_request(AGV, ANY, 101.0) == asked
 
@@ -25,7 +26,7 @@ def test_human_mode_may_be_requested_without_a_floor() -> None:
     assert messages.accept_request(human, ANY, 100.0) == asked
 
 
-def test_an_end_is_accepted_as_fleet_adapters_send_it_whatever_its_other_fields_say() -> None:
+def test_an_end_is_accepted_with_any_values_in_its_other_fields() -> None:
     bare = LiftRequest("Lift1", Time(100, 0), "fleet/a")
     odd = replace(bare, destination_floor="nowhere", door_state=77)
     ended = RideEnded("fleet/a", 100.0, 1.0)
@@ -49,7 +50,9 @@ def test_an_end_is_accepted_as_fleet_adapters_send_it_whatever_its_other_fields_
         ({"request_time": Time(1, 10**9)}, "impossible request_time"),
     ],
 )
-def test_an_impossible_request_is_refused_by_name(changes: dict[str, object], kind: str) -> None:
+def test_an_impossible_request_is_refused_with_the_name_of_its_field(
+    changes: dict[str, object], kind: str
+) -> None:
     wrong = replace(AGV, **changes)
     with pytest.raises(RequestRefused) as refusal:
         messages.accept_request(wrong, LiftSupervisorSettings(lifts=["Lift1"]), 101.0)
@@ -85,7 +88,7 @@ def test_a_state_with_texts_that_are_too_long_is_dropped(
     assert len(str(refusal.value)) < 400
 
 
-def test_a_message_is_about_its_lift_and_is_stamped_when_it_is_sent() -> None:
+def test_a_message_names_its_lift_and_gets_its_stamp_at_the_time_of_sending() -> None:
     assert messages.device_name(AGV) == "Lift1"
     assert messages.stamped(AGV, Time(7, 8)) == replace(AGV, request_time=Time(7, 8))
 

@@ -1,5 +1,5 @@
-"""Properties that hold in spite of losses, delays, copies and restarts, and in every order of
-events."""
+"""Properties that hold for every order of events, and in spite of losses, delays, copies and
+restarts."""
 
 import random
 from collections.abc import Iterator, Sequence
@@ -31,7 +31,7 @@ NAMES = ["fleet/a", "fleet/b", "fleet/c"]
 
 
 def bad_network(rng: random.Random, loss: float) -> Any:
-    """Return a route that loses, doubles and reorders messages, with delays of up to half a second."""
+    """Return a route that loses, doubles and reorders messages. Delays are at most half a second."""
 
     def route(sender: str, receiver: str) -> Sequence[float]:
         copies = 0 if rng.random() < loss else 2 if rng.random() < 0.1 else 1
@@ -41,9 +41,9 @@ def bad_network(rng: random.Random, loss: float) -> Any:
 
 
 def check_rates(requests: list[tuple[float, str]]) -> None:
-    """Require pauses: 0.1 s between any two messages, and 1 s between two equal messages.
+    """Require 0.1 s between any two messages, and 1 s between two equal messages.
 
-    Require at most 20 messages in any 10 s.
+    Require also at most 20 messages in any 10 s.
     """
     for (at, text), (later, again) in pairwise(requests):
         assert later - at >= (0.999 if text == again else 0.099), (at, text, again)
@@ -61,8 +61,8 @@ Restart = st.tuples(st.floats(0, 150), st.sampled_from(["supervisor", "Lift1", *
     our_skew=st.sampled_from([0.0, -3600.0, 3600.0]),
     restarts=st.lists(Restart, max_size=6),
 )
-@example(seed=1, loss=0.0, our_skew=0.0, restarts=[])  # a late state began an END twice
-def test_every_live_robot_is_served_whatever_is_lost_and_whoever_restarts(
+@example(seed=1, loss=0.0, our_skew=0.0, restarts=[])  # a late state started a second END
+def test_every_live_robot_is_served_in_spite_of_losses_and_restarts(
     seed: int, loss: float, our_skew: float, restarts: list[tuple[float, str]]
 ) -> None:
     rng = random.Random(seed)
@@ -134,7 +134,7 @@ class Watched:
         self.wake_at = float("inf")
 
     def hears(self, event: Any) -> str:
-        """Make one decision. Return the sent message, or "" if no message was sent."""
+        """Make one decision. Return the message that the core sends, or "" without a message."""
         before = self.memory
         decided = core.decide(before, event, self.now, self.limits)
         self.memory = memory = decided.memory
@@ -208,7 +208,7 @@ def events_at(now: float) -> list[Any]:
 def test_every_order_of_events_to_this_depth_keeps_the_rules(
     may_speak: bool, steps: int, steps_s: tuple[float, ...], at_least: int
 ) -> None:
-    """A memory that two histories reach at the same time is continued once."""
+    """If two histories reach the same memory at the same time, the walk continues only one of them."""
     memory = core.initial("Lift1", 0.0)
     memory = core.decide(memory, MaySpeak(may_speak), 0.0, LIMITS).memory
 
@@ -225,7 +225,8 @@ def test_every_order_of_events_to_this_depth_keeps_the_rules(
 
 @st.composite
 def histories(draw: st.DrawFn) -> list[tuple[float, int]]:
-    """Draw a history of events, each as (seconds before it, number of the event)."""
+    """Draw a history of events. Each event is a pair: the pause (s) before it, and the event's
+    number."""
     gap = st.sampled_from([0.0, 0.05, 0.1, 0.5, 1.0, 2.5, 4.0, 11.0])
     return draw(st.lists(st.tuples(gap, st.integers(0, 9)), max_size=60))
 
@@ -246,7 +247,7 @@ def test_long_histories_keep_the_rules_too(history: list[tuple[float, int]]) -> 
 
 @settings(max_examples=examples(100))
 @given(histories())
-def test_from_every_state_a_lift_that_obeys_is_granted_to_a_robot_that_asks(
+def test_from_every_state_a_robot_that_asks_gets_a_lift_that_obeys(
     history: list[tuple[float, int]],
 ) -> None:
     desk = Watched(core.initial("Lift1", 0.0), 0.0)
@@ -264,7 +265,8 @@ def test_from_every_state_a_lift_that_obeys_is_granted_to_a_robot_that_asks(
 
 
 def obeys(session: str, text: str) -> str:
-    """Return the session that has the lift after this request. `session` had the lift before."""
+    """Return the session that has the lift after this request. `session` had the lift before the
+    request."""
     kind, who = (*text.split(" "), "", "")[:2]
     if kind == "AGV" and not session:
         return who

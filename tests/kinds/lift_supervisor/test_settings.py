@@ -1,4 +1,4 @@
-"""The supervisor's section of the YAML file, and the keys that reach the core."""
+"""The supervisor's section of the YAML file. Each key reaches the core."""
 
 import math
 from pathlib import Path
@@ -42,6 +42,6 @@ def test_settings_that_cannot_be_right_are_refused(wrong: str) -> None:
         read(wrong)
 
 
-def test_an_alarm_comes_before_the_end_that_it_warns_of_and_lifts_are_named_or_left_out() -> None:
+def test_an_alarm_must_come_before_its_end_and_lifts_are_all_named_or_left_out() -> None:
     problems = read("{lifts: [], holder_alarm_s: 60, holder_ttl_s: 60}").problems()
     assert [path for path, _ in problems] == [("holder_ttl_s",), ("lifts",)]

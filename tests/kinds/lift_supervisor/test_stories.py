@@ -43,7 +43,7 @@ def changes(world: World) -> list[str]:
 
 
 def shown(world: World) -> list[str]:
-    """Return the sessions that the lift has shown, one after the other."""
+    """Return the sessions that the lift has shown, in order."""
     return [session for _, session in sessions(world)]
 
 
@@ -98,7 +98,7 @@ def test_a_second_robot_is_served_as_soon_as_the_first_has_released(route: objec
 
 
 @pytest.mark.parametrize("lost", [1, 10])
-def test_ends_lost_on_either_side_are_repeated_until_one_is_obeyed(lost: int) -> None:
+def test_lost_ends_are_repeated_until_one_is_obeyed(lost: int) -> None:
     world = World()
     left = {"supervisor": lost, "Lift1": lost}
 
@@ -136,7 +136,7 @@ def test_robots_that_wait_move_no_relay() -> None:
     assert edges(B, C) == edges()
 
 
-def test_a_queue_is_served_in_order_and_a_robot_that_falls_silent_in_it_is_skipped() -> None:
+def test_a_queue_is_served_in_order_without_robots_that_fell_silent() -> None:
     world = World()
     OurSupervisor(world)
     LiftNode(world)
@@ -168,7 +168,8 @@ def test_a_lift_node_that_restarts_in_mid_ride_gets_the_session_again_and_the_ri
 def test_a_supervisor_that_restarts_with_a_robot_in_the_car_moves_no_relay(
     skew: float, our_skew: float
 ) -> None:
-    """The robot keeps its ride, whatever the clocks of the supervisor and of the adapter show."""
+    """The clocks of the supervisor and of the adapter may be wrong by an hour. The robot keeps its
+    ride."""
     world = World()
     supervisor = OurSupervisor(world, wall_skew=our_skew)
     lift, robot = LiftNode(world), Rider(world, A, UP, skew=skew)
@@ -182,15 +183,14 @@ def test_a_supervisor_that_restarts_with_a_robot_in_the_car_moves_no_relay(
     assert robot.done
 
 
-def test_rmfs_own_supervisor_restarted_in_the_same_way_ends_the_ride_and_asks_for_it_again() -> (
-    None
-):
-    """The lift's node has a grace after END for RMF's supervisor. Our supervisor never needs it."""
+def test_the_supervisor_of_rmf_restarts_in_the_same_way_and_interrupts_the_ride() -> None:
+    """After END the lift's node keeps a grace for RMF's supervisor. Our supervisor never needs that
+    grace."""
     world = World()
     supervisor = RmfsSupervisor(world)
     lift, robot = LiftNode(world), Rider(world, A, UP)
     world.run(16.5)
-    world.retained.clear()  # the replay comes too late
+    world.retained.clear()  # the retained messages come too late
     supervisor.restart()
     world.run(60.0)
     assert changes(world)[2:4] == ["END fleet/a L3", "AGV fleet/a L3"]
@@ -218,7 +218,7 @@ def test_a_hundred_old_requests_of_many_sessions_move_nothing_at_a_restart() -> 
     assert robot.done
 
 
-def test_an_adapter_that_restarts_releases_a_lift_that_it_knows_nothing_of() -> None:
+def test_an_adapter_that_restarts_releases_the_lift_of_its_forgotten_ride() -> None:
     world = World()
     OurSupervisor(world)
     LiftNode(world)
@@ -232,9 +232,7 @@ def test_an_adapter_that_restarts_releases_a_lift_that_it_knows_nothing_of() -> 
 # ---- LIFT-SUPERVISOR-6: another supervisor
 
 
-def test_beside_rmfs_own_supervisor_it_is_silent_and_takes_over_in_mid_ride_when_that_is_gone() -> (
-    None
-):
+def test_ours_is_silent_beside_the_supervisor_of_rmf_and_takes_over_after_it() -> None:
     world = World()
     rmfs = RmfsSupervisor(world)
     ours = OurSupervisor(world)
@@ -270,7 +268,7 @@ def test_a_second_supervisor_of_ours_stands_by_and_takes_over() -> None:
 
 
 def test_an_operator_releases_the_lift_of_a_dead_robot_for_those_who_wait() -> None:
-    """The command `send lift Lift1 --end` sends this END. Here the operator's clock is a minute
+    """The command `send lift Lift1 --end` sends the operator's END. The operator's clock is a minute
     slow."""
     world = World()
     OurSupervisor(world)
@@ -288,7 +286,7 @@ def test_an_operator_releases_the_lift_of_a_dead_robot_for_those_who_wait() -> N
     assert shown(world) == [A, "", B, ""]
 
 
-def test_where_the_site_wants_it_a_dead_robots_lift_goes_to_the_next_by_itself() -> None:
+def test_with_the_setting_the_lift_of_a_dead_robot_goes_to_the_next_robot() -> None:
     world = World()
     OurSupervisor(world, LiftSupervisorSettings(holder_ttl_s=90))
     LiftNode(world)
@@ -301,7 +299,7 @@ def test_where_the_site_wants_it_a_dead_robots_lift_goes_to_the_next_by_itself()
     assert shown(world) == [A, "", B, ""]
 
 
-def test_in_a_fire_nobody_new_is_sent_and_the_rides_come_after_it() -> None:
+def test_in_a_fire_no_new_request_is_sent_and_the_rides_follow_afterwards() -> None:
     world = World()
     OurSupervisor(world)
     lift = LiftNode(world)

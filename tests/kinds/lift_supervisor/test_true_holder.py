@@ -1,4 +1,5 @@
-"""LIFT-SUPERVISOR-2, LIFT-SUPERVISOR-4: the true holder of the lift, and requesters that have gone."""
+"""LIFT-SUPERVISOR-2, LIFT-SUPERVISOR-4: the session that really has the lift, and requesters that have
+gone."""
 
 import math
 
@@ -7,10 +8,10 @@ from bridges.kinds.shared.decision import Fault
 from bridges.kinds.shared.durations import SILENT_S
 from tests.kinds.lift_supervisor.alone import Alone
 
-# ---- LIFT-SUPERVISOR-2: the true holder of the lift
+# ---- LIFT-SUPERVISOR-2: the session that really has the lift
 
 
-def test_a_session_that_the_lift_shows_goes_before_the_queue_if_its_robot_asks() -> None:
+def test_a_session_that_the_lift_shows_comes_before_the_queue_if_its_robot_asks() -> None:
     desk = Alone()
     desk.asks("b", "L1")
     desk.shows("a", "L2")
@@ -20,9 +21,7 @@ def test_a_session_that_the_lift_shows_goes_before_the_queue_if_its_robot_asks()
     assert desk.sent == [(0.0, "AGV b L1"), (0.5, "AGV a L3")]
 
 
-def test_a_holder_is_not_ended_for_a_short_silence_although_the_lift_daemon_has_lost_the_session() -> (
-    None
-):
+def test_a_short_silence_ends_no_holder_even_if_the_lift_daemon_lost_the_session() -> None:
     desk = Alone()
     desk.shows("a", "L2")
     desk.asks("a")
@@ -32,7 +31,7 @@ def test_a_holder_is_not_ended_for_a_short_silence_although_the_lift_daemon_has_
     assert {text for _, text in desk.sent} == {"AGV a L3"}
 
 
-def test_while_the_lift_shows_a_stranger_nobody_else_is_sent_to_it() -> None:
+def test_no_request_goes_to_a_lift_that_shows_the_session_of_a_stranger() -> None:
     desk = Alone()
     desk.asks("b")
     for second in range(1, 4):
@@ -52,7 +51,7 @@ def test_a_session_that_no_robot_requests_for_3_s_is_ended() -> None:
     assert desk.sent == [(3.0, "END a L2"), (4.0, "END a L2")]
 
 
-def test_a_strangers_session_gets_its_3_s_again_after_the_lift_was_silent() -> None:
+def test_after_a_silence_of_the_lift_the_session_of_a_stranger_gets_its_3_s_again() -> None:
     desk = Alone()
     desk.shows("a")
     desk.until(1.0)
@@ -68,9 +67,7 @@ def test_a_strangers_session_gets_its_3_s_again_after_the_lift_was_silent() -> N
     assert desk.sent == [(63.0, "END a L1")]
 
 
-def test_a_state_in_the_last_instant_before_the_lift_counts_as_silent_continues_those_before() -> (
-    None
-):
+def test_a_state_in_the_last_instant_prevents_the_silence_of_a_lift() -> None:
     def session_since(seconds: float) -> float:
         desk = Alone()
         desk.shows("a", "L2")
@@ -82,7 +79,7 @@ def test_a_state_in_the_last_instant_before_the_lift_counts_as_silent_continues_
     assert (session_since(SILENT_S), session_since(late)) == (0.0, late)
 
 
-def test_a_holder_whose_session_the_node_has_lost_in_a_restart_is_asked_for_again() -> None:
+def test_a_session_that_the_node_lost_in_a_restart_is_requested_again_for_its_holder() -> None:
     desk = Alone()
     desk.asks("a")
     desk.ride("a")
@@ -94,7 +91,7 @@ def test_a_holder_whose_session_the_node_has_lost_in_a_restart_is_asked_for_agai
 # ---- LIFT-SUPERVISOR-4: requesters that have gone
 
 
-def test_a_holder_that_the_lift_never_took_and_that_is_silent_for_10_s_is_ended() -> None:
+def test_a_holder_that_never_got_the_lift_is_ended_after_10_s_of_silence() -> None:
     desk = Alone()
     desk.shows("")
     desk.asks("a")
@@ -119,7 +116,7 @@ def test_a_silent_holder_keeps_the_lift_and_raises_an_alarm_after_a_minute() -> 
     assert desk.faults == []
 
 
-def test_where_the_site_wants_it_a_silent_holder_is_ended_after_its_time() -> None:
+def test_with_the_setting_a_silent_holder_is_ended_after_its_time() -> None:
     desk = Alone(LiftSupervisorLimits(holder_ttl_s=120.0))
     desk.asks("a")
     desk.ride("a")
@@ -129,7 +126,7 @@ def test_where_the_site_wants_it_a_silent_holder_is_ended_after_its_time() -> No
     assert desk.sent == [(0.0, "AGV a L3"), (120.0, "END a L3"), (121.0, "END a L3")]
 
 
-def test_a_silent_holder_whose_turn_is_ended_does_not_wait_in_the_queue() -> None:
+def test_a_silent_holder_does_not_wait_in_the_queue_after_its_turn() -> None:
     desk = Alone(LiftSupervisorLimits(holder_ttl_s=5.0, holder_alarm_s=2.0))
     desk.asks("a")
     for second in range(6):
@@ -153,14 +150,15 @@ def test_a_lift_that_does_not_take_the_holder_or_does_not_release_it_raises_an_a
 
 
 def shown_each_second(desk: Alone, session: str, until: int) -> tuple[Fault, ...]:
-    """Let states show this session each second until the time `until`. Return the last faults."""
+    """Let a state show this session each second until the time `until`. Return the faults at the
+    end."""
     for second in range(int(desk.now), until + 1):
         desk.until(float(second))
         desk.shows(session, "L1", to="L3")
     return desk.report.faults
 
 
-def test_each_alarm_says_which_session_it_is_about() -> None:
+def test_each_alarm_names_its_session() -> None:
     never_taken = Alone(LiftSupervisorLimits(silent_after_s=60.0))
     never_taken.asks("a")
     assert shown_each_second(never_taken, "", 30) == (

@@ -1,5 +1,5 @@
-"""Two supervisors start at the same moment, as after a power cut. Exactly one of them serves in the
-end."""
+"""Two supervisors start at the same moment, as after a power cut. In the end exactly one of them
+serves."""
 
 from collections import deque
 from collections.abc import Callable
@@ -18,8 +18,7 @@ STEP_S = 0.05
 
 
 class Late:
-    """A subscription that notices a publisher's start and end DISCOVERY_S late, as on a real
-    network."""
+    """A subscription that sees publishers come and go DISCOVERY_S late, as on a real network."""
 
     def __init__(self, end: Subscription) -> None:
         self._end = end
@@ -36,7 +35,7 @@ class Late:
 
 
 class LateTransport(MemoryTransport):
-    """A transport whose view of the other nodes lags by DISCOVERY_S."""
+    """A transport that sees other nodes come and go DISCOVERY_S late."""
 
     def __init__(self, network: MemoryNetwork, name: str) -> None:
         super().__init__(network, name)

@@ -1,4 +1,4 @@
-"""All histories to a depth. Each request for a lift is passed on, or the report says why not.
+"""All histories up to a depth. The supervisor passes each request for a lift on, or reports why not.
 
 There are nine moves. Two robots ask, one robot ends, the lift shows four states, the permission to
 publish changes, or time passes. `make deep` has all 9^5 = 59,049 histories of five moves. `make test`
@@ -40,7 +40,7 @@ def after(one: Alone, move: Move) -> Alone:
 
 
 def check(one: Alone) -> None:
-    """Require a reason in the report whenever a robot's request is not the last message sent."""
+    """Require a reason in the report if a robot has a request that is not the last sent message."""
     last = one.sent[-1][1] if one.sent else ""
     unserved = [c for c in one.memory.claims if last != f"AGV {c.session} {c.target.floor}"]
     assert bool(one.report.waits) >= bool(unserved), one.report
@@ -48,7 +48,7 @@ def check(one: Alone) -> None:
     assert bool(one.memory.claims) >= bool(one.report.waits)
 
 
-def test_in_every_history_whoever_waits_is_told_for_what() -> None:
+def test_in_every_history_the_report_tells_why_a_robot_waits() -> None:
     said = {
         one.report.waits for one, _ in histories(Alone(speaks=False), MOVES, depth(4, 5), after)
     }

@@ -103,10 +103,10 @@ class LiftNode:
 
 
 class Rider:
-    """A robot with its fleet adapter. The robot makes each of its trips, and then is done.
+    """A robot with its fleet adapter. The robot makes its trips one after the other.
 
-    `skew` is how far the adapter's clock is ahead of ours (s). `rode` has (s, trip) for each complete
-    ride.
+    `skew` is the time (s) by which the adapter's clock is ahead of ours. `rode` has (s, trip) for each
+    complete ride.
     """
 
     ENTER_S = 3.0
@@ -142,7 +142,7 @@ class Rider:
         self._next_at = NEVER if self.done else self.world.now + 2.0
 
     def die(self) -> None:
-        """Let the adapter die: it sends nothing more, and its retained messages are gone."""
+        """Kill the adapter. It sends nothing more, and its retained messages are gone."""
         self.world.retained.pop(self.name, None)
         self.world.hearers[LIFT_STATES.name].discard(self.name)
         self._next_at = NEVER

@@ -1,6 +1,6 @@
 """The core of a kind without hardware, in virtual time.
 
-Tests give events to the core, and the core's messages are noted.
+Tests give events to the core. The core's messages are kept in a list.
 """
 
 from abc import ABC, abstractmethod
@@ -18,9 +18,9 @@ E = TypeVar("E")
 
 
 class Alone(ABC, Generic[M, E, L, R]):
-    """A core alone. `sent` has (s, words) of each message, and `refused` has (s, reason).
+    """A core alone. `sent` has (s, words) of each message. `refused` has (s, reason).
 
-    Requesters' clocks are `skew` seconds ahead of ours.
+    The clocks of requesters are `skew` seconds ahead of ours.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class Alone(ABC, Generic[M, E, L, R]):
 
     @abstractmethod
     def words(self, message: Message) -> str:
-        """Return a message in short words, or "" if the message is not to be noted."""
+        """Return a message in short words. Return "" for a message that `sent` shall not show."""
 
     def hears(self, event: E | MaySpeak | Woken) -> None:
         """Make one decision, now."""
@@ -56,7 +56,7 @@ class Alone(ABC, Generic[M, E, L, R]):
             self.refused.append((at, decided.refused))
 
     def until(self, at: float) -> None:
-        """Let time pass, and wake the core at the times that it asked for."""
+        """Let time pass until `at`. Wake the core whenever it has asked for a wake-up."""
         while self.wake_at <= at:
             self.now = self.wake_at
             self.hears(Woken())
@@ -64,5 +64,6 @@ class Alone(ABC, Generic[M, E, L, R]):
         self.now = at
 
     def stamped(self, aged: float) -> float:
-        """Return the stamp (s) of a message that is `aged` seconds old by the requester's clock."""
+        """Return the stamp (s) of a message. By the requester's clock the message is `aged` seconds
+        old."""
         return self.now + self.skew - aged

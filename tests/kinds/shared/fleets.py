@@ -1,7 +1,7 @@
-"""Several daemons' alarms, a stranger's node and the robots of one graph, in virtual time.
+"""The alarms of several daemons, a stranger's node and the robots on one graph, in virtual time.
 
-Each message and each statement of the cores reaches everybody at once. A daemon's memory is on its disk
-before its messages go out. Robots obey the last word for their fleet.
+The daemons and the stranger tell everybody at once. A daemon writes its memory to its disk before it
+publishes. Each robot obeys the last message for its fleet.
 """
 
 from collections.abc import Mapping
@@ -30,9 +30,9 @@ QUIET_S = 3.0
 
 
 class DaemonSeen(msgspec.Struct, frozen=True):
-    """A daemon: its memory (None while it is dead), its disk, its causes, and its retained messages.
+    """A daemon with its disk, its causes of an alarm, and its retained messages.
 
-    `faults`: the codes of its last report.
+    `memory` is None if the daemon is dead. `faults` has the codes of its last report.
     """
 
     memory: FleetAlarmMemory | None = None
@@ -49,9 +49,13 @@ class DaemonSeen(msgspec.Struct, frozen=True):
 
 
 class AlarmGraph(msgspec.Struct, frozen=True):
-    """The graph. `stands`: fleet -> must its robots stand, by the last word. `said`: every message of
-    a daemon, as (s, daemon, value, fleets). `stranger`: the stranger itself has an alarm. `path`: the
-    names of the moves so far."""
+    """The graph with its daemons and fleets.
+
+    - `stands` tells for each fleet whether the last message makes its robots stand still.
+    - `said` has every message of a daemon, as (s, daemon, value, fleets).
+    - `stranger` says that the stranger has an alarm of its own.
+    - `path` has the names of the moves so far.
+    """
 
     daemons: Mapping[str, DaemonSeen]
     stands: Mapping[str, bool]
@@ -67,12 +71,12 @@ class AlarmGraph(msgspec.Struct, frozen=True):
     def tells(
         self, name: str, *present: str, drill: bool = False, seen: bool = True
     ) -> "AlarmGraph":
-        """Let the causes at a daemon's only device change."""
+        """Change the causes of an alarm at this daemon's only device."""
         daemon = replace(self.daemons[name], present=frozenset(present), drill=drill, seen=seen)
         return self._with(name, daemon)._inputs(name)
 
     def resets(self, name: str) -> "AlarmGraph":
-        """Reset a daemon, as a person does."""
+        """Reset this daemon, as a person does."""
         return self._decides(name, OperatorReset())
 
     def drills(self, name: str, for_s: float) -> "AlarmGraph":
@@ -80,11 +84,11 @@ class AlarmGraph(msgspec.Struct, frozen=True):
         return self._decides(name, DrillOrdered(for_s))
 
     def kill(self, name: str) -> "AlarmGraph":
-        """End a daemon's process; its retained messages go with it."""
+        """Kill this daemon. Its retained messages disappear too."""
         return self._with(name, replace(self.daemons[name], memory=None, retained=()))
 
     def start(self, name: str) -> "AlarmGraph":
-        """Start a daemon, which reads its disk, and hears the retained messages of the others."""
+        """Start this daemon. It reads its disk, and hears the retained messages of the other nodes."""
         daemon = self.daemons[name]
         memory = fleet_alarm.initial() if daemon.disk is None else kept_alarm.restore(daemon.disk)
         graph = self._with(name, replace(daemon, memory=memory, started_at=self.now))
@@ -98,13 +102,14 @@ class AlarmGraph(msgspec.Struct, frozen=True):
         return graph._inputs(name)
 
     def stranger_says(self, on: bool, *fleets: str) -> "AlarmGraph":
-        """Let a node of somebody else publish."""
+        """Let the stranger's node publish an alarm (`on`) or its end for these fleets."""
         told = frozenset(fleets)
         graph = replace(self, stranger=on, stranger_spoke=True, stranger_fleets=told)
         return graph._deliver(STRANGER, on, frozenset(fleets))
 
     def until(self, at: float) -> "AlarmGraph":
-        """Let time pass: states each second, wake-ups, and the ends of quiet starts."""
+        """Let time pass until `at`. Daemons state their alarm each second, wake up, and end their quiet
+        start."""
         graph = self
         while graph.now < at:
             graph = replace(graph, now=min(at, graph.now + 0.1))
@@ -186,7 +191,8 @@ class AlarmGraph(msgspec.Struct, frozen=True):
 
 
 def graph(**fleets: tuple[str, ...]) -> AlarmGraph:
-    """Return a graph of these daemons in service; their fleets, empty for all."""
+    """Return a graph with these daemons in service. Each daemon has these fleets. No fleet means all
+    fleets."""
     daemons = {name: DaemonSeen(fleets=frozenset(told)) for name, told in fleets.items()}
     robots = {fleet for told in fleets.values() for fleet in told} or {"tiny"}
     made = AlarmGraph(daemons, dict.fromkeys(sorted(robots), False))

@@ -1,4 +1,4 @@
-"""Debounce, sample by sample."""
+"""The debounce of one input, sample by sample."""
 
 from collections.abc import Sequence
 
@@ -19,12 +19,12 @@ def believed(samples: Sequence[tuple[float, object]], hold_s: float = HOLD_S) ->
     return values
 
 
-def test_a_value_counts_when_it_has_lasted() -> None:
+def test_a_value_counts_after_it_has_lasted_for_the_debounce() -> None:
     samples = [(0.0, True), (0.03, True), (0.05, True), (0.1, False), (0.14, False), (0.16, False)]
     assert believed(samples) == ["?", "?", True, True, True, False]
 
 
-def test_a_glitch_starts_the_time_again() -> None:
+def test_a_glitch_restarts_the_debounce() -> None:
     samples = [(0.0, 1), (0.05, 1), (0.1, 2), (0.14, 1), (0.15, 2), (0.19, 2), (0.2, 2)]
     assert believed(samples) == ["?", 1, 1, 1, 1, 1, 2]
 
@@ -38,7 +38,7 @@ def test_the_absence_of_a_value_is_debounced_like_any_value() -> None:
     assert believed(samples) == ["?", None, None, "up", "up", None]
 
 
-def test_the_debounce_says_when_the_value_now_seen_will_count() -> None:
+def test_the_debounce_tells_when_the_value_just_read_will_count() -> None:
     first = settle(None, 1, 10.0, HOLD_S)
     assert first.due_at(HOLD_S) == 10.0 + HOLD_S
     steady = settle(first, 1, 10.0 + HOLD_S, HOLD_S)
@@ -46,7 +46,7 @@ def test_the_debounce_says_when_the_value_now_seen_will_count() -> None:
     assert settle(steady, 2, 20.0, HOLD_S).due_at(HOLD_S) == 20.0 + HOLD_S
 
 
-def test_the_debounce_says_since_when_no_value_has_lasted() -> None:
+def test_the_debounce_tells_since_when_no_value_has_lasted() -> None:
     seen = settle(None, 0, 0.0, HOLD_S)
     torn = []
     for i, value in enumerate([0, 0, 1, 0, 1, 1, 1]):
@@ -56,7 +56,7 @@ def test_the_debounce_says_since_when_no_value_has_lasted() -> None:
     assert torn == [None, None, since, since, since, since, None]
 
 
-def test_after_a_gap_the_believed_value_stays_and_a_half_seen_one_starts_again() -> None:
+def test_after_a_gap_the_believed_value_stays_and_a_new_value_starts_again() -> None:
     steady = Settled(1, 1, 0.0, steady_at=0.1)
     half = settle(steady, 2, 1.0, HOLD_S)
     assert forget(half) == Settled(1, 1, 1.0, steady_at=0.1)
@@ -66,7 +66,9 @@ def test_after_a_gap_the_believed_value_stays_and_a_half_seen_one_starts_again()
 
 
 @given(st.lists(st.tuples(st.floats(0.001, 0.1), st.booleans()), min_size=1, max_size=60))
-def test_a_believed_value_was_seen_throughout_its_debounce(steps: list[tuple[float, bool]]) -> None:
+def test_a_believed_value_was_read_during_its_whole_debounce(
+    steps: list[tuple[float, bool]],
+) -> None:
     now, seen, samples = 0.0, None, list[tuple[float, bool]]()
     for gap_s, value in steps:
         now += gap_s

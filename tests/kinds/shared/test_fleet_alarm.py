@@ -1,4 +1,4 @@
-"""Stories of one alarm for the fleets of a graph: two daemons, a stranger's node, robots."""
+"""Stories of the fleets' alarm on one graph with two daemons, a stranger's node, and robots."""
 
 from typing import Any
 
@@ -33,7 +33,7 @@ def said(g: AlarmGraph) -> list[tuple[float, str, bool]]:
     return [(at, who, on) for at, who, on, _ in g.said]
 
 
-def test_an_alarm_is_said_once_and_ends_by_a_reset_after_its_cause() -> None:
+def test_an_alarm_is_published_once_and_ends_by_a_reset_after_its_cause() -> None:
     """FLEET-ALARM-1, FLEET-ALARM-2 and FLEET-ALARM-3."""
     g = graph(a=())
     g = g.tells("a", "fire").until(20.0)
@@ -42,7 +42,7 @@ def test_an_alarm_is_said_once_and_ends_by_a_reset_after_its_cause() -> None:
     g = g.tells("a").until(50.0)
     assert said(g) == [(5.0, "a", True)]
     assert g.daemons["a"].faults == ("ALARM_RAISED",)
-    g = g.tells("a", seen=False).resets("a").until(60.0)  # a fire may burn unseen
+    g = g.tells("a", seen=False).resets("a").until(60.0)  # perhaps a fire burns that nobody can see
     assert g.daemons["a"].state == "alarm"
     g = g.tells("a").resets("a").until(70.0)
     assert said(g) == [(5.0, "a", True), (60.0, "a", False)]
@@ -50,7 +50,7 @@ def test_an_alarm_is_said_once_and_ends_by_a_reset_after_its_cause() -> None:
     assert len(g.said) == 2
 
 
-def test_a_reset_ends_the_causes_that_are_over_and_leaves_the_others() -> None:
+def test_a_reset_ends_the_causes_that_are_over_and_leaves_the_other_causes() -> None:
     """FLEET-ALARM-1."""
     g = graph(a=()).tells("a", "fire", "code_blue").tells("a", "code_blue").resets("a")
     memory = g.daemons["a"].memory
@@ -76,7 +76,7 @@ def test_a_refused_reset_names_the_causes() -> None:
     assert made.refused == "the alarm is not over: fire of Panel"
 
 
-def test_two_sources_are_one_alarm_and_each_takes_its_retained_true_back() -> None:
+def test_two_sources_make_one_alarm_and_each_withdraws_its_retained_true() -> None:
     """FLEET-ALARM-3."""
     g = graph(a=(), b=()).tells("a", "fire").until(8.0).tells("b", "fire").until(10.0)
     g = g.tells("a").resets("a").until(20.0)
@@ -91,21 +91,21 @@ def test_two_sources_are_one_alarm_and_each_takes_its_retained_true_back() -> No
 
 
 def test_a_source_that_dies_in_its_alarm_still_holds_the_robots() -> None:
-    """FLEET-ALARM-4 and FLEET-ALARM-6: what stands is on the other daemon's disk too."""
+    """FLEET-ALARM-4 and FLEET-ALARM-6: the disk of daemon a also keeps the alarm of daemon b."""
     g = graph(a=(), b=()).tells("a", "fire").tells("b", "fire").until(8.0)
     g = g.kill("b").until(30.0).tells("a").resets("a").until(40.0)
     assert g.stands == {"tiny": True}
     g = g.kill("a").start("a").until(60.0)
     assert (g.daemons["a"].state, g.stands) == ("reset", {"tiny": True})
     g = g.tells("b", "fire").start("b").until(70.0)
-    assert said(g)[-1] == (60.0, "b", True)  # for fleet adapters that started in between
+    assert said(g)[-1] == (60.0, "b", True)  # for fleet adapters that started after b had died
     g = g.tells("b").resets("b").until(80.0)
     assert g.stands == {"tiny": False}
     assert {d.state for d in g.daemons.values()} == {"quiet"}
 
 
 def test_the_false_of_a_stranger_frees_the_daemon_that_waits_for_a_dead_one() -> None:
-    """FLEET-ALARM-4: it is the way out if a daemon was taken away for good."""
+    """FLEET-ALARM-4: if a daemon has been removed for good, a person ends its alarm in this way."""
     g = graph(a=(), b=()).tells("a", "fire").tells("b", "fire").until(8.0).kill("b").until(20.0)
     g = g.tells("a").resets("a").until(30.0).stranger_says(False).until(31.0)
     assert g.daemons["a"].state == "quiet"
@@ -134,7 +134,8 @@ def test_a_stranger_that_calls_the_alarm_off_is_contradicted_but_not_flooded() -
 
 
 def test_a_cause_after_a_false_for_some_of_our_fleets_is_said_again() -> None:
-    """FLEET-ALARM-5: daemon a waits for b, whose fleet the stranger has not freed."""
+    """FLEET-ALARM-5: daemon a waits for daemon b. The stranger has freed fleet x, but not b's fleet
+    y."""
     g = graph(a=("x", "y"), b=("y",)).tells("a", "fire").tells("b", "fire").until(8.0)
     g = g.tells("a").resets("a").until(12.0).stranger_says(False, "x").until(14.0)
     assert g.stands == {"x": False, "y": True}
@@ -210,14 +211,14 @@ def test_each_state_has_its_beginning_unless_a_restart_has_hidden_it() -> None:
 
 
 def test_an_alarm_of_one_building_does_not_hold_the_other_building() -> None:
-    """FLEET-ALARM-4: rmf's two buildings, each with its own fleets."""
+    """FLEET-ALARM-4: two buildings of one RMF, each with its own fleets."""
     g = graph(a=("x",), b=("y",)).tells("a", "fire").tells("b", "fire").until(8.0)
     g = g.tells("a").resets("a").until(12.0)
     assert g.stands == {"x": False, "y": True}
     assert g.daemons["a"].state == "quiet"
 
 
-def test_where_the_wire_hides_the_sender_a_stranger_among_the_publishers_is_believed() -> None:
+def test_without_a_named_sender_a_stranger_among_the_publishers_is_believed() -> None:
     """FLEET-ALARM-8."""
     memory = graph(a=(), b=()).until(8.0).daemons["a"].memory
     assert memory is not None

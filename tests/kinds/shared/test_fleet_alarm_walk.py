@@ -1,7 +1,7 @@
-"""Every state of two daemons, a stranger's node and the robots, within some moves of a quiet graph.
+"""All states that two daemons, a stranger's node and the robots can reach within some moves.
 
-Between two moves 9 s pass, so that every message and statement has arrived. The rules are checked in
-other words: what must never be published, and how the graph must be once it is at rest.
+The walk starts on a graph without alarms. After each move 9 s pass, so that every message has arrived.
+The rules do not use the core's code. They check the published messages, and the graph at rest.
 """
 
 from collections.abc import Callable, Hashable, Iterator, Mapping
@@ -26,7 +26,7 @@ Move = Callable[[AlarmGraph], AlarmGraph]
 
 
 def moves(*fleets: str) -> dict[str, Move]:
-    """Return every move of the walk, by name. `fleets`: the stranger's."""
+    """Return every move of the walk by its name. The stranger publishes for these fleets."""
     found: dict[str, Move] = {
         "the stranger alarms": lambda g: g.stranger_says(True, *fleets),
         "the stranger ends": lambda g: g.stranger_says(False, *fleets),
@@ -50,7 +50,7 @@ def _dead(g: AlarmGraph, name: str) -> bool:
 
 
 def latched(g: AlarmGraph, name: str) -> bool:
-    """Has this daemon seen a cause that nobody has reset, even if the daemon is dead?"""
+    """Return whether this daemon has seen a cause that nobody has reset. The daemon may be dead now."""
     return bool(kept(g, name).latched)
 
 
@@ -61,7 +61,7 @@ def kept(g: AlarmGraph, name: str) -> FleetAlarmMemory:
 
 
 def key(g: AlarmGraph) -> Hashable:
-    """Return everything but the times and the history."""
+    """Return everything except the times and the history."""
     return (
         tuple(
             (d.disk, d.memory is None, d.present, d.drill, d.seen, d.retained, d.state, d.faults)
@@ -74,7 +74,7 @@ def key(g: AlarmGraph) -> Hashable:
 
 
 def neighbours(g: AlarmGraph, moves: Mapping[str, Move]) -> Iterator[AlarmGraph]:
-    """Yield every state one move and a rest away, and check the move."""
+    """Yield every state that one move and a rest can reach. Check each move."""
     for name, move in moves.items():
         after = move(replace(g, said=(), path=(*g.path, name))).until(g.now + REST_S)
         check_messages(g, after)
@@ -83,7 +83,7 @@ def neighbours(g: AlarmGraph, moves: Mapping[str, Move]) -> Iterator[AlarmGraph]
 
 
 def check_messages(before: AlarmGraph, after: AlarmGraph) -> None:
-    """Check everything that the daemons have published since."""
+    """Check everything that the daemons have published since the move."""
     for name, daemon in after.daemons.items():
         if latched(before, name) and not latched(after, name):
             assert after.path[-1] == f"{name} is reset", f"an end without a reset: {after.path}"
@@ -106,19 +106,22 @@ def check_messages(before: AlarmGraph, after: AlarmGraph) -> None:
 
 
 def _is_overruled(before: AlarmGraph, after: AlarmGraph, name: str, other: str) -> bool:
-    """Has the stranger's `false` let the robots drive during the alarm of a daemon that has died? Or
-    could our daemon not hear that alarm, because it was dead itself?"""
+    """Return whether daemon `name` may end the alarm although dead daemon `other` still has one.
+
+    The stranger's `false` may have just freed the robots. Or `name` does not know the alarm of `other`,
+    because `name` was dead at that time.
+    """
     memory = before.daemons[name].memory or kept(before, name)
     return after.path[-1] == "the stranger ends" or other not in memory.others
 
 
 def _told_to(g: AlarmGraph, name: str) -> frozenset[str]:
-    """Return the fleets of a daemon's last `false`."""
+    """Return the fleets in a daemon's last `false`."""
     return frozenset(next(f for _, who, on, f in reversed(g.said) if who == name and not on))
 
 
 def check_rest(g: AlarmGraph) -> None:
-    """Check a graph on which everything has been said."""
+    """Check a graph on which every message has arrived."""
     live = [d for d in g.daemons.values() if d.memory is not None]
     raised = [d for d in live if d.state in ("alarm", "drill")]
     for daemon in raised:
@@ -128,7 +131,8 @@ def check_rest(g: AlarmGraph) -> None:
     if raised:
         late = any(d.retained[-1:] == (False,) for d in live)
         assert not late, f"a late fleet adapter may hear an old end last: {g.path}"
-    gone = any(_dead(g, name) for name in g.daemons)  # whose end nobody may have heard
+    # Nobody may have heard the end of a dead daemon's alarm.
+    gone = any(_dead(g, name) for name in g.daemons)
     over = not any(latched(g, name) for name in g.daemons) and not raised and not g.stranger
     if over and not gone:
         assert {d.state for d in live} <= {"quiet"}, f"the alarm does not end: {g.path}"
@@ -148,7 +152,7 @@ def test_no_state_of_two_daemons_lets_a_robot_drive_in_an_alarm_or_stand_for_eve
 
 
 def test_an_alarm_for_some_fleets_neither_holds_nor_frees_the_others() -> None:
-    """Daemon a tells x and y, daemon b tells y, the stranger speaks to x."""
+    """Daemon a publishes for the fleets x and y, daemon b for y, and the stranger for x."""
     start = graph(a=("x", "y"), b=("y",))
     found = reached([start], depth(4, 12), partial(neighbours, moves=moves("x")), key)
     assert {True, False} == {g.stands["x"] for g in found if g.stands["y"]}

@@ -1,4 +1,4 @@
-"""The rules decide by the adapter's stamps and by our clock whether an adapter's request counts."""
+"""The stamps of adapters and our clock decide whether an adapter's request counts."""
 
 import math
 
@@ -10,11 +10,11 @@ from bridges.messages.definitions import Time
 
 STAMP = 1_800_000_000.0
 STARTED = Rules(most_s=5.0)
-"""Rules for a daemon that started 5 s ago."""
+"""The rules of a daemon that started 5 s ago."""
 
 
 class Clocked:
-    """One requester, whose clock is `skew` s ahead of ours."""
+    """One requester. Its clock is `skew` seconds ahead of ours."""
 
     def __init__(self, rules: Rules = STARTED, skew: float = 0.0) -> None:
         self.rules = rules
@@ -22,9 +22,9 @@ class Clocked:
         self.requester = Requester()
 
     def at(self, now: float, *, sent: float | None = None, ends: bool = False) -> bool:
-        """Return whether a message counts that arrives at `now`.
+        """Return whether a message that arrives at `now` counts.
 
-        `sent` is the time of sending by our clock (s), by default `now`.
+        `sent` is the time of sending (s) by our clock, by default `now`.
         """
         sent = now if sent is None else sent
         stamp = STAMP + sent + self.skew
@@ -45,7 +45,7 @@ def test_a_request_sent_after_our_start_counts_at_once() -> None:
     ]
 
 
-def test_a_request_that_is_not_newer_than_the_last_one_that_counted_does_not_count() -> None:
+def test_a_request_must_be_newer_than_the_last_request_that_counted() -> None:
     requester = Clocked()
     assert requester.at(2.0)
     assert not requester.at(2.0)
@@ -53,14 +53,14 @@ def test_a_request_that_is_not_newer_than_the_last_one_that_counted_does_not_cou
     assert requester.at(2.2)
 
 
-def test_a_hundred_replayed_requests_do_not_count_but_a_live_repeat_does() -> None:
+def test_replayed_requests_do_not_count_but_a_live_repeat_counts() -> None:
     requester = Clocked(skew=-3600.0)
     replay = [requester.at(0.1, sent=-100.0 + number) for number in range(100)]
     assert replay == [False] * 100
     assert [requester.at(1.0), requester.at(1.2), requester.at(1.3)] == [False, True, True]
 
 
-def test_a_requester_that_has_counted_once_is_known_and_may_be_silent_for_long() -> None:
+def test_a_requester_whose_request_has_counted_may_be_silent_for_long() -> None:
     requester = Clocked(skew=-3600.0)
     assert [requester.at(0.0), requester.at(1.0), requester.at(900.0)] == [False, True, True]
 
@@ -82,7 +82,7 @@ def test_a_request_from_the_future_counts_unless_a_limit_is_set() -> None:
 
 
 def test_an_end_is_compared_with_earlier_ends_only() -> None:
-    """A robot and the operator who ends its session may have different clocks."""
+    """An operator may end a robot's session, and the two clocks may differ."""
     requester = Clocked()
     assert requester.at(100.0)
     assert requester.at(100.0, sent=95.0, ends=True)
@@ -108,7 +108,7 @@ def test_a_requester_whose_clock_is_set_back_is_believed_after_a_second() -> Non
     assert [requester.at(12.1), requester.at(13.0, ends=True)] == [True, True]
 
 
-def test_ends_by_a_clock_that_was_set_back_count_once_repeated() -> None:
+def test_after_a_clock_was_set_back_an_end_counts_when_it_is_repeated() -> None:
     requester = Clocked()
     assert requester.at(10.0, ends=True)
     requester.skew = -3600.0
@@ -120,26 +120,26 @@ def test_ends_by_a_clock_that_was_set_back_count_once_repeated() -> None:
     ]
 
 
-def test_an_end_that_counted_by_its_repeats_does_not_count_again() -> None:
+def test_an_end_that_counted_because_of_its_repeats_does_not_count_again() -> None:
     requester = Clocked(skew=-3600.0)
     assert [requester.at(t, ends=True) for t in (0.0, 1.0)] == [False, True]
     assert not requester.at(1.1, sent=1.0, ends=True)
 
 
-def test_an_end_by_a_slower_clock_counts_after_requests_that_counted_by_their_repeats() -> None:
+def test_an_end_with_a_slower_clock_counts_after_requests_that_counted_because_of_repeats() -> None:
     requester = Clocked(skew=-3600.0)
     assert [requester.at(0.0), requester.at(1.0)] == [False, True]
     assert requester.at(1.5, sent=0.5, ends=True)
 
 
-def test_late_echoes_out_of_order_are_never_taken_for_a_live_requester() -> None:
+def test_late_copies_in_a_wrong_order_do_not_look_like_a_live_requester() -> None:
     requester = Clocked()
     assert requester.at(60.0)
     echoes = [requester.at(61.0 + number, sent=50.0 - number) for number in range(10)]
     assert echoes == [False] * 10
 
 
-def test_echoes_far_apart_are_never_taken_for_a_live_requester() -> None:
+def test_copies_with_long_pauses_do_not_look_like_a_live_requester() -> None:
     requester = Clocked()
     assert requester.at(60.0)
     assert [requester.at(t, sent=t / 10) for t in (61.0, 64.1, 67.2)] == [False] * 3
@@ -157,13 +157,13 @@ def test_a_requester_never_heard_has_no_stamps() -> None:
     assert Requester() == Requester(*[-math.inf] * 6)
 
 
-def test_a_requester_that_counts_by_its_repeats_is_remembered_from_then_on() -> None:
+def test_a_requester_is_remembered_after_its_repeats_have_counted() -> None:
     requester = Clocked(skew=-3600.0)
     assert [requester.at(100.0), requester.at(101.0)] == [False, True]
     assert requester.requester.heard_at == 101.0
 
 
-def test_an_impossible_stamp_is_refused_and_a_missing_one_is_not() -> None:
+def test_an_impossible_stamp_is_refused_and_a_missing_stamp_is_accepted() -> None:
     assert [in_ns(Time(0, 0)), in_ns(Time(1, 999_999_999))] == [0, 1_999_999_999]
     for stamp, text in ((Time(-1, 0), "-1 s 0 ns"), (Time(0, 10**9), "0 s 1000000000 ns")):
         with pytest.raises(RequestRefused, match=f"^impossible request_time: {text}$"):

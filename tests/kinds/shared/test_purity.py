@@ -1,5 +1,5 @@
-"""The purity contract in pyproject.toml includes every kind, and the files listed for mutation
-exist."""
+"""The purity contract in pyproject.toml covers every kind. The files that pyproject.toml lists for
+mutation exist."""
 
 import tomllib
 from pathlib import Path
@@ -19,7 +19,7 @@ def test_every_kind_is_under_the_purity_contract() -> None:
     }
 
 
-def test_everything_that_make_mutate_breaks_or_runs_exists() -> None:
+def test_each_file_that_make_mutate_uses_exists() -> None:
     lists = ("source_paths", "only_mutate", "also_copy", "pytest_add_cli_args_test_selection")
     named = [path for name in lists for path in TOOLS["mutmut"][name]]
     assert [path for path in named if not (ROOT / path).exists()] == []

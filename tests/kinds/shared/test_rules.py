@@ -1,4 +1,4 @@
-"""A search for a rule's number finds the rule and its stories.
+"""A reader who searches for a rule's number finds the rule and its stories.
 
 So every rule must be cited by a test, and every citation must name a rule.
 """
@@ -24,7 +24,7 @@ def named(module: Path) -> list[str]:
     return found
 
 
-def test_every_rule_has_a_story_that_cites_it_and_no_story_cites_another() -> None:
+def test_every_rule_is_cited_by_a_test_and_every_citation_names_a_rule() -> None:
     of_cores = [named(core) for core in KINDS.glob("*/core.py")]
     assert all(of_cores)
     rules = {rule for module in KINDS.rglob("*.py") for rule in named(module)}

@@ -1,1 +1,1 @@
-"""Programs inside the machine. All but the far sides import only the standard library."""
+"""Programs inside the machine. They import only the standard library, except `far_side.py`."""

@@ -1,4 +1,4 @@
-"""Runs each check that the host names in a separate process, and sends the result to the host."""
+"""Runs each check that the host names in a separate process. Sends each result to the host."""
 
 import io
 import json
@@ -12,15 +12,15 @@ from typing import Final
 PORT: Final = Path("/dev/virtio-ports/checks")
 LONGEST_S: Final = 240.0
 BYTE_CODE: Final = ("-X", "pycache_prefix=/run/checks")
-"""Options that compile the checks once for each boot, because their folder is read only. Commands lack
-these options."""
+"""Options that compile the checks once for each boot, because their folder is read only. Commands of
+the package run without these options."""
 
 
 def main() -> int:
-    """Report that the machine is up. Then read the name of a check (`deaths.phases`) from each line,
-    for ever."""
+    """Report that the machine is up. Then read the names of checks for ever, one in each line (as
+    `deaths.phases`)."""
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-    # Wait for the end of the boot, so that the checks do not disturb measurements of the boot.
+    # Wait for the end of the boot, because a check could change the measured times of the boot.
     subprocess.run(["systemctl", "is-system-running", "--wait"], stdout=subprocess.DEVNULL)
     while not PORT.exists():
         time.sleep(0.1)
@@ -33,7 +33,7 @@ def main() -> int:
 
 def _tell(port: io.FileIO, what: dict[str, object]) -> None:
     left = json.dumps(what).encode() + b"\n"
-    while left:  # the kernel takes 32 KB at once, and a log may be longer
+    while left:  # a log may be longer than the 32 KB that the kernel takes
         left = left[port.write(left) or 0 :]
 
 

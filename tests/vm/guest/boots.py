@@ -1,4 +1,4 @@
-"""Relays across a boot. Between two checks the host cuts the power or restarts the machine."""
+"""Relays during a boot. Between two checks the host cuts the power or restarts the machine."""
 
 from tests.vm.guest import header
 from tests.vm.guest.rides import LIFT, energise, send
@@ -16,7 +16,7 @@ from tests.vm.guest.system import (
 
 SERVICE = unit("lift")
 LOW = 7
-"""The output of low.yaml. Its relay is on at the level low."""
+"""The output of low.yaml. A low level switches its relay on."""
 STARTS = 10
 
 
@@ -26,7 +26,7 @@ def energised() -> str:
 
 
 def reboot() -> str:
-    """The machine restarts in good order."""
+    """The machine restarts after a clean shutdown."""
     sh("systemctl", "reboot")
     return "it does"
 
@@ -45,9 +45,9 @@ def off() -> str:
 
 
 def active_low() -> str:
-    """A relay that is on at low stays off through ten starts, without a pulse, until a request
-    comes."""
-    header.pull(LOW, high=True)  # the relay board's resistor
+    """A relay that a low level switches on stays off through ten starts, without a pulse. A request
+    then switches it on."""
+    header.pull(LOW, high=True)  # the resistor on the relay board
     began = header.now()
     service = enable("low")
     for _ in range(STARTS - 1):
@@ -59,7 +59,7 @@ def active_low() -> str:
     )  # the door cannot move
     opened = _written(asked)
     disable("low")
-    sh("sync")  # the host may cut the power next
+    sh("sync")  # because the host may cut the power next
     if 0 in starts or len(starts) < STARTS or 0 not in opened:
         raise Wrong(f"writes of {STARTS} starts: {starts}; writes after a request: {opened}")
     return f"{len(starts)} writes, all of them high; a request wrote {opened[0]}"

@@ -1,4 +1,5 @@
-"""Deaths of a daemon whose relays are on. A relay counts as off when the kernel traces the write."""
+"""Deaths of a daemon that has switched relays on. A relay is off when the kernel's trace shows the
+write."""
 
 import os
 import signal
@@ -24,7 +25,7 @@ from tests.vm.guest.system import (
 
 SERVICE = unit("lift")
 MODE, HOLD = {18}, set(HELD)
-"""Outputs that are on together: the mode alone, or the mode and the door's hold."""
+"""Sets of outputs that are on together: AGV mode alone, and AGV mode with the held door."""
 ODD = 5
 """The lowest bit of the floor code. It falls when the car passes L2."""
 KILLED_S, STOPPED_S = 1.0, 4.0
@@ -32,8 +33,8 @@ KILLED_S, STOPPED_S = 1.0, 4.0
 
 
 def phases() -> str:
-    """After kill -9 in each phase of a ride, in a start and after END, relays go off and the service
-    returns."""
+    """kill -9 in each phase of a ride, in a start, and after END. Each time the relays go off, and the
+    service returns."""
     took = {}
     with asking("lift", "Lift1", "L3", "--session", "vm/robot"):
         took["mode asked for"] = _dies_with(set(), MODE)
@@ -47,14 +48,16 @@ def phases() -> str:
 
 
 def _dies_with(*outputs: set[int], at: Callable[[], bool] = lambda: True) -> float:
-    """Kill -9 when these sets of outputs were on in turn and `at` holds. Return the time to off (s)."""
+    """Kill -9 after these sets of outputs were on in turn and `at` holds. Return the time until off
+    (s)."""
     old = pid(SERVICE)
     _on(*outputs, at=at)
     return _killed(old, outputs[-1])
 
 
 def _on(*outputs: set[int], at: Callable[[], bool] = lambda: True) -> None:
-    """Wait until these sets of outputs were the last ones on, in this order, and `at` holds."""
+    """Wait until these sets of outputs have been on, in this order and as the last ones, and `at`
+    holds."""
     until(
         lambda: header.together(LIFT)[-len(outputs) :] == [*outputs] and at(),
         f"lines {outputs} are on, one set after the other",
@@ -71,10 +74,10 @@ def _killed(old: int, relays: set[int]) -> float:
 
 
 def _dies_at_start() -> float:
-    """Kill -9 a starting daemon when its `outputs-off` runs and the relays are still on.
+    """Kill -9 a daemon in its start. At that time its `outputs-off` runs, and the relays are still on.
 
-    First a daemon dies, and the `outputs-off` after its death dies too. Then the next daemon dies in
-    its start.
+    First a running daemon dies, and the `outputs-off` after its death dies too. So the next daemon
+    finds the relays on, and dies in its start.
     """
     old, running = pid(SERVICE), _group() / "cgroup.procs"
     _on(MODE, HOLD)
@@ -128,7 +131,8 @@ def out_of_memory() -> str:
 
 
 def _dies(act: Callable[[], object], within_s: float = KILLED_S) -> float:
-    """Let `act` end the daemon when two relays are on. Return the time until both were off (s)."""
+    """Let `act` end the daemon when two relays are on. Return the time until both relays were off
+    (s)."""
     relays, old = energise(), pid(SERVICE)
     when = header.now()
     act()
@@ -152,7 +156,7 @@ def _all_off(relays: Mapping[int, bool], when: float) -> dict[int, float]:
 
 
 def clean_stop() -> str:
-    """`systemctl stop` with two relays on: the daemon switches them off, and `outputs-off` finds no
+    """`systemctl stop` with two relays on. The daemon switches both off, and `outputs-off` finds no
     work."""
     relays, mark = energise(), cursor()
     when = header.now()
@@ -167,8 +171,8 @@ def clean_stop() -> str:
 
 
 def two_on_one_pin() -> str:
-    """`enable` refuses a second service on the lift's pins. Started by hand, it names the pins'
-    holder."""
+    """`enable` refuses a second service on the lift's pins. If started by hand, this service names the
+    holder of the pins."""
     copy = Path("/etc/rmf-bridges/second.yaml")
     copy.write_text(Path("/etc/rmf-bridges/lift.yaml").read_text().replace("Lift1", "Lift2"))
     sh("rmf-bridge", "enable", str(copy), fails=True)

@@ -1,4 +1,4 @@
-"""A service that does nothing, for comparison. `empty.py` serves, and `empty.py off` is its
+"""A service that does nothing, for comparison. `empty.py` is its program, and `empty.py off` its
 ExecStopPost."""
 
 import os

@@ -1,7 +1,7 @@
 """The equipment at the wires of a YAML: `python3 -m tests.vm.guest.far_side FILE`.
 
 The program runs in the package's own Python. It connects the plants of `hal_fakes/` to real wires:
-lines of gpio-sim, a pseudo-terminal, an interface of SocketCAN. The plants live on when the daemon
+lines of gpio-sim, a pseudo-terminal, or an interface of SocketCAN. The plants live on when the daemon
 dies.
 """
 
@@ -36,7 +36,7 @@ def main() -> int:
     stations = stations_on(config, bus, world.plants)
     threading.excepthook = lambda failed: os._exit(
         1
-    )  # an interface went down: systemd starts this program anew
+    )  # an interface has gone down: exit, and systemd starts this program again
     Control(Path(f"/run/far-{config.path.stem}"), world.plants)
     _serve(config, bus, stations)
     return 0
@@ -58,8 +58,8 @@ def _serve(config: Config, bus: str, stations: Sequence[object]) -> None:
 
 
 def _be_udev(adapter: Path, port: Path) -> None:
-    """Give the adapter a lasting name, and give the daemon access, each time somebody plugs the adapter
-    in."""
+    """Do udev's work whenever somebody plugs the adapter in. Give the adapter a lasting name, and give
+    the daemon access."""
     adapter.parent.chmod(0o755)
     port.parent.mkdir(parents=True, exist_ok=True)
     port.unlink(missing_ok=True)
@@ -73,9 +73,10 @@ def _be_udev(adapter: Path, port: Path) -> None:
 
 
 def _stand_at_header(wirings: Sequence[PlantWiring]) -> None:
-    """Follow the outputs and drive the inputs, again after each claim of a line.
+    """Follow the outputs and drive the inputs. Drive the inputs again after each claim of a line.
 
-    On gpio-sim a claimed input with a resistor reads the resistor's level. On a Pi the wire wins.
+    On gpio-sim a claimed input with a resistor shows the resistor's level. On a Pi the wire's level
+    wins.
     """
     driven: dict[str, bool] = {}
     _ready()

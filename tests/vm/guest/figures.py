@@ -1,4 +1,4 @@
-"""Times and memory compared with an empty Python service. Ratios do not depend on the machine."""
+"""Times and memory, compared with an empty Python service. Such ratios do not depend on the machine."""
 
 import re
 import time
@@ -9,7 +9,8 @@ from tests.vm.guest.system import KEPT, Wrong, kill, pid, ready_s, sh, unit, unt
 SERVICES = ("lift", "door", "charger", "lift_supervisor", "door_supervisor")
 WHOLE_MB = 200.0
 MOST = (25, 10, 10)
-"""The largest ratios to the empty service: start to ready, memory, kill -9 to off."""
+"""The highest permitted ratios to the empty service: time to ready, memory, time from kill -9 to
+off."""
 EMPTY = """
 [Service]
 Type=notify
@@ -29,8 +30,8 @@ def memory() -> str:
 
 
 def ratios() -> str:
-    """Lift, door and charger cost a bounded multiple of an empty Python service in start, memory and
-    time to off."""
+    """Lift, door and charger need at most a fixed multiple of an empty Python service. The test
+    compares start, memory and time to off."""
     Path("/run/systemd/system/empty.service").write_text(EMPTY)
     sh("systemctl", "daemon-reload")
     sh("systemctl", "start", "empty.service")
@@ -47,7 +48,7 @@ def ratios() -> str:
 
 
 def _ends() -> float:
-    """Return the time of the empty service from kill -9 to the end of its ExecStopPost (s)."""
+    """Return the time (s) from kill -9 of the empty service to the end of its ExecStopPost."""
     done, when = Path("/run/empty"), time.monotonic()
     done.unlink(missing_ok=True)
     kill("empty.service", "KILL")
@@ -56,6 +57,6 @@ def _ends() -> float:
 
 
 def pss_mb(service: str) -> float:
-    """Return the service's share of the memory (Pss of smaps_rollup), in MB."""
+    """Return the service's share of the memory (MB), as Pss of smaps_rollup."""
     text = Path(f"/proc/{pid(service)}/smaps_rollup").read_text()
     return int(re.findall(r"^Pss: +(\d+) kB", text, re.MULTILINE)[0]) / 1000

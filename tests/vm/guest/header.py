@@ -1,8 +1,8 @@
-"""The GPIO chip of a Raspberry Pi's header, simulated by gpio-sim, with every write to its outputs.
+"""The GPIO chip of a Raspberry Pi's header. gpio-sim simulates it, and a trace keeps every write.
 
 Sources are the kernel's admin-guide/gpio/gpio-sim.rst and its trace events of the group `gpio`. An
-output of gpio-sim falls when its line is released. So after a death only a traced write proves that a
-daemon switched it off; the level proves nothing.
+output of gpio-sim falls when its line is released. So after a death the level proves nothing. Only a
+traced write proves that a daemon has switched the output off.
 """
 
 import re
@@ -17,15 +17,16 @@ from typing import Final
 CONFIGFS: Final = Path("/sys/kernel/config/gpio-sim/header")
 TRACING: Final = Path("/sys/kernel/tracing")
 LABELS: Final = {"pinctrl-bcm2835": 54, "pinctrl-rp1": 54, "pinctrl-bcm2711": 58}
-"""Labels of the header's chips with their number of lines: Raspberry Pi 3 and older, 5, and 4."""
+"""The labels of the header's chips, with their number of lines. In this order: Raspberry Pi 3 and
+older, 5, and 4."""
 PI_4: Final = "pinctrl-bcm2711"
 OTHER: Final = "raspberrypi-exp-gpio"
-"""A chip beside the header's. Here it gets the lower chip number."""
+"""The label of a second chip. Here the second chip gets the lower chip number."""
 
 
 @dataclass(frozen=True, slots=True)
 class Write:
-    """A write to a line, with its time (monotonic s)."""
+    """A write to a line, with its time (s, monotonic clock)."""
 
     at: float
     line: int
@@ -40,7 +41,7 @@ def main() -> int:
 
 
 def plug(label: str) -> None:
-    """Make the header's chip and another chip."""
+    """Make the header's chip and a second chip."""
     for bank, name, lines in (("other", OTHER, 8), ("bank0", label, LABELS[label])):
         folder = CONFIGFS / bank
         folder.mkdir(parents=True)
@@ -67,7 +68,8 @@ def _lines() -> Path:
 
 
 def line(number: int) -> Path:
-    """Return the directory of a line. `pull` in it sets an input's level, and `value` shows a level."""
+    """Return the directory of a line. Its file `pull` sets an input's level, and its file `value` shows
+    a level."""
     return _lines() / f"sim_gpio{number}"
 
 
@@ -112,14 +114,15 @@ def _base() -> int:
 
 
 def on(lines: dict[int, bool], since: float = 0.0) -> dict[int, float]:
-    """Return the outputs whose last write was on, with its time (s). `lines` gives each line's level
-    for on."""
+    """Return the outputs whose last write was "on", with the time of that write (s). `lines` has the
+    level for "on" of each line."""
     last = {each.line: each for each in writes(since)}
     return {n: last[n].at for n, high in lines.items() if n in last and last[n].level == high}
 
 
 def together(lines: Mapping[int, bool]) -> list[set[int]]:
-    """Return the sets of these outputs that were on together, in order since the chip was made."""
+    """Return the sets of outputs that were on together, in order. Only these outputs count. The list
+    begins with the making of the chip."""
     found: list[set[int]] = [set()]
     for each in writes():
         if each.line in lines:
@@ -131,7 +134,8 @@ def together(lines: Mapping[int, bool]) -> list[set[int]]:
 
 
 def off_at(lines: Mapping[int, bool], after: float) -> dict[int, float]:
-    """Return the time (monotonic s) at which each line was first written off after `after`."""
+    """Return the first time (s, monotonic clock) later than `after` at which each line was written
+    off."""
     found: dict[int, float] = {}
     for each in writes(after):
         if each.line in lines and each.level != lines[each.line]:
@@ -140,7 +144,7 @@ def off_at(lines: Mapping[int, bool], after: float) -> dict[int, float]:
 
 
 def now() -> float:
-    """Return the time on the trace's clock."""
+    """Return the time of the clock that the trace uses."""
     return time.monotonic()
 
 

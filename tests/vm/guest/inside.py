@@ -1,23 +1,24 @@
-"""The demo and the transport tests, with the libraries from the installed package."""
+"""The demo and the transport tests. They use the libraries of the installed package."""
 
 from typing import Final
 
 from tests.vm.guest.system import PYTHON, Wrong, mounted, sh
 
 PATIENCE: Final = "6"
-"""Factor for the demo's waits compared with a laptop, because three daemons share one slow core."""
+"""The factor for the demo's waits. It is higher than on a laptop, because three daemons share a slow
+core."""
 
 
 def demo() -> str:
-    """In the demo on zenoh a robot passes the door, rides the lift and charges."""
-    suite = mounted("suite", "/media")  # this folder has the files of config/
+    """The demo on zenoh: a robot passes the door, rides the lift and charges."""
+    suite = mounted("suite", "/media")  # this folder holds the files of config/
     env = ("env", f"PYTHONPATH={suite}", "TRANSPORT=zenoh", "HOME=/root", "TERM=dumb")
     told = sh(*env, PYTHON, "-m", "hal_fakes.demo", "--patience", PATIENCE)
     return told.strip().splitlines()[-1].strip()
 
 
 def transport() -> str:
-    """The tests of zenoh pass. Zenoh is the transport that works here without ROS."""
+    """The tests of zenoh pass. Here only zenoh works without ROS."""
     suite = mounted("suite", "/media")
     tests = sorted(str(path) for path in (suite / "tests/transports").glob("test_zenoh_*.py"))
     path = f"PYTHONPATH={suite}:{suite / 'site'}"

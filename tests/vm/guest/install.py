@@ -1,4 +1,4 @@
-"""The installation of the packages, and of services from YAMLs."""
+"""The installation of the packages, and of services from YAML files."""
 
 import grp
 import time
@@ -28,7 +28,7 @@ from tests.vm.guest.system import (
 PAGE = "rmf-bridge-page.service"
 OURS = ("rmf-bridges", "rmf-bridges-workbench")
 EXPOSED = 2.0
-"""The score of `systemd-analyze security` that no unit may exceed."""
+"""The highest permitted score of a unit in `systemd-analyze security`."""
 
 
 def package() -> str:
@@ -51,14 +51,14 @@ def install(*files: Path) -> None:
 
 
 def debs(folder: str = ".", names: Sequence[str] = OURS) -> list[Path]:
-    """Return the packages of these names in the host's folder. The folder `next` has the next
+    """Return the packages of these names in a folder of the host. The folder `next` has the next
     version."""
     there = mounted("packages", "/srv") / folder
     return [file for (file,) in (there.glob(f"{name}_*.deb") for name in names)]
 
 
 def lift() -> str:
-    """After `rmf-bridge enable lift.yaml` the service starts, and is ready."""
+    """`rmf-bridge enable lift.yaml` starts a service, which becomes ready."""
     far_side("lift")
     name = enable("lift")
     return f"ready after {ready_s(name):.2f} s"
@@ -92,8 +92,8 @@ def wrong_yaml() -> str:
 
 
 def page() -> str:
-    """systemd starts the web page from its own package. The page answers, and stays below its memory
-    limit."""
+    """systemd starts the web page, which has its own package. The page answers, and stays below its
+    memory limit."""
     install(*debs(names=["rmf-bridges-page"]))
     began = time.monotonic()
     sh("systemctl", "start", PAGE)
@@ -120,7 +120,7 @@ def _answers() -> bool:
 
 
 def security() -> str:
-    """`systemd-analyze security` gives each live unit of ours at most 2.0, and this test's own unit
+    """`systemd-analyze security` gives each running unit of ours at most 2.0, and the test's own unit
     more."""
     scores = _scores()
     units = sh("systemctl", "list-units", "--plain", "--no-legend", "rmf-bridge*.service")
@@ -131,13 +131,13 @@ def security() -> str:
 
 
 def _scores() -> dict[str, float]:
-    """Return the exposure of each service, from 0 to 10."""
+    """Return the exposure score of each service, from 0 to 10."""
     table = (line.split() for line in sh("systemd-analyze", "security", "--no-pager").splitlines())
     return {words[0]: float(words[1]) for words in table if words and ".service" in words[0]}
 
 
 def upgrade() -> str:
-    """The next version is installed with two relays on. They go off and stay off, and the service
+    """The next version is installed while two relays are on. They go off and stay off, and the service
     returns."""
     service = unit("lift")
     relays, old = energise(), pid(service)

@@ -1,4 +1,4 @@
-"""A network that comes late, and that changes."""
+"""A network that comes up late, and that changes."""
 
 import time
 from typing import Final
@@ -6,14 +6,15 @@ from typing import Final
 from tests.vm.guest.system import Wrong, disable, enable, far_side, pid, sh
 
 SITE: Final = ("ip", "-n", "site")
-"""The start of a command on the other machine, a network namespace at the other end of a cable."""
+"""The start of a command on the other machine. A network namespace at the end of a cable stands in for
+it."""
 MOVES: Final = (("10.7.0", "open"), ("10.8.0", "close"))
-"""Each new network, and the request sent over it."""
+"""Each new network, with the request that is sent over it."""
 
 
 def late() -> str:
-    """The service starts without a network. When two networks come in turn, it fulfils requests on
-    each."""
+    """The service starts without a network. Then two networks come, one after the other. The service
+    fulfils a request on each network."""
     sh("ip", "netns", "add", "site")
     sh("ip", "link", "add", "eth0", "type", "veth", "peer", "name", "eth1", "netns", "site")
     sh(*SITE, "link", "set", "lo", "up")
@@ -30,8 +31,8 @@ def late() -> str:
 
 
 def _moved(addresses: str, word: str) -> float:
-    """Give both ends addresses of this network. Return the time from a request there until the door
-    moved."""
+    """Give both ends of the cable addresses of this network. Return the time (s) from a request on it
+    until the door moved."""
     for ip, name, last in ((("ip",), "eth0", 2), (SITE, "eth1", 3)):
         sh(*ip, "link", "set", name, "down")
         sh(*ip, "addr", "flush", "dev", name)

@@ -1,6 +1,6 @@
-"""Runs one check: `python3 -m tests.vm.guest.one deaths.phases` prints the function's result as JSON.
+"""Runs one check. `python3 -m tests.vm.guest.one deaths.phases` prints the function's result as JSON.
 
-A check returns its findings, or raises Wrong. The check's output goes to the log.
+A check returns its findings, or raises Wrong. The output of the check goes to the log.
 """
 
 import json
@@ -14,7 +14,7 @@ from tests.vm.guest.system import Wrong, sh
 
 
 def main() -> int:
-    """Run the check. After a failure the journal also goes to the log."""
+    """Run the check. After a failure, log the journal too."""
     module, _, function = sys.argv[1].partition(".")
     check = getattr(import_module(f"tests.vm.guest.{module}"), function)
     began = time.monotonic()

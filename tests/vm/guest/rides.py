@@ -1,4 +1,4 @@
-"""RMF's requests from outside the services."""
+"""RMF's requests, sent by a process outside the services."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,26 +10,26 @@ ROOM = ("--domain-id", "7", "--localhost")
 LIFT = dict.fromkeys((18, 16, 22, 23, 24), True)
 """The outputs of lift.yaml. Each is on at the level high."""
 HELD = [16, 18]
-"""The outputs that a session holds on: door and mode."""
+"""The outputs that a session holds on: the door's hold and AGV mode."""
 
 
 def send(*words: str, fails: bool = False) -> str:
-    """Send one of RMF's requests and wait for its effect. With `fails` the effect must not come in
+    """Send one of RMF's requests and wait for its effect. With `fails` fail if the effect comes in
     time."""
     return sh("rmf-bridge", "send", *words, *ROOM, fails=fails)
 
 
 @contextmanager
 def asking(*words: str) -> Iterator[None]:
-    """Send a request each second in the block, even to a service that restarts. Wait for the effect at
-    the end."""
+    """Send a request each second in the block, even if the service restarts. At the end wait for the
+    effect."""
     with beside("rmf-bridge", "send", *words, *ROOM, "--direct", "--timeout", "150"):
         yield
 
 
 def energise() -> dict[int, bool]:
-    """Let a session of the lift hold two relays on. Return the relays' lines, each with its level for
-    on."""
+    """Let a session of the lift hold two relays on. Return the lines of the relays, with the level for
+    "on"."""
     began = header.now()
     send("lift", "Lift1", "L1", "--session", "vm/robot", "--direct")
     until(lambda: sorted(header.on(LIFT, began)) == HELD, "two relays are on")
@@ -43,8 +43,8 @@ def end() -> None:
 
 
 def ride() -> str:
-    """A robot rides from L1 to L3 by requests from outside the service. The header's lines show the
-    ride."""
+    """A robot rides from L1 to L3. A process outside the service sends its requests. The header's lines
+    show the ride."""
     began = header.now()
     send("lift", "Lift1", "L1", "--session", "vm/robot", "--direct")
     send("lift", "Lift1", "L3", "--session", "vm/robot", "--direct")

@@ -12,9 +12,9 @@ from typing import Final, TypeVar
 CONFIG: Final = Path("/mnt/tests/vm/guest/config")
 PYTHON: Final = "/usr/lib/rmf-bridges/current/bin/python3"
 LATE_S: Final = 60.0
-"""The limit (s) for waits without their own limit."""
+"""The limit (s) of a wait that has no limit of its own."""
 KEPT: Final = Path("/var/lib/checks-kept")
-"""A file with one line for each service: the time from kill -9 until its relays were off (s)."""
+"""A file with one line for each service: the time (s) from kill -9 until its relays were off."""
 
 Found = TypeVar("Found")
 
@@ -24,7 +24,8 @@ class Wrong(Exception):
 
 
 def sh(*words: str, fails: bool = False) -> str:
-    """Return a command's output. Raises Wrong if its exit code is not 0, or with `fails` if it is 0."""
+    """Return a command's output. Without `fails` the exit code must be 0. With `fails` it must not be
+    0. Raises Wrong."""
     done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     print(f"{time.monotonic():.3f} $ {' '.join(words)} -> {done.returncode}\n{done.stdout}", end="")
     if (done.returncode != 0) is not fails:
@@ -34,7 +35,7 @@ def sh(*words: str, fails: bool = False) -> str:
 
 @contextmanager
 def beside(*words: str) -> Iterator[None]:
-    """Run a command during the block. Raises Wrong if its exit code is not 0."""
+    """Run a command in parallel with the block. Raises Wrong if its exit code is not 0."""
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as it:
         try:
             yield
@@ -92,23 +93,23 @@ def restarts(service: str) -> int:
 
 
 def ready_s(service: str) -> float:
-    """Return the time from the start of the service's process to its "ready" (s)."""
+    """Return the time (s) from the start of the service's process until it reported "ready"."""
     began = since_boot_s(service, "ExecMainStartTimestampMonotonic")
     return since_boot_s(service, "ActiveEnterTimestampMonotonic") - began
 
 
 def since_boot_s(service: str, name: str) -> float:
-    """Return the value of a property of a unit that is a time (monotonic s)."""
+    """Return a property of a unit that is a time (s, monotonic clock)."""
     return int(shown(service, name)[name]) / 1e6
 
 
 def kill(service: str, name: str) -> None:
-    """Send this signal to the service's main process alone."""
+    """Send this signal only to the service's main process."""
     sh("systemctl", "kill", "-s", name, "--kill-whom=main", service)
 
 
 def back(service: str, old: int) -> None:
-    """Wait until another process of this service is ready."""
+    """Wait until the service is ready with another process."""
 
     def look() -> bool:
         seen = shown(service, "MainPID", "ActiveState")
@@ -124,13 +125,13 @@ def keep(name: str, took_s: float) -> None:
 
 
 def cursor() -> str:
-    """Return the journal's present end."""
+    """Return a cursor at the present end of the journal."""
     text = sh("journalctl", "-n", "0", "--show-cursor")
     return text.partition("-- cursor: ")[2].strip()
 
 
 def journal(after: str, service: str) -> str:
-    """Return the journal of a service since `after`."""
+    """Return the journal of a service after the cursor `after`."""
     sh("journalctl", "--sync")
     return sh("journalctl", *_monotonic(after, service))
 
@@ -140,7 +141,7 @@ def _monotonic(after: str, service: str) -> tuple[str, ...]:
 
 
 def heard(after: str, service: str, pattern: str) -> float:
-    """Return the time (monotonic s) at which a service logged this pattern, after the cursor
+    """Return the time (s, monotonic clock) at which a service logged this pattern after the cursor
     `after`."""
     words = ["journalctl", "--follow", "--no-tail", *_monotonic(after, service)]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as follows:
@@ -159,7 +160,8 @@ def heard(after: str, service: str, pattern: str) -> float:
 
 
 def enable(name: str) -> str:
-    """Enable the service of one of our YAMLs, wait until the service is ready, and return its unit."""
+    """Enable the service of one of our YAML files, and wait until it is ready. Return the service's
+    unit."""
     sh("rmf-bridge", "enable", str(CONFIG / f"{name}.yaml"))
     until(lambda: is_active(unit(name)), f"{name} is ready")
     return unit(name)
@@ -171,7 +173,7 @@ def disable(name: str) -> None:
 
 
 def far_side(name: str) -> None:
-    """Connect the equipment of a YAML to its wires, until the next boot."""
+    """Connect the equipment of a YAML file to its wires, until the next boot."""
     given = (
         "Restart=always",
         "Type=notify",

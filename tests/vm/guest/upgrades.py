@@ -26,22 +26,24 @@ from tests.vm.guest.wires import tell
 
 SERVICES = ("lift", "door", "charger", "lift_supervisor", "door_supervisor", "low")
 OFF_S, READY_S = 12.0, 20.0
-"""Limits (s) in docs/explanation/reliability.md after a power cut, from the kernel's start."""
+"""Limits (s) after a power cut, from the start of the kernel. docs/explanation/reliability.md has
+them."""
 YAML = Path("/etc/rmf-bridges/lift.yaml")
 CURRENT = Path("/usr/lib/rmf-bridges/current")
 NOT_OURS = ("/var/cache/", "/run/systemd/", "/var/tmp/systemd-private-")
 """Files of apt, and files that systemd keeps for a unit until the next boot."""
 UPGRADE_S = 45.0
-"""The power cut comes within this time (s). A whole upgrade takes less."""
+"""The power cut comes within this time (s). A whole upgrade takes less time."""
 FORCE = ("dpkg", "--force-confold", "--install")
 BEFORE, NEXT = ".", "next"
-"""The folders of both versions, among the packages."""
+"""The folders of the two versions, below the folder of packages."""
 TARGET = Path("/var/lib/checks-target")
-"""The file with the packages whose installation the power cut interrupted."""
+"""A file that lists the packages whose installation the power cut interrupted."""
 
 
 def site() -> str:
-    """Lift, two doors, charger and both supervisors serve. Relays of the lift and of a door are on."""
+    """Lift, two doors, charger and both supervisors serve. Relays of the lift and of one door are
+    on."""
     enable("low")
     wait = [since_boot_s(unit(name), "ActiveEnterTimestampMonotonic") for name in SERVICES]
     send("door", "ward_door", "open", "--direct")
@@ -52,8 +54,8 @@ def site() -> str:
 
 
 def booted() -> str:
-    """After a power cut the whole site returns: outputs are off within 12 s, all services ready within
-    20 s."""
+    """After a power cut the whole site returns. Outputs are off within 12 s, and all services ready
+    within 20 s."""
     until(lambda: all(map(is_active, map(unit, SERVICES))), "every service is ready")
     first, on = _first_writes()
     ready = {n: since_boot_s(unit(n), "ActiveEnterTimestampMonotonic") for n in SERVICES}
@@ -68,17 +70,17 @@ def booted() -> str:
 
 
 def _first_writes() -> tuple[float, list[header.Write]]:
-    """Return the time of the first write to the last lift output, and the writes that switched an
-    output on."""
+    """Return the time of the first write to the lift's last output. Return also the writes that
+    switched an output on."""
     writes = [each for each in header.writes() if each.line in LIFT]
     if {each.line for each in writes} != LIFT.keys():
-        raise Wrong(f"writes: {writes}")
+        raise Wrong(f"not every output of the lift was written; writes: {writes}")
     first = {line: min(w.at for w in writes if w.line == line) for line in LIFT}
     return max(first.values()), [each for each in writes if each.level == LIFT[each.line]]
 
 
 def _wires_back() -> None:
-    """Start the equipment at the wires again, because the boot has ended its process."""
+    """Start the equipment at the wires again. The boot has ended its process."""
     if not Path("/sys/class/net/vcan0").exists():
         sh("ip", "link", "add", "vcan0", "type", "vcan")
         sh("ip", "link", "set", "vcan0", "up")
@@ -88,35 +90,37 @@ def _wires_back() -> None:
 
 
 def version() -> str:
-    """Return the package's version from dpkg."""
+    """Return the package's version, as dpkg reports it."""
     return sh("dpkg-query", "-W", "-f", "${Version}", "rmf-bridges")
 
 
 def _states() -> str:
-    """Return each package's state and version from dpkg."""
+    """Return each package's state and version, as dpkg reports them."""
     return sh("dpkg-query", "-W", "-f", "${db:Status-Status} ${Version}, ", *OURS).rstrip(", ")
 
 
 def _is_whole() -> bool:
-    """Return whether dpkg has all packages installed in one version."""
+    """Return whether dpkg has all packages installed, all in the same version."""
     states = set(_states().split(", "))
     return len(states) == 1 and states.pop().startswith("installed ")
 
 
 def _force(folder: str, fails: bool = False) -> str:
-    """Install the packages of this folder with dpkg alone, as after a power cut. Return dpkg's
-    output."""
+    """Install the packages of this folder with dpkg alone, as a person does after a power cut. Return
+    dpkg's output."""
     return sh(*FORCE, *map(str, debs(folder)), fails=fails)
 
 
 def _held() -> dict[int, bool]:
-    """Hold two relays on. The supervisor is stopped, because it would end an unknown session."""
+    """Hold two relays on. The supervisor is stopped, because it would end a session that it does not
+    know."""
     sh("systemctl", "stop", unit("lift_supervisor"))
     return energise()
 
 
 def _status() -> str:
-    """Return the exit code of `rmf-bridge status`: 0 well, 1 faults, 2 a daemon died."""
+    """Return the exit code of `rmf-bridge status`: 0 if all is well, 1 for faults, 2 for a dead
+    daemon."""
     import subprocess
 
     done = subprocess.run(["rmf-bridge", "status"], capture_output=True, text=True)
@@ -127,7 +131,7 @@ def _status() -> str:
 
 
 def refused() -> str:
-    """An upgrade that refuses a YAML names file and line, and changes nothing else."""
+    """An upgrade that refuses a YAML names the file and the line, and changes nothing."""
     old, tree, text = pid(unit("lift")), CURRENT.readlink(), YAML.read_text()
     YAML.write_text(text + "flors: [L1]\n")
     try:
@@ -145,7 +149,8 @@ def refused() -> str:
 
 
 def absent() -> str:
-    """With a mended YAML and a missing adapter `dpkg --configure -a` starts every service."""
+    """After a correction of the YAML, `dpkg --configure -a` starts every service. An adapter is
+    missing."""
     tell("door", "fail ward_door server off")
     began = time.monotonic()
     told = sh("dpkg", "--configure", "-a")
@@ -161,19 +166,20 @@ def absent() -> str:
 
 
 def back() -> str:
-    """The earlier version is installed with two relays on. They go off, and every service returns."""
+    """The earlier version is installed while two relays are on. They go off, and every service
+    returns."""
     relays, when = _held(), header.now()
     _force(BEFORE)
     sh("systemctl", "start", unit("lift_supervisor"))
     off = header.off_at(relays, when)
     if off.keys() != relays.keys() or not all(map(is_active, map(unit, SERVICES))):
-        raise Wrong(f"{version()}: off {off}")
+        raise Wrong(f"version {version()}, relays written off: {off}")
     return f"{version()}: off after {max(off.values()) - when:.1f} s, all serve, status {_status()}"
 
 
 @contextmanager
 def _full() -> Iterator[None]:
-    """Fill the disk until the end of the block, also for root."""
+    """Fill the disk for everybody, even for root, until the end of the block."""
     filler = Path("/var/filler")
     try:
         with filler.open("wb") as out:
@@ -187,11 +193,11 @@ def _full() -> Iterator[None]:
 
 
 def full_var() -> str:
-    """/var and its disk are full. `enable`, a ride and an upgrade leave all services running."""
+    """/var and its disk are full. All services keep running through `enable`, a ride and an upgrade."""
     with _full():
         sh(
             "sh", "-c", f"rmf-bridge enable {YAML} || true"
-        )  # the room of its old record may suffice for `enable`
+        )  # the space of its old record may be enough for `enable`
         until(lambda: is_active(unit("lift")), "the lift's service is back")
         energise()
         _status()
@@ -221,8 +227,8 @@ def cut() -> str:
 
 
 def completed() -> str:
-    """After that power cut outputs are off at boot, and all services serve one version. dpkg completes
-    the other version, and all services serve."""
+    """After that power cut the outputs are off at boot, and all services serve one version. dpkg
+    completes the other version, and all services serve that version."""
     moment = Path("/var/lib/checks-moment").read_text()
     until(lambda: all(map(is_active, map(unit, SERVICES))), "every service is ready")
     first, on = _first_writes()

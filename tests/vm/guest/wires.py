@@ -1,4 +1,4 @@
-"""A door on RS-485 and a charger on CAN. The relays of these services lie at the far end of a wire."""
+"""A door on RS-485 and a charger on CAN. Their relays lie at the far end of a wire."""
 
 import json
 import socket
@@ -27,13 +27,13 @@ KILLED_S: Final = 2.0
 
 
 def door_service() -> str:
-    """`rmf-bridge enable` starts a door on RS-485 whose port is a pseudo-terminal."""
+    """`rmf-bridge enable` starts a door on RS-485. Its serial port is a pseudo-terminal."""
     far_side("door")
     return f"ready after {ready_s(enable('door')):.2f} s"
 
 
 def door() -> str:
-    """A request holds a door on RS-485 open, and another request closes the door."""
+    """One request holds a door on RS-485 open, and another request closes it."""
     began = time.monotonic()
     send("door", "ward_door", "open", "--direct")
     opened = time.monotonic() - began
@@ -48,7 +48,7 @@ def door_killed() -> str:
 
 
 def adapter_pulled() -> str:
-    """A fault comes when the RS-485 adapter is pulled out, and ends when the adapter is plugged in."""
+    """The RS-485 adapter is pulled out and a fault comes. It is plugged in and the fault ends."""
     return _fault_ends(
         "door ward_door usb-rs485",
         lambda: tell("door", "fail ward_door server off"),
@@ -82,14 +82,13 @@ def _charge(request: str) -> None:
 
 
 def charger_killed() -> str:
-    """After kill -9 of a charger's service in a charge the CAN receiver gets the command to stop."""
+    """kill -9 of a charger's service during a charge. The CAN receiver gets the command to stop."""
     _charge("vm-2")
     return _killed("charger")
 
 
 def interface_down() -> str:
-    """A fault names the CAN interface when the interface goes down, and ends when the interface is
-    up."""
+    """The CAN interface goes down and a fault names it. The interface goes up and the fault ends."""
     return _fault_ends(
         "charger charger_b vcan0",
         lambda: sh("ip", "link", "set", "vcan0", "down"),
@@ -98,8 +97,8 @@ def interface_down() -> str:
 
 
 def bus_off() -> str:
-    """A fault names bus-off when the CAN controller reports bus-off, and ends when the controller
-    recovers."""
+    """The CAN controller reports bus-off and a fault names it. The controller recovers and the fault
+    ends."""
     return _fault_ends(
         "charger charger_b bus-off",
         lambda: tell("charger", "fail charger_b bus wrong"),
@@ -134,7 +133,7 @@ def _killed(name: str) -> str:
 
 
 def _relay_off_at(name: str, act: Callable[[], object]) -> float:
-    """Return the time (monotonic s) at which `act` made a relay of this far side go off."""
+    """Return the time (s, monotonic clock) at which `act` made a relay of this far side go off."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as control, control.makefile() as lines:
         control.settimeout(LATE_S)
         control.connect(f"/run/far-{name}")

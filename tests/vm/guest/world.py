@@ -1,4 +1,4 @@
-"""Changes around a service: its YAML, its disks, its clock, the model of the Pi."""
+"""Changes around a service: its YAML file, its disks, its clock, and the model of the Pi."""
 
 import os
 import re
@@ -14,20 +14,20 @@ from tests.vm.guest.system import Wrong, back, far_side, is_active, kill, pid, s
 SERVICE = unit("lift")
 YAML = Path("/etc/rmf-bridges/lift.yaml")
 MOVED = {"BCM18": "BCM25", "BCM16": "BCM26"}
-"""Pins of the outputs that a session holds, each with a free pin."""
+"""The pins of the outputs that a session holds on, each with a free pin to replace it."""
 EVENT = re.compile(r"[a-z_]+( [a-z_]+=\S|$)")
 SYSRQ = Path("/proc/sysrq-trigger")
 STEPS = (10, -20, 10)
-"""Steps of the clock (years): ten ahead, then ten behind, then right again."""
+"""The steps of the clock (years): ten years ahead, then ten years behind, then right again."""
 MEANWHILE_S = 12.0
-"""A time (s) above the watchdog's and a node's lease, so that a sleep by the wall clock shows
-itself."""
+"""A pause (s) longer than the leases of the watchdog and of a node. A sleep by the wall clock would
+show."""
 HEARD_S = 20.0
-"""The latest effect (s) of a request after a step. The ride takes 5 s of this time."""
+"""The time (s) within which a request must take effect after a step. The ride takes 5 s of it."""
 
 
 def edited_yaml() -> str:
-    """The YAML gets other pins when two relays are on. After kill -9 the old pins go off."""
+    """The YAML file gets other pins while two relays are on. After kill -9 the old pins go off."""
     relays, old, text = energise(), pid(SERVICE), YAML.read_text()
     YAML.write_text(re.sub("|".join(MOVED), lambda found: MOVED[found[0]], text))
     when = header.now()
@@ -40,7 +40,7 @@ def edited_yaml() -> str:
         YAML.write_text(text)
         sh("systemctl", "restart", SERVICE)
     if new != {25, 26}:
-        raise Wrong(f"the service has written the new pins {new}")
+        raise Wrong(f"of the new pins the service has written only {sorted(new)}")
     return f"old pins off after {took:.2f} s, back with the new ones"
 
 
@@ -64,7 +64,7 @@ def full_run() -> str:
 
 
 def clock() -> str:
-    """The clock steps by ten years, forth and back. Two relays stay on, and the service fulfils
+    """The clock steps by ten years, ahead and back. Two relays stay on, and the service fulfils
     requests."""
     relays, old, waits = energise(), pid(SERVICE), []
     for years, floor in zip(STEPS, ("L3", "L1", "L3"), strict=True):
@@ -81,7 +81,7 @@ def clock() -> str:
 
 
 def _goes_to(floor: str) -> float:
-    """Return the time (s) until a new node's request takes effect. The session's relays must stay
+    """Return the time (s) until a request of a new node takes effect. The session's relays must stay
     on."""
     began = header.now()
     send("lift", "Lift1", floor, "--session", "vm/robot", "--direct")
@@ -92,11 +92,11 @@ def _goes_to(floor: str) -> float:
 
 
 def read_only_root() -> str:
-    """With a read-only root file system the service starts and serves, and after its death outputs are
+    """The root file system is read only. The service starts and serves. After its death the outputs are
     off."""
     sh("systemctl", "stop", SERVICE)
     sh("journalctl", "--relinquish-var")
-    SYSRQ.write_text("u")  # remounts the root read only, as the kernel does for a damaged disk
+    SYSRQ.write_text("u")  # this makes the root read only, as the kernel does for a damaged disk
     until(lambda: "ro" in _options("/"), "the root is read only")
     try:
         sh("systemctl", "start", SERVICE)
@@ -120,7 +120,7 @@ def _options(mount: str) -> set[str]:
 def labels() -> str:
     """The service finds the header's chip by its label on Raspberry Pi 3, 5 and 4."""
     sh("systemctl", "stop", SERVICE, "far-lift.service")
-    for label in header.LABELS:  # the other checks use the last label
+    for label in header.LABELS:  # the last label stays for the other checks
         header.unplug()
         header.plug(label)
         sh("udevadm", "settle")
@@ -131,7 +131,7 @@ def labels() -> str:
 
 
 def _claims(label: str, lines: Iterable[int]) -> None:
-    """Start the service until it has written each output, then stop the service."""
+    """Start the service, wait until it has written each output, and stop it."""
     when = header.now()
     sh("systemctl", "start", SERVICE)
     written = {each.line for each in header.writes(when)}
@@ -141,11 +141,13 @@ def _claims(label: str, lines: Iterable[int]) -> None:
 
 
 def said() -> str:
-    """The journal is readable: a line for each event, key=value, no traceback."""
+    """The journal is readable. It has one line for each event, with key=value, and no traceback."""
     text = sh("journalctl", "-b", "-u", SERVICE, "-o", "cat", "-t", "rmf-bridge")
     lines = text.splitlines()
     if not lines:
         raise Wrong("the journal has no line of the service")
     if others := [line for line in lines if not EVENT.match(line)]:
-        raise Wrong(f"{len(others)} of {len(lines)} lines: {others[0]}")
+        raise Wrong(
+            f"{len(others)} of {len(lines)} log lines have another form, first: {others[0]}"
+        )
     return f"{len(lines)} lines, the longest has {max(map(len, lines))} characters"

@@ -1,1 +1,1 @@
-"""A helper module beside the buses. It is no bus."""
+"""A helper module in the folder of the buses. It is not a bus."""

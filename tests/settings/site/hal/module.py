@@ -1,4 +1,4 @@
-"""A bus whose points have names in words. A table shows these names unchanged."""
+"""A bus whose points have names in words. The wiring table shows these names unchanged."""
 
 from typing import Annotated
 
@@ -16,7 +16,7 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 def canonical(point: str) -> str:
-    """Return the only spelling of the point."""
+    """Return the point in its only spelling."""
     if not point.startswith("coil "):
         raise ValueError(f"{point!r}: write coil and its number")
     return point

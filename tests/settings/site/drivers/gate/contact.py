@@ -1,4 +1,4 @@
-"""A driver with wires. Its structs have every type of field that a struct may have."""
+"""A driver with wires. Its structs have a field of each type that a struct may have."""
 
 from enum import Enum
 from typing import Annotated, Literal
@@ -30,7 +30,7 @@ class Lane(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Every type of number."""
+    """Limits with each type of number."""
 
     open_s: Annotated[float, Meta(ge=0.1, le=60, extra={"unit": "s"})] = 5.0
     close_s: Seconds | None = None
@@ -42,7 +42,7 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     label: Annotated[str, Meta(pattern="^[a-z]+$", extra={"pattern": "a small word"})] | int = 0
 
     def problems(self) -> Remarks:
-        """Yield problems between several fields."""
+        """Yield conflicts between several fields."""
         if self.close_s is not None and self.close_s > self.open_s:
             yield ("close_s",), "'close_s' may not be longer than 'open_s'"
 
@@ -58,7 +58,7 @@ class Settings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=
     limits: Limits = Limits()
 
     def problems(self) -> Remarks:
-        """Yield the codes that name an unknown lane."""
+        """Yield a problem for each code that names an unknown lane."""
         for code, lane in self.codes.items():
             if lane not in self.lanes:
                 yield ("codes", str(code)), f"code {code} is no lane: '{lane}'"

@@ -1,4 +1,4 @@
-"""A kind of device that only the loader's tests know."""
+"""A kind of device for the loader's tests only."""
 
 from typing import Any
 
