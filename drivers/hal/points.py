@@ -254,6 +254,11 @@ class Points:
             {point for w, point in self._out.values() if not w.read_back},
             {point: w.clearing for w, point in self._out.values() if w.clearing},
         )
+        self._unread = {signal for signal, (wire, _) in self._out.items() if not wire.read_back}
+        self._driven = {point for _, point in self._out.values()}
+        self._renews = isinstance(self._lines, RenewedLines)
+        self._levels: Mapping[str, int] = {}
+        self._here: dict[str, bool] = {}
         self._read: dict[str, bool] = {}
         self._written: dict[str, bool] | None = None
 
@@ -267,17 +272,23 @@ class Points:
         self._lines.claim()
 
     def read(self) -> dict[str, bool]:
-        """Return for each input whether it is asserted. After a failure of the device's own bus, the
-        next `write` writes all outputs again.
+        """Return for each input whether it is asserted. If no input has changed, the call returns the
+        same object again. After a failure of the device's own bus, the next `write` writes all outputs
+        again.
 
         Raises DriverError also while the inputs of another bus are unknown.
         """
         written, self._written = self._written, None
         levels = self._lines.read()
-        kept = (written or {}).items()
-        self._written = {s: on for s, on in kept if self._out[s][1] not in levels}
-        here = {s: w.asserted(levels[point]) for s, (w, point) in self._in.items()}
-        self._read = {**here, **self._elsewhere()}
+        kept = written or {}
+        if not self._driven.isdisjoint(levels):
+            kept = {s: on for s, on in kept.items() if self._out[s][1] not in levels}
+        self._written = kept
+        if levels != self._levels or not self._here:
+            self._here = {s: w.asserted(levels[point]) for s, (w, point) in self._in.items()}
+            self._levels = levels
+        elsewhere = self._elsewhere()
+        self._read = {**self._here, **elsewhere} if elsewhere else self._here
         return self._read
 
     def last_known(self) -> dict[str, bool]:
@@ -288,9 +299,10 @@ class Points:
     def write(self, asserted: Mapping[str, bool]) -> None:
         """Set every output. Outputs that go off come first, so that exclusive outputs never overlap."""
         wanted = {signal: asserted.get(signal, False) for signal in self._out}
+        if wanted == self._written and not (self._unread or self._renews):
+            return
         known = self._written or {}
-        unread = {s for s, (wire, _) in self._out.items() if not wire.read_back}
-        changed = [s for s in wanted if known.get(s) != wanted[s] or s in unread]
+        changed = [s for s in wanted if known.get(s) != wanted[s] or s in self._unread]
         kept = [self._out[s][1] for s in wanted if wanted[s] and s not in changed]
         for turning_on in (False, True):
             levels = {

@@ -63,14 +63,24 @@ class DryContactLift(OnPoints):
         super().__init__(Points(wires(settings), bus))
         self._settings = settings
         self._conditional = lift_table.conditional(settings)
+        self._shown: Mapping[str, bool] = {}
+        self._sample: LiftSample | None = None
+        self._outputs: LiftOutputs | None = None
+        self._lines: Mapping[str, bool] = {}
 
     def read(self) -> LiftSample:
-        """Read and decode every input now."""
-        return decode(self._settings, self._points.read(), self._conditional)
+        """Read every input now. Decode the inputs if one has changed."""
+        shown = self._points.read()
+        if self._sample is None or shown is not self._shown:
+            self._shown = shown
+            self._sample = decode(self._settings, shown, self._conditional)
+        return self._sample
 
     def write(self, outputs: LiftOutputs) -> None:
         """Set every output to this level. Outputs that go off come first."""
-        self._points.write(encode(self._settings, outputs))
+        if outputs != self._outputs:
+            self._outputs, self._lines = outputs, encode(self._settings, outputs)
+        self._points.write(self._lines)
 
 
 def encode(settings: DryContactLiftSettings, outputs: LiftOutputs) -> dict[str, bool]:

@@ -180,10 +180,10 @@ class GpioLines:
             raise HalError(DROPPED)
 
     def _levels(self, points: Iterable[str]) -> dict[str, bool]:
-        levels = {}
+        levels, claimed = {}, self._claimed
         for point in points:
             try:
-                levels[point] = bool(self._of(point).state)
+                levels[point] = bool((claimed.get(point) or self._of(point)).state)
             except _failures() as error:
                 raise _hal_error(point, error) from error
         return levels

@@ -10,6 +10,7 @@ because it costs 15 MB of memory.
 
 import logging
 import struct
+from functools import lru_cache
 from typing import Final
 
 from pymodbus.exceptions import ModbusException
@@ -31,12 +32,14 @@ from pymodbus.pdu.register_message import (
     WriteSingleRegisterResponse,
 )
 
-from drivers.hal.modbus.wire import BadReply, UnitReply, UnitRequest
+from drivers.hal.modbus.wire import READS, BadReply, UnitReply, UnitRequest
 
 logging.getLogger("pymodbus.logging").setLevel(
     logging.CRITICAL
 )  # HalErrors report the same failures
 
+KEPT: Final = 1024
+"""The number of requests whose frames are kept, because a poll sends the same requests again."""
 FAILURES: Final = (ModbusException, struct.error, IndexError, ValueError)
 """The errors that pymodbus raises for bytes that are not a reply."""
 
@@ -122,7 +125,12 @@ RTU: Final = FramerRTU(DECODER)
 def tcp_request(question: UnitRequest, number: int) -> bytes:
     """Return the request's frame on TCP. `number` is the transaction number, which must not be 0.
     Raises BadReply."""
-    return TCP.buildFrame(_request(question, number))
+    return number.to_bytes(2, "big") + _after_number(question)
+
+
+@lru_cache(maxsize=KEPT)
+def _after_number(question: UnitRequest) -> bytes:
+    return TCP.buildFrame(_request(question, 1))[2:]
 
 
 def tcp_answer(question: UnitRequest, number: int, heard: bytes) -> tuple[int, UnitReply | None]:
@@ -182,15 +190,29 @@ def _request(question: UnitRequest, number: int = 0) -> ModbusPDU:
     return REQUESTS[function](*where, count=question.value)
 
 
+_last: Final[dict[UnitRequest, tuple[bytes, UnitReply]]] = {}
+"""The last reply to each request that reads, and its answer. Most polls bring the same reply again."""
+
+
 def _decoded(question: UnitRequest, content: bytes) -> UnitReply:
     """Decode the answer from a frame's function and data. Raises BadReply."""
+    last = _last.get(question)
+    if last is not None and last[0] == content:
+        return last[1]
+    answer = _answer(question, _reply(content))
+    if question.function in READS.values():
+        _last[question] = content, answer
+    return answer
+
+
+def _reply(content: bytes) -> ModbusPDU:
     try:
         reply = DECODER.decode(content)
     except FAILURES as error:
         raise BadReply(str(error)) from error
     if reply is None:
         raise BadReply(f"{content.hex(' ')} does not decode")
-    return _answer(question, reply)
+    return reply
 
 
 def _answer(question: UnitRequest, reply: ModbusPDU) -> UnitReply:

@@ -47,11 +47,12 @@ class Image:
     def _part(self, part: Range, asked: list[Range], safe: bool) -> dict[Point, int]:
         """Make one request. If the module lacks an address between used points, later requests leave
         that address out."""
-        parts = pieces(part, self._points)
-        if len(parts) == 1 or not self._units.refused.within(part):
+        parts = pieces(part, self._points) if self._units.refused.within(part) else []
+        if len(parts) < 2:
             try:
                 return self._units.read(part, safe)
             except UnitException as refusal:
+                parts = pieces(part, self._points)
                 if refusal.code != ILLEGAL_ADDRESS or len(parts) == 1:
                     raise
             self._units.refused.add(part)
@@ -87,6 +88,11 @@ class ModbusLines:
         self._back = Image(units, back)
         self._all = Image(units, [*(point.cell for point in inputs.values()), *back])
         self._calls = ClearedCalls(units.now, units.scan_s, safe, clearing)
+        self._clearing = bool(clearing)
+        self._verified: tuple[dict[str, int], dict[Point, int]] | None = None
+        """The written values and the readings that `read` has compared last. A place that clears itself
+        is judged by the time too."""
+        self._levels: dict[str, int] = {}
         self._set: dict[str, int] = {}
         self._touched = False
         self._claimed = False
@@ -121,10 +127,15 @@ class ModbusLines:
         known, self._set = self._set, {}
         self._guard.check()
         image = self._all.read()
+        if self._verified == (known, image):
+            self._set = known
+            return self._levels
         self._verify(known, image)
         lost = self._lost(known, image)
         self._set = {name: value for name, value in known.items() if name not in lost}
-        return {**lost, **{name: p.of(image[p.cell]) for name, p in self._inputs.items()}}
+        self._levels = {**lost, **{n: p.of(image[p.cell]) for n, p in self._inputs.items()}}
+        self._verified = None if self._clearing else (dict(known), image)
+        return self._levels
 
     def bring(self, values: Mapping[str, int]) -> None:
         """Set these outputs. Skip an output that certainly has its value already. Raises HalError.

@@ -10,6 +10,7 @@ holding register 0 is 40001. Such a number is refused, and the error suggests th
 
 import re
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from typing import Final, Literal
 
 from msgspec import Struct
@@ -98,7 +99,8 @@ class Range(Struct, frozen=True):
             return f"{self.table} {self.start}"
         return f"{self.table}s {self.start} to {self.start + self.count - 1}"
 
-    def points(self) -> list[Point]:
+    @lru_cache(maxsize=1024)  # noqa: B019 - a range lives as long as its device
+    def points(self) -> Sequence[Point]:
         """Return every point in the range, in the order of the reply."""
         return [Point(self.unit, self.table, self.start + i) for i in range(self.count)]
 
