@@ -92,6 +92,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
             lambda memory, event, now: kind.decide(memory, event, now, limits),
             lambda report, now: kind.summary(report),
             self._identity,
+            kind.repeated,
         )
         self.subject = Subject(name, memory, core, publish, self._refusals, clock, writer)
         self._pace = PublishPace()
@@ -130,19 +131,36 @@ class Node(Generic[S, L, M, X, E, O, R]):
         started = self._clock.monotonic()
         self._failing = False
         self._bus_words.clear()
-        self._decide(self._read())
-        for event in events:
-            if isinstance(event, OperatorReset):  # the next scan claims a failed device again
-                self._open = self._open and not self._io_fault
-            self._decide(event)
-        self._keep()
-        self._write()
+        reading, events = self._read(), tuple(events)
+        if not events and self._is_nothing_new(reading, started):
+            self._write()
+            if not self._failing:
+                self._count(self._clock.monotonic() - started)
+                return
+        else:
+            self._decide_all(reading, events)
         self._count(self._clock.monotonic() - started)
         self._contacts = {} if self._failing else self._driver.contacts()
         self._alarm()
         self._tell()
         self._answer()
         self._log()
+
+    def _is_nothing_new(self, reading: Sampled[X] | IoFailed, now: float) -> bool:
+        """Return whether this reading only repeats the last one, and nothing is due."""
+        due = now >= self.wake_at or (self._tell_alarm is not None and now >= self._alarm_at)
+        return not due and self.subject.read_again(reading)
+
+    def _decide_all(
+        self, reading: Sampled[X] | IoFailed, events: Iterable[DeviceEvent[X, E]]
+    ) -> None:
+        self._decide(reading)
+        for event in events:
+            if isinstance(event, OperatorReset):  # the next scan claims a failed device again
+                self._open = self._open and not self._io_fault
+            self._decide(event)
+        self._keep()
+        self._write()
 
     def make_safe(self) -> bool:
         """Switch every output off. If an output is not verified off, log this and return False."""

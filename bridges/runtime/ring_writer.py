@@ -31,8 +31,8 @@ KNOWN_EVERY_S: Final = 60.0
 """The interval (s) at which all known state is written again. A recording can begin at such a place."""
 MOST_WAITING: Final = 20_000
 SAME_AT_ONCE: Final = 20
-"""The number of unchanged readings in one entry. A kill of the daemon loses at most this number of
-readings."""
+"""The number of unchanged readings in one entry. A kill of the daemon loses at most twice this number
+of readings of a device."""
 LONGEST_SAME: Final = 400
 """The maximum size (bytes) of an entry with unchanged readings."""
 MOST_SPOKEN_PER_S: Final = 200.0
@@ -47,9 +47,17 @@ class NoWriter:
     """The writer of a daemon that does not record. It has the interface of `RingWriter`."""
 
     def decided(
-        self, subject: str, before: object, event: object, now: float, decision: AnyDecision
+        self,
+        subject: str,
+        before: object,
+        event: object,
+        now: float,
+        decision: AnyDecision,
+        *,
+        again: bool = False,
     ) -> None:
-        """Note a core's decision. `before`: the subject's memory before the decision."""
+        """Note a core's decision. `before`: the subject's memory before the decision. `again`: the same
+        reading came again, and changed nothing."""
 
     def published(self, subject: str, memory: object, now: float) -> None:
         """Note that a report was published. `memory`: the core's memory after the publication."""
@@ -64,7 +72,8 @@ class NoWriter:
         known."""
 
     def flush(self) -> None:
-        """Write the noted events. The daemon calls this method when nothing urgent waits."""
+        """Write the noted events. The daemon calls this method when nothing urgent waits. A few repeated
+        readings wait for the next call."""
 
     def look(self) -> None:
         """Make a new ring if needed. The daemon's main thread calls this method each second."""
@@ -94,33 +103,42 @@ class RingWriter(NoWriter):
         self._waiting: deque[tuple[Any, ...]] = deque(maxlen=MOST_WAITING)
         self._once = Once()
         self._again_at = AGES_AGO
+        self._news = True
         self._dead = False
         self._fresh()
         self.look()
 
     def decided(
-        self, subject: str, before: object, event: object, now: float, decision: AnyDecision
+        self,
+        subject: str,
+        before: object,
+        event: object,
+        now: float,
+        decision: AnyDecision,
+        *,
+        again: bool = False,
     ) -> None:
         self._waiting.append((self._step, subject, before, event, now, decision))
+        self._news |= not again
 
     def published(self, subject: str, memory: object, now: float) -> None:
-        self._waiting.append((self._published, subject, memory, now))
+        self._note(self._published, subject, memory, now)
 
     def forgotten(self, subject: str, now: float) -> None:
-        self._waiting.append((self._forgotten, subject, now))
+        self._note(self._forgotten, subject, now)
 
     def spoken(
         self, topic: str, message: Message, *, sent: bool, sender: Sender | None = None
     ) -> None:
-        self._waiting.append((self._spoken, self._clock.monotonic(), topic, message, sent, sender))
+        self._note(self._spoken, self._clock.monotonic(), topic, message, sent, sender)
 
     def died(self, reason: str) -> None:
         self._dead = True
-        self._waiting.append((self._last, entries.DaemonDied(self._clock.monotonic(), reason)))
+        self._note(self._last, entries.DaemonDied(self._clock.monotonic(), reason))
         self.flush()
 
     def ended(self, *, safe: bool) -> None:
-        self._waiting.append((self._last, entries.DaemonEnded(self._clock.monotonic(), safe)))
+        self._note(self._last, entries.DaemonEnded(self._clock.monotonic(), safe))
         self.flush()
         with self._lock, suppress(OSError):
             ring, self._ring = self._ring, None
@@ -128,7 +146,13 @@ class RingWriter(NoWriter):
             if ring is not None:
                 ring.close(ended=safe and not self._dead)
 
+    def _note(self, *entry: Any) -> None:
+        self._waiting.append(entry)
+        self._news = True
+
     def flush(self) -> None:
+        if not self._news and len(self._waiting) < SAME_AT_ONCE:
+            return
         if self._lock.acquire(blocking=False):  # otherwise another thread is flushing
             try:
                 self._drain()
@@ -145,6 +169,7 @@ class RingWriter(NoWriter):
                 self._again_at = now
             if self._ring is None and now >= self._again_at:
                 self._open(now)
+        self._news = True  # so that repeated readings wait for a second at most
         self.flush()
 
     def _open(self, now: float) -> None:
@@ -174,7 +199,7 @@ class RingWriter(NoWriter):
         self._offset_s = 0.0
 
     def _drain(self) -> None:
-        waiting = self._waiting
+        waiting, self._news = self._waiting, False
         if self._ring is None:
             waiting.clear()
             return

@@ -8,8 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Generic, TypeVar
 
 from msgspec import Struct
+from msgspec.structs import replace
 
-from bridges.kinds.shared.decision import Decision, Fault, M, O, OrderedByPerson, R
+from bridges.kinds.shared.decision import Decision, Fault, M, O, OrderedByPerson, R, Sampled
 from bridges.kinds.shared.durations import NEVER
 from bridges.messages.definitions import Message
 from bridges.messages.topics import Topic
@@ -37,12 +38,14 @@ class SubjectCore(Struct, Generic[M, V, O, R], frozen=True):
     - `decide(memory, event, now)`: one step of the core
     - `summary(report, now)`: keys and values for the log and the status file
     - `identity(fault)`: a value that is equal in all reports of one fault. So the fault is logged once.
+    - `repeated(memory, now)`: as in `Kind`; None if the core must decide on every event
     """
 
     word: str
     decide: Callable[[M, V, float], Decision[M, O, R]]
     summary: Callable[[R, float], Mapping[str, str]]
     identity: Callable[[Fault], object]
+    repeated: Callable[[M, float], M] | None = None
 
 
 class Subject(Generic[M, V, O, R]):
@@ -66,6 +69,8 @@ class Subject(Generic[M, V, O, R]):
         self.ordered: tuple[object, str] = (None, "")
         self._core = core
         self._whose = {core.word: name}
+        self._event: object = None
+        self._is_steady = False
         self._publish = publish
         self._refusals = refusals
         self._clock = clock
@@ -79,6 +84,8 @@ class Subject(Generic[M, V, O, R]):
         before, now = self.memory, self._clock.monotonic()
         decision = self._core.decide(before, event, now)
         self._writer.decided(self.name, before, event, now, decision)
+        self._is_steady = self._is_as_before(event, decision, now)
+        self._event = event
         self.memory, self.wake_at, self.decision = decision.memory, decision.wake_at, decision
         if isinstance(event, OrderedByPerson):
             self.ordered = event, decision.refused
@@ -90,11 +97,42 @@ class Subject(Generic[M, V, O, R]):
             self._refusals.add(kind, f"{detail}; {asked}" if detail else asked, **self._whose)
         return decision
 
+    def read_again(self, event: V) -> bool:
+        """Note a reading that came before `wake_at`. Return False if the core must decide on it.
+
+        The core need not decide if the last event was an equal reading, and its decision only moved on
+        the reading's times. Until `wake_at` its answer would be the same.
+        """
+        now, decision, repeated = self._clock.monotonic(), self.decision, self._core.repeated
+        if not self._is_steady or event != self._event or decision is None or repeated is None:
+            return False
+        before, self.memory = self.memory, repeated(self.memory, now)
+        report: Any = decision.report
+        report = replace(report, read_at=now)
+        self.decision = replace(decision, memory=self.memory, report=report)
+        self._writer.decided(self.name, before, event, now, self.decision, again=True)
+        return True
+
+    def _is_as_before(self, event: V, decision: Decision[M, O, R], now: float) -> bool:
+        """Return whether this reading is equal to the last event, and has only moved on its times."""
+        last, repeated = self.decision, self._core.repeated
+        if repeated is None or last is None or not isinstance(event, Sampled):
+            return False
+        if event != self._event or decision.refused or decision.publish:
+            return False
+        report: Any = last.report
+        return (
+            decision.outputs == last.outputs
+            and decision.report == replace(report, read_at=now)
+            and decision.memory == repeated(self.memory, now)
+        )
+
     def published(self, memory: M) -> None:
         """Note that the subject's report was published. `memory`: the core's memory after the
         publication."""
         if memory is not self.memory:
             self.memory = memory
+            self._is_steady = False
             self._writer.published(self.name, memory, self._clock.monotonic())
 
     def log(self, report: R) -> None:

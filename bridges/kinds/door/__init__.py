@@ -28,6 +28,7 @@ KIND: Kind[
     limits=DoorLimits.of,
     initial=core.initial,
     decide=core.decide,
+    repeated=core.repeated,
     state_message=messages.state_message,
     attended_by=topics.DOOR_REQUESTS,
     recorded=(topics.ADAPTER_DOOR_REQUESTS,),

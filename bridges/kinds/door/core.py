@@ -82,6 +82,11 @@ def decide(
     )
 
 
+def repeated(memory: DoorMemory, now: float) -> DoorMemory:
+    """Return the memory after the last reading was read once more, if only its time moves on."""
+    return replace(memory, senses=replace(memory.senses, read_at=now))
+
+
 def _hear(
     memory: DoorMemory, event: Event, now: float, limits: DoorLimits
 ) -> tuple[DoorMemory, str]:

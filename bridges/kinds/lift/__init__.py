@@ -27,6 +27,7 @@ KIND: Kind[
     limits=LiftLimits.of,
     initial=core.initial,
     decide=core.decide,
+    repeated=core.repeated,
     published=core.published,
     alarm_inputs=lambda report: report.alarm,
     on_map=lambda settings: settings.on_map(),

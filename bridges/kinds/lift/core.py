@@ -48,7 +48,16 @@ from msgspec.structs import replace
 from bridges.kinds.lift import drive, forgotten, sessions
 from bridges.kinds.lift.memory import LiftLimits, LiftMemory, LiftSession
 from bridges.kinds.lift.report import NOT_FRESH, LiftReport, report
-from bridges.kinds.lift.sensing import HAZARDS, BelievedLift, gap, look, take, trust, unsure
+from bridges.kinds.lift.sensing import (
+    HAZARDS,
+    BelievedLift,
+    gap,
+    look,
+    read_again,
+    take,
+    trust,
+    unsure,
+)
 from bridges.kinds.lift.signals import (
     Event,
     FromAdapter,
@@ -117,6 +126,11 @@ def published(memory: LiftMemory, shown: LiftReport) -> LiftMemory:
     robot = session.robot
     robot = replace(robot, opened=robot.opened or shown.open_at == robot.floor)
     return replace(memory, session=replace(session, boarded=boarded, robot=robot))
+
+
+def repeated(memory: LiftMemory, now: float) -> LiftMemory:
+    """Return the memory after the last reading was read once more, if only its times move on."""
+    return replace(memory, senses=read_again(memory.senses, now))
 
 
 def obstacles(

@@ -110,6 +110,15 @@ def take(senses: LiftSenses, sample: LiftSample, now: float, limits: LiftLimits)
     )
 
 
+def read_again(senses: LiftSenses, now: float) -> LiftSenses:
+    """Move on the times of the last reading, because the same reading came again."""
+    at, position = senses.read_at, senses.position
+    seen_at = now if position.seen_at == at else position.seen_at
+    moved_at = now if position.moved_at == at else position.moved_at
+    position = replace(position, seen_at=seen_at, moved_at=moved_at)
+    return replace(senses, read_at=now, position=position)
+
+
 def gap(senses: LiftSenses, now: float) -> LiftSenses:
     """Restart the debounce after a failed read, because the car may have moved."""
     return LiftSenses(

@@ -97,6 +97,8 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     - `decide`: the core.
     - `summary(report)`: key -> value for the log line, the status file and `watch`.
     - `published(memory, report)`: the memory after this report has gone out to RMF.
+    - `repeated(memory, now)`: the memory after the last reading came once more, at `now`, if only the
+      times of that reading move on. Without this function the core decides on every reading.
     - `alarm_inputs(report)`: the causes of a fleet alarm that the device sees
       (`bridges/kinds/shared/fleet_alarm.py`); None for a kind without alarms.
     - `keeping`: for a memory that must survive a restart.
@@ -121,6 +123,7 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     device_name: Callable[[Any], str] = lambda message: ""
     sender: Callable[[Any], str] = lambda request: ""
     published: Callable[[M, R], M] = lambda memory, report: memory
+    repeated: Callable[[M, float], M] | None = None
     publishes: Callable[[S], tuple[Topic[Message], ...]] = lambda settings: ()
     alarm_inputs: Callable[[R], AlarmInputs] | None = None
     answer: Callable[[str, object, str, R], RefusalAnswer | None] = (
