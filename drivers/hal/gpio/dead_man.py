@@ -11,6 +11,8 @@ import time
 from collections.abc import Callable
 
 AFTER_S = 2.0
+SHORTEST_S = 0.01
+"""The shortest wait (s) of the dead-man's thread."""
 
 
 class GpioDeadMan:
@@ -48,5 +50,10 @@ class GpioDeadMan:
             self._thread.join()
 
     def _watch(self) -> None:
-        while not self._ended.wait(AFTER_S / 8):
+        while not self._ended.wait(self._left_s()):
             self.check()
+
+    def _left_s(self) -> float:
+        """Return the time (s) until the last scan is too old."""
+        fed_at = self._fed_at
+        return AFTER_S if fed_at is None else max(fed_at + AFTER_S - self._clock(), SHORTEST_S)
