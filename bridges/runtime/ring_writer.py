@@ -72,8 +72,8 @@ class NoWriter:
         known."""
 
     def flush(self) -> None:
-        """Write the noted events. The daemon calls this method when nothing urgent waits. A few repeated
-        readings wait for the next call."""
+        """Write the noted events. The daemon calls this method when nothing urgent waits. A few
+        repeated readings wait for the next call."""
 
     def look(self) -> None:
         """Make a new ring if needed. The daemon's main thread calls this method each second."""

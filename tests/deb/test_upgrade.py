@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.deb.small import System, package
+from tests.depth import part
 
 pytestmark = pytest.mark.skipif(shutil.which("dpkg") is None, reason="dpkg is Debian's")
 
@@ -65,10 +66,13 @@ def test_after_an_upgrade_or_downgrade_all_earlier_services_run(
 def test_whenever_the_power_is_cut_one_version_is_whole_and_dpkg_completes_the_other(
     tmp_path: Path, debs: dict[str, Path], before: str, after: str
 ) -> None:
-    first = system(tmp_path / "0", debs[before])
-    first.dpkg("-i", debs[after])
-    for cut in range(1, first.counted() + 1):
-        made = system(tmp_path / str(cut), debs[before])
+    machine, image = tmp_path / "machine", tmp_path / "image"
+    made = system(machine, debs[before])
+    shutil.copytree(machine, image, symlinks=True)
+    made.dpkg("-i", debs[after])
+    for cut in part(range(1, made.counted() + 1), 2, first=before == OLD):
+        shutil.rmtree(machine)
+        shutil.copytree(image, machine, symlinks=True)
         made.dpkg("-i", debs[after], cut=cut)
         now = made.off()
         assert now in (whole(before), whole(after)), cut

@@ -11,6 +11,7 @@ from random import Random
 
 import pytest
 
+from tests.depth import part
 from tests.site.network import CLEAR, Weather
 from tests.workbench.judge.nodes import wrong_charger, wrong_door, wrong_lift
 from tests.workbench.judge.nodes.different import (
@@ -176,8 +177,8 @@ def test_no_right_node_is_convicted_for_the_silence_of_the_network(
     make: Make, for_s: float
 ) -> None:
     """After a short outage all messages arrive. After a longer outage the messages are lost."""
-    found = [convicted(make, cut=(at, for_s)) for at in (5.0, 12.0, 19.0, 26.0, 33.0)]
-    assert found == [set()] * 5
+    for at in part((5.0, 12.0, 19.0, 26.0, 33.0), 2, first=int(for_s) % 2):
+        assert convicted(make, cut=(at, for_s)) == set(), at
 
 
 @pytest.mark.parametrize("at", [6.0, 14.0, 21.0, 29.0])
