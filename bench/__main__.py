@@ -3,20 +3,28 @@
 Everything runs on loopback, on fake hardware, and in processes of its own. The tables go to stdout. The
 figures go to bench/results/bench.json. `python -m bench idle buses` runs only the parts `idle` and
 `buses`.
+
+A busy machine is refused, because its figures mean nothing; `--anyway` measures there, and says so. The
+last table compares the figures with the aims, and with the best of earlier runs on a like machine.
 """
 
 import json
 import os
 import platform
+import socket
+import subprocess
 import sys
 import tempfile
+import time
 from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
-from bench import brokers, buses, day, explain, idle, latency, page, recording
+from bench import brokers, buses, day, explain, history, idle, latency, page, recording
 from bench.figures import lines
 
+MOST_LOAD = 1.0
+"""The load average over a minute above which figures mean nothing."""
 RESULTS = Path(__file__).parent / "results"
 SECTIONS = {
     "latency": latency,
@@ -36,20 +44,44 @@ def main(words: list[str]) -> int:
         prog="python -m bench", description="Parts to measure; without parts, all."
     )
     parser.add_argument("parts", nargs="*", help=", ".join(SECTIONS), metavar="PART")
-    chosen = parser.parse_args(words).parts
+    parser.add_argument("--anyway", action="store_true", help="measure on a busy machine too")
+    args = parser.parse_args(words)
+    chosen = args.parts
     if unknown := set(chosen) - set(SECTIONS):
         parser.error(f"no such part: {', '.join(sorted(unknown))} (parts: {', '.join(SECTIONS)})")
-    figures: dict[str, Any] = {"machine": _machine()}
+    load = os.getloadavg()[0]
+    if load > MOST_LOAD and not args.anyway:
+        print(f"the load is {load:.1f}: wait until it is {MOST_LOAD:g} or less, or add --anyway")
+        return os.EX_TEMPFAIL
+    figures: dict[str, Any] = {"machine": _machine(), **_run(), "load": load}
     print(figures["machine"], flush=True)
+    print(figures["date"], figures["host"], figures["commit"], _busy(load), flush=True)
     for name in chosen or SECTIONS:
+        began = time.monotonic()
         with tempfile.TemporaryDirectory(prefix="rmf-bench-") as scratch:
             figures[name] = SECTIONS[name].measure(Path(scratch))
         for title, rows in figures[name].items():
             print("", *lines(title, rows), sep="\n", flush=True)
+        print(f"\n{name}: {time.monotonic() - began:.0f} s", flush=True)
+    print("", *history.table(figures), *history.losses(figures, RESULTS), sep="\n")
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / "bench.json").write_text(json.dumps(figures, indent=2) + "\n")
+    if load <= MOST_LOAD:
+        history.keep(figures, RESULTS)
     print(f"\nwritten to {RESULTS / 'bench.json'}")
     return 0
+
+
+def _run() -> dict[str, str]:
+    """Return the date, the host and the commit of this run."""
+    words = ["git", "describe", "--always", "--dirty", "--exclude=*"]
+    told = subprocess.run(words, cwd=RESULTS.parent, capture_output=True, text=True)
+    date = time.strftime("%Y-%m-%d %H:%M")
+    return {"date": date, "host": socket.gethostname(), "commit": told.stdout.strip() or "no git"}
+
+
+def _busy(load: float) -> str:
+    return f"BUSY: the load was {load:.1f}" if load > MOST_LOAD else f"load {load:.1f}"
 
 
 def _machine() -> str:

@@ -35,8 +35,8 @@ def each_more(rows: Rows, counts: Sequence[int]) -> Row:
 def lines(title: str, rows: Rows) -> list[str]:
     """Return the lines of a table."""
     headings = list(dict.fromkeys(heading for row in rows.values() for heading in row))
-    table = [f"{title:34}" + "".join(f"{heading:>12}" for heading in headings)]
+    table = [f"{title:42}" + "".join(f"{heading:>12}" for heading in headings)]
     for name, row in rows.items():
         cells = (f"{row[h]:>12.3f}" if h in row else f"{'':12}" for h in headings)
-        table.append(f"{name:34}" + "".join(cells).rstrip())
+        table.append(f"{name:42}" + "".join(cells).rstrip())
     return table

@@ -9,7 +9,7 @@ from bench.charger_servers import chargers_at, http_chargers
 from bench.daemons import BARE, WIRES, Content, cost, daemon, shipped
 from bench.figures import Rows, Tables, each_more
 
-LIFTS, CAN_CHARGERS, DOORS, HTTP_CHARGERS = (1, 8), (1, 8), (25, 50, 100, 200), (1, 10, 25, 50)
+LIFTS, CAN_CHARGERS, DOORS, HTTP_CHARGERS = (1, 8), (1, 8), (25, 200), (1, 50)
 TCP = {"type": "modbus", "tcp": {"host": "127.0.0.1", "port": 502}}
 SLCAN = {"port": "/dev/serial/by-id/simulated", "bitrate": 250000}
 

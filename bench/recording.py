@@ -33,7 +33,7 @@ from workbench.replay.files import opened
 from workbench.replay.replayed import Replay, ReplayedCores, of_head
 from workbench.replay.sources import Notes
 
-ROUNDS, WATCHED_S = 2, 30.0
+ROUNDS, WATCHED_S = 2, 15.0
 SCAN_S, DAY_S, RIDES = 0.05, 86400.0, 4000
 RIDE_S = DAY_S / RIDES
 WALL = 1_800_000_000.0

@@ -139,11 +139,12 @@ class Node(Generic[S, L, M, X, E, O, R]):
                 return
         else:
             self._decide_all(reading, events)
-        self._count(self._clock.monotonic() - started)
-        self._contacts = {} if self._failing else self._driver.contacts()
+        took_s = self._clock.monotonic() - started
         self._alarm()
         self._tell()
         self._answer()
+        self._count(took_s)
+        self._contacts = {} if self._failing else self._driver.contacts()
         self._log()
 
     def _is_nothing_new(self, reading: Sampled[X] | IoFailed, now: float) -> bool:
