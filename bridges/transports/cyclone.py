@@ -2,8 +2,8 @@
 stays on this machine."""
 
 from collections.abc import Mapping
+from html import escape  # the same in XML; xml.sax.saxutils would load urllib, http and ssl
 from typing import Final
-from xml.sax.saxutils import quoteattr
 
 from bridges.messages.cdr import LONGEST
 
@@ -67,9 +67,7 @@ def configuration(environ: Mapping[str, str]) -> str:
     if wanted == "SYSTEM_DEFAULT":
         return for_ros(environ)
     here = ["localhost"] if wanted == "LOCALHOST" else []
-    named = "".join(
-        f"<Peer address={quoteattr(peer)}/>" for peer in [*here, *static_peers(environ)]
-    )
+    named = "".join(f'<Peer address="{escape(peer)}"/>' for peer in [*here, *static_peers(environ)])
     silent = "<General><AllowMulticast>false</AllowMulticast></General>" if here else ""
     ours = (
         f"<CycloneDDS><Domain>{silent}{INTERNAL}<Discovery>{FOUND_AGAIN}{NEVER_FORGOTTEN}"
