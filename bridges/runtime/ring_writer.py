@@ -47,17 +47,10 @@ class NoWriter:
     """The writer of a daemon that does not record. It has the interface of `RingWriter`."""
 
     def decided(
-        self,
-        subject: str,
-        before: object,
-        event: object,
-        now: float,
-        decision: AnyDecision,
-        *,
-        again: bool = False,
+        self, subject: str, before: object, event: object, now: float, decision: AnyDecision
     ) -> None:
-        """Note a core's decision. `before`: the subject's memory before the decision. `again`: the same
-        reading came again, and changed nothing."""
+        """Note a core's decision. `before`: the subject's memory before the decision. If a reading
+        changes nothing but its time, `event` is the same object as the last time."""
 
     def published(self, subject: str, memory: object, now: float) -> None:
         """Note that a report was published. `memory`: the core's memory after the publication."""
@@ -104,27 +97,23 @@ class RingWriter(NoWriter):
         self._once = Once()
         self._again_at = AGES_AGO
         self._news = True
+        self._events: dict[str, object] = {}
         self._dead = False
         self._fresh()
         self.look()
 
     def decided(
-        self,
-        subject: str,
-        before: object,
-        event: object,
-        now: float,
-        decision: AnyDecision,
-        *,
-        again: bool = False,
+        self, subject: str, before: object, event: object, now: float, decision: AnyDecision
     ) -> None:
         self._waiting.append((self._step, subject, before, event, now, decision))
-        self._news |= not again
+        self._news |= self._events.get(subject) is not event
+        self._events[subject] = event
 
     def published(self, subject: str, memory: object, now: float) -> None:
         self._note(self._published, subject, memory, now)
 
     def forgotten(self, subject: str, now: float) -> None:
+        self._events.pop(subject, None)
         self._note(self._forgotten, subject, now)
 
     def spoken(

@@ -110,7 +110,7 @@ class Subject(Generic[M, V, O, R]):
         report: Any = decision.report
         report = replace(report, read_at=now)
         self.decision = replace(decision, memory=self.memory, report=report)
-        self._writer.decided(self.name, before, event, now, self.decision, again=True)
+        self._writer.decided(self.name, before, self._event, now, self.decision)
         return True
 
     def _is_as_before(self, event: V, decision: Decision[M, O, R], now: float) -> bool:

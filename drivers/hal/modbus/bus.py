@@ -92,7 +92,7 @@ class ModbusBus(Bus):
     def read(self, asked: Range, safe: bool = False) -> dict[Point, int]:
         """Read these bits (0 or 1) or registers with one request. Raises HalError."""
         question = UnitRequest(asked.unit, READS[asked.table], asked.start, asked.count)
-        found = self._ask(("read", asked), question, safe)
+        found = self._ask(f"read {asked}", question, safe)
         return dict(zip(asked.points(), found.values, strict=True))
 
     def cells(self, points: Iterable[Point]) -> dict[Point, int]:
@@ -104,7 +104,7 @@ class ModbusBus(Bus):
         value."""
         coil = point.table == "coil"
         sent = (COIL_ON if value else 0) if coil else value
-        what = "write", "coil" if coil else "register", point.address
+        what = f"write {'coil' if coil else 'register'} {point.address}"
         self._ask(what, UnitRequest(point.unit, WRITES[point.table], point.address, sent), safe)
 
     def flash(self, place: Point, on_s: float) -> None:
@@ -119,7 +119,7 @@ class ModbusBus(Bus):
         error nobody knows whether the module gives the pulse.
         """
         question = UnitRequest(place.unit, WRITES["coil"], place.address, round(on_s * 10))
-        self._ask(("flash at coil", f"{place.address:#x}"), question, once=True)
+        self._ask(f"flash at coil {place.address:#x}", question, once=True)
 
     def guard(self, units: Iterable[int]) -> DeviceWatchdogs:
         """Return the watchdogs of the modules at these units. The caller's device has outputs there."""
@@ -139,16 +139,9 @@ class ModbusBus(Bus):
         self._wire.close()
 
     def _ask(
-        self,
-        what: tuple[object, ...],
-        question: UnitRequest,
-        safe: bool = False,
-        once: bool = False,
+        self, what: str, question: UnitRequest, safe: bool = False, once: bool = False
     ) -> UnitReply:
-        """Return the unit's valid answer. Raises HalError.
-
-        `what`: the words of an error's text for the request. `once`: send the request only once.
-        """
+        """Return the unit's valid answer. With `once` send the request only once. Raises HalError."""
         unit = question.unit
         backoff = self._backoffs.get((unit, safe))
         if backoff is None:
@@ -165,7 +158,7 @@ class ModbusBus(Bus):
         if answer is not None and answer.exception is None:
             backoff.mended()
             return answer
-        text = f"modbus unit {unit} at {self._where}, {' '.join(map(str, what))}: "
+        text = f"modbus unit {unit} at {self._where}, {what}: "
         if answer is None:
             self._turn_at = self.now() + TURN_S
             raise backoff.failed(f"{text}{reason}, tried {tries}x")

@@ -199,13 +199,13 @@ def _decoded(question: UnitRequest, content: bytes) -> UnitReply:
     last = _last.get(question)
     if last is not None and last[0] == content:
         return last[1]
-    answer = _answer(question, _reply(content))
+    answer = _answer(question, _pdu(content))
     if question.function in READS.values():
         _last[question] = content, answer
     return answer
 
 
-def _reply(content: bytes) -> ModbusPDU:
+def _pdu(content: bytes) -> ModbusPDU:
     try:
         reply = DECODER.decode(content)
     except FAILURES as error:

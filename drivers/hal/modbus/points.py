@@ -100,7 +100,7 @@ class Range(Struct, frozen=True):
         return f"{self.table}s {self.start} to {self.start + self.count - 1}"
 
     @lru_cache(maxsize=1024)  # noqa: B019 - a range lives as long as its device
-    def points(self) -> Sequence[Point]:
+    def points(self) -> list[Point]:
         """Return every point in the range, in the order of the reply."""
         return [Point(self.unit, self.table, self.start + i) for i in range(self.count)]
 
