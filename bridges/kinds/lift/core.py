@@ -45,19 +45,10 @@ LIFT-5. The report says OPEN when fresh inputs show that the car stands at a kno
 
 from msgspec.structs import replace
 
-from bridges.kinds.lift import drive, forgotten, sessions
+from bridges.kinds.lift import drive, forgotten, sensing, sessions
 from bridges.kinds.lift.memory import LiftLimits, LiftMemory, LiftSession
 from bridges.kinds.lift.report import NOT_FRESH, LiftReport, report
-from bridges.kinds.lift.sensing import (
-    HAZARDS,
-    BelievedLift,
-    gap,
-    look,
-    read_again,
-    take,
-    trust,
-    unsure,
-)
+from bridges.kinds.lift.sensing import HAZARDS, BelievedLift, gap, look, take, trust, unsure
 from bridges.kinds.lift.signals import (
     Event,
     FromAdapter,
@@ -130,7 +121,7 @@ def published(memory: LiftMemory, shown: LiftReport) -> LiftMemory:
 
 def repeated(memory: LiftMemory, now: float) -> LiftMemory:
     """Return the memory after the last reading was read once more, if only its times move on."""
-    return replace(memory, senses=read_again(memory.senses, now))
+    return replace(memory, senses=sensing.read_again(memory.senses, now))
 
 
 def obstacles(

@@ -11,8 +11,6 @@ import time
 from collections.abc import Callable
 
 AFTER_S = 2.0
-SHORTEST_S = 0.01
-"""The shortest wait (s) of the dead-man's thread."""
 
 
 class GpioDeadMan:
@@ -56,4 +54,4 @@ class GpioDeadMan:
     def _left_s(self) -> float:
         """Return the time (s) until the last scan is too old."""
         fed_at = self._fed_at
-        return AFTER_S if fed_at is None else max(fed_at + AFTER_S - self._clock(), SHORTEST_S)
+        return AFTER_S if fed_at is None else max(fed_at + AFTER_S - self._clock(), 0.01)

@@ -143,9 +143,7 @@ class ModbusBus(Bus):
     ) -> UnitReply:
         """Return the unit's valid answer. With `once` send the request only once. Raises HalError."""
         unit = question.unit
-        backoff = self._backoffs.get((unit, safe))
-        if backoff is None:
-            backoff = self._backoffs[unit, safe] = self._backoff()
+        backoff = self._backoffs.setdefault((unit, safe), self._backoff())
         self._link.check()
         not_yet = self._wire.owes(unit) or self.now() < self._turn_at
         backoff.check(not_yet=backoff.probing and not_yet)

@@ -38,8 +38,6 @@ logging.getLogger("pymodbus.logging").setLevel(
     logging.CRITICAL
 )  # HalErrors report the same failures
 
-KEPT: Final = 1024
-"""The number of requests whose frames are kept, because a poll sends the same requests again."""
 FAILURES: Final = (ModbusException, struct.error, IndexError, ValueError)
 """The errors that pymodbus raises for bytes that are not a reply."""
 
@@ -128,7 +126,7 @@ def tcp_request(question: UnitRequest, number: int) -> bytes:
     return number.to_bytes(2, "big") + _after_number(question)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=1024)
 def _after_number(question: UnitRequest) -> bytes:
     return TCP.buildFrame(_request(question, 1))[2:]
 
