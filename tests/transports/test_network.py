@@ -42,7 +42,10 @@ PEERS = '<Peers><Peer address="10.0.0.5"/><Peer address="rmf.local"/></Peers>'
         ({}, AUTO.format("")),
         ({"ROS_STATIC_PEERS": "10.0.0.5;rmf.local"}, AUTO.format(PEERS)),
         ({"ROS_STATIC_PEERS": ";; 10.0.0.5; rmf.local ;"}, AUTO.format(PEERS)),
-        ({"ROS_STATIC_PEERS": '"<&'}, AUTO.format("<Peers><Peer address='\"&lt;&amp;'/></Peers>")),
+        (
+            {"ROS_STATIC_PEERS": '"<&'},
+            AUTO.format('<Peers><Peer address="&quot;&lt;&amp;"/></Peers>'),
+        ),
         (
             {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_STATIC_PEERS": "10.0.0.5"},
             AUTO.format(
