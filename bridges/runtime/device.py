@@ -318,8 +318,10 @@ class Node(Generic[S, L, M, X, E, O, R]):
 
     def _identity(self, fault: Fault) -> object:
         """Return a value that is equal in all reports of one fault. If the fault's detail is a bus's
-        error text, which varies, this value is the code alone."""
-        return fault.code if fault.detail in ("", *self._bus_words) else fault
+        error text, which varies, this value is the code alone. The core keeps the last error's text for
+        one more scan."""
+        bus_words = ("", self._io_fault, *self._bus_words)
+        return fault.code if fault.detail in bus_words else fault
 
 
 AnyNode = Node[Any, Any, Any, Any, Any, Any, Any]

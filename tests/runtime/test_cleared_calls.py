@@ -211,7 +211,7 @@ def test_a_lift_that_clears_its_calls_is_ridden_without_a_fault_and_the_place_is
     assert [text.split(" reason")[0] for text in told] == [
         f'call_cleared place="{place}"' for place in PLACES[example]
     ]
-    assert all("so write read_back: false at this command; or another" in text for text in told)
+    assert all("write read_back: false at this command. Otherwise another" in text for text in told)
 
 
 @pytest.mark.long(4)

@@ -49,10 +49,11 @@ class RobotNode(Node[Any, Any, Any, Any, Any, Any, RobotReport]):
 
     def _send(self, report: RobotReport) -> bool:
         self.adapter.update(self.name, report)
-        if self.tell is not None and report.read_at is not None:
+        message = self._kind.state_message
+        if self.tell is not None and message is not None and report.read_at is not None:
             with suppress(ClockError):
                 at = self._clock.stamp(report.read_at)
-                state = self._kind.state_message(self.name, self._settings, report, at)
+                state = message(self.name, self._settings, report, at)
                 self.told[self.name] = cast(FleetState, state).robots[0]
             self.tell()
         return True

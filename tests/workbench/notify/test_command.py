@@ -93,7 +93,7 @@ def test_a_killed_daemon_is_told_repeated_until_acknowledged_and_over_when_it_is
 def test_the_end_of_a_certificate_is_told(sink: Sink, tmp_path: Path, domain: int) -> None:
     file, ended = tmp_path / "to.yaml", certificate(tmp_path / "page.pem", -3.5)
     more = f"certificates: [{ended}]\n"
-    file.write_text(more + FILE.format(url=sink.url).replace("after_s: 3", "after_s: 0.5"))
+    file.write_text(more + FILE.format(url=sink.url))
     with notify(file, tmp_path / "state", domain):
         wait_until(lambda: sink.got, "the end is told")
     told = [json.loads(body) for _, body in sink.got]
