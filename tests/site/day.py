@@ -25,7 +25,7 @@ from tests.site.daemons import (
 )
 from tests.site.fire_panels import FirePanels
 from tests.site.growth import Look, look
-from tests.site.laws import BOUND_S, Laws
+from tests.site.laws import BOUND_S, Broken, Laws
 from tests.site.network import CLEAR, Air, Place
 from tests.site.robots import Places, Resident
 from tests.site.storeroom import Storeroom
@@ -119,7 +119,7 @@ class Site:
             self.timeline.at(60.0, self._kill)
         self.timeline.at(end - WIND_DOWN_S, self._wind_down)
         self.timeline.at(end - SWEEP_S, self._sweep)
-        with _silent():
+        with _defects_end_the_day():
             hour = 0
             while (hour := hour + 1) * HOUR_S < end:
                 self.timeline.run(hour * HOUR_S)
@@ -467,12 +467,23 @@ class Site:
         return Ill("cut", name, "cut off", begin, lambda: None, lasts_s, lasts_s + 0.001)
 
 
+class _Defects(logging.Handler):
+    """Ends the day at a defect that a daemon has contained, because the daemon would serve on."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if "defect" in (text := record.getMessage()):
+            raise Broken(text)
+
+
 @contextmanager
-def _silent() -> Iterator[None]:
-    """Log nothing. The log of a day would fill the memory of the process that captures it."""
-    before = logging.root.manager.disable
-    logging.disable(logging.CRITICAL)
+def _defects_end_the_day() -> Iterator[None]:
+    """Log nothing below an error, because a whole day's log would fill the memory of a test's
+    process."""
+    before, defects = logging.root.manager.disable, _Defects(logging.ERROR)
+    logging.disable(logging.WARNING)
+    logging.root.addHandler(defects)
     try:
         yield
     finally:
+        logging.root.removeHandler(defects)
         logging.disable(before)
