@@ -20,6 +20,7 @@ help:
 	@echo "make flood   ten thousand requests a second to a lift for a minute: memory, states, the last word"
 	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again; RMF=jazzy: its supervisors"
 	@echo "             (SEEDS=20: a day of each seed under each party's rules, and their table; those in build/soak are not played again)"
+	@echo "             (SIZE='50 200 30 100': so many lifts, doors, chargers and robots)"
 	@echo "             (KILL_EVERY=27: no trouble but a kill of RMF's lift supervisor each 27 s)"
 	@echo "make torture  kill, starve and lie to real daemons for ten minutes, and print docs/explanation/reliability.md's table"
 	@echo "make test-vm  boot Debian 13 in QEMU, install our packages, and kill and hang it there (ARCH=arm64)"
@@ -165,7 +166,7 @@ flood: .venv/ready
 # Without SEED one is drawn, and printed.
 soak: .venv/ready
 	@$(if $(SEEDS),$(BIN)/python -m tests.site.days --seeds $(SEEDS) --hours $(or $(HOURS),24) $(if $(RMF),--rmf $(RMF)),\
-	  $(BIN)/python -m tests.site --hours $(or $(HOURS),24) $(if $(SEED),--seed $(SEED)) $(if $(RMF),--rmf $(RMF)) $(if $(KILL_EVERY),--kill-every $(KILL_EVERY)))
+	  $(BIN)/python -m tests.site --hours $(or $(HOURS),24) $(if $(SEED),--seed $(SEED)) $(if $(RMF),--rmf $(RMF)) $(if $(KILL_EVERY),--kill-every $(KILL_EVERY)) $(if $(SIZE),--size $(SIZE)))
 
 torture: .venv/ready
 	@$(BIN)/python -m tests.torture $(if $(SEED),--seed $(SEED))
