@@ -4,7 +4,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from bridges.kinds.shared import fleet_alarm, kept_alarm
+from bridges.kinds.shared import alarming, fleet_alarm, kept_alarm
 from bridges.kinds.shared.decision import AlarmInputs, Decision, Fault, OperatorReset
 from bridges.kinds.shared.durations import NEVER
 from bridges.kinds.shared.fleet_alarm import (
@@ -224,3 +224,24 @@ def test_every_fault_and_report_says_what_a_person_must_know() -> None:
     text = "reset here, but this daemon has just started"
     quiet_start = after(CALM, OperatorReset(), memory=restarted(after(FIRE))).report
     assert quiet_start == FleetAlarmReport("reset", (), (), (Fault("ALARM_WAITS", text),))
+
+
+def test_an_alarm_for_every_fleet_meets_every_alarm_for_some() -> None:
+    """FLEET-ALARM-3 to FLEET-ALARM-5: no fleet is an empty set of fleets."""
+    waits = after(FIRE, AlarmHeard(fleets("b"), True, fleets("y")), CALM, OperatorReset())
+    assert (waits.publish, waits.report.state, waits.report.waits) == ((), "reset", ("b",))
+    some = after(FIRE, AlarmHeard(fleets("b"), True), CALM, OperatorReset(), limits=to("y"))
+    assert (some.publish, some.report.waits) == ((), ("b",))
+    against = after(FIRE, AlarmHeard(fleets("desk"), False, fleets("y")))
+    assert against.report.faults[0].code == "ALARM_CONTRADICTED"
+
+
+def test_a_statement_names_the_causes_and_comes_back_from_any_wire() -> None:
+    report = after(FIRE).report
+    assert alarming.statement(report, fleets()) == {
+        "state": "alarm",
+        "fleets": "[]",
+        "causes": "fire of Panel",
+    }
+    assert alarming.statement(after(CALM).report, fleets("x"))["causes"] == "-"
+    assert alarming.heard(EmergencySignal(("x",), True), ["/X/a"]).senders == {"X/a"}
