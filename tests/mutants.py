@@ -169,7 +169,8 @@ class Run:
         known = self.results.get(mutant.name)
         if known is None or known.function != mutant.hash:
             return False
-        return known.verdict == KILLED or known.tests == self._tests(mutant)
+        same = known.verdict != UNJUDGED and known.tests == self._tests(mutant)
+        return known.verdict == KILLED or same
 
     def _tests(self, mutant: Mutant) -> str:
         files = {item.path for item in self._callers[mutant.of]}
@@ -191,7 +192,8 @@ class Run:
         item.config.hook.pytest_runtest_protocol(item=item, nextitem=None)
         sys.setprofile(None)
         if session.testsfailed:
-            pytest.exit(f"{item.nodeid} fails without a mutant", returncode=2)
+            sys.stderr.write(f"{item.nodeid} fails without a mutant\n")
+            pytest.exit("", returncode=2)
         calls = Calls(digest, time.process_time() - began, frozenset(called))
         self._known.calls[item.nodeid] = calls
         return calls
@@ -211,13 +213,17 @@ class Run:
         cpu_s = int(time.process_time() + max(LEAST_CPU_S, 10.0 * usual_s))
         resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s + 1))
         signal.alarm(WALL_S)
-        os._exit(_fails(session, items, mutant))
+        code = 3  # in the child nothing may return to the parent's loop
+        try:
+            code = _fails(session, items, mutant)
+        finally:
+            os._exit(code)
 
     def _wait(self) -> None:
         child, status = os.wait()
         code = os.waitstatus_to_exitcode(status)
-        ends = {0: SURVIVED, 3: UNJUDGED, -signal.SIGXCPU: ENDLESS, -signal.SIGALRM: ENDLESS}
-        self._note(self._running.pop(child), ends.get(code, KILLED))
+        ends = {0: SURVIVED, 1: KILLED, -signal.SIGXCPU: ENDLESS, -signal.SIGALRM: ENDLESS}
+        self._note(self._running.pop(child), ends.get(code, UNJUDGED))
 
     def _note(self, mutant: Mutant, verdict: str) -> None:
         change = mutant.change if verdict != KILLED else ""
