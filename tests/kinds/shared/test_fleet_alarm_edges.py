@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from bridges.kinds.shared import alarming, fleet_alarm, kept_alarm
 from bridges.kinds.shared.decision import AlarmInputs, Decision, Fault, OperatorReset
-from bridges.kinds.shared.durations import NEVER
+from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
 from bridges.kinds.shared.fleet_alarm import (
     MOST_OTHERS,
     AlarmCause,
@@ -79,6 +79,7 @@ def test_the_memory_of_a_restart_is_whole() -> None:
         told=fleets("x"),
         owed=True,
         others={"b": fleets("y")},
+        shown="alarm",
     )
     assert restarted(after(CALM)) == FleetAlarmMemory(owed=True)
 
@@ -189,7 +190,7 @@ def test_a_contradicted_alarm_wakes_for_its_next_word_and_for_the_end_of_its_fau
     )
     again = after(Woken(), memory=false.memory, now=false.wake_at)
     assert again.publish == raised.publish
-    assert again.wake_at == 10.125 + fleet_alarm.RIVAL_QUIET_S
+    assert again.wake_at == 10.125 + RIVAL_QUIET_S
     over = after(Woken(), memory=again.memory, now=again.wake_at)
     assert ([fault.code for fault in over.report.faults], over.wake_at) == (["ALARM_RAISED"], NEVER)
 
@@ -211,19 +212,19 @@ def test_every_fault_and_report_says_what_a_person_must_know() -> None:
     raised = after(both, AlarmHeard(fleets("b"), True))
     text = "the robots stand: code_blue of Panel, fire of Panel"
     fault = Fault("ALARM_RAISED", text)
-    assert raised.report == FleetAlarmReport("alarm", causes, ("b",), (fault,))
+    assert raised.report == FleetAlarmReport("alarm", causes, ("b",), (fault,), 10.0)
     against = after(AlarmHeard(fleets("desk", "c"), False), memory=raised.memory).report
     text = "c or desk publishes false: robots hear both"
     assert against.faults == (Fault("ALARM_CONTRADICTED", text), fault)
     drill = Fault("ALARM_DRILL", "the robots stand for a drill, which ends by itself")
-    assert after(DRILL).report == FleetAlarmReport("drill", (), (), (drill,))
+    assert after(DRILL).report == FleetAlarmReport("drill", (), (), (drill,), 10.0)
     heard = [AlarmHeard(fleets(name), True) for name in "cb"]
     waits = after(FIRE, *heard, CALM, OperatorReset()).report
     text = "reset here, but the alarm of b, c stands"
-    assert waits == FleetAlarmReport("reset", (), ("b", "c"), (Fault("ALARM_WAITS", text),))
+    assert waits == FleetAlarmReport("reset", (), ("b", "c"), (Fault("ALARM_WAITS", text),), 10.0)
     text = "reset here, but this daemon has just started"
     quiet_start = after(CALM, OperatorReset(), memory=restarted(after(FIRE))).report
-    assert quiet_start == FleetAlarmReport("reset", (), (), (Fault("ALARM_WAITS", text),))
+    assert quiet_start == FleetAlarmReport("reset", (), (), (Fault("ALARM_WAITS", text),), 10.0)
 
 
 def test_an_alarm_for_every_fleet_meets_every_alarm_for_some() -> None:
