@@ -232,8 +232,8 @@ class Run:
 
 def _fails(session: pytest.Session, items: Sequence[pytest.Item], mutant: Mutant) -> int:
     """Run the tests on the mutant, in a process of its own. Return 1 as soon as one fails."""
-    real: Any = mutant.function  # a field's function looks like a method to mypy
-    broken = mutant.broken
+    real: Any = mutant.function  # to mypy the function of a field is a method
+    broken: Any = mutant.broken
     try:
         real.__code__ = broken.__code__.replace(co_name=real.__name__)
     except ValueError:  # the mutant closes over other variables

@@ -7,8 +7,8 @@ from msgspec.structs import replace
 from bridges.kinds.shared import alarming, fleet_alarm, kept_alarm
 from bridges.kinds.shared.decision import AlarmInputs, Decision, Fault, OperatorReset
 from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
-from bridges.kinds.shared.fleet_alarm import (
-    MOST_OTHERS,
+from bridges.kinds.shared.fleet_alarm import MOST_OTHERS
+from bridges.kinds.shared.fleet_alarm_memory import (
     AlarmCause,
     AlarmHeard,
     AlarmNamed,
