@@ -19,12 +19,15 @@ help:
 	@echo "make bench   latency and memory, beside a bare transport node"
 	@echo "make flood   ten thousand requests a second to a lift for a minute: memory, states, the last word"
 	@echo "make soak    a whole site for a day in virtual time: SEED=7 HOURS=24 plays one day again; RMF=jazzy: its supervisors"
+	@echo "             (SEEDS=20: a day of each seed under each party's rules, and their table; those in build/soak are not played again)"
+	@echo "             (SIZE='50 200 30 100': so many lifts, doors, chargers and robots)"
 	@echo "             (KILL_EVERY=27: no trouble but a kill of RMF's lift supervisor each 27 s)"
 	@echo "make torture  kill, starve and lie to real daemons for ten minutes, and print docs/explanation/reliability.md's table"
 	@echo "make test-vm  boot Debian 13 in QEMU, install our packages, and kill and hang it there (ARCH=arm64)"
 	@echo "             (one of its machines: ONLY=lift, site or upgrade)"
 	@echo "make test-rollout  roll versions out to two Debian machines in containers, one version that cannot start; as root"
-	@echo "make mutate  break the cores in every small way, and list breaks that no test noticed (docs/explanation/mutation.md)"
+	@echo "make mutate  break the cores in every small way, and list breaks that no test noticed (docs/explanation/mutation.md;"
+	@echo "             a part: ONLY='bridges.kinds.door.*')"
 	@echo "make docs    the documentation as a site, build/site/index.html; a broken link is an error"
 	@echo "make reference  write the generated pages of docs/"
 	@echo "make man     the manual page, build/rmf-bridge.1"
@@ -162,7 +165,8 @@ flood: .venv/ready
 
 # Without SEED one is drawn, and printed.
 soak: .venv/ready
-	@$(BIN)/python -m tests.site --hours $(or $(HOURS),24) $(if $(SEED),--seed $(SEED)) $(if $(RMF),--rmf $(RMF)) $(if $(KILL_EVERY),--kill-every $(KILL_EVERY))
+	@$(if $(SEEDS),$(BIN)/python -m tests.site.days --seeds $(SEEDS) --hours $(or $(HOURS),24) $(if $(RMF),--rmf $(RMF)),\
+	  $(BIN)/python -m tests.site --hours $(or $(HOURS),24) $(if $(SEED),--seed $(SEED)) $(if $(RMF),--rmf $(RMF)) $(if $(KILL_EVERY),--kill-every $(KILL_EVERY)) $(if $(SIZE),--size $(SIZE)))
 
 torture: .venv/ready
 	@$(BIN)/python -m tests.torture $(if $(SEED),--seed $(SEED))
@@ -178,18 +182,11 @@ test-rollout: .venv/ready
 	@ls dist/*+deb12_amd64.deb dist/*+deb13_amd64.deb >/dev/null 2>&1 || $(MAKE) --no-print-directory deb ARCHS=amd64 PYTHONS="3.11 3.13"
 	@$(BIN)/python -m tests.rollout
 
-# Mutants live in a copy. After an interruption only the missing results are computed. For a part:
-# make mutate ONLY='bridges.kinds.door.*' CHILDREN=1. To start again from nothing: rm -rf the directory first.
-MUTANTS ?= $(or $(TMPDIR),/tmp)/rmf-bridges-mutants-$(shell id -u)
-MUTATED := bridges config drivers hal_fakes tests workbench pyproject.toml
+# After an interruption only the missing results are computed. For a part: make mutate ONLY='bridges.kinds.door.*'. To
+# start again from nothing: rm build/mutants.json first.
 mutate: .venv/ready
-	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[mutate]'
-	@mkdir -p $(MUTANTS) && cd $(MUTANTS) && rm -rf $(MUTATED)
-	@cp -Rp $(MUTATED) $(MUTANTS)
-	@cd $(MUTANTS) && $(CURDIR)/$(BIN)/mutmut run --max-children $(or $(CHILDREN),2) $(if $(ONLY),'$(ONLY)')
-	@cd $(MUTANTS) && $(CURDIR)/$(BIN)/mutmut results | grep -v ': not checked' || true
-	@cd $(MUTANTS) && $(CURDIR)/$(BIN)/mutmut export-cicd-stats >/dev/null && cat mutants/mutmut-cicd-stats.json && echo
-	@echo "one of them: cd $(MUTANTS) && $(CURDIR)/$(BIN)/mutmut show NAME"
+	@$(BIN)/pip install --quiet --disable-pip-version-check -e '.[mutate]'
+	@CHILDREN=$(or $(CHILDREN),1) $(BIN)/python -m tests.mutants $(if $(ONLY),'$(ONLY)')
 
 clean:
 	rm -rf .venv .venv-ros build dist *.egg-info .mypy_cache .ruff_cache .hypothesis .import_linter_cache

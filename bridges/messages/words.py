@@ -5,6 +5,7 @@ modes of a lift are in upper case, such as `AGV` for MODE_AGV. A number without 
 number. Control characters are escaped, because names come from the network.
 """
 
+from collections.abc import Mapping
 from enum import IntEnum
 from typing import Final, Literal
 
@@ -16,11 +17,28 @@ WorkcellRequested = d.DispenserRequest | d.IngestorRequest
 WorkcellResulted = d.DispenserResult | d.IngestorResult
 Stated = d.LiftState | d.DoorState | d.ChargerState | WorkcellStated
 Requested = d.LiftRequest | d.DoorRequest | d.ChargerRequest | d.ChargerCancel | WorkcellRequested
+Named = Stated | Requested | WorkcellResulted
 LONGEST_NAME: Final = 256
 """The maximum length (characters) of a name in memory and on a display. Anybody can send a name of 1
 MB."""
 Kind = Literal["lift", "door", "charger", "dispenser", "ingestor"]
 KINDS: Final[tuple[Kind, ...]] = ("lift", "door", "charger", "dispenser", "ingestor")
+_NAMED: Final[Mapping[type, tuple[Kind, str]]] = {
+    d.LiftState: ("lift", "lift_name"),
+    d.LiftRequest: ("lift", "lift_name"),
+    d.DoorState: ("door", "door_name"),
+    d.DoorRequest: ("door", "door_name"),
+    d.ChargerState: ("charger", "charger_name"),
+    d.ChargerRequest: ("charger", "charger_name"),
+    d.ChargerCancel: ("charger", "charger_name"),
+    d.DispenserState: ("dispenser", "guid"),
+    d.DispenserRequest: ("dispenser", "target_guid"),
+    d.DispenserResult: ("dispenser", "source_guid"),
+    d.IngestorState: ("ingestor", "guid"),
+    d.IngestorRequest: ("ingestor", "target_guid"),
+    d.IngestorResult: ("ingestor", "source_guid"),
+}
+"""The kind of the device that each type of message names, and the field that has the device's name."""
 
 
 def printable(text: str) -> str:
@@ -40,36 +58,14 @@ def word(enum: type[IntEnum], value: int) -> str:
         return f"{value}?"
 
 
-def device(message: Stated | Requested | WorkcellResulted) -> str:
+def device(message: Named) -> str:
     """Return the device that a state, request or result names."""
-    match message:
-        case d.DispenserState() | d.IngestorState():
-            return message.guid
-        case d.DispenserRequest() | d.IngestorRequest():
-            return message.target_guid
-        case d.DispenserResult() | d.IngestorResult():
-            return message.source_guid
-        case d.LiftState() | d.LiftRequest():
-            return message.lift_name
-        case d.DoorState() | d.DoorRequest():
-            return message.door_name
-        case _:
-            return message.charger_name
+    return str(getattr(message, _NAMED[type(message)][1]))
 
 
-def kind(message: Stated | Requested | WorkcellResulted) -> Kind:
+def kind(message: Named) -> Kind:
     """Return the kind of the device that a state, request or result names."""
-    match message:
-        case d.DispenserState() | d.DispenserRequest() | d.DispenserResult():
-            return "dispenser"
-        case d.IngestorState() | d.IngestorRequest() | d.IngestorResult():
-            return "ingestor"
-        case d.LiftState() | d.LiftRequest():
-            return "lift"
-        case d.DoorState() | d.DoorRequest():
-            return "door"
-        case _:
-            return "charger"
+    return _NAMED[type(message)][0]
 
 
 def stamped_at(state: Stated) -> float:

@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Sequence
 
+from tests.site.building import SITE, hospital
 from tests.site.day import SUPERVISORS, Site
 from tests.site.growth import growth
 from tests.site.laws import Broken
@@ -31,6 +32,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         metavar="S",
         help="the only trouble: RMF's lift supervisor dies each S seconds",
     )
+    parser.add_argument(
+        "--size",
+        type=int,
+        nargs=4,
+        metavar=("LIFTS", "DOORS", "CHARGERS", "ROBOTS"),
+        help="a larger site; by default 2 lifts, 5 doors, 3 chargers and 5 robots",
+    )
     parser.add_argument("--log", type=int, default=60, help="log lines printed after a failure")
     options = parser.parse_args(argv)
     seed = secrets.randbelow(10**6) if options.seed is None else options.seed
@@ -38,7 +46,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser.error("less than 0.3 hours is no day")
     if options.kill_every and options.rmf not in SUPERVISORS[1:]:
         parser.error("--kill-every needs --rmf kilted or jazzy")
-    began, site = time.perf_counter(), Site(seed, options.rmf, options.kill_every)
+    size = hospital(*options.size) if options.size else SITE
+    began, site = time.perf_counter(), Site(seed, options.rmf, options.kill_every, size)
     _print(f"seed {seed}, {options.hours:g} hours, supervisors: {site.rmf}")
     try:
         site.run(options.hours, told=lambda look: _print(str(look)))
@@ -61,7 +70,9 @@ def _failed(site: Site, why: str, options: argparse.Namespace) -> int:
     _print(f"present troubles: {', '.join(site.ills.all()) or 'nothing'}")
     _print(f"BROKEN {why}")
     kills = f" KILL_EVERY={options.kill_every:g}" if options.kill_every else ""
-    _print(f"to repeat: make soak SEED={site.seed} HOURS={options.hours:g} RMF={site.rmf}{kills}")
+    size = f" SIZE='{' '.join(map(str, options.size))}'" if options.size else ""
+    hours = f"HOURS={options.hours:g} RMF={site.rmf}"
+    _print(f"to repeat: make soak SEED={site.seed} {hours}{kills}{size}")
     return 1
 
 

@@ -10,6 +10,7 @@ have register maps. The site has three charging stations.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -39,9 +40,37 @@ FLOORS = ["L1", "L2", "L3", "L4"]
 LIFTS = ("Lift1", "Lift2")
 DOORS = ("ward", "lab", "store", "gate", "icu")
 CHARGERS = ("bay1", "bay2", "bay3")
+ROBOTS = ("red", "green", "blue", "white", "black")
 POLL_S = {"gpio": 0.0, "modbus": 0.05, "http": 0.5}
 """The delay (s) until a daemon sees a change. GPIO reports an edge at once. Other buses wait for the
 next poll."""
+
+
+@dataclass(frozen=True)
+class Size:
+    """The names of a site's devices and robots."""
+
+    lifts: tuple[str, ...] = LIFTS
+    doors: tuple[str, ...] = DOORS
+    chargers: tuple[str, ...] = CHARGERS
+    robots: tuple[str, ...] = ROBOTS
+
+
+SITE = Size()
+
+
+def hospital(lifts: int, doors: int, chargers: int, robots: int) -> Size:
+    """Return a site with so many of each. Wirings and drivers repeat as the names do."""
+    return Size(
+        tuple(f"Lift{number}" for number in range(1, lifts + 1)),
+        _numbered(DOORS, doors),
+        tuple(f"bay{number}" for number in range(1, chargers + 1)),
+        _numbered(ROBOTS, robots),
+    )
+
+
+def _numbered(names: tuple[str, ...], many: int) -> tuple[str, ...]:
+    return tuple(f"{names[n % len(names)]}{n // len(names) or ''}" for n in range(many))
 
 
 @dataclass(frozen=True)
@@ -62,17 +91,23 @@ class Device:
     poll_s: float
 
 
-def devices(timeline: Timeline) -> dict[str, Device]:
+def devices(timeline: Timeline, size: Size = SITE) -> dict[str, Device]:
     """Return every lift, door and charger of the site by name."""
-    found = [_lift(timeline, "Lift1", _shipped("lift_dry_contact", "Lift1"), "gpio")]
-    found += [_lift(timeline, "Lift2", _convert(lift_dry_contact, _lift2()), "modbus")]
-    for name, content, bus in _dry_doors():
-        found.append(_dry_door(timeline, name, _convert(door_dry_contact, content), bus))
-    for name, shipped in (("gate", "ward_door"), ("icu", "lab_door")):
-        found.append(_register_door(timeline, name, _shipped("door_register", shipped)))
-    for number, name in enumerate(CHARGERS):
-        found.append(_charger(timeline, name, clear_errors_per_h=60 if number == 0 else 0))
+    found = [_lift(timeline, name, number) for number, name in enumerate(size.lifts)]
+    found += [_door(timeline, name, number) for number, name in enumerate(size.doors)]
+    for number, name in enumerate(size.chargers):
+        found.append(_charger(timeline, name, clear_errors_per_h=60 if number % 3 == 0 else 0))
     return {device.name: device for device in found}
+
+
+def _door(timeline: Timeline, name: str, number: int) -> Device:
+    dry, shipped = _dry_doors(), ("ward_door", "lab_door")
+    number %= len(DOORS)
+    if number >= len(dry):
+        settings = _shipped("door_register", shipped[number - len(dry)])
+        return _register_door(timeline, name, settings)
+    content, bus = dry[number]
+    return _dry_door(timeline, name, _convert(door_dry_contact, content), bus)
 
 
 def _wired(
@@ -99,8 +134,13 @@ def _wired(
     )
 
 
-def _lift(timeline: Timeline, name: str, settings: Any, bus: str) -> Device:
+def _lift(timeline: Timeline, name: str, number: int) -> Device:
+    on_gpio = number % 2 == 0
+    settings = (
+        _shipped("lift_dry_contact", "Lift1") if on_gpio else _convert(lift_dry_contact, _lift2())
+    )
     plant = lift_plant.build(name, settings)
+    bus = "gpio" if on_gpio else "modbus"
     return _wired(timeline, name, LIFT, lift_dry_contact, plant, settings, bus)
 
 
@@ -146,6 +186,7 @@ def _charger(timeline: Timeline, name: str, clear_errors_per_h: int) -> Device:
     )
 
 
+@cache
 def _shipped(file: str, name: str) -> Any:
     return load(CONFIG / f"{file}.yaml").devices[name]
 
@@ -178,7 +219,7 @@ def _lift2() -> dict[str, Any]:
     }
 
 
-def _dry_doors() -> list[tuple[str, dict[str, Any], str]]:
+def _dry_doors() -> list[tuple[dict[str, Any], str]]:
     limits = {"opened": line(0), "closed": line(1)}
     pins = {
         signal: {"point": f"BCM{pin}", "active": active, "pull": "down"}
@@ -198,7 +239,7 @@ def _dry_doors() -> list[tuple[str, dict[str, Any], str]]:
     }
     lab = {"inputs": {**limits, "fire": alarm(2)}, "outputs": hold, "on_fire": "release"}
     return [
-        ("ward", {"inputs": pins, "outputs": header, "on_fire": "open"}, "gpio"),
-        ("lab", lab, "modbus"),
-        ("store", store, "modbus"),
+        ({"inputs": pins, "outputs": header, "on_fire": "open"}, "gpio"),
+        (lab, "modbus"),
+        (store, "modbus"),
     ]

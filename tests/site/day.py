@@ -14,7 +14,7 @@ from hal_fakes.plants.charger import ChargerPlant
 from hal_fakes.plants.door import DoorPlant
 from hal_fakes.plants.lift import FAILS, LiftPlant
 from tests.site import charging
-from tests.site.building import CHARGERS, DOORS, FLOORS, LIFTS, Device, devices
+from tests.site.building import FLOORS, SITE, Device, Size, devices
 from tests.site.daemons import (
     RIVAL,
     DeviceDaemon,
@@ -25,14 +25,13 @@ from tests.site.daemons import (
 )
 from tests.site.fire_panels import FirePanels
 from tests.site.growth import Look, look
-from tests.site.laws import BOUND_S, Laws
+from tests.site.laws import BOUND_S, Broken, Laws
 from tests.site.network import CLEAR, Air, Place
 from tests.site.robots import Places, Resident
 from tests.site.storeroom import Storeroom
 from tests.site.timeline import NEVER, Timeline
 from tests.site.trouble import BY_RESET_S, Ill, Ills, Mortal, Trouble, breakable, pressable
 
-ROBOTS = ("red", "green", "blue", "white", "black")
 WIND_DOWN_S = BOUND_S + 90.0
 """The length of the wind-down (s). In this time no new trouble begins, and every robot ends its
 tour."""
@@ -62,9 +61,14 @@ class Site:
     """
 
     def __init__(
-        self, seed: int, rmf: str | None = None, kill_every_s: float | None = None
+        self,
+        seed: int,
+        rmf: str | None = None,
+        kill_every_s: float | None = None,
+        size: Size = SITE,
     ) -> None:
         self.seed = seed
+        self.size = size
         self.rmf = rmf or SUPERVISORS[seed % len(SUPERVISORS)]
         self.jazzy = self.rmf == "jazzy" or (self.rmf == "ours" and seed % 2 == 1)
         self.random = Random(seed)
@@ -73,17 +77,17 @@ class Site:
         self.air = Air(timeline, Random(self.random.random()))
         self.laws = Laws(timeline, self.ills)
         self.air.watch = self.laws.heard
-        self.devices = devices(timeline)
+        self.devices = devices(timeline, size)
         self.daemons = {n: DeviceDaemon(timeline, self.air, d) for n, d in self.devices.items()}
         self.supervisors = self._rmfs() if self.rmf != "ours" else self._ours()
         self.air.release = JAZZY if self.jazzy else KILTED
-        self.charging = charging.settings(CHARGERS, ROBOTS)
+        self.charging = charging.settings(size.chargers, size.robots)
         self.coordinator = GraphDaemon(
             timeline, self.air, "coordinator", COORDINATOR, settings=self.charging
         )
         self.coordinated = seed // len(SUPERVISORS) % 2 == 0
         self.nodes = [*self.supervisors, *([self.coordinator] if self.coordinated else [])]
-        self.robots = [self._robot(f"fleet/{name}") for name in ROBOTS]
+        self.robots = [self._robot(f"fleet/{name}") for name in size.robots]
         self.trouble = Trouble(
             timeline, self.ills, Random(self.random.random()), self._draw, self.laws.note
         )
@@ -119,7 +123,7 @@ class Site:
             self.timeline.at(60.0, self._kill)
         self.timeline.at(end - WIND_DOWN_S, self._wind_down)
         self.timeline.at(end - SWEEP_S, self._sweep)
-        with _silent():
+        with _defects_end_the_day():
             hour = 0
             while (hour := hour + 1) * HOUR_S < end:
                 self.timeline.run(hour * HOUR_S)
@@ -179,8 +183,8 @@ class Site:
     def _live(self) -> None:
         """Let people use lifts and doors. This does not count as trouble."""
         people = self._people
-        name = people.choice([*LIFTS, *DOORS])
-        signal = f"hall_{people.choice(FLOORS)}" if name in LIFTS else "push"
+        name = people.choice([*self.size.lifts, *self.size.doors])
+        signal = f"hall_{people.choice(FLOORS)}" if name in self.size.lifts else "push"
         self._press(name, signal, True)
         self.timeline.after(people.uniform(0.2, 2.0), lambda: self._press(name, signal, False))
         if self.timeline.now < self.trouble.over_at:
@@ -230,7 +234,7 @@ class Site:
 
     def crossed(self, robot: Resident) -> None:
         self.laws.crossed(robot.name)
-        for door in DOORS:
+        for door in self.size.doors:
             if self.devices[door].plant.contact("obstruction") and self._people.random() < 0.2:
                 self._follows(door)  # a person walks in behind the robot
             self._obstruct(door)
@@ -282,7 +286,8 @@ class Site:
 
     def _robot(self, name: str) -> Resident:
         self.air.best_effort.add(name)
-        places = Places(FLOORS, [*LIFTS], [*DOORS], [*CHARGERS])
+        size = self.size
+        places = Places(FLOORS, [*size.lifts], [*size.doors], [*size.chargers])
         own = Random(self.random.random())
         charge = charging.Charge(name.split("/")[1], self.charging) if self.coordinated else None
         return Resident(
@@ -305,7 +310,9 @@ class Site:
         return draw(random)
 
     def _device(self, random: Random) -> Device:
-        return self.devices[random.choice(random.choice((LIFTS, DOORS, CHARGERS)))]
+        return self.devices[
+            random.choice(random.choice((self.size.lifts, self.size.doors, self.size.chargers)))
+        ]
 
     def _rival(self, random: Random) -> Ill:
         """Return a trouble: RMF's own lift supervisor runs beside ours for some time."""
@@ -313,11 +320,11 @@ class Site:
 
         def begin() -> None:
             rival.start()
-            self._distrust(LIFTS, "rival")
+            self._distrust(self.size.lifts, "rival")
 
         def end() -> None:
             rival.kill()
-            self._trust(LIFTS, "rival")
+            self._trust(self.size.lifts, "rival")
 
         return Ill("rival", rival.name, "rival", begin, end, most_s=40.0)
 
@@ -325,7 +332,7 @@ class Site:
         """Return a trouble: RMF's supervisor forgets everything, and then may speak for other
         robots."""
         supervisor = random.choice([s for s in self.supervisors if isinstance(s, RmfsSupervisor)])
-        devices = LIFTS if supervisor.name == RIVAL else DOORS
+        devices = self.size.lifts if supervisor.name == RIVAL else self.size.doors
 
         why = f"supervisor {random.random()}"  # unique, because two restarts may be close together
 
@@ -398,7 +405,7 @@ class Site:
         what = f"hazard {signal}" if hazard else f"press {signal}"
         if signal == "obstruction":
             return Ill("person", name, what, lambda: self._obstruct(name), lambda: None, most_s=40)
-        latches = not isinstance(device.plant, DoorPlant) and name != "Lift1"
+        latches = not isinstance(device.plant, DoorPlant) and device.poll_s > 0.0
         return Ill(
             "hazard",
             name,
@@ -467,12 +474,23 @@ class Site:
         return Ill("cut", name, "cut off", begin, lambda: None, lasts_s, lasts_s + 0.001)
 
 
+class _Defects(logging.Handler):
+    """Ends the day at a defect that a daemon has contained, because the daemon would serve on."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if "defect" in (text := record.getMessage()):
+            raise Broken(text)
+
+
 @contextmanager
-def _silent() -> Iterator[None]:
-    """Log nothing. The log of a day would fill the memory of the process that captures it."""
-    before = logging.root.manager.disable
-    logging.disable(logging.CRITICAL)
+def _defects_end_the_day() -> Iterator[None]:
+    """Log nothing below an error, because a whole day's log would fill the memory of a test's
+    process."""
+    before, defects = logging.root.manager.disable, _Defects(logging.ERROR)
+    logging.disable(logging.WARNING)
+    logging.root.addHandler(defects)
     try:
         yield
     finally:
+        logging.root.removeHandler(defects)
         logging.disable(before)

@@ -59,8 +59,12 @@ SHOWN = ("floor", "door", "motion")
 """The groups of lines on which the shown door of a lift depends."""
 
 
-class Broken(AssertionError):
-    """A broken law. The text names the law and the time."""
+class Broken(BaseException):
+    """A broken law. The text names the law and the time.
+
+    Broken is no Exception, because a relay's edge comes in the middle of a driver's call. A daemon
+    contains every Exception of a driver (`bridges/runtime/contained.py`).
+    """
 
 
 @dataclass

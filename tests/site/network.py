@@ -72,9 +72,9 @@ class Air:
     def delays(self, speaker: str, hearer: str, topic: Topic[Any]) -> Sequence[float]:
         """Return the delay of each copy of a sample (s). A lost sample has no copy."""
         weather, random, now = self.weather, self._random.random, self.timeline.now
-        until = max(self._cut.get(speaker, 0.0), self._cut.get(hearer, 0.0))
         delay = 0.002 + 0.02 * random()
-        if until > now:
+        if self._cut:
+            until = max(self._cut.get(speaker, now), self._cut.get(hearer, now))
             if until - now > LEASE_S:
                 return ()
             delay += until - now

@@ -6,7 +6,7 @@ from bridges.kinds.lift import forgotten
 from tests.depth import depth
 from tests.site.day import Site
 from tests.site.growth import Look, growth
-from tests.site.laws import Broken
+from tests.site.laws import Broken, Laws
 
 SEEDS = depth([2], [1, 2, 3])
 """The seeds of the days. Each seed has other supervisors. tests/workbench/replay/test_replay.py also
@@ -74,3 +74,25 @@ def test_growth_from_hour_to_hour_is_reported() -> None:
         "objects: 33000 to 39000",
         "memory: 34.0 to 60.0 MB",
     ]
+
+
+def test_a_law_that_is_broken_in_the_middle_of_a_drivers_call_ends_the_day(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A daemon contains what its driver raises; a relay's edge comes in the driver's `write`."""
+    monkeypatch.setattr(
+        Laws, "_lift_relay", lambda laws, name, edge: laws.require(False, f"{edge.signal} moves")
+    )
+    with pytest.raises(Broken, match="moves"):
+        Site(6, "ours").run(0.3)
+
+
+def test_a_defect_that_a_daemon_contains_ends_the_day(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(driver: object) -> None:
+        raise ZeroDivisionError
+
+    site = Site(6, "ours")
+    of_lift1 = type(site.devices["Lift1"].driver())
+    site.timeline.at(60.0, lambda: monkeypatch.setattr(of_lift1, "read", fails))
+    with pytest.raises(Broken, match="a defect of the driver: ZeroDivisionError"):
+        site.run(0.3)

@@ -30,19 +30,20 @@ ENDS_WITHIN_S: Final[dict[int, float]] = {int(ASSIGNED): 5.0, int(CHARGING): 120
 120 s to ramp down."""
 FOREIGN_S: Final = 2.0
 UNREACHED_S: Final = 15.0
+_NUMBERS: Final = frozenset(d.ChargerStateValue)
 
 
 def _numbers(history: ChargerHistory) -> Finding:
     if history.new is None:
         return None
-    known = history.new.state in list(d.ChargerStateValue)
+    known = history.new.state in _NUMBERS
     return KEPT if known else f"state {history.new.state}: RMF has no such number"
 
 
 def _known(history: ChargerHistory) -> d.ChargerState | None:
     """Return the new state if RMF defines the state's number. Otherwise return None."""
     state = history.new
-    return state if state is not None and state.state in list(d.ChargerStateValue) else None
+    return state if state is not None and state.state in _NUMBERS else None
 
 
 def _has_id(history: ChargerHistory) -> Finding:

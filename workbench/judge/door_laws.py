@@ -17,12 +17,13 @@ BYPASS_S: Final = 5.0
 FLICKERS_S: Final = 0.9
 """Time (s) that is too short for a real door to close and open again."""
 LATE_S: Final = FLICKERS_S + 1.0
+_NUMBERS: Final = frozenset(d.DoorModeValue)
 
 
 def _numbers(history: DoorHistory) -> Finding:
     if history.new is None:
         return None
-    known = history.mode in list(d.DoorModeValue)
+    known = history.mode in _NUMBERS
     return KEPT if known else f"current_mode {history.mode}: RMF has no such number"
 
 

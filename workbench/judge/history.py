@@ -43,6 +43,7 @@ TESTED_S: Final = 5.0
 SILENCES: Final = 5
 
 NOT_YET: Final = float("-inf")
+StatedOrRequested = words.Stated | words.Requested
 
 T = TypeVar("T", d.LiftState, d.DoorState, d.ChargerState, d.DispenserState)
 V = TypeVar("V")
@@ -156,9 +157,10 @@ class History(AnyHistory, Generic[T]):
         about another device, which needs no check."""
         self._begin(heard, own)
         message = heard.message
-        if not isinstance(message, words.Stated | words.Requested):
+        if not isinstance(message, StatedOrRequested):
             return self.take_other(heard)
-        if (words.kind(message), words.device(message)) == (self.seen.kind, self.name):
+        kind, name = words.kind(message), words.device(message)
+        if kind == self.seen.kind and name == self.name:
             earlier = self.heard_at
             self.seen.hear(Moment(heard.at, heard.wall), heard.topic, message)
             if isinstance(message, words.Stated):
@@ -166,8 +168,8 @@ class History(AnyHistory, Generic[T]):
                 return self._take_state(message, earlier)  # type: ignore[arg-type]
         elif isinstance(message, words.Stated):
             self._other_at = self.now
-            if words.kind(message) == self.seen.kind and len(self.others) < REMEMBERED:
-                self.others.add(words.device(message))
+            if kind == self.seen.kind and len(self.others) < REMEMBERED:
+                self.others.add(name)
             return False
         return self.take_other(heard)
 

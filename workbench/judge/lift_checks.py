@@ -22,6 +22,9 @@ recording may lack the supervisor."""
 SETTLED_S: Final = 3.0
 """Time (s) after a node's first state in which the node may still obey requests that we have not
 heard."""
+_DOORS: Final = frozenset(d.LiftDoor)
+_MOTIONS: Final = frozenset(d.LiftMotion)
+_MODES: Final = frozenset(d.LiftMode)
 
 
 def _is_open(history: LiftHistory) -> d.LiftState | None:
@@ -36,12 +39,12 @@ def numbers(history: LiftHistory) -> Finding:
     found = [
         f"{field} {value}"
         for field, value, known in (
-            ("door_state", state.door_state, d.LiftDoor),
-            ("motion_state", state.motion_state, d.LiftMotion),
-            ("current_mode", state.current_mode, d.LiftMode),
-            *(("available_modes", mode, d.LiftMode) for mode in state.available_modes[:20]),
+            ("door_state", state.door_state, _DOORS),
+            ("motion_state", state.motion_state, _MOTIONS),
+            ("current_mode", state.current_mode, _MODES),
+            *(("available_modes", mode, _MODES) for mode in state.available_modes[:20]),
         )
-        if value not in list(known)
+        if value not in known
     ]
     return f"{', '.join(found[:3])}: RMF has no such number" if found else KEPT
 

@@ -2,12 +2,17 @@
 
 from typing import Any
 
+import pytest
+from msgspec.structs import replace
+
 from bridges.kinds.alarm import core
 from bridges.kinds.alarm.memory import PanelLimits, PanelMemory
 from bridges.kinds.alarm.messages import summary
 from bridges.kinds.alarm.report import PanelReport
-from bridges.kinds.alarm.signals import PanelSample
-from bridges.kinds.shared.decision import AlarmInputs, IoFailed, Sampled, Suspended
+from bridges.kinds.alarm.settings import PanelDurations, PanelSettings
+from bridges.kinds.alarm.signals import PanelOutputs, PanelSample
+from bridges.kinds.shared.decision import AlarmInputs, IoFailed, OperatorReset, Sampled, Suspended
+from bridges.kinds.shared.durations import NEVER
 from tests.depth import depth
 from tests.walk import histories
 
@@ -137,6 +142,117 @@ def test_a_panel_that_never_answers_alarms_after_the_same_time() -> None:
     assert panel.report.alarm.present == frozenset()
     assert panel.faults == ["PANEL_SILENT: no answer"]
     assert panel.until(10.0).report.alarm.present == {"silence"}
+
+
+def test_a_reading_is_believed_until_it_is_stale_and_the_silence_has_its_own_reason() -> None:
+    """ALARM-2: `stale_after_s` is 1 s."""
+    panel = Panel().until(1.0)
+    panel.unreadable = "no answer"
+    panel.until(1.5)
+    panel.unreadable = ""
+    panel.until(2.0)
+    panel.now = 2.875
+    panel.scan(OperatorReset())
+    assert (panel.report.silent, panel.faults, panel.report.read_at) == (False, [], 2.0)
+    panel.now = 3.0
+    panel.scan(OperatorReset())
+    assert (panel.report.silent, panel.faults) == (True, ["PANEL_SILENT: no reading"])
+    assert summary(panel.report)["state"] == "silent"
+
+
+def test_a_panel_that_was_never_tried_is_not_silent_yet() -> None:
+    """ALARM-2: the first scan may be an event."""
+    panel = Panel()
+    panel.scan(OperatorReset())
+    assert (panel.report.silent, panel.faults) == (False, [])
+    panel.scan(IoFailed("no answer"))
+    assert (panel.report.silent, panel.faults) == (True, ["PANEL_SILENT: no answer"])
+
+
+def test_every_active_source_is_named_and_nothing_is_driven() -> None:
+    """ALARM-1."""
+    panel = Panel().until(1.0)
+    panel.on.update(fire=True, blue=True)
+    assert panel.until(2.0).faults == ["ALARM_SOURCE_ACTIVE: blue, fire"]
+    made = core.decide(panel.memory, Sampled(PanelSample(panel.on)), 3.0, LIMITS)
+    assert made.outputs == PanelOutputs()
+
+
+def test_without_a_debounce_a_source_and_a_drill_count_at_their_first_reading() -> None:
+    """ALARM-1 and ALARM-4."""
+    plain = PanelLimits(silent_alarm_after_s=10.0, drill_s=5.0)
+    memory = core.initial(plain, 0.0)
+    off, on = PanelSample({"fire": False}, False), PanelSample({"fire": True}, True)
+    memory = core.decide(memory, Sampled(off), 1.0, plain).memory
+    made = core.decide(memory, Sampled(on), 2.0, plain)
+    assert made.report.alarm == AlarmInputs(frozenset({"fire"}), True, drill=True)
+    assert made.wake_at == 3.0  # the reading is stale then
+
+
+@pytest.mark.parametrize("drill", [False, True])
+def test_a_panel_that_is_scanned_only_when_it_asks_for_it_sees_every_change_in_time(
+    drill: bool,
+) -> None:
+    """ALARM-1 to ALARM-4: the daemon reads a quiet panel no sooner than the core asks for it."""
+    panel, told = Panel().until(1.0), []
+    fault = "ALARM_DRILL: a drill, which ends by itself" if drill else "ALARM_SOURCE_ACTIVE: fire"
+    panel.drill, panel.on["fire"] = drill, not drill
+    for _ in range(4):
+        panel.scan()
+        told.append((panel.now, *panel.faults))
+        panel.now = core.decide(panel.memory, OperatorReset(), panel.now, LIMITS).wake_at
+    assert told == [(1.0,), (1.25, fault), (2.25, fault), (3.25, fault)]
+    panel.on["fire"], panel.now = False, 4.0
+    panel.scan()
+    assert core.decide(panel.memory, OperatorReset(), 4.0, LIMITS).wake_at == 5.0  # clear_s
+
+
+def test_a_change_of_anything_but_a_reason_is_news_for_the_log() -> None:
+    panel = Panel().until(1.0)
+    quiet = panel.report.news()
+    panel.scan()
+    assert panel.report.news() == quiet
+    panel.scan(IoFailed("no answer"))
+    lost = panel.report.news()
+    panel.now = 2.0
+    panel.scan(IoFailed("no answer"))
+    assert panel.report.news() not in (quiet, lost)
+
+
+def test_a_silent_panel_asks_to_be_woken_for_its_alarm() -> None:
+    """ALARM-3."""
+    panel = Panel().until(1.0)
+    asked = []
+    for _ in range(3):
+        made = core.decide(panel.memory, IoFailed("no answer"), panel.now, LIMITS)
+        panel.memory, panel.now = made.memory, made.wake_at
+        asked.append(made.wake_at)
+    assert asked == [2.0, 11.0, NEVER]
+
+
+def test_a_failed_reading_restarts_the_debounce_of_the_drill_too() -> None:
+    """ALARM-1 and ALARM-4: one bad reading must not make a drill of a bounce."""
+    panel = Panel().until(1.0)
+    panel.drill = True
+    panel.until(1.125)
+    panel.unreadable = "no answer"
+    panel.until(1.25)
+    panel.unreadable = ""
+    panel.until(1.5)
+    assert panel.report.alarm.drill is False
+    assert panel.until(1.625).report.alarm.drill is True
+
+
+def test_the_limits_are_those_of_the_file() -> None:
+    durations = PanelDurations(stale_after_s=2.0)
+    settings = PanelSettings(
+        alarm="fire_alarm_trigger", silent_alarm_after_s=30.0, drill_s=60.0, limits=durations
+    )
+    assert PanelLimits.of(settings, {"fire": 0.5}) == PanelLimits(
+        30.0, 60.0, durations, {"fire": 0.5}
+    )
+    without = replace(settings, drill_s=None)
+    assert PanelLimits.of(without, {}) == PanelLimits(30.0, 0.0, durations, {})
 
 
 def test_a_machine_that_slept_counts_its_sleep_as_silence() -> None:

@@ -85,6 +85,7 @@ class Story:
         before = self.memory.command
         decision = core.decide(self.memory, event, self.now, self.limits)
         self.memory, self.wake_at = decision.memory, decision.wake_at
+        assert self.wake_at > self.now
         assert decision.outputs.command == self.memory.command
         if self.memory.command != before:
             self.sent.append((round(self.now - self.began, 3), self.memory.command))

@@ -1,0 +1,190 @@
+"""Single decisions of a dispenser's core: failures in mid-cycle, the disk, decisions of a person."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from bridges.kinds.dispenser import core
+from bridges.kinds.dispenser.memory import WorkcellLimits, WorkcellMemory
+from bridges.kinds.dispenser.report import WorkcellReport
+from bridges.kinds.dispenser.settings import WorkcellDurations
+from bridges.kinds.dispenser.signals import Item, ItemRequested, WorkcellOutputs, WorkcellSample
+from bridges.kinds.shared.decision import (
+    DecidedByPerson,
+    IoFailed,
+    MemoryKept,
+    MemoryNotKept,
+    OperatorReset,
+    RivalSeen,
+    Sampled,
+    Suspended,
+    WriteFailed,
+)
+from bridges.messages.definitions import WorkcellStatus
+
+BOX = Item("box", 1)
+ASKS = ItemRequested("task", BOX, "fleet")
+CALM = WorkcellSample(done=False, busy=False, ready=True, fault=False)
+WORKS = replace(CALM, busy=True)
+STEADY = WorkcellLimits(WorkcellDurations(cycle_limit_s=60.0))
+PULSED = replace(STEADY, pulse_s=0.5)
+ON = WorkcellOutputs(True, "task", BOX)
+OFF = WorkcellOutputs(False, "task", BOX)
+
+
+class Cell:
+    """A dispenser from event to event. `refused` and `wake_at` are those of the last decision."""
+
+    def __init__(self, limits: WorkcellLimits = STEADY) -> None:
+        self.limits = limits
+        self.now = 0.0
+        self.memory: WorkcellMemory = core.initial(limits, 0.0)
+        self.outputs = WorkcellOutputs()
+        self.report: WorkcellReport
+        self.refused = ""
+        self.wake_at = 0.0
+
+    def take(self, *events: Any, at: float | None = None) -> "Cell":
+        self.now = self.now if at is None else at
+        for event in events:
+            made = core.decide(self.memory, event, self.now, self.limits)
+            assert made.wake_at > self.now
+            self.memory, self.outputs, self.report = made.memory, made.outputs, made.report
+            self.refused, self.wake_at = made.refused, made.wake_at
+        return self
+
+    @property
+    def faults(self) -> Sequence[str]:
+        return [str(fault) for fault in self.report.faults]
+
+
+def asked(limits: WorkcellLimits = STEADY) -> Cell:
+    """Return a dispenser whose next cycle is decided, and is not on disk yet."""
+    cell = Cell(limits).take(Sampled(CALM), at=10.0).take(ASKS, MemoryKept())
+    assert (cell.outputs, cell.report.queue) == (WorkcellOutputs(), ("task",))
+    return cell
+
+
+def running(limits: WorkcellLimits = STEADY) -> Cell:
+    """Return a dispenser whose cycle has begun at 10 s."""
+    cell = asked(limits).take(MemoryKept())
+    assert cell.outputs == ON
+    return cell
+
+
+# ---- DISPENSER-6: a failure in mid-cycle
+
+
+@pytest.mark.parametrize("failure", [WriteFailed("no"), IoFailed("no"), Suspended("slept")])
+def test_after_any_failure_in_mid_cycle_the_start_stays_off_and_done_still_counts(
+    failure: Any,
+) -> None:
+    """DISPENSER-6."""
+    cell = running().take(failure)
+    assert cell.outputs == OFF
+    assert cell.take(Sampled(WORKS), at=10.25).outputs == OFF
+    assert cell.take(Sampled(replace(CALM, done=True)), at=11.0).outputs == WorkcellOutputs()
+    assert cell.take(MemoryKept()).report.results == (("task", WorkcellStatus.SUCCESS),)
+
+
+@pytest.mark.parametrize("failure", [WriteFailed("no"), IoFailed("no"), Suspended("slept")])
+def test_a_failure_without_a_cycle_stops_nothing_and_its_reason_ends_with_a_reading(
+    failure: Any,
+) -> None:
+    cell = Cell().take(Sampled(CALM), at=10.0).take(failure)
+    assert (cell.memory.io_failure, cell.refused) == (str(failure.reason), "")
+    assert cell.take(Sampled(CALM), at=10.25).memory.io_failure == ""
+
+
+def test_a_suspended_daemon_knows_no_input_any_more() -> None:
+    """DISPENSER-4: what was read before the sleep may be outdated."""
+    cell = Cell().take(Sampled(CALM), at=10.0).take(Suspended("slept"))
+    assert cell.faults == ["COMMUNICATION_LOST: slept"]
+    assert cell.take(ASKS, MemoryKept(), MemoryKept()).outputs == WorkcellOutputs()
+
+
+def test_a_failed_reading_restarts_the_debounce_of_each_input() -> None:
+    """DISPENSER-4: one bad reading makes no `ready` of a bounce."""
+    limits = replace(STEADY, debounce={"ready": 0.5})
+    cell = Cell(limits).take(Sampled(replace(CALM, ready=False)), at=10.0)
+    cell.take(Sampled(replace(CALM, ready=False)), at=10.5)
+    cell.take(Sampled(CALM), at=10.75).take(IoFailed("no"), at=11.0)
+    cell.take(Sampled(CALM), at=11.25).take(ASKS, MemoryKept(), MemoryKept())
+    assert cell.outputs == WorkcellOutputs()
+    cell.take(Sampled(CALM), at=11.75).take(MemoryKept())
+    assert cell.outputs == ON
+
+
+# ---- DISPENSER-2: the disk
+
+
+def test_a_cycle_that_rmf_gave_up_before_its_start_was_on_disk_waits_again() -> None:
+    """DISPENSER-2 and DISPENSER-4: RMF repeats within 5 s."""
+    cell = asked().take(MemoryNotKept("disk full"))
+    assert (cell.outputs, cell.faults) == (
+        WorkcellOutputs(), ["NOT_KEPT: nothing is accepted or started: disk full"],
+    )  # fmt: skip
+    cell.take(Sampled(CALM), at=15.0).take(MemoryKept())
+    assert (cell.outputs, cell.memory.cycle, cell.faults) == (WorkcellOutputs(), None, [])
+    assert cell.report.queue == ("task",)
+    cell.take(ASKS, MemoryKept(), MemoryKept())
+    assert cell.outputs == ON
+
+
+def test_a_cycle_whose_start_comes_late_to_the_disk_has_its_whole_pulse_and_time() -> None:
+    """DISPENSER-2: the time counts from the disk."""
+    cell = asked(PULSED).take(MemoryNotKept("disk full"))
+    cell.take(Sampled(CALM), ASKS, at=14.0).take(MemoryKept())
+    assert cell.outputs == ON
+    assert cell.take(Sampled(WORKS), at=14.25).outputs == ON
+    assert cell.take(Sampled(WORKS), at=14.5).outputs == OFF
+    cell.take(Sampled(WORKS), at=73.75)
+    assert cell.memory.cycle is not None
+    cell.take(Sampled(WORKS), at=74.0).take(MemoryKept())
+    assert cell.report.results == (("task", WorkcellStatus.FAILED),)
+
+
+def test_a_further_write_to_the_disk_does_not_prolong_the_pulse() -> None:
+    cell = running(PULSED)
+    cell.take(Sampled(WORKS), replace(ASKS, guid="other"), MemoryKept(), at=10.25)
+    assert cell.take(Sampled(WORKS), at=10.5).outputs == OFF
+
+
+def test_a_result_is_sent_once_for_each_request_of_rmf() -> None:
+    """DISPENSER-1 and DISPENSER-3."""
+    cell = running().take(replace(ASKS, guid="other"), MemoryKept())
+    accepted = ("task", WorkcellStatus.ACKNOWLEDGED), ("other", WorkcellStatus.ACKNOWLEDGED)
+    assert cell.report.results == accepted
+    half = replace(cell.report, results=accepted[:1])
+    cell.memory = core.published(cell.memory, half)
+    assert cell.take(Sampled(CALM)).report.results == accepted[1:]
+    cell.memory = core.published(cell.memory, cell.report)
+    assert cell.take(Sampled(CALM)).report.results == ()
+    assert cell.take(ASKS).report.results == accepted[:1]
+
+
+# ---- refusals and decisions
+
+
+def test_no_event_but_a_wrong_request_or_decision_is_refused() -> None:
+    events = (
+        Sampled(CALM), Suspended("slept"), WriteFailed("no"), IoFailed("no"), RivalSeen(),
+        OperatorReset(), MemoryKept(), MemoryNotKept("full"), ASKS,
+    )  # fmt: skip
+    assert [Cell().take(event, at=1.0).refused for event in events] == [""] * len(events)
+    nothing = Cell().take(DecidedByPerson("done", ""), at=1.0)
+    assert nothing.refused == "nothing in doubt: no request waits for a decision"
+    other = asked().take(replace(ASKS, item=Item("jar", 1)))
+    assert other.refused == "guid of another request: task is for 1 box"
+
+
+def test_a_failure_halts_until_a_reset_and_no_longer() -> None:
+    """DISPENSER-5."""
+    cell = running().take(Sampled(replace(WORKS, fault=True)), MemoryKept(), at=11.0)
+    assert cell.outputs == WorkcellOutputs()
+    cell.take(Sampled(CALM), replace(ASKS, guid="next"), MemoryKept(), MemoryKept(), at=12.0)
+    assert (cell.outputs, cell.report.waits) == (WorkcellOutputs(), "because of WORKCELL_HALTED")
+    cell.take(OperatorReset(), MemoryKept())
+    assert (cell.outputs.guid, cell.memory.halted) == ("next", "")
