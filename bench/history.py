@@ -11,7 +11,8 @@ from typing import Any
 LOSS = 1.15
 """The ratio to the best earlier figure above which a figure is told as a loss."""
 LEAST_LOSS = 0.05
-"""The least difference that is told, because the kernel counts CPU in hundredths of a second."""
+"""A smaller difference is never reported as a loss. The kernel counts CPU time in steps of 0.01 s, so
+a small difference may be noise."""
 LIFT, DOOR, CHARGER = "lift_dry_contact", "door_modbus", "charger_http"
 BARE = "bare node on dds"
 

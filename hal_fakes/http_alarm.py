@@ -1,4 +1,5 @@
-"""An alarm panel on HTTP. The YAML names the fields that show the plant's sources."""
+"""A fake alarm panel on HTTP. The device's YAML names the JSON field that shows each alarm source, such
+as a fire or a drill."""
 
 from bridges.kinds.alarm.signals import DRILL
 from drivers.alarm.http import HttpPanelSettings

@@ -134,8 +134,9 @@ class Once:
     """A log filter for an action that is repeated. It logs the first of several failures, and then the
     first success.
 
-    `fails`, `again`: the names of these two log events. `key`: the log's key for the failing thing.
-    `level`: the log level of a failure. `wrong`: the error of each failing thing.
+    `fails` is the name of the failure's log event, and `again` that of the success. `key` is the log
+    key that names the action. `level` is the log level of a failure. `wrong` maps each action that
+    fails now to its error.
     """
 
     def __init__(

@@ -138,7 +138,8 @@ def warnings(settings: JsonChargerSettings, unseen_timer: Remarks = ()) -> Remar
     """Yield a warning, with its path in the YAML, for each missing ability. Yield a warning for each
     valid setting that may be a mistake.
 
-    `unseen_timer` is the warning about a `start` command that does not contain the timer's number.
+    `unseen_timer` is the warning about a `start` command without the time after which the station must
+    switch off by itself.
     """
     missing = [name for name in ("receiver_id", "stop") if _lacks(settings, name)]
     consequences = {

@@ -153,7 +153,8 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
                 text = unknown("value", name, KNOWN)
                 yield ("values", name), f"{text}; rules and errors do not use it either"
         if self.range_check and "in_range" not in self.values:
-            yield ("range_check",), "needs the value in_range, for the check's result"
+            needs = "needs the value `in_range`, which tells the result of the range check"
+            yield ("range_check",), needs
 
     def orders(self) -> Mapping[str, str]:
         """Return the place of each command that the map gives."""

@@ -165,9 +165,10 @@ class Lines(Protocol):
         """Claim every input, and claim every output at its safe level in one step. Raises HalError."""
 
     def read(self) -> Mapping[str, int]:
-        """Read the level of every input now. Return the level of each canonical point. Raises HalError.
+        """Read every input now. Return the level of each input by its point in canonical spelling.
+        Raises HalError.
 
-        If the result contains an output, this output has lost its level, and must be written again.
+        The result contains an output only if the output has lost its level and must be written again.
         """
 
     def write(self, levels: Mapping[str, bool]) -> None:

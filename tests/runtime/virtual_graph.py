@@ -334,7 +334,8 @@ class StandIn:
         self.restart()
 
     def restart(self) -> None:
-        """Start a new party. It has no memory, and hears all retained messages again."""
+        """Replace the party on the graph by a new one. The new party has no memory, and receives all
+        retained messages again."""
         self.party = self._new()
         self.world.add(self, *self.party.subscribes)
         self.world.publishers[self._publishes.name].add(self.name)

@@ -22,7 +22,8 @@ class HeardRefusal:
 
 
 class ChargerFacts(Device, ObservedCharger):
-    """A charger with its story. `refusal` is the last refusal. `charges` counts the charges begun."""
+    """A charger, its last refused request (`refusal`) and the number of charges that have begun
+    (`charges`)."""
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)

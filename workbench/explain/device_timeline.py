@@ -143,7 +143,7 @@ class Drawing:
         return rows[part]
 
     def _say(self, lane: LaneName, text: str, looks: Tone) -> None:
-        """Set the value of a lane that has only one row. The value comes from a state."""
+        """Set the value of a lane that has only one row. The value comes from a state message."""
         self._row(lane, fills=True).say(self._now, label(text), looks)
 
     # ---- our daemon's notes

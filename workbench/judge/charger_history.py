@@ -49,7 +49,7 @@ class ChargerHistory(History[d.ChargerState]):
         return state.state != ERROR
 
     def take_other(self, heard: Heard) -> bool:
-        """Take requests and cancels for this charger."""
+        """Note a request or a cancellation for this charger. Return whether the message was one."""
         match heard.message:
             case d.ChargerRequest(charger_name=self.name):
                 self.asked()

@@ -215,8 +215,8 @@ class ModbusLines:
                 )
 
     def _reading(self, name: str, value: int, image: Mapping[Point, int]) -> int:
-        """Return an output's reading. Return the written value if the output was not read or is in
-        `unread`."""
+        """Return an output's value in this image. Return the written value instead if the image lacks
+        the output, or if the output cannot be read back (`unread`)."""
         return value if name in self._unread else image.get(self._outputs[name], value)
 
     def _lost(self, known: Mapping[str, int], image: Mapping[Point, int]) -> dict[str, int]:

@@ -67,8 +67,8 @@ class Node:
         return self.state is IDLE or (self.holder is None and self.on_pad == who)
 
     def restarts(self) -> None:
-        """Restart the daemon, which forgets its request. The current flows on until the daemon's next
-        state."""
+        """Restart the charger's daemon, which forgets the coordinator's request. A robot that was being
+        charged stays on the pad, and the charger goes on charging."""
         self.on_pad = self.holder[1] if self.holder and self.state is CHARGING else None
         self.state = CHARGING if self.on_pad else IDLE
         self.holder, self.error, self.known = None, "", set()

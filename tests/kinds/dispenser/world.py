@@ -127,7 +127,7 @@ class World:
         self.inbox["person"] = DecidedByPerson(verdict, request)
 
     def reset(self) -> None:
-        """Let an operator reset."""
+        """Let an operator reset the dispenser."""
         self.inbox["reset"] = OperatorReset()
 
     def rival(self) -> None:

@@ -102,7 +102,7 @@ def stamp(now: float, aged: float = 0.0) -> int:
 
 
 def after(ledger: Ledger, event: Callable[[float], Any]) -> Ledger:
-    """Return a copy that has heard this event, and let STEP_S pass."""
+    """Return a copy of the ledger after this event and after STEP_S more seconds."""
     ledger = ledger.copy()
     ledger.hears(event(ledger.now))
     ledger.until(ledger.now + STEP_S)

@@ -1,4 +1,5 @@
-"""The equipment at the wires of a YAML: `python3 -m tests.vm.guest.far_side FILE`.
+"""Simulate the equipment to which a device's YAML connects the daemon: `python3 -m
+tests.vm.guest.far_side FILE`.
 
 The program runs in the package's own Python. It connects the plants of `hal_fakes/` to real wires:
 lines of gpio-sim, a pseudo-terminal, or an interface of SocketCAN. The plants live on when the daemon

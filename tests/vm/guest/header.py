@@ -17,8 +17,8 @@ from typing import Final
 CONFIGFS: Final = Path("/sys/kernel/config/gpio-sim/header")
 TRACING: Final = Path("/sys/kernel/tracing")
 LABELS: Final = {"pinctrl-bcm2835": 54, "pinctrl-rp1": 54, "pinctrl-bcm2711": 58}
-"""The labels of the header's chips, with their number of lines. In this order: Raspberry Pi 3 and
-older, 5, and 4."""
+"""The label of each GPIO header's chip, with its number of lines. bcm2835 is the chip of a Raspberry Pi
+3 or older, rp1 of a Raspberry Pi 5, and bcm2711 of a Raspberry Pi 4."""
 PI_4: Final = "pinctrl-bcm2711"
 OTHER: Final = "raspberrypi-exp-gpio"
 """The label of a second chip. Here the second chip gets the lower chip number."""
