@@ -93,7 +93,7 @@ class Device:
 
 def devices(timeline: Timeline, size: Size = SITE) -> dict[str, Device]:
     """Return every lift, door and charger of the site by name."""
-    found = [_lift(timeline, name, number) for number, name in enumerate(size.lifts)]
+    found = [_numbered_lift(timeline, name, number) for number, name in enumerate(size.lifts)]
     found += [_door(timeline, name, number) for number, name in enumerate(size.doors)]
     for number, name in enumerate(size.chargers):
         found.append(_charger(timeline, name, clear_errors_per_h=60 if number % 3 == 0 else 0))
@@ -134,13 +134,14 @@ def _wired(
     )
 
 
-def _lift(timeline: Timeline, name: str, number: int) -> Device:
-    on_gpio = number % 2 == 0
-    settings = (
-        _shipped("lift_dry_contact", "Lift1") if on_gpio else _convert(lift_dry_contact, _lift2())
-    )
+def _numbered_lift(timeline: Timeline, name: str, number: int) -> Device:
+    if number % 2 == 0:
+        return _lift(timeline, name, _shipped("lift_dry_contact", "Lift1"), "gpio")
+    return _lift(timeline, name, _convert(lift_dry_contact, _lift2()), "modbus")
+
+
+def _lift(timeline: Timeline, name: str, settings: Any, bus: str) -> Device:
     plant = lift_plant.build(name, settings)
-    bus = "gpio" if on_gpio else "modbus"
     return _wired(timeline, name, LIFT, lift_dry_contact, plant, settings, bus)
 
 

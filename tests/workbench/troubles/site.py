@@ -231,7 +231,7 @@ def devices(timeline: Timeline) -> dict[str, Device]:
     content = {**building._lift2(), "fire_reset": "auto", "alarm": "fire_alarm_trigger"}
     settings = building._convert(lift_dry_contact, content)
     other = building._shipped("lift_dry_contact", LIFT)
-    (_, lab, _) = building._dry_doors()[1]
+    lab, _ = building._dry_doors()[1]
     found = [
         _at_module(timeline, building._lift(timeline, LIFT, settings, "modbus"), lift_dry_contact),
         building._lift(timeline, OTHER_LIFT, other, "gpio"),
