@@ -146,8 +146,8 @@ def _unreleased(folder: Path) -> str:
     for path in paths(Directories(folder, state / folder.name)):
         if record := read(path):
             return (
-                f"do: rmf-bridge outputs-off {record.file}; if that hardware is gone, cut its"
-                f" supply and remove {path}"
+                f"do: rmf-bridge outputs-off {record.file}; if the device will not answer"
+                f" again, cut its relays' supply and remove {path}"
             )
     return ""
 

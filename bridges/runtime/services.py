@@ -22,7 +22,7 @@ INSTANCE: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 NO_INSTANCE: Final = "{!r} is not a service name: use only letters, digits and _ . -"
 LEFT_ON: Final = (
     "the outputs of {} are not verified off, and a new drop-in may block access to them: mend the"
-    " device and try again. If that hardware is gone, cut its supply, then: rm {}"
+    " device and try again. If the device will not answer again, cut its relays' supply, then: rm {}"
 )
 
 

@@ -299,7 +299,7 @@ def test_all_daemons_of_a_machine_share_one_bound_and_the_largest_in_a_yaml_coun
 
 
 def file(name: str, at: float, size: int = 1) -> Stored:
-    """Return a stored file with the name `<daemon> <reason>`."""
+    """Return a stored file. `name` is `<daemon> <reason>`."""
     daemon, why = name.split(" ")
     return Stored(Path(f"{daemon}_{why}_{at:.0f}"), Named(at, daemon, why), size)
 

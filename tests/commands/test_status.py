@@ -176,8 +176,8 @@ def test_outputs_that_nobody_has_verified_off_are_reported_even_without_a_status
     head, remedy = shown(found)
     assert head.startswith("lift_a: has died, and its outputs were not verified off (")
     assert remedy == (
-        f"  do: rmf-bridge outputs-off {config.path}; if that hardware is gone, cut its supply and"
-        f" remove {record}"
+        f"  do: rmf-bridge outputs-off {config.path}; if the device will not answer again,"
+        f" cut its relays' supply and remove {record}"
     )
 
 

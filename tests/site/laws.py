@@ -481,7 +481,8 @@ class Laws:
         )
 
     def at_rest(self) -> None:
-        """Require at the end of the day that no output is on, and that no session or hold remains."""
+        """Require at the end of the day that no output is on, no lift shows a session, every door is
+        closed and no daemon has a fault."""
         for name, on in self._relays.items():
             self.require(not on, f"{name} drives {sorted(on)} at the end of the day")
         for name, truth in self._lifts.items():

@@ -86,7 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="for_s",
         default=NEVER,
         metavar="S",
-        help="listen for S seconds (default: until Ctrl-C, which judges)",
+        help="listen for S seconds, then judge (default: listen until Ctrl-C, then judge)",
     )
     parser.add_argument("--json", action="store_true", help="the verdict as one JSON object")
     parser.add_argument(

@@ -87,7 +87,7 @@ class RmfRobot:
         if fit == self._fit:
             return
         self._fit = fit
-        if fit:  # somebody else may have decommissioned it before
+        if fit:  # as before the fault: somebody else may have decommissioned the robot
             more.set_commission(self._commissioned)
             return
         self._commissioned, none = more.commission(), more.commission()
