@@ -114,8 +114,10 @@ gzip -9nc "$here/build/rmf-bridge.1" > "$root/usr/share/man/man1/rmf-bridge.1.gz
 mkdir -p "$bench/usr/share/doc/rmf-bridges-workbench"
 cp -R "$here/build/site" "$bench/usr/share/doc/rmf-bridges-workbench/html" # `make docs`
 
-# package NAME ROOT DEPENDS SUMMARY [TREE]: builds a package with control files, changelog, copyright and lintian's overrides.
-# The description comes on stdin. TREE is the tree that the package's postinst unpacks.
+# package NAME ROOT DEPENDS SUMMARY [TREE [RECOMMENDS]]: builds a package with control files, changelog, copyright and
+# lintian's overrides.
+# The description comes on stdin. TREE is the tree that the package's postinst unpacks. Without a recommended package the package
+# works, and says what it cannot do.
 package() {
   doc=$2/usr/share/doc/$1
   mkdir -p "$doc"
@@ -136,8 +138,9 @@ Installed-Size: $(du -ck --apparent-size "$2" ${5:-} | tail -1 | cut -f1)
 Depends: $3
 Section: net
 Priority: optional
-Description: $4
 CONTROL
+  [ -z "${6:-}" ] || echo "Recommends: $6" >> "$2/DEBIAN/control"
+  echo "Description: $4" >> "$2/DEBIAN/control"
   cat >> "$2/DEBIAN/control"
   find "$2" -exec touch -hd "@$SOURCE_DATE_EPOCH" {} +
   mkdir -p "$here/dist"
@@ -145,9 +148,10 @@ CONTROL
   ! command -v lintian > /dev/null || lintian --allow-root --fail-on error "$here/dist/$1_${version}_$arch.deb"
 }
 # Depend on this exact Python. The version of `python3` changes with Debian's release, so an upgrade would remove our packages.
+# The program openssl reads the ends of certificates for check, doctor, exporter and notify.
 libc='libc6 (>= 2.34)' # of the wheels' tags (wheels.py, lgpio.sh)
 package rmf-bridges "$root" "python$python, $libc, systemd (>= 252)" \
-  "connect Open-RMF to lifts, doors and chargers" "$tree" <<'DESCRIPTION'
+  "connect Open-RMF to lifts, doors and chargers" "$tree" openssl <<'DESCRIPTION'
  Small daemons, one for each controller, that stand between Open-RMF and a
  building: dry contacts, Modbus, HTTP and CAN. Each is configured by one YAML
  and run by systemd.

@@ -10,12 +10,14 @@ import argparse
 import os
 import shutil
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import msgspec
 
-from bridges.settings.cross_file_checks import Found, across
+from bridges.settings.certificate_files import CERTIFICATES
+from bridges.settings.cross_file_checks import Found, across, named_files
 from bridges.settings.load import Config, Problem, SettingsError, load
 from bridges.settings.sheets import text
 from bridges.settings.sheets.findings import Findings, findings, wrong
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 
 COORDINATOR, FLEET = "charger_coordinator", "fleet"
 NAMED_BY_GRAPH = ("lift", "door", "charger", COORDINATOR)
+RENEW = "after the end no TLS connection succeeds: renew the certificate, and restart the daemon"
 NOTHING_BESIDE = (
     "this file is compared with YAMLs of a charger coordinator or lifts, and no such YAML is given"
 )
@@ -78,7 +81,9 @@ def run(args: argparse.Namespace) -> int:
         found |= _beside_fleet(file, right, found, building)
     for file in [file for file, (config, _) in right.items() if config.kind == FLEET]:
         found |= _of_fleet(file, right, found)
-    together = across([config for config, _ in right.values()], not args.several_machines)
+    configs = [config for config, _ in right.values()]
+    together = across(configs, not args.several_machines)
+    together.warnings.extend(_certificates(configs))
     files = [_with(found[file], together) for file in args.files]
     return _tell(files, args)
 
@@ -188,6 +193,23 @@ def _more(
         warnings=[*file.warnings, *warnings],
         notes=[*file.notes, *notes],
     )
+
+
+def _certificates(configs: Iterable[Config]) -> Iterator[Problem]:
+    """Yield a warning for each certificate that has ended or ends soon.
+
+    If the end is unknown, yield nothing, because `check` may run on another machine than the daemon.
+    """
+    uses = [use for config in configs for use in named_files(config, CERTIFICATES)]
+    if not uses:
+        return
+    from bridges.system.certificates import SOON_S, CertificateReader, told
+
+    reader, now = CertificateReader(), time.time()
+    for use in uses:
+        end = reader.end(use.what)
+        if end.at is not None and end.at < now + SOON_S:
+            yield use.problem(f"warning: {told(use.what, end, now)}: {RENEW}")
 
 
 def _with(file: Findings, together: Found) -> Findings:

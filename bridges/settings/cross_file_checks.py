@@ -47,6 +47,11 @@ class ExclusiveUse(Struct, frozen=True):
         root = compose(page, self.config.text)
         return page.problem(locate(Spot(root, root, ""), self.path).where(), "")
 
+    def problem(self, text: str) -> Problem:
+        """Return a problem at this place. The text may quote any part of the file."""
+        place = self.place()
+        return Problem(place.file, place.line, place.column, text)
+
 
 def across(configs: Sequence[Config], one_machine: bool = True) -> Found:
     """Return the errors and warnings that two or more of these files cause together."""
@@ -72,7 +77,7 @@ def shared_secrets(configs: Sequence[Config]) -> Iterator[Problem]:
     service has a user of its own."""
     for claim, other in _twice(use for one in configs for use in named_files(one, SECRETS)):
         text = "give each service a copy, because each has a user of its own"
-        yield _said(claim, f"{claim.what} is the secret of {other.config.path} too: {text}")
+        yield claim.problem(f"{claim.what} is the secret of {other.config.path} too: {text}")
 
 
 def named_files(config: Config, keys: Sequence[str]) -> Iterator[ExclusiveUse]:
@@ -105,15 +110,10 @@ def _twice(claims: Iterable[ExclusiveUse]) -> Iterator[tuple[ExclusiveUse, Exclu
             yield claim, other
 
 
-def _said(claim: ExclusiveUse, text: str) -> Problem:
-    place = claim.place()
-    return Problem(place.file, place.line, place.column, text)
-
-
 def _taken(pair: tuple[ExclusiveUse, ExclusiveUse]) -> Problem:
     claim, other = pair
     first = other.place()
-    return _said(claim, f"{claim.what} is used in {first.file} too, on line {first.line}")
+    return claim.problem(f"{claim.what} is used in {first.file} too, on line {first.line}")
 
 
 def _buses(config: Config) -> Iterator[tuple[str, Where]]:
@@ -174,8 +174,8 @@ def _shared(pair: tuple[ExclusiveUse, ExclusiveUse], claims: Sequence[ExclusiveU
     both = _units(claim.config, claim.what, claims) & _units(other.config, claim.what, claims)
     units = f" for unit {', '.join(sorted(both))}" if both else ""
     text = f"warning: {claim.what} is asked in {other.config.path} too{units}"
-    return _said(
-        claim, f"{text}: many gateways take only one client: use one file for each gateway"
+    return claim.problem(
+        f"{text}: many gateways take only one client: use one file for each gateway"
     )
 
 
@@ -189,10 +189,8 @@ def _domains(configs: Sequence[Config]) -> Iterator[Problem]:
         ours, first = (c.rmf.domain_id or 0 for c in (config, configs[0]))
         if ours != first:
             text = f"DDS domain {ours}, but {configs[0].path} is in domain {first}"
-            yield _said(
-                ExclusiveUse(config, "", ("rmf", "domain_id")),
-                f"{text}: the daemons cannot hear each other",
-            )
+            place = ExclusiveUse(config, "", ("rmf", "domain_id"))
+            yield place.problem(f"{text}: the daemons cannot hear each other")
 
 
 def _devices(configs: Sequence[Config], kind: str) -> dict[str, Config]:
@@ -204,7 +202,7 @@ def _nowhere(configs: Sequence[Config]) -> Iterator[Problem]:
     for claim, kind, name in _spoken(configs):
         known = _devices(configs, kind)
         if known and name not in known:
-            yield _said(claim, unknown(kind, name, known))
+            yield claim.problem(unknown(kind, name, known))
 
 
 def _unspoken(configs: Sequence[Config]) -> Iterator[Problem]:
@@ -218,7 +216,7 @@ def _unspoken(configs: Sequence[Config]) -> Iterator[Problem]:
             if name not in names:
                 key = kind_called(kind).devices_key
                 text = f"warning: '{name}' is not served: {speaker.path} does not name it"
-                yield _said(ExclusiveUse(config, "", (key, name)), text)
+                yield ExclusiveUse(config, "", (key, name)).problem(text)
 
 
 def _spoken(configs: Sequence[Config]) -> Iterator[tuple[ExclusiveUse, str, str]]:

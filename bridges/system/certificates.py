@@ -55,7 +55,7 @@ def _days(seconds: float) -> str:
 
 
 class CertificateReader:
-    """Reads the ends of certificates. A file that has not changed is not read again."""
+    """Reads the ends of certificates. A file with a known end is read again when it has changed."""
 
     def __init__(self) -> None:
         self._read: dict[str, tuple[Stamp, CertificateEnd]] = {}
@@ -71,7 +71,8 @@ class CertificateReader:
                 end = _asked(file, found.st_size)
         except OSError as error:
             return CertificateEnd(None, error.strerror or str(error))
-        self._read[file] = stamp, end
+        if end.at is not None:
+            self._read[file] = stamp, end
         return end
 
 

@@ -131,8 +131,8 @@ def _fixed() -> Iterator[dict[str, Any]]:
         "5m",
         "warning",
         f"The end of the certificate {file} is unknown.",
-        "Run `sudo rmf-bridge doctor FILE` there: it says why. The exporter must be able to read"
-        " the file (group rmf-bridge).",
+        "`journalctl -u rmf-bridge-exporter` there says why: the exporter needs the program openssl,"
+        " and must be able to read the file (mode 644, or group rmf-bridge).",
     )
     yield _rule(
         "UnitFails",

@@ -198,6 +198,10 @@ class Rollouts:
         done = self._roll("install", self.old)
         self._expect("the first installation", done == 0, self._versions() == [self.old] * 2)
         self._expect("every daemon serves", *self._serving())
+        metrics = sh("curl", "-s", "127.0.0.1:9763/metrics").stdout
+        for name in ("door2", "door_supervisor"):
+            up = f'rmf_bridge_daemon_up{{daemon="{name}"}} 1.0' in metrics
+            self._expect(f"the exporter reads the status of {name}", up)
         self._users()
 
     def _users(self) -> None:

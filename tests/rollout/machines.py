@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Final
 
 PACKAGES: Final = (
-    *("dbus", "iproute2", "openssh-server", "procps", "python3", "python3-apt"),
-    *("systemd", "systemd-sysv", "udev"),
+    *("dbus", "iproute2", "openssh-server", "openssl", "procps", "python3"),
+    *("python3-apt", "systemd", "systemd-sysv", "udev"),
 )
 PROGRAMS: Final = {
     "apt-ftparchive": "apt-utils",

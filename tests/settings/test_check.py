@@ -10,6 +10,7 @@ import pytest
 from bridges.cli import main
 from tests.settings.reading import RIGHT, changed
 from tests.settings.test_sections import WEB
+from tests.system.test_certificates import certificate
 
 TABLE = """\
 gate.yaml: gate, driver contact
@@ -158,3 +159,37 @@ def test_quiet_prints_problems_only(capsys: pytest.CaptureFixture[str]) -> None:
     Path("gate.yaml").write_text(changed("tries: 2", "loud: yes"))
     assert check("--quiet", "gate.yaml") == os.EX_CONFIG
     assert len(capsys.readouterr().err.splitlines()) == 2
+
+
+def test_a_certificate_that_has_ended_or_ends_soon_is_a_warning(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ended = certificate(tmp_path / "ca.pem", -3.5)
+    soon = certificate(tmp_path / "lift.pem", 400, 12.5)
+    Path("gate.yaml").write_text(with_tls(ended, soon))
+    assert check("gate.yaml") == 0
+    out, err = capsys.readouterr()
+    assert out.endswith("\nOK, 2 warnings\n")
+    first, second = err.splitlines()
+    assert first.startswith(f"gate.yaml:3:68: warning: {ended} ended 3 days ago, on ")
+    assert second.startswith(f"gate.yaml:3:{83 + len(ended)}: warning: {soon} ends in 12 days, on ")
+    assert second.endswith(": renew the certificate, and restart the daemon")
+
+
+def test_an_unknown_or_late_end_of_a_certificate_is_no_warning(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`check` may run on another machine than the daemon, or on a machine without openssl."""
+    late, missing = certificate(tmp_path / "ca.pem", 31), str(tmp_path / "missing.pem")
+    Path("gate.yaml").write_text(with_tls(late, missing))
+    assert check("gate.yaml") == 0
+    Path("gate.yaml").write_text(with_tls(late, certificate(tmp_path / "lift.pem", 1)))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert check("gate.yaml") == 0
+    assert capsys.readouterr().err == ""
+
+
+def with_tls(ca: str, own: str) -> str:
+    tls = f"tls: {{ca: {ca}, certificate: {own}, private_key: /k}}"
+    new = f"{{transport: zenoh, zenoh: {{connect: [tls/rmf:7447], {tls}}}}}"
+    return changed("{transport: dds, domain_id: 7}", new)

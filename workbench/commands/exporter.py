@@ -7,6 +7,7 @@ with TLS and a login prevents this reading.
 """
 
 import argparse
+import logging
 import os
 import signal
 import threading
@@ -21,8 +22,9 @@ from bridges.observe.requesters import Moment
 from bridges.observe.tally import SiteTally
 from bridges.runtime import daemons
 from bridges.system import directories, log
-from bridges.system.certificates import CertificateReader
+from bridges.system.certificates import CertificateEnd, CertificateReader
 from bridges.system.installed import how_to_install
+from bridges.system.log import pairs
 from bridges.transports.transport import TransportError
 from workbench.graph.join import (
     add_graph_arguments,
@@ -40,6 +42,7 @@ PORT: Final = 9763
 RECORDER: Final = Path("/var/lib/rmf-bridge-recorder")
 """Folder in which `rmf-bridge-recorder.service` writes recordings."""
 LISTEN_S: Final = 0.5
+logger = logging.getLogger(__name__)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -124,6 +127,7 @@ class Site:
     def __init__(self, runtime_dirs: Path | None = None, certificates: Sequence[str] = ()) -> None:
         self._runtime_dirs = runtime_dirs
         self._certificates, self._reader = certificates, CertificateReader()
+        self._unreadable: dict[str, str] = {}
         self._graph, self._tally = PlainGraph(), SiteTally()
         self._lock = threading.Lock()
         self._listens = False
@@ -146,8 +150,16 @@ class Site:
                 yield from families.of_graph(self._graph, self._tally, now)
         found = [*self._daemons(now.wall)]
         yield from machine.of_machine(found)
-        yield from machine.of_certificates(found, self._certificates, self._reader.end)
+        yield from machine.of_certificates(found, self._certificates, self._end)
         yield from machine.of_recordings(RECORDER)
+
+    def _end(self, file: str) -> CertificateEnd:
+        """Return the end of a certificate. Log once why the end is unknown: no metric says so."""
+        end = self._reader.end(file)
+        if end.reason and end.reason != self._unreadable.get(file):
+            logger.warning(pairs("certificate_unreadable", file=file, reason=end.reason))
+        self._unreadable[file] = end.reason
+        return end
 
     def _daemons(self, wall: float) -> Iterator[daemons.DaemonStatus]:
         if self._runtime_dirs is not None:

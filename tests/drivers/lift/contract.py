@@ -103,6 +103,7 @@ class LiftContract(Contract[Bench]):
         bench.open()
         for _ in range(3):
             bench.write(CALL)
+        wait_until(lambda: len(bench.relays()) >= 2, "both outputs have come through")
         assert sorted(bench.relays()) == [("agv_mode_request", True), ("call_1", True)]
 
     def test_make_safe_and_close_each_switch_everything_off(self, bench: Bench) -> None:
@@ -111,6 +112,7 @@ class LiftContract(Contract[Bench]):
             before = len(bench.relays())
             bench.write(HOLD)
             end()
+            wait_until(lambda: len(bench.relays()) >= before + 4, "every edge has come through")
             assert sorted(bench.relays()[before:]) == [
                 ("agv_mode_request", False),
                 ("agv_mode_request", True),
