@@ -42,6 +42,10 @@ class Bench(benches.Bench[LiftSample, LiftOutputs]):
         wait_until(look, what)
         return seen
 
+    def sees(self, edges: int) -> None:
+        """Wait until so many edges have come through to the relays."""
+        wait_until(lambda: len(self.relays()) >= edges, f"{edges} edges have come through")
+
     def rides(self) -> list[LiftSample]:
         """Call the lift to landing 1 in AGV mode. Then hold the door open.
 
@@ -90,7 +94,7 @@ class LiftContract(Contract[Bench]):
         bench.write(AGV)
         for level in ("G", "1", "B1"):
             bench.write(LiftOutputs(True, call=level))
-        wait_until(lambda: len(bench.relays()) >= 6, "the last call has come through")
+        bench.sees(6)
         assert bench.relays()[1:] == [
             ("call_G", True),
             ("call_G", False),
@@ -103,7 +107,7 @@ class LiftContract(Contract[Bench]):
         bench.open()
         for _ in range(3):
             bench.write(CALL)
-        wait_until(lambda: len(bench.relays()) >= 2, "both outputs have come through")
+        bench.sees(2)
         assert sorted(bench.relays()) == [("agv_mode_request", True), ("call_1", True)]
 
     def test_make_safe_and_close_each_switch_everything_off(self, bench: Bench) -> None:
@@ -112,7 +116,7 @@ class LiftContract(Contract[Bench]):
             before = len(bench.relays())
             bench.write(HOLD)
             end()
-            wait_until(lambda: len(bench.relays()) >= before + 4, "every edge has come through")
+            bench.sees(before + 4)
             assert sorted(bench.relays()[before:]) == [
                 ("agv_mode_request", False),
                 ("agv_mode_request", True),
