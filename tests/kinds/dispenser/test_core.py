@@ -7,7 +7,8 @@ import pytest
 from msgspec.structs import replace
 
 from bridges.kinds.dispenser import core
-from bridges.kinds.dispenser.memory import WorkcellLimits, WorkcellMemory
+from bridges.kinds.dispenser.keep import persist, restore
+from bridges.kinds.dispenser.memory import Job, WorkcellLimits, WorkcellMemory
 from bridges.kinds.dispenser.report import WorkcellReport
 from bridges.kinds.dispenser.settings import WorkcellDurations
 from bridges.kinds.dispenser.signals import Item, ItemRequested, WorkcellOutputs, WorkcellSample
@@ -188,3 +189,20 @@ def test_a_failure_halts_until_a_reset_and_no_longer() -> None:
     assert (cell.outputs, cell.report.waits) == (WorkcellOutputs(), "because of WORKCELL_HALTED")
     cell.take(OperatorReset(), MemoryKept())
     assert (cell.outputs.guid, cell.memory.halted) == ("next", "")
+
+
+def test_a_restart_keeps_every_request_the_halt_and_the_lost_memory() -> None:
+    item = Item("box", 3, "left")
+    failed = Job("a", item, "fleet", "failed", "it jams", kept="failed", closed=True)
+    waits = Job("b", item, "other", "queued", kept="queued")
+    before = WorkcellMemory(
+        jobs=(failed, waits), halted="a has failed: it jams", lost="a full disk"
+    )
+    after = restore(persist(before), 7.0)
+    assert after == replace(before, jobs=(replace(failed, asked_at=7.0), waits))
+
+
+def test_one_request_twice_in_the_memory_is_refused() -> None:
+    twice = WorkcellMemory(jobs=(Job("a", kept="queued"), Job("a", kept="queued")))
+    with pytest.raises(ValueError, match="one request is in the memory twice"):
+        restore(persist(twice), 0.0)
