@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from bridges.settings.certificate_files import CERTIFICATES
-from bridges.settings.cross_file_checks import Found, across, named_files
+from bridges.settings.cross_file_checks import ExclusiveUse, Found, across
 from bridges.settings.load import Config, Problem, SettingsError, load
+from bridges.settings.named_files import CERTIFICATES, named_files
 from bridges.settings.sheets import text
 from bridges.settings.sheets.findings import Findings, findings, wrong
 from bridges.system.columns import columns_of, hanging
@@ -200,7 +200,11 @@ def _certificates(configs: Iterable[Config]) -> Iterator[Problem]:
 
     If the end is unknown, yield nothing, because `check` may run on another machine than the daemon.
     """
-    uses = [use for config in configs for use in named_files(config, CERTIFICATES)]
+    uses = [
+        ExclusiveUse(config, file, path)
+        for config in configs
+        for path, file in named_files(config, CERTIFICATES)
+    ]
     if not uses:
         return
     from bridges.system.certificates import SOON_S, CertificateReader, told

@@ -38,8 +38,9 @@ from bridges.runtime.services import (
     switch_off,
     unit,
 )
-from bridges.settings.cross_file_checks import SECRETS, named_files, shared_secrets, taken
+from bridges.settings.cross_file_checks import shared_secrets, taken
 from bridges.settings.load import Config, Problem, SettingsError, load
+from bridges.settings.named_files import SECRETS, named_files
 from bridges.system.directories import GROUPS, user_of
 
 
@@ -103,8 +104,8 @@ def groups(root: Path) -> set[str]:
 
 def _secrets(config: Config, root: Path) -> Iterator[Path]:
     """Yield the secret files that exist. A link is left as it is, because its place may change."""
-    for secret in named_files(config, SECRETS):
-        path = root / secret.what.lstrip("/")
+    for _, secret in named_files(config, SECRETS):
+        path = root / secret.lstrip("/")
         if path.is_file() and not path.is_symlink():
             yield path
 

@@ -33,8 +33,8 @@ from bridges.runtime.ring_writer import NOBODY, NoWriter, RingWriter
 from bridges.runtime.runtime_directory import KEPT, MemoryFile, Once, RuntimeDirectory, state_file
 from bridges.runtime.service import OpenBus, clock_of, named_by, service
 from bridges.runtime.serving import stop
-from bridges.settings.certificate_files import certificate_files
 from bridges.settings.load import Config
+from bridges.settings.named_files import certificate_files
 from bridges.system.log import pairs
 from bridges.transports.choose import open_transport
 from bridges.transports.transport import Publisher, TransportError

@@ -4,24 +4,20 @@ Files that are checked together belong to one site. They are for one machine, un
 otherwise.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator, Sequence
 
 from msgspec import Struct
-from msgspec.structs import asdict
 
 from bridges.kinds import kind_called
 from bridges.kinds.shared.graph_kind import GraphKind
 from bridges.settings.load import Config
+from bridges.settings.named_files import SECRETS, named_files
 from bridges.yaml.parsing import Problem, YamlFile, compose
 from bridges.yaml.positions import Spot, locate
 from bridges.yaml.spelling import unknown
 from drivers.hal import Where
 
 Path = tuple[str, ...]
-
-SECRETS = ("private_key", "key_file", "password_file", "token_file")
-"""The keys of files that only one user may read."""
 
 
 class Found(Struct, frozen=True):
@@ -75,29 +71,14 @@ def taken(configs: Sequence[Config], one_machine: bool = True) -> Iterator[Probl
 def shared_secrets(configs: Sequence[Config]) -> Iterator[Problem]:
     """Yield a problem for each secret file that two services use: a secret has one owner, and each
     service has a user of its own."""
-    for claim, other in _twice(use for one in configs for use in named_files(one, SECRETS)):
+    uses = (
+        ExclusiveUse(config, file, path)
+        for config in configs
+        for path, file in named_files(config, SECRETS)
+    )
+    for claim, other in _twice(uses):
         text = "give each service a copy, because each has a user of its own"
         yield claim.problem(f"{claim.what} is the secret of {other.config.path} too: {text}")
-
-
-def named_files(config: Config, keys: Sequence[str]) -> Iterator[ExclusiveUse]:
-    """Yield each file that a YAML names under one of these keys, at any depth."""
-    kind = kind_called(config.kind)
-    sections = {"rmf": config.rmf, "buses": config.buses, kind.devices_key: config.devices}
-    for path, file in _files_at(sections, keys):
-        yield ExclusiveUse(config, file, path)
-
-
-def _files_at(settings: Any, keys: Sequence[str], path: Path = ()) -> Iterator[tuple[Path, str]]:
-    """Yield each of these keys that has a value, with its path, at any depth of these settings."""
-    if isinstance(settings, Struct):
-        settings = asdict(settings)
-    if isinstance(settings, Mapping):
-        for key, value in settings.items():
-            if key in keys and value:
-                yield (*path, key), str(value)
-            else:
-                yield from _files_at(value, keys, (*path, str(key)))
 
 
 def _twice(claims: Iterable[ExclusiveUse]) -> Iterator[tuple[ExclusiveUse, ExclusiveUse]]:

@@ -3,8 +3,8 @@
 import time
 from collections.abc import Iterator
 
-from bridges.settings.certificate_files import certificate_files
 from bridges.settings.config import Config
+from bridges.settings.named_files import certificate_files
 from bridges.system.certificates import SOON_S, CertificateEnd, first_end, listing, told
 from workbench.commissioning.doctor.finding import Finding, ok, unknown, warning, wrong
 from workbench.commissioning.doctor.machine import Machine

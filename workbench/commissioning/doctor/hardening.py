@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from bridges.kinds.shared.rmf_section import Rmf, Zenoh
 from bridges.settings.config import Config
-from bridges.settings.cross_file_checks import SECRETS, named_files
+from bridges.settings.named_files import CERTIFICATES, SECRETS, named_files
 from bridges.system.directories import SERVICE_USER, user_of
 from workbench.commissioning.doctor.finding import Finding, note, ok, unknown, warning, wrong
 from workbench.commissioning.doctor.machine import Machine
@@ -29,7 +29,6 @@ ENABLE: Final = "rmf-bridge enable FILE"
 ENCRYPTED: Final = ("tls/", "quic/", "https://")
 OTHERS_WRITE: Final = stat.S_IWGRP | stat.S_IWOTH
 OTHERS_READ: Final = stat.S_IRWXG | stat.S_IRWXO
-READABLE: Final = ("ca", "certificate", "ca_file", "certificate_file")
 LISTENS: Final = {"tcp": "0A", "udp": "07"}
 """Protocol -> a socket state in /proc/net, as a hexadecimal number. A socket in this state is open and
 has no peer (include/net/tcp_states.h)."""
@@ -204,8 +203,8 @@ def _files(config: Config, machine: Machine) -> Iterator[Finding]:
     """Examine the modes of the YAML, of the YAML's folder, and of each file that the YAML names."""
     file = config.path.absolute()
     secrets, readable = (
-        list(dict.fromkeys(Path(use.what) for use in named_files(config, keys)))
-        for keys in (SECRETS, READABLE)
+        list(dict.fromkeys(Path(file) for _, file in named_files(config, keys)))
+        for keys in (SECRETS, CERTIFICATES)
     )
     bad = 0
     for path, forbidden in [

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from bridges.settings.certificate_files import certificate_files
 from bridges.settings.load import understood
+from bridges.settings.named_files import certificate_files
 
 ROOT = Path(__file__).parents[2]
 RMF = """rmf:
