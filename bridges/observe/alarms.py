@@ -10,14 +10,12 @@ from typing import Final, Literal
 
 from msgspec import Struct
 
+from bridges.kinds.shared import alarming
 from bridges.kinds.shared.alarming import CAUSES, FLEETS, RAISED, SINCE, STATE, fleets_in
-from bridges.kinds.shared.fleet_alarm_memory import (
-    Fleets,
-    overlap,
-)
-from bridges.messages.definitions import Bool, EmergencySignal
+from bridges.kinds.shared.fleet_alarm_memory import Fleets, overlap
+from bridges.messages.definitions import EmergencySignal
 from bridges.messages.heard import Heard
-from bridges.messages.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER
+from bridges.messages.topics import EMERGENCY_SIGNAL
 from bridges.messages.words import printable
 from bridges.observe.diagnosis import Diagnosis
 from bridges.observe.requesters import Moment
@@ -74,7 +72,7 @@ class ObservedAlarm(Struct, frozen=True):
 
     @property
     def ends(self) -> tuple[Actor, str]:
-        """Who must act to let the robots drive (`a person` or `nobody`), and how."""
+        """The actor who lets the robots drive (`a person` or `nobody`), and what the actor must do."""
         reset = f"when the cause is over and it is safe: `rmf-bridge reset FILE` of {self.node}"
         if self.state == "drill":
             return "nobody", "the drill ends by itself"
@@ -94,21 +92,18 @@ class PublishedAlarms:
     def hear(self, heard: Heard, moment: Moment, began: float) -> None:
         """Take a message, if it is about an alarm."""
         topic, message = heard.topic.rpartition("/")[2], heard.message
-        if isinstance(message, EmergencySignal):
-            topic, on, fleets = EMERGENCY_SIGNAL.name, message.is_emergency, message.fleet_names
-        elif isinstance(message, Bool) and topic == FIRE_ALARM_TRIGGER.name:
-            on, fleets = message.data, ()
-        else:
+        if not alarming.is_alarm(topic, message):
             return
         node = printable(heard.sender.node.lstrip("/")) if heard.sender else ""
-        told, old = frozenset(fleets), moment.at - began < OLD_S
-        if on:
+        event, old = alarming.heard(message, [node]), moment.at - began < OLD_S
+        if event.on:
             if node not in self.found and len(self.found) < MOST:
+                named = EMERGENCY_SIGNAL.name if isinstance(message, EmergencySignal) else topic
                 since = Moment(moment.at, moment.wall, seen=not old)
-                self.found[node] = topic, told, since
+                self.found[node] = named, event.fleets, since
             return
         for name, (_, stand, _) in [*self.found.items()]:
-            if overlap(stand, told) and (name == node or not old):
+            if overlap(stand, event.fleets) and (name == node or not old):
                 del self.found[name]
 
 

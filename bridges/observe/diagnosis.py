@@ -67,6 +67,13 @@ class Diagnosis:
     faults: dict[str, tuple[str, Moment]] = field(default_factory=dict)
     refused: dict[str, tuple[int, Moment]] = field(default_factory=dict)
 
+    @property
+    def subject(self) -> tuple[str, str]:
+        """The kind and the name of the report's subject. The subject is a device or a site, or the node
+        itself, whose kind is then `daemon`."""
+        node, _, subject = self.name.partition(": ")
+        return ("daemon", node) if subject == "daemon" else (self.kind, subject)
+
     def is_current(self, now: float) -> bool:
         """Return whether the report is recent enough to count."""
         return now - self.last.at <= SILENT_S

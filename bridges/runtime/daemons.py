@@ -11,6 +11,7 @@ from typing import Any, Final, cast
 
 import msgspec
 
+from bridges.messages.words import printable
 from bridges.runtime import holder
 from bridges.runtime.diagnostics import CERTIFICATE_FILES
 from bridges.runtime.record import paths, read
@@ -19,6 +20,9 @@ from bridges.system import files
 from bridges.system.directories import SERVICE_RUN, SERVICE_STATE, Directories, owner_of, state_base
 
 UNIT: Final = "rmf-bridge@"
+
+NamedCertificate = tuple[str, str, str]
+"""A certificate: the daemon that uses it, the key of the YAML that names it, and its file."""
 
 RUNS: Final = ("active (running)", "activating (start)", "deactivating (stop-sigterm)")
 """The states of a systemd unit whose process runs."""
@@ -91,9 +95,10 @@ class DaemonStatus(msgspec.Struct, kw_only=True):
         return cast(Mapping[str, Status], self.status.get("devices", {}))
 
     @property
-    def certificates(self) -> list[tuple[str, str]]:
-        """The certificates that the daemon uses: (key of the YAML, file)."""
-        return [*self.status.get(CERTIFICATE_FILES, {}).items()]
+    def certificates(self) -> list[NamedCertificate]:
+        """The certificates that the daemon uses."""
+        named = self.status.get(CERTIFICATE_FILES, {}).items()
+        return [(printable(self.name), key, file) for key, file in named]
 
     @property
     def level(self) -> int:

@@ -57,8 +57,8 @@ def listed(state: Json, field: str) -> list[Json]:
 
 
 def places_left(state: Json, order: Json) -> list[Json] | None:
-    """Return the places of the nodes that are left of the robot's order, with those that its manager
-    only plans; None if neither the state tells them nor this order."""
+    """Return the places of the remaining nodes of the robot's order. Nodes that the manager only plans
+    belong to the order. Return None if neither the state nor the order has the places."""
     same = order.get("orderId") == state.get("orderId")
     known = {n.get("sequenceId"): n.get("nodePosition") for n in listed(order, "nodes") if same}
     nodes = listed(state, "nodeStates")

@@ -58,7 +58,7 @@ class TrafficLight:
         self._new: Sequence[Waypoint] | None = None
 
     def follow_new_path(self, waypoint: Sequence[Waypoint]) -> None:
-        """Take a path at the next `step`. Raises RuntimeError for one that RMF does not take."""
+        """Take a path at the next `step`. Raises RuntimeError for a path that RMF does not take."""
         if len(waypoint) < 2 or any(_apart(a, b) < 1e-3 for a, b in pairwise(waypoint)):
             raise RuntimeError("the path has less than two checkpoints, or two at one place")
         self._new = waypoint

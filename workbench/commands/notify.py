@@ -213,7 +213,7 @@ class Certificates:
             self._next_at = now.at + CERTIFICATES_EVERY_S
             found = [*daemons.daemons(directories.runtimes(), {}, now.wall)]
             self.known = {("daemon", printable(one.name)) for one in found} | {("daemon", NOTIFY)}
-            named = [(printable(one.name), *pair) for one in found for pair in one.certificates]
+            named = [used for one in found for used in one.certificates]
             named += self._named
             self._present = [*of_certificates(named, self._reader.end, now.wall)]
         return self._present
@@ -244,10 +244,8 @@ class Desk:
         ids: dict[tuple[str, str], str] = {
             (one.kind, printable(one.id)): one.id for one in site.stated()
         }
-        for name, report in site.nodes.items():
-            node, _, subject = name.partition(": ")
-            own = subject == "daemon"
-            ids["daemon" if own else report.kind, printable(node if own else subject)] = ""
+        for report in site.nodes.values():
+            ids[report.subject[0], printable(report.subject[1])] = ""
         ids |= dict.fromkeys(self._certificates.known, "")
         for notice in self._notices.turn(present, ids, site.now.at, datetime.now().time()):
             one = notice.trouble

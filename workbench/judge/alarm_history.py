@@ -10,7 +10,7 @@ from bridges.kinds.shared.fleet_alarm_memory import (
     overlap,
 )
 from bridges.messages import definitions as d
-from bridges.messages import topics, words
+from bridges.messages import words
 from bridges.messages.heard import Heard
 from workbench.judge.history import NOT_YET, REMEMBERED, AnyHistory, keep
 
@@ -60,8 +60,7 @@ class AlarmHistory(AnyHistory):
             for node, state, fleets in alarming.statements(message):
                 self._state(node, state, fleets)
             return self.new
-        fire = isinstance(message, d.Bool) and heard.topic == topics.FIRE_ALARM_TRIGGER.name
-        if not fire and not isinstance(message, d.EmergencySignal):
+        if not alarming.is_alarm(heard.topic, message):
             self._other_at = self.now if isinstance(message, words.Stated) else self._other_at
             return False
         node = heard.sender.node.lstrip("/") if heard.sender else ""

@@ -90,10 +90,8 @@ def _trouble(
         "1 while a daemon reports this fault of a device, an alarm panel, a robot or itself.",
         (*DEVICE, "code"),
     )
-    for name, report in graph.nodes.items():
-        node, _, subject = name.partition(": ")
-        own = subject == "daemon"
-        names = ("daemon" if own else label(report.kind), label(node if own else subject))
+    for report in graph.nodes.values():
+        names = tuple(map(label, report.subject))
         for code in report.faults if report.is_current(now.at) else ():
             fault.add_metric((*names, label(code)), 1)
     publishers = _gauge(

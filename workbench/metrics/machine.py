@@ -53,7 +53,7 @@ def of_certificates(
         "end_timestamp_seconds", "End of the certificate; of a file's first to end."
     )
     unreadable = _certificate("unreadable", "1 if the certificate's end cannot be read.")
-    named = [(printable(one.name), *pair) for one in found for pair in one.certificates]
+    named = [used for one in found for used in one.certificates]
     for daemon, key, file in (*named, *(("", "--certificate", each) for each in others)):
         names, known = (daemon, printable(key), printable(file)), end(file)
         unreadable.add_metric(names, known.at is None)

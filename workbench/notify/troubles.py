@@ -81,12 +81,9 @@ def _of_nodes(graph: ObservedGraph[Any], now: Moment) -> Iterator[Trouble]:
 
     If the daemon of a lift, door or charger is silent, the device already has that trouble.
     """
-    for name, report in graph.nodes.items():
-        node, _, subject = name.partition(": ")
-        kind, named = report.kind, printable(subject)
-        if subject == "daemon":
-            kind, named = "daemon", printable(node)
-        elif not report.is_current(now.at):
+    for report in graph.nodes.values():
+        kind, named = report.subject[0], printable(report.subject[1])
+        if kind != "daemon" and not report.is_current(now.at):
             headline = f"{kind} {named} is silent"
             yield Trouble(kind, named, "SILENT", "critical", headline)
         for code in sorted(report.faults) if report.is_current(now.at) else ():

@@ -99,6 +99,12 @@ def disagreements(devices: Mapping[str, AlarmingSettings]) -> Iterator[tuple[str
             yield name, f"{text}: give both the same alarm and fleets, or put them into two files"
 
 
+def is_alarm(topic: str, message: object) -> bool:
+    """Return whether a message on this topic raises or ends an alarm. `topic`: its name in RMF."""
+    fire = isinstance(message, Bool) and topic == FIRE_ALARM_TRIGGER.name
+    return fire or isinstance(message, EmergencySignal)
+
+
 def heard(message: Message, senders: Iterable[str]) -> AlarmHeard:
     """Turn a message on an alarm's topic into an event."""
     if isinstance(message, EmergencySignal):
