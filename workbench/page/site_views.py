@@ -71,13 +71,18 @@ class SiteWall(Tab):
         self.rebuild()
 
     def change(self, script: str) -> None:
-        """Send a change. If a browser is away, it gets all cards when it returns."""
+        """Send a change. A browser that is away gets all cards when it returns."""
         if not self.is_here:
             self._missed = True
-        elif self._missed:
-            self.rebuild()
-        else:
+        elif not self._missed:
             self.run(script)
+
+    def answer(self, wrong: int) -> None:
+        """Send everything that the browser has missed, even if nothing changes any more. Then answer
+        the browser's question."""
+        if self._missed and self.is_here:
+            self.rebuild()
+        super().answer(wrong)
 
     def rebuild(self) -> None:
         """Draw all cards, by kind and name."""
