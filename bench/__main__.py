@@ -4,8 +4,9 @@ Everything runs on loopback, on fake hardware, and in processes of its own. The 
 figures go to bench/results/bench.json. `python -m bench idle buses` runs only the parts `idle` and
 `buses`.
 
-A busy machine is refused, because its figures mean nothing; `--anyway` measures there, and says so. The
-last table compares the figures with the aims, and with the best of earlier runs on a like machine.
+The benchmark refuses a busy machine, because its figures mean nothing. With `--anyway` it measures all
+the same, and prints that the machine is busy. The last table compares the figures with their aims.
+After it come the figures that are worse than the best earlier figure of the same type of machine.
 """
 
 import json
@@ -24,7 +25,7 @@ from bench import brokers, buses, day, explain, history, idle, latency, page, re
 from bench.figures import lines
 
 MOST_LOAD = 1.0
-"""The load average over a minute above which figures mean nothing."""
+"""The greatest load average over a minute. With a higher load the figures mean nothing."""
 RESULTS = Path(__file__).parent / "results"
 SECTIONS = {
     "latency": latency,

@@ -1,8 +1,8 @@
-"""Compare a door behind an MQTT broker with the same door on Modbus TCP. The measures are a command's
-time, and memory.
+"""Compare a door behind an MQTT broker with the same door on Modbus TCP: time of a command, and memory.
 
-The two daemons run side by side and get their requests in turn. The time begins at RMF's request, and
-ends at the edge of the far side's relay. On MQTT, the message passes through the broker mosquitto.
+The two daemons run side by side and get their requests in turn. The time begins when the request is
+published. It ends when the simulated door's relay switches. On MQTT, the message passes through the
+broker mosquitto.
 """
 
 import subprocess
@@ -56,7 +56,8 @@ def _door(
 
 
 def _held(requests: Publisher[DoorRequest], name: str, plant: Caller) -> float:
-    """Return the time (s) from a request to the relay that holds the door. Then release the door."""
+    """Publish an OPEN and return the time (s) until the relay `hold_open` switches on. Then release the
+    door."""
     sent_at = time.monotonic()
     _request(requests, name, DoorModeValue.MODE_OPEN)
     took = plant.edge("hold_open", True) - sent_at

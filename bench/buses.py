@@ -1,9 +1,9 @@
-"""The limits of four buses. Each bus is compared with the least time that is possible in theory.
+"""Load four buses to their limits, and compare each with the least time that is possible in theory.
 
-- One serial line has many doors.
-- TCP has many doors, and one of the doors is dead.
-- Some HTTP chargers are bad.
-- A CAN bus is full.
+- A serial line with many doors.
+- TCP with many doors, of which one is dead.
+- HTTP with many chargers, of which some are dead or slow.
+- A full CAN bus.
 """
 
 import statistics
@@ -35,7 +35,7 @@ from hal_fakes.simulate import Simulation
 
 
 def measure(scratch: Path) -> Tables:
-    """Return a table for each bus."""
+    """Return the tables of the four buses."""
     return {
         "8 doors at 19200 baud": _serial(scratch),
         "states of doors on one TCP gateway": _many_doors(scratch),
@@ -63,16 +63,16 @@ CYCLES: Final = 60
 WARM_UP: Final = 3
 REQUEST: Final = 8
 REPLY: Final = 6
-"""REQUEST and REPLY are numbers of characters, with unit and CRC. The request asks for bits, and the
-reply has the bits."""
+"""The lengths of a request and its reply (characters). Both lengths include unit and CRC. The request
+asks for bits, and the reply has the bits."""
 READINGS: Final = 2
-"""The number of readings for one door: one of the coil, and one of the inputs."""
+"""The number of reads for one door: one read of its coil, and one read of its inputs."""
 
 
 def _serial(scratch: Path) -> Rows:
-    """Compare a poll cycle with the least time on the wire.
+    """Compare a poll cycle with the least time that its characters take on the wire.
 
-    The least time has all characters on the wire, and 3.5 characters of silence before each frame.
+    The least time is the time of all characters, and of 3.5 characters of silence before each frame.
     """
     daemon(doors(POLLED, LINE), scratch / "serial")  # writes the YAML
     config = load(scratch / "serial.yaml")
@@ -104,7 +104,7 @@ def _cycles(config: Config, scratch: Path) -> list[float]:
     return times[WARM_UP:]
 
 
-# ---- many doors on TCP: the states' age at a subscriber, and the time between a door's states
+# ---- many doors on TCP: the age of a state when it arrives, and the time between two states of a door
 
 WATCHED_S: Final = 20.0
 MANY: Final = 200
@@ -113,7 +113,11 @@ States = dict[str, list[tuple[float, DoorState]]]
 
 
 def _many_doors(scratch: Path) -> Rows:
-    """Poll each door every 0.1 s. Each door's daemon publishes the state once a second."""
+    """Measure the ages of door states for many doors, for few doors, and for few doors with one dead
+    door.
+
+    The daemon polls each door every 0.1 s, and publishes each door's state once a second.
+    """
     with _doors(scratch, MANY):
         many = _ages(_door_states())
     with _doors(scratch, DEAD_OF) as plant:
@@ -135,7 +139,7 @@ def _doors(scratch: Path, many: int) -> Iterator[Caller]:
 
 
 def _door_states() -> States:
-    """Return door -> (wall time of arrival, state) of each state heard in the measured time."""
+    """Return door -> (wall time of arrival, state) of each state that arrives within WATCHED_S."""
     seen: States = defaultdict(list)
     with graph() as transport:
         transport.subscribe(
@@ -157,7 +161,7 @@ def _ages(seen: States) -> Row:
     }
 
 
-# ---- HTTP chargers: the age (poll periods) of RMF's knowledge about the sound chargers
+# ---- HTTP chargers: the age (poll periods) of the last reading that RMF has of each healthy charger
 
 SOUND, DEAD, TRICKLING = 35, 10, 5
 LOOK_S: Final = 0.02
@@ -170,7 +174,7 @@ class Known:
         self.read_at: dict[int, float] = {}
 
     def state(self, state: ChargerState) -> None:
-        """Note a ChargerState."""
+        """Note the time of a ChargerState's reading."""
         self.read_at[int(state.charger_name.rpartition("_")[2])] = in_seconds(state.charger_time)
 
 
@@ -178,7 +182,7 @@ def _bad_chargers(scratch: Path) -> Rows:
     """Measure our daemon, and at the same time a naive loop, on the same servers.
 
     Each second, the naive loop calls `requests.get` for one charger after another. The timeout of
-    `requests.get` limits each single read.
+    `requests.get` does not limit a whole answer. It limits only the wait for the next bytes.
     """
     rmf, plain, done = Known(), Known(), threading.Event()
     with http_chargers(SOUND, DEAD, TRICKLING) as ports, graph() as transport:
@@ -197,7 +201,7 @@ def _bad_chargers(scratch: Path) -> Rows:
 
 
 def _mixed(ports: Sequence[int]) -> list[int]:
-    """Return the ports in an order that spreads the bad chargers among the sound chargers."""
+    """Return the ports in an order that spreads the bad chargers among the healthy chargers."""
     bad, sound = list(ports[SOUND:]), list(ports[:SOUND])
     every = len(ports) // len(bad)
     mixed = [
@@ -241,11 +245,12 @@ LASTS_S: Final = 10.0
 BATCH_S: Final = 0.005
 SCAN_S: Final = 0.2
 OURS: Final = (0x58A, 0x70A, 0x123, 0x321)
-"""Ids of every second frame, which the reader wants. The other frames belong to other devices."""
+"""The CAN ids that the reader wants. Every second frame has one of these ids. The other frames belong
+to other devices."""
 
 
 def _flooded(read: Callable[[str, threading.Event, list[int]], float]) -> Row:
-    """Send frames at a full bus's pace. Count the wanted frames that a reader gets."""
+    """Send as many frames as a full bus carries. Return the frames lost, and the reader's CPU load."""
     channel = f"bench-{read.__name__}"
     ended, heard, seconds = threading.Event(), [0], list[float]()
     reader = threading.Thread(target=lambda: seconds.append(read(channel, ended, heard)))
@@ -280,7 +285,7 @@ def _send(channel: str) -> tuple[int, float]:
 
 
 def _bare_can(channel: str, ended: threading.Event, heard: list[int]) -> float:
-    """Return the CPU time (s) of python-can alone."""
+    """Read the frames with python-can alone. Return the CPU time (s)."""
     bus = can.Bus(channel, interface="virtual")
     begun_s = time.thread_time()
     while not ended.wait(SCAN_S):
@@ -292,7 +297,8 @@ def _bare_can(channel: str, ended: threading.Event, heard: list[int]) -> float:
 
 
 def _our_can(channel: str, ended: threading.Event, heard: list[int]) -> float:
-    """Return the CPU time (s) of our bus, if a driver wants four ids."""
+    """Read the frames with our bus, which passes on only the four wanted ids. Return the CPU time
+    (s)."""
     settings = CanSettings(socketcan="can0", scan_s=SCAN_S)
     bus = CanBus(settings, vendor=lambda: can.Bus(channel, interface="virtual"))
 

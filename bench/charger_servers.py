@@ -1,6 +1,7 @@
-"""HTTP chargers for the bench, in a separate process: sound, dead and trickling chargers.
+"""HTTP chargers for the benchmarks, in a separate process.
 
-The process prints the ports as one JSON line, and serves until its standard input ends.
+A sound charger answers at once. A dead charger never answers. A trickling charger sends its answer byte
+by byte. The process prints the ports as one JSON line, and serves until its standard input ends.
 """
 
 import asyncio
@@ -16,7 +17,8 @@ from typing import Any, Final
 BODY: Final = b'{"state": 0, "error_msg": ""}'
 HEAD: Final = b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n"
 TRICKLE_S: Final = 0.25
-"""Time (s) between two bytes, which is less than any timeout for a single read."""
+"""The time (s) between two bytes of a trickling charger. It is shorter than any timeout for a single
+read."""
 
 
 PERIOD_S: Final = 1.0
@@ -57,7 +59,7 @@ def chargers_at(ports: Sequence[int]) -> dict[str, Any]:
 
 
 async def _sound(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """Answer each request at once, on a kept connection."""
+    """Answer each request at once, and keep the connection open."""
     with contextlib.suppress(OSError, asyncio.IncompleteReadError):
         while await reader.readuntil(b"\r\n\r\n"):
             writer.write(HEAD % len(BODY) + BODY)

@@ -29,7 +29,7 @@ SETTLE_S = 3.0
 
 @contextmanager
 def graph(speaks: Wire = "dds") -> Iterator[Transport]:
-    """Join the daemons' graph with this process, and yield the transport."""
+    """Join the DDS or zenoh network of the daemons from this process, and yield the transport."""
     rmf = Rmf(transport=speaks, domain_id=DOMAIN)
     transport = open_transport(rmf, "bench", localhost=True)
     try:
@@ -67,8 +67,10 @@ def shipped(name: str) -> Content:
 def daemon(
     content: Content, directory: Path, transport: str = "dds", *, simulate: bool = True
 ) -> list[str]:
-    """Write the YAML, and return the command that starts its daemon. In the YAML, `transport` and
-    loopback replace the earlier settings."""
+    """Write the YAML, and return the command that starts its daemon.
+
+    `transport` and the loopback network replace the `rmf:` section of `content`.
+    """
     file = directory.with_suffix(".yaml")
     rmf = {"transport": transport, "network": "localhost"}
     file.write_text(yaml.safe_dump({**content, "rmf": rmf}, sort_keys=False))

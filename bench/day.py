@@ -31,7 +31,7 @@ def measure(scratch: Path) -> Tables:
 
 
 class _Lift(LiftNode):
-    SCAN_S = 0.9  # s; more scans come at every wake_at, request and edge
+    SCAN_S = 0.9  # s; a scan also comes at each `wake_at`, each request and each edge of an input
 
 
 class _Rider(Rider):

@@ -1,7 +1,7 @@
-"""Measure the explanation of a busy lift's day: CPU time (s) and memory in a process of its own.
+"""Measure `rmf-bridge explain` on a busy lift's day: CPU time (s) and memory in a process of its own.
 
-The recording covers 86,400 s, with 4,000 rides of two robots. The recording has states, requests, the
-supervisor's repeats, and diagnostics at 1 Hz. The time for writing the file does not count.
+The recording covers 86,400 s, with 4,000 rides of two robots. It has states, requests, the requests
+that the supervisor repeats, and diagnostics at 1 Hz. The time for writing the file does not count.
 """
 
 import json
@@ -29,7 +29,7 @@ VALUES = ("mode", "floor", "door", "motion", "session", "boarded", "destination"
 
 
 def measure(scratch: Path) -> dict[str, Any]:
-    """Return the figures of a process that explains the day."""
+    """Write the recording, explain it in a separate process, and return the figures of that process."""
     from tests.workbench.replay.written import write
 
     bag = write(scratch / "day", day(), NEWEST)
@@ -47,7 +47,7 @@ def measure(scratch: Path) -> dict[str, Any]:
 
 
 def day() -> Iterator[Heard]:
-    """Yield the messages of the day."""
+    """Yield the messages of the recorded day."""
     every = DAY_S / RIDES
     for second in range(DAY_S):
         ride, at = divmod(second, every)
@@ -86,7 +86,7 @@ def _heard(second: int, part: float, topic: str, message: d.Message) -> Heard:
 
 
 def main(bag: Path) -> None:
-    """Explain the day, and print figures as JSON."""
+    """Explain a recording, and print figures as JSON."""
     from workbench.explain.heard_devices import HeardDevices
     from workbench.replay.recordings import RecordingSpan, told_between
 

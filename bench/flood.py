@@ -76,7 +76,7 @@ def _longest_gap(heard: list[tuple[float, LiftState]], start: float, end: float)
 
 
 def show(figures: dict[str, Any]) -> None:
-    """Print one figure a line."""
+    """Print each figure on its own line."""
     for name, value in figures.items():
         shown = value if isinstance(value, dict | bool) else round(value, 2)
         print(f"{name:28}{shown}")

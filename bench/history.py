@@ -1,4 +1,5 @@
-"""The promised figures of a run, their aims, and the best of earlier runs on a like machine.
+"""The figures that the project promises, their aims, and the best earlier figures of the same machine
+type.
 
 bench/results/history.jsonl has a line for each run on a quiet machine.
 """
@@ -9,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 LOSS = 1.15
-"""The ratio to the best earlier figure above which a figure is told as a loss."""
+"""The ratio to the best earlier figure. A figure above this ratio is reported as a loss."""
 LEAST_LOSS = 0.05
-"""A smaller difference is never reported as a loss. The kernel counts CPU time in steps of 0.01 s, so
-a small difference may be noise."""
+"""The least difference that is reported as a loss. The kernel counts CPU time in steps of 0.01 s, so a
+smaller difference may be noise."""
 LIFT, DOOR, CHARGER = "lift_dry_contact", "door_modbus", "charger_http"
 BARE = "bare node on dds"
 
@@ -47,14 +48,15 @@ FIGURES: list[Figure] = [
 
 
 def table(figures: dict[str, Any]) -> Iterator[str]:
-    """Yield the lines of the table of promised figures. Parts that were not measured are left out."""
+    """Yield the lines of the table of promised figures. Leave out figures that were not measured."""
     yield f"{'promised':64}{'aim':>8}{'seen':>8}"
     for title, seen, aim in _promised(figures):
         yield f"{title:64}{aim:>8g}{seen:>8.2f}"
 
 
 def losses(figures: dict[str, Any], folder: Path) -> Iterator[str]:
-    """Yield a line for each figure that is worse than the best earlier one on a like machine."""
+    """Yield a line for each figure that is worse than the best earlier figure of the same machine
+    type."""
     like = [run for run in _kept(folder) if run["machine"] == figures["machine"]]
     for title, seen, _ in _promised(figures):
         before = [(run["seen"][title], run["commit"]) for run in like if title in run["seen"]]

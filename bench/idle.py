@@ -15,8 +15,8 @@ SLCAN = {"port": "/dev/serial/by-id/simulated", "bitrate": 250000}
 
 
 def measure(scratch: Path) -> Tables:
-    """Measure a bare node on each wire, a lift on zenoh, and the shipped devices. Then measure many
-    devices of each kind on dds."""
+    """Measure a bare node on each transport, a lift on zenoh, and the shipped devices. Then measure
+    many devices of each kind on dds."""
     one = {f"bare node on {wire}": cost([*BARE, wire], scratch / f"{wire}.log") for wire in WIRES}
     lift = daemon(shipped("lift_dry_contact"), scratch / "on_zenoh", "zenoh")
     one["lift_dry_contact on zenoh"] = cost(lift, scratch / "on_zenoh.log")

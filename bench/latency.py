@@ -1,8 +1,9 @@
-"""Measure three times: from request to relay, from input to RMF, and from hazard to all outputs off.
+"""Measure three durations: from request to relay, from input to RMF, and from hazard to all outputs
+off.
 
 The baseline is a bare round trip and a bare edge callback. If ROS 2 is installed, a bare rclpy node is
-one more baseline. For each path, the same far end sends and measures. The far end uses `dds`, which
-costs least.
+one more baseline. For each path, this process sends the requests and measures the times. It uses `dds`,
+because `dds` costs the least time.
 """
 
 import queue
@@ -42,8 +43,8 @@ ROUNDS = 100
 HAZARDS = 50
 WARM_UP = 20
 PAUSE_S = 0.12
-"""Pause (s) between rounds. A shorter pause would hide two facts. A daemon sends at most ten states a
-second, and idle CPUs sleep."""
+"""The pause (s) between rounds. A shorter pause would hide two delays that real use has: a daemon sends
+at most ten states a second, and an idle CPU sleeps between requests."""
 MINIMAL = [sys.executable, "-m", "bench.minimal_ros", str(DOMAIN)]
 Times = list[float]
 
@@ -92,7 +93,7 @@ def _with_ros(scratch: Path) -> Tables:
 
 
 class Graph:
-    """This process's end of the graph. `Graph` sends LiftRequests, and measures when LiftStates
+    """This process's publisher of LiftRequests and subscriber to LiftStates. It notes when LiftStates
     arrive."""
 
     def __init__(self, transport: Transport) -> None:
@@ -118,8 +119,8 @@ class Graph:
         return at
 
     def state(self, since: float, true: Callable[[LiftState], bool]) -> float:
-        """Return the arrival time (monotonic s) of the first state after `since` that fulfils
-        `true`."""
+        """Return the arrival time (monotonic s) of the first state after `since` for which `true`
+        returns True."""
         while True:
             at, state = self._states.get(timeout=10.0)
             if at > since and true(state):
@@ -167,7 +168,8 @@ def daemon_paths(
     """Return three lists of times (s), and the daemon's memory (MB). The times are from request to
     relay, from edge to RMF, and from hazard to all outputs off.
 
-    `ours` is the wire of this end. `keep` is the setting for recording, or "" for the default.
+    `ours` is the transport of this process. `keep` is `keep` in the YAML's section `recording`, or ""
+    for the default.
     """
     directory = scratch / f"quick_{transport}{keep}"
     recording = {"recording": {"keep": keep}} if keep else {}
@@ -209,8 +211,8 @@ def _to_outputs_off(far: Graph, plant: Caller, hand: Caller) -> float:
     hand.order("press Lift1 fire_alarm on")
     at = plant.edge("fire_alarm", True)
     took = plant.edge("agv_mode_request", False) - at
-    # End the session during the fire. Otherwise the session would switch its relay on again after the
-    # fire.
+    # End the session during the fire. Otherwise the lift would switch the session's relay on again
+    # after the fire.
     ended_at = far.send("bench", LiftRequestType.REQUEST_END_SESSION, "")
     far.state(ended_at, lambda state: not state.session_id)
     hand.order("press Lift1 fire_alarm off")

@@ -1,14 +1,15 @@
-"""Measure the page with 50 lifts, 200 doors and 50 chargers at 1 Hz. Three real browsers show the page.
+"""Measure the web page (`rmf-bridge page`) with 50 lifts, 200 doors and 50 chargers at 1 Hz. Three real
+browsers show the page.
 
-A lift's session holds the time of publishing. A script in each browser notes the time at which the
-screen shows the session. The row `a tenth changes` is like a busy site. In the row `all change`, every
-card changes each second. Each device's daemon also publishes its diagnostics.
+Each lift's session id holds the time at which the state was published. A script in each browser notes
+the time at which the screen shows that id. The row `a tenth changes` is like a busy site. In the row
+`all change`, every card changes each second. Each device's daemon also publishes its diagnostics.
 
 The row `an hour` needs BENCH_PAGE_HOUR_S=N, and runs for N seconds. Every half minute, the benchmark
-notes the memory of the page and of two browsers, after a garbage collection in the browsers. One
-browser shows the site, and the other shows a device. The first ten minutes do not count, because a
-device's page first fills with ten minutes of history. `first` and `last` are the least memory in the
-first and in the last ten minutes.
+notes the memory of the page's process and of two browsers. Before that, it collects the garbage in the
+browsers. One browser shows the site, and the other shows a device. The first ten minutes do not count,
+because a device's page first fills with ten minutes of history. `first` and `last` are the least memory
+in the first and in the last ten minutes.
 """
 
 import os
@@ -68,14 +69,15 @@ def measure(scratch: Path) -> Tables:
 
 @dataclass(frozen=True)
 class Seen:
-    """A page, its publisher, and the browsers that show the page."""
+    """The running web page, the publisher of its devices' states, and the browsers that show the
+    page."""
 
     pid: int
     site: "_Site"
     tabs: list[Page]
 
     def live(self, seconds: float) -> None:
-        """Keep the site running for this time (s)."""
+        """Publish the devices' states for this time (s)."""
         self.site.live(seconds, self.tabs[0])
 
 
@@ -107,7 +109,8 @@ def _tabs(playwright: Playwright, site: "_Site", address: str) -> list[Page]:
 
 
 class _Site:
-    """A publisher that sends every state once a second. The states are spread over the second."""
+    """A publisher that sends the state of every simulated device once a second. The states are spread
+    over the second."""
 
     def __init__(self, domain: int, share: int) -> None:
         self._share = share
@@ -157,8 +160,8 @@ class _Site:
         return d.ChargerState(stamp(time.time()), state, f"charger{number:02}")
 
     def live(self, seconds: float, tab: Page) -> None:
-        """Publish for this time (s). Meanwhile, serve the events of `tab`, which is any one of the
-        browsers."""
+        """Publish for this time (s). Meanwhile, let the browsers work. `tab` may be any of their
+        tabs."""
         began, said = time.monotonic(), 0
         while (at := time.monotonic() - began) < seconds:
             while said < at * DEVICES:
@@ -193,7 +196,7 @@ def _looked_at(seen: Seen) -> Row:
 
 
 def _hour(seen: Seen) -> Rows:
-    """Return the memory in use, and the growth of this memory."""
+    """Return the memory that the page's process and two browsers use, and the growth of that memory."""
     *_, site, device = seen.tabs
     device.goto(f"{device.url}lift/lift00")
     kept: list[tuple[float, float, float, float]] = []

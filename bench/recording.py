@@ -1,5 +1,5 @@
-"""Measure the cost of a ring, and the replay speed of a day's recording. A daemon without a ring is the
-baseline."""
+"""Measure the cost of a ring, and the replay speed of a day's recording. A ring is the file on tmpfs
+that holds a daemon's last minutes. A daemon without a ring is the baseline."""
 
 import os
 import time
@@ -41,8 +41,8 @@ CONFIG = Path(__file__).parent.parent / "config/lift_dry_contact.yaml"
 
 
 def measure(scratch: Path) -> Tables:
-    """Measure a lift with and without a ring in turn. Then measure the lift's paths, and the lift's day
-    at 20 Hz."""
+    """Measure an idle lift's daemon, alternately with and without a ring. Then measure its latencies,
+    and a day of the lift at 20 Hz."""
     return {
         "a lift, left alone": _idle(scratch),
         "its paths, with a ring": _paths(scratch),
@@ -71,7 +71,7 @@ def _mean(rows: list[Row]) -> Row:
 
 
 def _paths(scratch: Path) -> Rows:
-    """Compare three paths with and without a ring: request to relay, input to RMF, and hazard to
+    """Compare three latencies with and without a ring: request to relay, input to RMF, and hazard to
     outputs off."""
     with_ring = daemon_paths(scratch, "dds", keep="ring")
     without = daemon_paths(scratch, "dds", keep="nothing")
@@ -106,7 +106,7 @@ def _day(scratch: Path) -> Row:
 
 
 class Day:
-    """A lift's day with 20 scans a second, in virtual time. The lift has its ring and a recorder."""
+    """A lift's day with 20 scans a second, in virtual time. A ring and a recorder record the lift."""
 
     def __init__(self, scratch: Path) -> None:
         self.now = 0.0
@@ -165,7 +165,7 @@ def _floor(now: float) -> str:
 
 
 def events(now: float) -> Iterator[object]:
-    """Yield the lift's readings and requests. One ride comes every RIDE_S (s)."""
+    """Yield the readings and requests of the lift at the time `now`. A ride begins every RIDE_S (s)."""
     into, before = now % RIDE_S, _floor(now - RIDE_S)
     agv = 0.5 < into < 16.0
     if into < 2.0:

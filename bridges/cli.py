@@ -16,8 +16,8 @@ from bridges import VERSION, exit_codes
 from bridges.system.installed import NotInstalled, is_there, of_workbench
 
 EX_PIPE = 141
-"""The exit code after the reader of our output has gone. A shell reports the same code after
-SIGPIPE."""
+"""The exit code if the program that reads our output, such as `head`, has ended. A shell reports the
+same code after SIGPIPE."""
 
 COMMANDS = {
     "init": (
@@ -25,7 +25,7 @@ COMMANDS = {
         "init my_lift.yaml --kind lift --wiring gpio --floors L1,L2,L3 --yes",
     ),
     "run": (
-        "serve a device, from its YAML, until SIGTERM or SIGINT",
+        "run the daemon for a device YAML, until SIGTERM or SIGINT",
         "run my_lift.yaml --simulate",
     ),
     "check": (
@@ -37,7 +37,7 @@ COMMANDS = {
         "migrate my_lift.yaml --dry-run",
     ),
     "enable": (
-        "make a service of a device YAML, or update the service after a change",
+        "run a device YAML as a systemd service, or update that service after a change",
         "enable my_lift.yaml --dry-run",
     ),
     "backup": (
@@ -68,7 +68,7 @@ COMMANDS = {
         "status --json",
     ),
     "doctor": (
-        "find what keeps a bridge from working on this machine; switch nothing",
+        "find what keeps a bridge from working on this machine, without switching any output",
         "doctor my_lift.yaml --scan",
     ),
     "explain": (
@@ -90,11 +90,11 @@ COMMANDS = {
     "release": ("end the session that holds a lift", "release Lift1"),
     "reset": ("let a running daemon clear its latched faults", "reset my_lift.yaml"),
     "drill": (
-        "let the robots stand for some time, as in an alarm, and then drive on",
+        "stop the robots for some time, as in an alarm, and then let them drive on",
         "drill my_panel.yaml --for 300",
     ),
     "workcell": (
-        "decide the outcome of a dispenser's or ingestor's request in doubt",
+        "decide the outcome of a dispenser's or ingestor's request, if it is in doubt",
         "workcell again my_dispenser.yaml",
     ),
     "walk": (
@@ -148,13 +148,14 @@ WORKBENCH = frozenset(
     }
     | {"judge", "release", "walk", "press", "fail", "replay"}
 )
-"""The subcommands that are in the workbench. No daemon needs these subcommands."""
+"""The subcommands in the package `workbench`, which a machine may lack. No daemon needs these
+subcommands."""
 
 
 def main(argv: list[str] | None = None) -> int:
     """Run one subcommand and return its exit code."""
-    # Without this line Python collects garbage at exit. That takes a fifth of a short process's CPU
-    # time.
+    # Without this line Python collects garbage at exit. The collection takes a fifth of a short
+    # process's CPU time. After `gc.freeze` it finds nothing to do.
     atexit.register(gc.freeze)
     if "_ARGCOMPLETE" in os.environ:  # set by the shell; autocomplete ends the process
         import argcomplete
@@ -166,7 +167,7 @@ def main(argv: list[str] | None = None) -> int:
         if any("\ud800" <= one <= "\udfff" for one in argument):
             sys.stderr.write(f"rmf-bridge: {os.fsencode(argument)!r} is not UTF-8: rename it\n")
             return 2
-    # Print a character that the terminal cannot show as an escape.
+    # If the terminal cannot show a character, print the character as an escape.
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
     typed = argparse.Namespace(ros_args=ros_args, typed=arguments)
@@ -178,7 +179,7 @@ def main(argv: list[str] | None = None) -> int:
     except NotInstalled as error:
         sys.stderr.write(f"rmf-bridge {arguments[0]}: {error}\n")
         return os.EX_UNAVAILABLE
-    except BrokenPipeError:  # the reader of our output, such as `head`, has ended
+    except BrokenPipeError:  # the program that reads our output, such as `head`, has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EX_PIPE
 
@@ -200,10 +201,11 @@ def _nearest(typed: str, listed: str) -> str:
 
 
 def parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
-    """Return the parser of the first argument's subcommand.
+    """Return the parser of the subcommand that the first argument names.
 
-    Leave out all other subcommands, because `outputs-off` has no time to import them. If the first
-    argument is no subcommand, return the parser of all subcommands, without their options.
+    The other subcommands are left out, because importing them takes time that `outputs-off` does not
+    have. If the first argument names no subcommand, return the parser of all subcommands, without their
+    options.
     """
     if arguments and arguments[0] in COMMANDS:
         return _parser(arguments[:1], whole=True)

@@ -28,7 +28,7 @@ SIMULATION: Final = {
 }
 ORDERED: Final = {
     4: "the order was refused (the reason is printed)",
-    69: "the daemon does not answer, or this user may not see or signal it",
+    69: "the daemon does not answer, or this user may not see it or send it a signal",
 }
 SENT: Final = {
     0: "the effect was seen",
@@ -39,7 +39,7 @@ SENT: Final = {
 EXIT_CODES: Final[dict[str, dict[int, str]]] = {
     "init": {
         0: "the file is written",
-        64: "answers are missing, or do not fit together",
+        64: "answers are missing, or contradict each other",
         66: "the map cannot be read",
         73: "the file exists, or cannot be written",
         130: "Ctrl-C",
@@ -87,7 +87,7 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
     "watch": {0: "Ctrl-C, or `--once` heard something", 1: GRAPH},
     "page": {
         0: "Ctrl-C or SIGTERM",
-        64: "the page would show the site to strangers, or the password was not repeated",
+        64: "the page would show the site to strangers, or the two typed passwords differ",
         **RECORDING,
         69: "the port is taken, or NiceGUI is not installed",
         78: "the password file has an error",
@@ -115,7 +115,7 @@ EXIT_CODES: Final[dict[str, dict[int, str]]] = {
         1: "a daemon has a fault",
         2: "a daemon died or is silent",
         3: "there is no daemon",
-        4: "with --idle: a device is in use, or nobody knows whether one is",
+        4: "with --idle: a device is in use, or nobody knows whether a device is in use",
     },
     "doctor": {
         0: "all is well",

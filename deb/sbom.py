@@ -1,7 +1,7 @@
 """Writes a package's bill of materials (CycloneDX JSON): python deb/sbom.py --help.
 
 The components are the distributions in the package's folders. If a library's wheel has no licence text,
-deb/licences/ gives the text. If deb/licences/ has none either, the build ends.
+the text is taken from deb/licences/. If it is not there either, the build fails.
 """
 
 import argparse
@@ -94,8 +94,8 @@ def _part(name: str, version: str) -> Component:
 
 
 def _licences(library: Distribution) -> Iterator[License]:
-    """Yield the licences that the metadata names. The expression comes first, then the field, then the
-    classifiers."""
+    """Yield a library's licences from the first of these sources that exists: our file in
+    deb/licences/, the field License-Expression, the field License, the classifiers."""
     about, factory = library.metadata, LicenseFactory()
     said = about.get("License-Expression") or about.get("License", "").partition("\n")[0]
     classes = about.get_all("Classifier", [])

@@ -1,9 +1,10 @@
 """Installs a wheel and its requirements for another machine: python deb/wheels.py --help.
 
-pip can fetch wheels of another platform, but pip judges conditions (`; platform_machine == ...`) by the
-machine on which pip runs. Therefore this script works in rounds. Each round finds the requirements that
-the target machine still lacks, and fetches these requirements with pip. The version comes from the
-lock. The file's SHA-256 must be in the lock.
+pip can fetch wheels of another platform. But pip evaluates the conditions of requirements (`;
+platform_machine == ...`) for the machine on which pip itself runs. Therefore this script works in
+rounds. Each round finds the requirements that the target machine still lacks, and fetches them with
+pip. The lock file gives the version of each requirement. The SHA-256 of the fetched file must be in the
+lock file too.
 """
 
 import argparse
@@ -22,8 +23,8 @@ from packaging.utils import canonicalize_name
 
 MACHINES = {"amd64": "x86_64", "arm64": "aarch64"}
 GLIBC = (34, 31, 28, 27, 24, 17)
-"""Minor versions of glibc in manylinux tags. Debian 12 has 2.36. A wheel runs with the tag's version or
-with a newer version."""
+"""Minor versions of glibc in manylinux tags. Debian 12 has glibc 2.36. A wheel runs with the glibc
+version in its tag, and with newer versions."""
 
 Without = Collection[tuple[str, ...]]
 """Pairs of a distribution and a requirement. The distribution declares this requirement, but does not
@@ -83,7 +84,7 @@ def _arguments() -> argparse.Namespace:
 
 
 def _locked(text: str, machine: dict[str, str]) -> dict[str, str]:
-    """Return name -> the lines of this name in the lock, for the target machine."""
+    """Return a mapping from each name to its lines in the lock file, for the target machine."""
     found = {}
     for entry in re.split(r"\n(?=\S)", text):
         if entry and not entry.startswith("#"):
@@ -108,10 +109,10 @@ def _built(name: str, args: argparse.Namespace) -> list[Path]:
 
 
 def _fetch(what: Iterable[str], args: argparse.Namespace, listed: bool = False) -> None:
-    """Install these distributions without their requirements. With `listed`, `what` has lines of a
-    requirements file instead of wheel files.
+    """Install these distributions without their requirements. `what` has wheel files. With `listed`,
+    `what` has lines of a requirements file.
 
-    If one line has a hash, pip demands a hash of every line.
+    If one line has a hash, pip demands a hash for every line.
     """
     if not (what := list(what)):
         return
@@ -121,7 +122,7 @@ def _fetch(what: Iterable[str], args: argparse.Namespace, listed: bool = False) 
     options += ["--python-version", args.python, "--implementation", "cp", "--abi"]
     options += [f"cp{args.python.replace('.', '')}", "--abi", "abi3", "--abi", "none"]
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    with tempfile.TemporaryDirectory() as closed:  # pip leaves out a package that is partly there
+    with tempfile.TemporaryDirectory() as closed:  # pip skips packages that exist in part
         fresh = f"{closed}/fresh"  # open to all users, because a daemon's user must read the copy
         place = ["--no-deps", "--no-compile", "--only-binary", ":all:", "--target", fresh]
         if listed:
@@ -167,8 +168,8 @@ def _missing(
 def _wrong(
     target: Path, machine: dict[str, str], extras: dict[str, tuple[str, ...]], without: Without
 ) -> Iterator[str]:
-    """Yield requirements that the installed version does not meet. Then two packages want different
-    versions."""
+    """Yield requirements that the installed version does not meet. This happens if two packages want
+    different versions of a third."""
     there = _there(target)
     for need in _needed(target, machine, extras, without):
         version = there[canonicalize_name(need.name)].version

@@ -1,5 +1,5 @@
-"""Drivers translate between a controller's signals and the values that the daemon uses. Each way to
-connect a device has a file.
+"""Drivers translate between a controller's signals and the values that the daemon uses. There is one
+file for each way to connect a device.
 
 A driver is the file `drivers/<kind>/<driver>.py`. The YAML's `kind:` and `driver:` give this path. The
 file's last statement defines `DRIVER` (`drivers/driver_type.py`). The rest of the code uses only this
@@ -30,8 +30,7 @@ class Driver(Protocol[Sample, Outputs]):
         each DriverError."""
 
     def read(self) -> Sample:
-        """Read and decode every input. Return only values that this call has read. Raises
-        DriverError."""
+        """Read and decode every input. Do not return values of an earlier call. Raises DriverError."""
 
     def write(self, outputs: Outputs) -> None:
         """Set every output to its level in `outputs`. The call is cheap if no level has changed."""
@@ -46,11 +45,12 @@ class Driver(Protocol[Sample, Outputs]):
 
 @runtime_checkable
 class OnContacts(Protocol):
-    """A driver on contacts. A person can check the contacts' levels with a meter."""
+    """A driver for a device that is connected by contacts. A person can check the contacts' levels with
+    a meter."""
 
     def contacts(self) -> Mapping[str, bool]:
-        """Return for each known signal whether it is asserted. The value is from the last reading or
-        writing."""
+        """Return whether each signal is asserted, from the last reading or writing. Leave out signals
+        that are not known yet."""
 
 
 @runtime_checkable

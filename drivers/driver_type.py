@@ -1,7 +1,7 @@
 """The record that describes a driver. Each driver's file ends with such a record, named `DRIVER`.
 
 The YAML's `kind:` and `driver:` name the file `drivers/<kind>/<driver>.py`, so there is no table of
-drivers to edit. Only `bridges/settings/names.py` imports a driver by its name.
+drivers to edit. `bridges/settings/names.py` imports a driver by this name. No other file does so.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -22,8 +22,8 @@ Outputs = TypeVar("Outputs")
 class DriverType(msgspec.Struct, Generic[Settings, Sample, Outputs], frozen=True):
     """One driver.
 
-    - `settings` is a struct with the device's settings and wiring. It derives from the kind's settings,
-      such as `bridges.kinds.lift.settings.LiftSettings`.
+    - `settings` is a struct with the device's settings and wiring. It is a subclass of the kind's
+      settings struct, such as `bridges.kinds.lift.settings.LiftSettings`.
     - `buses` lists the bus types that the driver works on, as names of files in `drivers/hal/`.
     - `create(name, settings, bus)` makes the driver of one device. The driver sends nothing before
       `open`.
@@ -36,13 +36,15 @@ class DriverType(msgspec.Struct, Generic[Settings, Sample, Outputs], frozen=True
       wires.
     - `tables(settings)` gives tables of codes, pulses and frames for `check`
       (`bridges/kinds/shared/table.py`).
-    - `claims(settings)` gives each place that no other device may use, with its path in the YAML. The
-      points of the wires are claimed anyway.
+    - `claims(settings)` gives each register, path or topic that no other device may use, with its path
+      in the YAML. The points in the wiring table need not be listed, because they are always claimed.
     - `warnings(settings)` gives (path, text) for each valid setting that may be a mistake.
-    - `notes(settings)` gives (path, text) for each intended setting whose effects the site should know.
+    - `notes(settings)` gives (path, text) for each setting that is no mistake, but whose effects the
+      site should know.
     - `unwired(settings)` gives the signals without a wire that `accept_unsafe` may name.
-    - `fake` names the module that replaces the hardware in `run --simulate` (`hal_fakes/fake.py`).
-      Without a name, the wires lead to the simulated plant of the device's kind.
+    - `fake` names the module that replaces the hardware in `run --simulate` (`hal_fakes/fake.py`). If
+      `fake` is empty, the simulation connects the wires to a simulated lift, door or other device of
+      the same kind.
     """
 
     settings: type[Settings]

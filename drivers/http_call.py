@@ -17,7 +17,7 @@ class Call(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     method: Annotated[http.Method, tells("the HTTP method.")] = "POST"
     body: Annotated[
         Annotated[str, msgspec.Meta(max_length=1024)] | None,
-        tells("the JSON body, as a quoted string. Without `body` the request has none."),
+        tells("the JSON body, as a quoted string. Without this key the request has no body."),
     ] = None
 
     def problems(self) -> Remarks:
@@ -42,8 +42,8 @@ class Calls(Protocol):
 
 
 class InsistentCalls(Calls, Protocol):
-    """An HTTP bus that can also skip its backoff. The last command before the daemon's end needs
-    this."""
+    """An HTTP bus that can also skip its backoff. Drivers need this for the last command before the
+    daemon's end."""
 
     def insist(self) -> None:
         """Let the next request skip the backoff."""
@@ -62,14 +62,14 @@ def claim(call: Call) -> str:
 
 
 def timer_unseen(call: Call, off_s: float) -> str:
-    """Describe a command that does not contain the timer's time (in s or ms). Return "" if the command
-    contains this time."""
+    """Return a warning if the command does not contain the timer's time (in s or ms). Return "" if the
+    command contains it."""
     written = f"{call.path} {call.body or ''}".strip()
     numbers = re.findall(r"[0-9]+(?:\.[0-9]+)?", written)
     if {off_s, 1000 * off_s}.intersection(map(float, numbers)):
         return ""
     return (
-        f"the number of the timer (switches_off_after_s: {off_s:g} s) is not in"
+        f"the timer's time (switches_off_after_s: {off_s:g} s) is not in"
         f" {written}: compare the command with switches_off_after_s"
     )
 

@@ -69,20 +69,23 @@ def flag(answer: Mapping[str, object], place: JsonFlag) -> bool:
 
 
 def flag_if(answer: Mapping[str, object], place: JsonFlag | None) -> bool | None:
-    """Return the flag as `flag` does. Return None without a place. Raises DriverError."""
+    """Return the flag as `flag` does. Return None if `place` is None. Raises DriverError."""
     return None if place is None else flag(answer, place)
 
 
 def certain(answer: Mapping[str, object], place: JsonFlag | None) -> bool:
-    """Return the flag; False without a place. Raises DriverError as `flag` does. Raises it for null
-    too, because null says nothing about a danger, a contact or a relay."""
+    """Return the flag. Return False if `place` is None. Raises DriverError as `flag` does.
+
+    Raises DriverError for null too. Null would leave open whether there is a danger, or whether a
+    contact or relay is on.
+    """
     if place and needed(answer, place.field) is None:
         raise wrong(place.field, None, "yes or no")
     return place is not None and flag(answer, place)
 
 
 def certain_if(answer: Mapping[str, object], place: JsonFlag | None) -> bool | None:
-    """Return the flag as `certain` does; None without a place. Raises DriverError."""
+    """Return the flag as `certain` does. Return None if `place` is None. Raises DriverError."""
     return None if place is None else certain(answer, place)
 
 
@@ -100,7 +103,7 @@ def value_text(value: Value) -> str:
 
 
 def same(value: object, given: Value) -> bool:
-    """Are both the same JSON value? The value true differs from 1, and 1.0 equals 1."""
+    """Are the two JSON values equal? The value true differs from 1, and 1.0 equals 1."""
     return isinstance(value, bool) == isinstance(given, bool) and value == given
 
 
@@ -131,7 +134,7 @@ def needed(answer: Mapping[str, object], field: str) -> object:
     value = found(answer, field)
     if value is ABSENT:
         names = ", ".join(clean(name) for name in list(answer)[:5]) or "nothing"
-        raise DriverError(f"the answer has no '{field}', but {names}: is state_path right?")
+        raise DriverError(f"the answer has no '{field}'; it has {names}: is state_path right?")
     return value
 
 
@@ -163,8 +166,8 @@ def number(answer: Mapping[str, object], field: str, scale: float) -> float | No
 
 
 def name(answer: Mapping[str, object], field: str) -> str:
-    """Return an id as text. Return "" for null. Raises DriverError if the field is absent or not an
-    id."""
+    """Return an id (a whole number or a text) as text. Return "" for null. Raises DriverError if the
+    field is absent or has another type."""
     value = needed(answer, field)
     if value is None:
         return ""

@@ -1,4 +1,5 @@
-"""The common part of all drivers on contacts. Each driver adds `read` and `write`."""
+"""The common part of all drivers for devices with contacts and relays. Each driver adds `read` and
+`write`."""
 
 from collections.abc import Mapping
 
@@ -12,7 +13,8 @@ class OnPoints:
         self._points = points
 
     def take_inputs(self, elsewhere: Readings) -> None:
-        """Let the driver call `elsewhere` for the contacts on other buses."""
+        """Give the driver the function `elsewhere`. The driver calls it to read the contacts that are
+        on other buses."""
         self._points.take_inputs(elsewhere)
 
     def open(self) -> None:

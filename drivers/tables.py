@@ -1,4 +1,4 @@
-"""Finds the readings of a code on several lines when one wire is broken. The checks and their tables
+"""Finds how a code on several lines reads when one of its wires is broken. The checks and their tables
 use these readings."""
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,11 +15,11 @@ def lines_on(shown: Lines) -> str:
 
 
 def breaks(shown: Lines, wires: Mapping[str, Wire]) -> Iterator[tuple[str, str, dict[str, bool]]]:
-    """Yield (signal, `cut` or `shorted`, lines) for each line that may break. `lines` is the reading of
-    the whole code.
+    """Yield (signal, `cut` or `shorted`, lines) for each line of the code, as if only this line were
+    broken. `lines` is the wrong reading of the whole code.
 
     The reading of a cut line depends on its wiring (`Wire.broken_reads`). A shorted line, or a line
-    with a stuck contact, reads the opposite. A cut line that floats (`pull: none`) may read either way.
+    with a stuck contact, reads the opposite. A cut line that floats (`pull: none`) may read on or off.
     """
     for signal, on in shown.items():
         how = "shorted" if wires[signal].broken_reads() is on else "cut"
@@ -32,8 +32,8 @@ def one_cut(shown: Lines, wires: Mapping[str, Wire]) -> Iterator[tuple[str, dict
 
 
 def told_of_cuts(readings: Sequence[tuple[str, str]]) -> str:
-    """Join pairs (signal, reading with this signal cut) to one text:
-    `L1: floor_bit1; a fault: floor_bit0`."""
+    """Join pairs (signal, reading when this signal's wire is cut) to one text. The text lists the
+    signals of each reading: `L1: floor_bit1; a fault: floor_bit0`."""
     by_reading: dict[str, list[str]] = {}
     for signal, reading in readings:
         by_reading.setdefault(reading, []).append(signal)

@@ -44,7 +44,7 @@ def energised_at_boot(wires: Iterable[Wire]) -> Iterator[Unsafe]:
                 wire.signal,
                 wire.path,
                 f"{gpio.describe(wire.point)} is pulled {pulled} from power-on through boot, and"
-                f" its relay is on at {pulled}: use {use}, or the other active level",
+                f" {pulled} switches its relay on: use {use}, or the opposite active level",
             )
 
 
@@ -61,8 +61,8 @@ def slow_alarms(wires: Iterable[Wire]) -> Remarks:
     """Yield a warning, with its path in the YAML, for each alarm with a long debounce."""
     for wire in wires:
         if wire.debounce_s is not None and wire.debounce_s > ALARM_WITHIN_S:
-            text = f"{wire.signal} counts only after {wire.debounce_s:g} s"
-            yield (*wire.path, "debounce_s"), f"{text}: contacts bounce for 0.05 s"
+            text = f"{wire.signal} is noticed only after {wire.debounce_s:g} s"
+            yield (*wire.path, "debounce_s"), f"{text}, but contacts bounce for only 0.05 s"
 
 
 def needlessly_accepted(found: Iterable[Unsafe], accepted: Mapping[str, str]) -> Remarks:
@@ -73,8 +73,8 @@ def needlessly_accepted(found: Iterable[Unsafe], accepted: Mapping[str, str]) ->
 
 
 def unaccepted(found: Iterable[Unsafe], accepted: Mapping[str, str]) -> Remarks:
-    """Yield a problem for each unsafe choice that `accept_unsafe` does not name. The problem's text has
-    two remedies."""
+    """Yield a problem for each unsafe choice that `accept_unsafe` does not name. The problem's text
+    describes the danger, and shows how the YAML can accept it."""
     for signal, path, text in found:
         if signal not in accepted:
             yield path, f"unsafe: {text}; or accept_unsafe: {{{signal}: <why it is safe here>}}"

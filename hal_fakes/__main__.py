@@ -1,11 +1,12 @@
 """Serves the far side of one bus in a separate process: `python -m hal_fakes FILE BUS --socket PATH`.
 
-This is for buses whose fake is `Outside` (`hal_fakes/fake.py`). When the far side is ready, the process
-prints the replacements for the bus's settings as one line of JSON.
+The far side of a bus is the simulated hardware behind the bus. This program serves the buses whose fake
+is an `Outside` (`hal_fakes/fake.py`). When the far side is ready, the process prints one line of JSON.
+The line has the settings with which the real bus finds the far side, such as its port.
 
 The process ends when its standard input ends, so nothing is left behind even if the daemon is killed.
-The process ignores SIGINT. Ctrl-C in a terminal reaches the daemon and the far side, and the daemon has
-to finish first.
+The process ignores SIGINT. Otherwise Ctrl-C in a terminal would end the far side before the daemon has
+finished.
 """
 
 import argparse
@@ -55,8 +56,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def served(path: Path, bus_name: str, socket: Path) -> Iterator[dict[str, object]]:
-    """Serve the far side of this bus until the end of the block. Yield the replacements for the bus's
-    settings.
+    """Serve the far side of this bus until the end of the block. Yield the settings with which the real
+    bus finds the far side.
 
     Raises SettingsError or DriverError.
     """

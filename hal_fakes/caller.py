@@ -12,8 +12,8 @@ PATIENCE_S: Final = 120.0
 
 
 class SimulationRefused(Exception):
-    """The error of an order that the simulation refuses. The error's text is the simulation's
-    answer."""
+    """The error that `order` raises if the simulation refuses an order. The error's text is the
+    simulation's answer."""
 
 
 class Caller:
@@ -52,12 +52,14 @@ class Caller:
         return self._lines.readline().rstrip("\n")
 
     def edges(self) -> Iterator[Edge]:
-        """Yield every edge until the simulation closes the connection. Send `follow` first."""
+        """Yield every edge (a change of a relay or contact) until the simulation closes the connection.
+        The caller must send the order `follow` first."""
         while line := self.hear():
             yield Edge(**json.loads(line))
 
     def edge(self, signal: str, value: bool) -> float:
-        """Wait for this edge. Return its monotonic time (s). Send `follow` first."""
+        """Wait for this edge. Return its monotonic time (s). The caller must send the order `follow`
+        first."""
         return next(e.at for e in self.edges() if (e.signal, e.value) == (signal, value))
 
     def close(self) -> None:

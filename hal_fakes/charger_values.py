@@ -1,5 +1,5 @@
-"""Chooses values for a charger's fields. From these values the driver's rules and errors must read the
-wanted activity.
+"""Chooses values for a simulated charger's fields, so that the driver reads the wanted activity from
+them.
 
 This file tries values until the driver's own rules give that activity.
 """
@@ -27,8 +27,8 @@ NEAREST: Final = {
     Activity.STOPPING: Activity.CHARGING,
     Activity.RELEASED: Activity.IDLE,
 }
-"""The replacement for each activity that may lack a code and a rule. In this case the replacement is
-shown."""
+"""The replacement for each activity that a charger may be unable to show. If the charger's map has no
+code and no rule for an activity, the charger shows the replacement."""
 
 
 def values(
@@ -58,8 +58,8 @@ def values(
 
 
 def _shows_error(errors: StationErrors, shown: dict[str, Value], robot: bool) -> bool:
-    """Show an error of the robot, or of the station. If this side has no error field, show an error of
-    the other side. Return whether an error is shown."""
+    """Write an error of the robot or of the station into `shown`. If there is no field for errors of
+    that side, write an error of the other side. Return whether `shown` has an error now."""
     sides = ("robot", "station") if robot else ("station", "robot")
     for side in sides:
         for number in errors.codes:

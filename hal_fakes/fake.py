@@ -1,4 +1,5 @@
-"""Finds fakes by name. `DRIVER` and `BUS` each name a module whose `FAKE` replaces the hardware.
+"""Finds the fake of a driver or a bus by the name of a module. The driver's `DRIVER` and the bus's
+`BUS` name this module. `FAKE` of this module replaces the hardware.
 
 Only this file imports fakes by name. If a driver has no fake, the wires of its device lead to the
 kind's plant, `hal_fakes/plants/<kind>.py`.
@@ -26,8 +27,8 @@ class Fake(Generic[Settings]):
 
     - `plant(name, settings, wires)` makes the physics of the device. `wires` is the driver's wiring
       table.
-    - `station(plant, settings)` makes the controller for the bus's fake. The plant is behind the
-      controller. Without `station`, a `PlantWiring` wires the plant's contacts to the bus.
+    - `station(plant, settings)` makes the controller that the bus's fake serves. The plant is behind
+      the controller. If `station` is None, a `PlantWiring` connects the plant's contacts to the bus.
     - `sited(config, name)` makes a plant that needs more of the YAML than the device's settings. If
       given, `sited` replaces `plant`.
     """
@@ -38,9 +39,9 @@ class Fake(Generic[Settings]):
 
 
 class Server(Protocol):
-    """A running far side.
+    """The running far side of a bus, which is the simulated hardware behind the bus.
 
-    `replace` holds the replacements for the bus's settings, such as
+    `replace` has the settings with which the real bus finds the far side, for example
     `{"tcp": {"host": "127.0.0.1", "port": 41234}}`.
     """
 
@@ -54,9 +55,9 @@ class Server(Protocol):
 class Outside(Generic[Settings, Station]):
     """The far side of a bus, in a process of its own.
 
-    - `serve(settings, stations)` starts a real server on 127.0.0.1, or on a line of its own, and
-      returns at once. The server may call the plants from any thread, and never advances the plants'
-      time.
+    - `serve(settings, stations)` starts a real server on 127.0.0.1, or on a simulated serial line, and
+      returns at once. The server may call the plants from any thread. The server need not advance the
+      plants' time, because a `RealTime` does so.
     - `parts` are the parts of the far side that can fail, for each plant on the bus.
     """
 
@@ -68,7 +69,8 @@ class Outside(Generic[Settings, Station]):
 class Inside(Generic[Settings, Station]):
     """The far side of a bus that must be in the daemon's process.
 
-    `open_bus(settings, stations, world)` makes the real bus with these stations on it.
+    `open_bus(settings, stations, world)` makes the real bus with these stations on it. `world` runs the
+    plants in real time.
     """
 
     open_bus: Callable[[Settings, Sequence[Station], RealTime], Bus]
@@ -94,8 +96,8 @@ def _plant(config: Config, name: str) -> Plant:
 
 
 def stations_on(config: Config, bus: str, plants: Mapping[str, Plant]) -> list[Any]:
-    """Return this bus's stations. They are the devices on the bus, and contacts of devices on other
-    buses."""
+    """Return this bus's stations. There is one for each device on the bus, and one for each device of
+    another bus that has contacts here."""
     return [_station(config, bus, name, plants[name]) for name in config.devices_at(bus)]
 
 

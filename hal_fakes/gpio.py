@@ -2,8 +2,8 @@
 
 The daemon's own code and gpiozero run as on hardware. Only the pins are simulated. They claim an output
 at its safe level in one call, as `drivers/hal/gpio/pins.py` does on hardware. gpiozero's own MockPin
-would record a glitch at this point. The simulated pins refuse the same uses as hardware: a second claim
-of a pin, another pull on a pin with a fixed resistor, driving an input, a pull on an output.
+would record a glitch during the claim. The simulated pins refuse the same uses as hardware: a second
+claim of a pin, another pull on a pin with a fixed resistor, driving an input, a pull on an output.
 """
 
 import time
@@ -47,7 +47,8 @@ class WiredPin(MockPin):  # type: ignore[misc]
         self.clear_states()
 
     def close(self) -> None:
-        """Set an output to its safe level, then release the pin. The kernel would keep this level."""
+        """Set an output to its safe level, then release the pin. On hardware the kernel would keep this
+        level after the release."""
         if self._safe is not None:
             self._change_state(self._safe)
         self._safe = None
@@ -70,8 +71,8 @@ class WiredPin(MockPin):  # type: ignore[misc]
 class WiredFactory(MockFactory):  # type: ignore[misc]
     """The header with its wiring.
 
-    `clock` gives the time (s) of the daemon's outputs. A thread holds `lock` while it sets pins to
-    their wires' levels. So an older level never replaces a newer level.
+    `clock` gives the time (s) at which the daemon changes an output. A thread holds `lock` while it
+    sets pins to their wires' levels. So an older level never replaces a newer level.
     """
 
     def __init__(

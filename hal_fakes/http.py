@@ -70,7 +70,8 @@ class HttpStation(Protocol):
 
 @runtime_checkable
 class FreeStation(Protocol):
-    """A station whose requests have values of a command in their paths and bodies."""
+    """A station that reads values of a command from the path and body of a request. So its requests
+    cannot be listed in advance."""
 
     plant: Plant
 
@@ -79,10 +80,11 @@ class FreeStation(Protocol):
 
 
 class HttpServer:
-    """A running server. `replace` holds the replacements for the bus's settings.
+    """A running HTTP server. `replace` has the settings with which the real bus finds the server.
 
-    `path` is the API's path. `timeout_s` is the client's deadline (s), and slow failures take longer.
-    `push_path` is the WebSocket's path below `path`, if the controller has a WebSocket.
+    `path` is the API's path. `timeout_s` is the client's deadline (s). An answer in the mode `slow`
+    takes longer than this deadline. `push_path` is the WebSocket's path below `path`, if the controller
+    has a WebSocket.
     """
 
     def __init__(

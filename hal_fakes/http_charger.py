@@ -24,7 +24,7 @@ from hal_fakes.plants.plant import Plant
 def build(
     name: str, settings: JsonChargerSettings, links: Sequence[str] = ("server", "headers", "body")
 ) -> ChargerPlant:
-    """Build the station for these settings, with the robots of `receivers`."""
+    """Build the station for these settings. Its pad knows the robots in `receivers` of the settings."""
     return ChargerPlant(
         name,
         settings.receivers,
@@ -73,8 +73,8 @@ class FakeJsonCharger:
         return self.body(self.reading())
 
     def body(self, reading: Reading) -> bytes:
-        """Return the answer for this reading. In a failure mode of the server or the body, return the
-        answer of this mode."""
+        """Return the answer for this reading. If the server or the body fails, return the spoilt answer
+        of the failure mode."""
         server, body = reading.failures.get("server"), reading.failures.get("body")
         if server == "stuck" and self._last is not None:
             return self._last
@@ -112,7 +112,7 @@ class FakeJsonCharger:
         return answer
 
     def _by_rules(self, reading: Reading, answer: dict[str, object]) -> dict[str, Value]:
-        """Return the value of each field that rules and errors read."""
+        """Return a value for each field that a rule or an error of the YAML reads."""
         said = self._settings
         wanted = ROBOT_ERROR if reading.robots else (reading.activity, "")
         shown = {at: found(answer, at) for _, at in places(said.rules)}

@@ -1,6 +1,7 @@
 """A dispenser or ingestor behind HTTP. The YAML names the fields that show the plant's contacts.
 
-The plant takes a start as a pulse.
+The command `start` switches the plant's relay `start` on, and the command `stop` switches it off. The
+relay must stay on during a cycle.
 """
 
 from drivers.dispenser.http import HttpWorkcellSettings

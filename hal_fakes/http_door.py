@@ -14,7 +14,7 @@ from hal_fakes.plants.plant import Plant
 
 
 class FakeHttpDoor(FlagStation):
-    """A controller with a relay, whose timer it restarts at each command."""
+    """A controller with a relay. Each command restarts the relay's timer."""
 
     def __init__(self, plant: Plant, settings: HttpDoorSettings) -> None:
         super().__init__(plant, settings.state_path, flags(settings.inputs))
@@ -34,13 +34,13 @@ class FakeHttpDoor(FlagStation):
         self.plant.drive(signal, asserted, now)
 
     def tick(self) -> None:
-        """Switch the relay off when its timer has run out, and let the plant run."""
+        """Switch the relay off when its timer has run out. Advance the plant to the present time."""
         if time.monotonic() >= self._off_at:
             self.obey(HOLD, False)
         super().tick()
 
     def add(self, said: dict[str, object]) -> None:
-        """Add the relay's own state."""
+        """Add the relay's own state to the answer `said`."""
         if held := self._settings.held:
             put(said, held.field, value_of(held, self._on))
 

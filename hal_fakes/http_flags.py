@@ -24,8 +24,8 @@ def flags(inputs: Any) -> dict[str, JsonFlag]:
 
 
 def contacts(fields: Mapping[str, JsonFlag], *relays: str) -> list[Wire]:
-    """Return the controller's own contacts and relays. The plant needs them, because they can fail as
-    our wires can."""
+    """Return the controller's own contacts and relays as wires. The plant needs these wires, because
+    they can fail in the same way as the daemon's wires."""
     inputs = [Wire(name, "in", name, "high") for name in fields]
     return [*inputs, *(Wire(name, "out", name, "high") for name in relays)]
 
@@ -46,15 +46,15 @@ class FlagStation:
         self.plant.drive(signal, asserted, time.monotonic())
 
     def tick(self) -> None:
-        """Let the plant run."""
+        """Advance the plant to the present time."""
         self.plant.advance(time.monotonic())
 
     def add(self, said: dict[str, object]) -> None:
-        """Add the controller's own fields to an answer."""
+        """Add the controller's own fields to the answer `said`."""
 
     def answer(self, asked: Asked) -> bytes:
-        """Return the present answer to `GET state_path`. If that failure is ordered, return a wrong
-        answer."""
+        """Return the present answer to `GET state_path`. If the server or the body fails, return the
+        spoilt answer of the failure mode."""
         self.tick()
         server, body = self.plant.failures.get("server"), self.plant.failures.get("body")
         if server == "stuck" and self._last is not None:
@@ -62,7 +62,7 @@ class FlagStation:
         said: dict[str, object] = {}
         for name in sorted(
             self._fields, key=self.plant.sense
-        ):  # several contacts may share a field
+        ):  # asserted contacts come last, so they decide about a shared field
             place, on = self._fields[name], self.plant.sense(name)
             if on or place.field not in said:
                 put(said, place.field, value_of(place, on))

@@ -1,8 +1,9 @@
-"""A fleet manager on HTTP, with the interface that the YAML describes: one server for all its robots.
+"""A fleet manager on HTTP. One server answers for all robots of the manager, with the interface that
+the YAML describes.
 
-It matches paths and bodies by the YAML's own texts, so it understands every interface that the driver
-can speak. Failures of server, headers and body: `hal_fakes/http.py`; those of one robot are the whole
-manager's.
+The server matches paths and bodies with the YAML's own templates. So it understands every interface
+that the driver can speak. `hal_fakes/http.py` describes the failures of server, headers and body. If
+one robot has such a failure, the whole manager has it.
 """
 
 import json
@@ -41,7 +42,7 @@ class FakeFleetRobot:
     def reply(
         self, method: str, path: str, body: bytes, all_stations: Sequence["FakeFleetRobot"]
     ) -> bytes | None:
-        """Answer a call about this robot; None for another call."""
+        """Answer a request about this robot. Return None if the request is not about this robot."""
         now = time.monotonic()
         self.plant.advance(now)
         if method == "GET":
@@ -137,7 +138,8 @@ def _limit(given: dict[str, object]) -> float | None:
 
 
 def _matched(template: str, path: str) -> dict[str, object] | None:
-    """Return the values of a path's placeholders; None for another path."""
+    """Return the values of a path's placeholders. Return None if the path does not match the
+    template."""
     pattern, names, end = "", [], 0
     for place in PLACE.finditer(template):
         pattern += re.escape(template[end : place.start()]) + "([^&/?]*)"

@@ -1,5 +1,5 @@
-"""A lift's gateway on HTTP. The fields of its API show the plant's contacts. Its commands act as
-relays.
+"""A lift's gateway on HTTP. The fields of its API show the plant's contacts. Each of its commands
+switches a relay of the plant.
 
 A held command ends by itself when its timer is not renewed. A call without `cancel` is a short press of
 a button. `hal_fakes/http.py` describes the failures of server, headers and body.
@@ -65,7 +65,7 @@ def build(name: str, settings: HttpLiftSettings, pace: LiftPace | None = None) -
 
 
 class FakeHttpLift:
-    """A gateway (`hal_fakes.http.HttpStation`)."""
+    """The gateway of one lift, as a station of the server (`hal_fakes.http.HttpStation`)."""
 
     def __init__(self, plant: Plant, settings: HttpLiftSettings) -> None:
         self.plant = plant
@@ -102,8 +102,8 @@ class FakeHttpLift:
             self._drive(signal, False, NEVER)
 
     def answer(self, asked: Asked) -> bytes:
-        """Return the present answer to this request. In the failure mode `wrong`, return a wrong
-        answer."""
+        """Return the present answer to this request. If the server or the body fails, return the spoilt
+        answer of the failure mode."""
         self.tick()
         self.plant.advance(time.monotonic())
         server, body = self.plant.failures.get("server"), self.plant.failures.get("body")
@@ -173,8 +173,8 @@ class FakeHttpLift:
 
 
 def _value(place: ListedStates, *states: str) -> Value:
-    """Return the API's value for the first of these states that has a value. If the state has several
-    values, return the first."""
+    """Return a value of the API that shows one of these states. The first state that the API can show
+    counts. If it has several values, return the first value."""
     listed = place.states()
     return next((listed[state][0] for state in states if state in listed), NONSENSE)
 

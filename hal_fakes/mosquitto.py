@@ -22,8 +22,8 @@ ENDS_WITH_US: Final = ("setpriv", "--pdeathsig", "KILL")
 class Mosquitto:
     """A broker at `port`. `lines` are further lines of its configuration, such as those for TLS.
 
-    `replace` holds the replacements for a bus's settings. With them a bus reaches the broker without
-    user and without TLS, as the default `lines` allow.
+    `replace` has the settings with which a bus finds this broker. These settings have no user and no
+    TLS, so they need the default `lines`.
     """
 
     def __init__(self, lines: Sequence[str] = ("allow_anonymous true",)) -> None:
@@ -52,7 +52,8 @@ class Mosquitto:
         self.start()
 
     def start(self) -> None:
-        """Start the broker without earlier messages, and wait until it listens. Raises HalError."""
+        """Start the broker, and wait until it listens. The broker does not remember earlier messages.
+        Raises HalError."""
         self._process = subprocess.Popen(
             self._command,
             stdin=subprocess.DEVNULL,

@@ -1,8 +1,9 @@
 """The far side of an `mqtt` bus: a real broker on 127.0.0.1, and the devices that publish there.
 
-One real MQTT client plays all devices. The devices publish a changed state at once, and answer `ask`.
-They publish states without `ask` three times in `stale_after_s`. A relay with a timer switches itself
-off. The order `fail DEVICE unit|server MODE` lets one device (`unit`) or the broker (`server`) fail:
+One real MQTT client plays all devices. The devices publish a changed state at once. A device with the
+YAML's `ask` also publishes its states when the daemon asks. A device without `ask` publishes its states
+three times in each `stale_after_s`. A relay with a timer switches itself off. The order `fail DEVICE
+unit|server MODE` lets one device (`unit`) or the broker (`server`) fail:
 
 |        | off    | stuck              | slow           | garbage         | wrong               |
 | unit   | silent | repeats its states | obeys too late | publishes noise | publishes `?`       |
@@ -74,8 +75,7 @@ def serve(
 
 
 class MqttDevice:
-    """One device's points as a station. The station has contacts, and relays that publish their
-    states."""
+    """One device as a station. It has contacts, and relays that publish their states."""
 
     def __init__(self, wiring: PlantWiring, points: Mapping[str, MqttPoint]) -> None:
         self.plant = wiring.plant
@@ -131,7 +131,8 @@ class MqttDevice:
 
 
 class MqttSite:
-    """A broker with its devices. `replace` holds the replacements for the bus's settings."""
+    """A broker with its devices. `replace` has the settings with which the real bus finds the
+    broker."""
 
     def __init__(
         self, settings: MqttSettings, stations: Sequence[PlantWiring | MqttStation]
@@ -299,8 +300,8 @@ class MqttSite:
 
 
 def _value(group: Sequence[tuple[MqttPoint, bool]]) -> object:
-    """Return the value of a field that several points read. The value is a word that is right for all
-    of them."""
+    """Return the value of a field that several points read. The value has the right meaning for each of
+    these points."""
     points = [point for point, _ in group]
     asserted = [point for point, on in group if on]
     if not points[0].when:

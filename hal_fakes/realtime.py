@@ -36,7 +36,8 @@ class RealTime:
             self._due.notify()
 
     def show(self) -> None:
-        """Show moved contacts at once, in the caller's thread. Wake the world's thread if necessary."""
+        """Let the buses see changed contacts at once, in the caller's thread. Wake the world's thread
+        if necessary."""
         with self.lock:
             if self._step() < self._next_at:
                 self.stir()

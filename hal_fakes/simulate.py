@@ -1,9 +1,10 @@
-"""The hardware of `rmf-bridge run FILE --simulate`. Each device has a plant behind its bus.
+"""The hardware of `rmf-bridge run FILE --simulate`. Each device has a plant, its simulated physics,
+behind its bus.
 
-If possible, a far side is a child process on 127.0.0.1 (`hal_fakes/__main__.py`), and the real bus
-connects to this process. GPIO pins cannot leave a process, so their fake is in the daemon's process. If
-a device has inputs on another bus, its plant is behind both buses. In this case all far sides are in
-the daemon's process.
+The far side of a bus is the simulated hardware behind the bus. If possible, a far side is a child
+process on 127.0.0.1 (`hal_fakes/__main__.py`), and the real bus connects to this child process. GPIO
+pins cannot leave a process, so their fake is in the daemon's process. If a device has inputs on another
+bus, its plant is behind both buses. In this case all far sides are in the daemon's process.
 
 Each bus has a control socket in the runtime directory. The socket is `plant.sock`, or
 `plant-<bus>.sock` if the file has several buses.
@@ -47,8 +48,8 @@ class Simulation:
     def __init__(
         self, config: Config, runtime_dir: Path, *, log_format: LogFormat | None = None
     ) -> None:
-        """Start the far sides. `log_format` is the format in which a child logs presses. None means no
-        log."""
+        """Start the far sides. `log_format` is the format in which a child logs the orders `press`.
+        None means no log."""
         self._log = ["--log-format", log_format] if log_format else []
         self._config = config
         self._file = str(Path(config.path).resolve())

@@ -1,7 +1,9 @@
-"""Robots that speak VDA 5050, behind a real broker: each is an MQTT client with a last will.
+"""Simulated robots that speak VDA 5050, behind a real broker. Each robot is an MQTT client with a last
+will.
 
-A robot publishes its state at each event and each QUIET_S, and its place (`visualization`) while it
-drives. It refuses an order while it has one, and one that does not begin where it stands. Failures:
+A robot publishes its state at each event, and each QUIET_S. While it drives, it also publishes its
+place (`visualization`). It refuses a second order while it still has an order. It also refuses an order
+that does not begin where the robot stands. Failures:
 
 |        | off               | stuck           | slow       | garbage           | wrong           |
 | unit   | drops off the net | repeats a state | obeys late | publishes noise   | another serial  |
@@ -182,7 +184,7 @@ class FakeVdaRobot:
         self._instant[str(one["actionId"])] = {**one, "actionStatus": status}
 
     def _progress(self, seen: RobotSeen) -> None:
-        """End the order when the plant has arrived, and its actions after that."""
+        """Finish the order's actions when the plant has arrived. Then end the order."""
         if self._done:
             return
         nodes = cast(list[Json], self._order["nodes"])
@@ -234,7 +236,8 @@ class FakeVdaRobot:
         }
 
     def _mission(self, seen: RobotSeen) -> list[Json]:
-        """Return the nodes left of the mission; its own manager sends a new one as an order."""
+        """Return the nodes of the mission that the robot has still to reach. Publish a new mission as
+        an order, as the robot's own manager would."""
         if seen.mission != self._sent:
             self._sent, self._nodes = seen.mission, []
             for number, at in enumerate(seen.path, 1):

@@ -13,7 +13,7 @@ LOOK_S: Final = 0.02
 
 
 class VdaSite:
-    """A broker with its robots. `replace`: replacements for the bus's settings."""
+    """A broker with its robots. `replace` has the settings with which the real bus finds the broker."""
 
     def __init__(self, settings: MqttSettings, stations: Sequence[FakeVdaRobot]) -> None:
         self._robots = stations
@@ -26,7 +26,7 @@ class VdaSite:
         self._thread.start()
 
     def close(self) -> None:
-        """End the robots and the broker. May be called twice."""
+        """End the robots and the broker. The caller may call `close` twice."""
         self._closed.set()
         self._thread.join()
         for each in self._robots:

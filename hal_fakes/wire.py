@@ -1,4 +1,4 @@
-"""The wire of the demos and the tests. The wire is `dds` if available, otherwise `zenoh`."""
+"""The wire (transport) of the demos and the tests. It is `dds` if available, otherwise `zenoh`."""
 
 import os
 from typing import Literal

@@ -12,8 +12,8 @@ from hal_fakes.plants.plant import Plant
 class PlantWiring:
     """The wires between one plant and one bus. `canonical` returns the bus's spelling of a point.
 
-    `clears_s` is the time (s) after which a module clears the coil of a call that its controller has
-    taken. None means never.
+    `clears_s` is the time (s) after which a module clears the coil of a call that the lift's controller
+    has accepted. None means never.
     """
 
     def __init__(

@@ -1,6 +1,6 @@
 """Accepts requests as the daemon's service does.
 
-Some stories run a core without the service.
+Some tests run a device's decision logic (a core) without the service.
 """
 
 from typing import Any

@@ -22,9 +22,9 @@ WIRES_HANG_AFTER_S = 900
 
 if not DEEP and missing_of_ros():
     os.environ.setdefault("TRANSPORT", "zenoh")
-"""Between processes, tests of other subjects use the zenoh transport, as on a Raspberry Pi. On zenoh a
-daemon starts with half the CPU time that it needs on dds. Where dds is installed, `make deep` and
-runs beside ROS use dds."""
+"""Tests of other subjects than the transports use the zenoh transport between processes, as on a
+Raspberry Pi. On zenoh a daemon starts with half the CPU time that it needs on dds. Where dds is
+installed, `make deep` and runs beside ROS use dds."""
 
 settings.register_profile(
     "here",
@@ -43,7 +43,7 @@ signal.signal(
 
 gc.disable()
 atexit.register(gc.freeze)
-"""The garbage collector is off while pytest collects the tests, because the collection makes no
+"""The garbage collector is off while pytest collects the tests, because collecting tests makes no
 garbage. When a worker ends, the collector ignores all objects, which saves time."""
 
 end_with_us()

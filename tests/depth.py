@@ -1,4 +1,5 @@
-"""The depth of walks and the number of examples. Only `make deep` runs everything."""
+"""The depth of walks and the number of examples. A walk visits all states within some steps. Only `make
+deep` runs everything."""
 
 import os
 from collections.abc import Sequence
@@ -11,7 +12,7 @@ T = TypeVar("T")
 
 def depth(default: T, deep: T) -> T:
     """Return `default` in `make test` and `deep` in `make deep`. The number is the depth of a walk, or
-    the fewest states of a walk."""
+    the fewest states that a walk must reach."""
     return deep if DEEP else default
 
 

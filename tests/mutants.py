@@ -1,12 +1,14 @@
-"""`python -m tests.mutants [PATTERN …]`: break functions in every small way; list what no test notices.
+"""`python -m tests.mutants [PATTERN …]`: break each function in many small ways, and list the changes
+that no test notices.
 
-mutmut makes the mutants (`[tool.mutmut]` in pyproject.toml names files and tests). pytest collects the
-tests once, and runs each once to see which functions it calls. Then each mutant is a fork, in which the
-function has the mutant's code, and the tests that call the function run, the cheapest first, until one
-fails.
+mutmut makes the mutants. A mutant is a function with one small change. `[tool.mutmut]` in
+pyproject.toml names the files and the tests. First pytest runs each test once, to see which functions
+the test calls. Then each mutant is judged in a forked process, in which the function has the mutant's
+code. The tests that call the function run there, the cheapest first, until one test fails.
 
-A result is kept in `build/mutants.json`. It counts as long as the function is the same, that of a
-survivor also as long as the tests are the same. PATTERN (`bridges.kinds.door.*`) chooses by name.
+The results are kept in `build/mutants.json`. A result is used again as long as the function is the
+same. If no test has noticed the mutant, the tests must also be the same. PATTERN selects mutants by
+name, for example `bridges.kinds.door.*`.
 """
 
 import difflib
@@ -34,16 +36,18 @@ from mutmut.mutation.file_mutation import compute_function_hashes, mutate_file_c
 TOOL: Final = tomllib.loads(Path("pyproject.toml").read_text())["tool"]["mutmut"]
 RESULTS: Final = Path("build/mutants.json")
 LEAST_CPU_S: Final = 10.0
-"""The least time (s) of CPU for the tests of a mutant. They may take ten times their usual time."""
+"""The CPU time (s) that the tests of a mutant may always use. If ten times their usual time is longer,
+they may use that time."""
 WALL_S: Final = 3600
-"""The longest time (s) for the tests of a mutant, because a mutant may wait for ever."""
+"""The longest time (s) by the clock for the tests of a mutant, because a mutant may wait for ever."""
 SAVE_EVERY: Final = 50
 KILLED, SURVIVED, ENDLESS = "killed", "survived", "endless"
 UNTESTED, UNJUDGED = "untested", "not judged"
 
 
 class Result(msgspec.Struct, frozen=True):
-    """A mutant's verdict, the hash of its function, and the digest of the tests that call it."""
+    """The verdict on a mutant, the hash of its function, and the digest of the test files that call
+    it."""
 
     verdict: str
     function: str
@@ -52,7 +56,8 @@ class Result(msgspec.Struct, frozen=True):
 
 
 class Calls(msgspec.Struct, frozen=True):
-    """What a test took (s of CPU) and called. It counts for the test's file and code with `digest`."""
+    """The CPU time (s) of a test, and the functions that the test calls. They are used again as long as
+    the test's file and the code have this `digest`."""
 
     digest: str
     took_s: float
@@ -60,14 +65,14 @@ class Calls(msgspec.Struct, frozen=True):
 
 
 class Known(msgspec.Struct):
-    """All that `build/mutants.json` keeps: results by mutant, calls by test."""
+    """The content of `build/mutants.json`: a result for each mutant, and calls for each test."""
 
     results: dict[str, Result] = {}
     calls: dict[str, Calls] = {}
 
 
 class Mutant(msgspec.Struct, frozen=True):
-    """One mutant: `function` in the daemon's module, and the code of its broken copy."""
+    """One mutant. `function` is the real function, and `broken` is its changed copy."""
 
     name: str
     function: FunctionType
@@ -77,12 +82,13 @@ class Mutant(msgspec.Struct, frozen=True):
 
     @property
     def of(self) -> str:
-        """The function's full name."""
+        """Return the full name of the real function."""
         return f"{self.function.__module__}.{self.function.__qualname__}"
 
 
 def mutants_of(path: str) -> Iterator[Mutant]:
-    """Yield every mutant of a file. The file's mutated copy is a module that nobody imports."""
+    """Yield every mutant of a file. The mutants' code is in a new module object that nobody can
+    import."""
     text = Path(path).read_text()
     made = mutate_file_contents(path, text)
     name = path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
@@ -106,7 +112,7 @@ def _may_match(path: str, patterns: Sequence[str]) -> bool:
 
 
 def _found(module: ModuleType, key: str) -> FunctionType:
-    """Return the function with mutmut's name (`x_look`, `xǁRobotǁhear`)."""
+    """Return the function for a name that mutmut has made, such as `x_look` or `xǁRobotǁhear`."""
     if key.startswith("xǁ"):
         _, holder, name = key.split("ǁ")
         found = vars(vars(module)[holder])[name if "__mutmut" not in name else key]
@@ -123,7 +129,8 @@ def _change(before: Sequence[str], after: Sequence[str]) -> str:
 
 
 class Run:
-    """A pytest plugin that judges the mutants in place of pytest's own loop."""
+    """A pytest plugin that runs the tests on the mutants, in place of pytest's own loop over the
+    tests."""
 
     def __init__(self, patterns: Sequence[str], children: int) -> None:
         self._known = msgspec.json.decode(
@@ -143,7 +150,7 @@ class Run:
         self._running: dict[int, Mutant] = {}
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
-        """Judge the mutants that have no result that counts."""
+        """Judge the mutants for which no stored result can be used."""
         for item in session.items:
             for of in self._called(session, item).functions:
                 self._callers[of].append(item)
@@ -177,7 +184,8 @@ class Run:
         return _digest([*files])
 
     def _called(self, session: pytest.Session, item: pytest.Item) -> Calls:
-        """Run a test on the real code, if that is not known, and note the functions that it calls."""
+        """Return the functions that a test calls. Run the test on the real code if no stored answer can
+        be used."""
         digest, called = f"{_digest([item.path])} {self._code}", set[str]()
         known = self._known.calls.get(item.nodeid)
         if known is not None and known.digest == digest:
@@ -213,7 +221,7 @@ class Run:
         cpu_s = int(time.process_time() + max(LEAST_CPU_S, 10.0 * usual_s))
         resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s + 1))
         signal.alarm(WALL_S)
-        code = 3  # in the child nothing may return to the parent's loop
+        code = 3  # the child must end here, and not return to the loop of its parent
         try:
             code = _fails(session, items, mutant)
         finally:
@@ -231,12 +239,15 @@ class Run:
 
 
 def _fails(session: pytest.Session, items: Sequence[pytest.Item], mutant: Mutant) -> int:
-    """Run the tests on the mutant, in a process of its own. Return 1 as soon as one fails."""
-    real: Any = mutant.function  # to mypy the function of a field is a method
+    """Run these tests on the mutant. Return 1 as soon as a test fails, or 0.
+
+    This function runs in a process of its own, because it changes the real function.
+    """
+    real: Any = mutant.function  # Any, because mypy takes the field for a method
     broken: Any = mutant.broken
     try:
         real.__code__ = broken.__code__.replace(co_name=real.__name__)
-    except ValueError:  # the mutant closes over other variables
+    except ValueError:  # the mutant uses other closure variables
         return 3
     real.__defaults__, real.__kwdefaults__ = broken.__defaults__, broken.__kwdefaults__
     for item in items:
@@ -252,7 +263,8 @@ def _digest(paths: Sequence[Path]) -> str:
 
 
 def main(argv: Sequence[str]) -> int:
-    """Judge, and print a table by file and the mutants that survive. Return 1 if some do."""
+    """Judge the mutants. Print a table by file, and the mutants that no test has noticed. Return 1 if
+    there are such mutants."""
     run = Run(argv or ["*"], int(os.environ.get("CHILDREN", "1")))
     chosen = TOOL["pytest_add_cli_args_test_selection"]
     options = ["-o", "addopts=-p no:terminal -p no:xdist -p no:faulthandler", *chosen]

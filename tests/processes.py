@@ -1,4 +1,5 @@
-"""Finds the processes that a test has left behind. Ends all processes of a killed run."""
+"""Functions that find the processes which a test has left behind, and end all processes of a killed
+test run."""
 
 import os
 from contextlib import suppress
@@ -19,9 +20,10 @@ for round in 1 2 3 4 5 6 7 8 9 10; do
     done
 done
 """
-"""A shell program that waits until the run closes the pipe. Then it kills the run's processes.
+"""A shell program that waits until the test run closes the pipe. Then it kills the processes of the
+run.
 
-A killed daemon's guard may have started another process in the meantime. So the program looks again.
+It looks for processes several times, because a killed daemon's guard may have started another process.
 """
 
 
@@ -29,11 +31,11 @@ def end_with_us() -> None:
     """Let all later children and grandchildren of this process end when this process ends.
 
     The children also end when this process dies from SIGKILL. PR_SET_PDEATHSIG would not suffice, for
-    two reasons. Its signal comes when the thread ends that started the child, and grandchildren do not
-    inherit the setting.
+    two reasons. It already sends its signal when the thread that started the child ends. And
+    grandchildren do not inherit the setting.
     """
     if RUN in os.environ:
-        return  # the run that started this worker ends the worker's processes
+        return  # this is a worker of a run that ends the worker's processes itself
     os.environ[RUN] = f"{os.getpid()}-{token_hex(8)}"
     waits, _ = os.pipe()
     os.posix_spawn(

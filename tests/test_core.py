@@ -1,4 +1,5 @@
-"""The core's imports. The core imports no extra, and no library except its own (decision 0123)."""
+"""The imports of the core, the modules that every installation has. The core imports no extra module.
+It imports only the libraries that every installation has (decision 0123)."""
 
 import sys
 import tomllib
@@ -17,7 +18,7 @@ BUSES = ("can", "gpio", "http", "modbus")
 PACKAGES = (
     "bridges", "bridges.commands", "bridges.kinds", "bridges.transports", "drivers", "drivers.hal",
 )  # fmt: skip
-"""The core's folders. INSIDE lists the core's part of each folder."""
+"""The packages that contain the core. INSIDE lists which modules of each package belong to the core."""
 INSIDE = {
     "bridges": "blackbox cli exit_codes messages observe runtime settings system yaml",
     "bridges.commands": "backup check completion disable enable incident log migrate outputs_off"
@@ -32,24 +33,25 @@ INSIDE = {
     " serial_port unit_calls",
 }
 CORE = [f"{package}.{name}" for package, listed in INSIDE.items() for name in listed.split()]
-"""Modules and whole folders of the core. A driver in these folders is an extra if it knows only the bus
-of an extra."""
+"""The modules and whole folders of the core. Exception: a driver in these folders is no part of the
+core if all of its buses are extras."""
 LIBRARIES = {
     "argcomplete": "argcomplete", "can": "python-can", "canopen": "canopen", "cantools": "cantools",
     "cyclonedds": "cyclonedds", "gpiozero": "gpiozero", "lgpio": "lgpio", "mcap": "mcap",
     "msgspec": "msgspec", "pymodbus": "pymodbus", "requests": "requests", "serial": "pyserial",
     "urllib3": "requests", "xxhash": "xxhash", "yaml": "PyYAML", "zenoh": "eclipse-zenoh",
 }  # fmt: skip
-"""The PyPI name of the library that contains each module. The core needs these libraries."""
+"""For each imported module, the PyPI name of its library. The core may import only these modules."""
 FLEET = ("bridges.runtime.fleet", "bridges.settings.fleet_site", "bridges.settings.nav_graph")
-"""Modules for a fleet's rooms. These modules are extras, although they lie in the core's folders."""
+"""Modules for fleets of robots. These modules are extras, although they lie in the core's folders."""
 ON_REQUEST = {
     ("drivers.hal.http", "drivers.hal.http_push"),
     ("bridges.runtime.service", "bridges.runtime.fleet.service"),
     ("bridges.commands.run", "bridges.settings.fleet_site"),
     ("bridges.commands.check", "bridges.settings.fleet_site"),
 }
-"""Imports of extras in the core. The core imports an extra only if a YAML asks for it."""
+"""The permitted imports of extras by the core, as (core module, extra module). Each import runs only if
+a YAML needs the extra."""
 OF_ROS = {"rclpy", "launch", "launch_ros", "_typeshed"}
 
 

@@ -1,4 +1,5 @@
-"""`make mutate` judges a small file rightly, and computes only missing results (needs its extra)."""
+"""`make mutate` judges the mutants of a small file correctly, and tests only mutants without a stored
+result. It needs the extra `mutate`."""
 
 import os
 import subprocess

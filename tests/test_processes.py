@@ -22,8 +22,8 @@ starts.start()
 starts.join()
 sys.stdin.read()
 """
-"""A program whose second thread starts a child in a new session, and then ends. The child starts
-another child."""
+"""A program with a second thread. This thread starts a child process in a new session, and then the
+thread ends. The child starts another child."""
 
 
 def test_what_a_killed_run_has_started_is_killed(tmp_path: Path) -> None:

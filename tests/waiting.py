@@ -20,7 +20,8 @@ TOO_LATE = re.compile(
 """Error texts of a bus whose answer came late, or of a serial line on which two answers collided."""
 
 LEASE_S = 9.5
-"""A wait (s) slightly below the lease. After 10 s DDS notices a node that left without a farewell."""
+"""A wait (s) slightly shorter than the lease, which is 10 s. After the lease, DDS removes a node that
+has ended without saying so. A node that leaves the graph properly is gone before this wait ends."""
 
 
 def wait_until(condition: Callable[[], object], what: str, patience_s: float = PATIENCE_S) -> None:
@@ -38,8 +39,8 @@ def wait_until(condition: Callable[[], object], what: str, patience_s: float = P
 
 
 def at_last(step: Callable[[], T], what: str, between: Callable[[], object] = lambda: None) -> T:
-    """Return the result of a step on a wire. Repeat the step after a late answer, as from a busy
-    machine.
+    """Return the result of `step`, which uses a wire. If the wire's answer came late, repeat the step.
+    On a busy machine, answers may come late.
 
     `between` runs before each repetition. Any other DriverError is raised at once.
     """

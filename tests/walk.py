@@ -1,4 +1,4 @@
-"""Walks through all states that some steps can reach, and through all histories of some moves."""
+"""Visits all states that can be reached with given steps. Also visits all sequences of given moves."""
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,11 +8,11 @@ W = TypeVar("W")
 M = TypeVar("M")
 
 Seen = Callable[[Any], None]
-"""A function that a walk calls with every step."""
+"""A function that receives each step of a walk."""
 
 
 def unseen(step: object) -> None:
-    """Ignore the step, in walks that check no steps."""
+    """Ignore the step. This is the default for walks that check no steps."""
 
 
 def reached(
@@ -23,7 +23,7 @@ def reached(
 ) -> list[W]:
     """Return every state within `depth` steps from the roots. Each state comes once, the nearest first.
 
-    States with the same `key` cannot behave differently.
+    Two states with the same `key` count as one state, so both must behave in the same way.
     """
     found = {key(root): root for root in roots}
     edge = list(found.values())
@@ -54,7 +54,8 @@ def histories(
 
 @dataclass(frozen=True)
 class Walker(Generic[W, M]):
-    """The steps of a world. Moves take no time, and waits take seconds. `seen` gets each step."""
+    """A world whose states a walk visits. A step is a move, which takes no time, or a wait of some
+    seconds. `seen` receives each step."""
 
     moves: Mapping[str, M]
     waits: Sequence[float]

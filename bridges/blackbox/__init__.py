@@ -1,2 +1,2 @@
-"""Recordings of a daemon's messages, events and decisions. A ring in memory keeps the last minutes, and
-the recorder writes files from the rings."""
+"""Recordings of a daemon's messages, events and decisions. Each daemon keeps its last minutes in a
+ring, which is a file in memory. The recorder reads the rings and writes recordings to the disk."""

@@ -57,7 +57,8 @@ def read(folder: Path) -> Days:
 
 
 def add(folder: Path, day: date, counts: Mapping[Key, DeviceCounts]) -> None:
-    """Add counts to a day, and keep only the last MOST_DAYS days. Raises OSError."""
+    """Add the counts to the day `day` in the file, and keep only the last MOST_DAYS days. Raises
+    OSError."""
     counted = {key: one for key, one in counts.items() if one.watched_s}
     if not counted:
         return

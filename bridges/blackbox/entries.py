@@ -1,12 +1,11 @@
-"""The contents of a ring. A head describes one run of a daemon. The entries tell what happened in that
-run.
+"""The contents of a ring, which is the file in memory that holds a daemon's last minutes.
 
-All times come from the daemon's monotonic clock (s). A `Clocks` entry pairs such a time with the wall
-clock's time.
+A head describes one run of a daemon. The entries tell what happened in that run. All times come from
+the daemon's monotonic clock (s). A `Clocks` entry pairs such a time with the wall clock's time.
 
-A subject is a lift, a door, a charger, or a coordinator's site. The core that decides for a subject is
-a pure function. So a replay can repeat every decision from the subject's memory at one time and the
-later events.
+A subject is a lift, a door, a charger, or a coordinator's site. A pure function, the core, decides for
+a subject from the subject's memory and an event. So a replay needs only the memory at one time and all
+later events. From these it can repeat every later decision.
 """
 
 from collections.abc import Callable
@@ -25,12 +24,13 @@ LATEST_S: Final = 4e9
 fits into an MCAP file."""
 Seconds = Annotated[float, Meta(ge=-LATEST_S, le=LATEST_S)]
 DEEPEST: Final = 60
-"""The maximum depth of a tree of values. The memory of a core is about a tenth as deep."""
+"""The maximum depth of a tree of values. The deepest tree of a core's memory has about a tenth of this
+depth."""
 E = TypeVar("E")
 
 
 class Invalid(ValueError):
-    """The error of bytes that are no entry or head of this version. The error's text gives the
+    """Error for bytes that cannot be decoded as an entry or a head of this version. Its text gives the
     reason."""
 
 
@@ -60,13 +60,15 @@ class RingEntry(msgspec.Struct, frozen=True, array_like=True, tag_field="is"):
 
 
 class Clocks(RingEntry, frozen=True, tag_field="is", tag=0):
-    """The wall clock's time at the entry's time. `wall`: seconds since the epoch."""
+    """A pair of times of one instant. `at`: by the monotonic clock. `wall`: by the wall clock, in
+    seconds since the epoch."""
 
     wall: Seconds
 
 
 class Spoken(RingEntry, frozen=True, tag_field="is", tag=1):
-    """A message of RMF's graph. `sent`: the daemon sent the message. Otherwise the daemon heard it.
+    """A message on RMF's graph (the nodes and topics of RMF). `sent`: whether the daemon sent or heard
+    the message.
 
     `cdr`: the message's bytes on the wire, as `release` encodes them. `node`: the publisher's node,
     `/namespace/name`, or "" if the wire does not name the node.
@@ -84,8 +86,8 @@ class Known(RingEntry, frozen=True, tag_field="is", tag=2):
     """A state of a subject from which a replay can start: memory, last reading, last outputs and last
     report.
 
-    Reading, outputs and report are None before the first decision. `anew`: the memory is not the one
-    that the last recorded decision left.
+    Reading, outputs and report are None before the first decision. `anew`: the memory does not come
+    from the last recorded decision.
     """
 
     subject: str
@@ -97,8 +99,8 @@ class Known(RingEntry, frozen=True, tag_field="is", tag=2):
 
 
 class Decided(RingEntry, frozen=True, tag_field="is", tag=3):
-    """An event, and the core's decision on the event. Each of `outputs`, `news` and `faults` is empty
-    if its value has not changed."""
+    """An event, and the core's decision on the event. `outputs`, `news` and `faults` are each an empty
+    list if the decision has not changed them."""
 
     subject: str
     event: Tree
@@ -111,21 +113,21 @@ class Decided(RingEntry, frozen=True, tag_field="is", tag=3):
 
 
 class Same(RingEntry, frozen=True, tag_field="is", tag=4):
-    """The repeats of the last reading that changed no decision. `times`: the time of each repeat, as
-    doubles."""
+    """Further readings that were equal to the last reading and changed nothing. `times`: the time of
+    each such reading, as packed doubles."""
 
     subject: str
     times: bytes
 
 
 class Published(RingEntry, frozen=True, tag_field="is", tag=5):
-    """The daemon has published the subject's report. The subject's memory has noted the publication."""
+    """The daemon has published the subject's report, and has noted this in the subject's memory."""
 
     subject: str
 
 
 class SubjectForgotten(RingEntry, frozen=True, tag_field="is", tag=6):
-    """The daemon no longer remembers the subject."""
+    """The daemon has dropped the subject's memory."""
 
     subject: str
 
@@ -224,7 +226,7 @@ def _known(entry: AnyEntry) -> AnyEntry:
 
 
 def _require_shallow(tree: Tree, deeper: int) -> None:
-    """Raise Invalid if the tree has more than `deeper` levels."""
+    """Raise Invalid if the tree is nested more than `deeper` levels deep."""
     if isinstance(tree, dict | list):
         if deeper == 0:
             raise Invalid(f"a value is nested more than {DEEPEST} deep")

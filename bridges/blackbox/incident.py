@@ -1,5 +1,5 @@
 """One incident: the reasons for a recording, and the daemon's entries before and after these reasons.
-The module is pure."""
+The functions of this file are pure."""
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -18,8 +18,8 @@ ERRORS: Final = (name_of(IoFailed), name_of(WriteFailed), name_of(Suspended))
 
 
 class Note(msgspec.Struct, frozen=True):
-    """A reason for a recording. `at`: the reason's time (monotonic s). `code`: one of a few fixed
-    words."""
+    """A reason for a recording. `at`: the time (monotonic s) at which the reason came. `code`: one of a
+    few fixed words."""
 
     at: float
     code: str
@@ -48,8 +48,8 @@ def part(entries: Sequence[AnyEntry], begin_at: float, end_at: float) -> Sequenc
 
 
 def timed(entries: Sequence[AnyEntry]) -> Iterator[tuple[AnyEntry, float, float]]:
-    """Yield each entry with two times (s since the epoch). A steady clock gives the first time, and the
-    wall clock gives the second."""
+    """Yield each entry with two times (s since the epoch). The first of the two never jumps. The second
+    is the wall clock's time, which jumps when somebody sets that clock."""
     clocks = [entry for entry in entries if isinstance(entry, Clocks)]
     steady = wall = clocks[0].wall - clocks[0].at if clocks else 0.0
     for entry in entries:
@@ -59,7 +59,8 @@ def timed(entries: Sequence[AnyEntry]) -> Iterator[tuple[AnyEntry, float, float]
 
 
 def readable(step: Decided) -> Iterator[tuple[str, Tree]]:
-    """Yield a decision as pairs of a topic and JSON, which Foxglove and `ros2 bag` can show."""
+    """Yield the parts of a decision as pairs of a topic and a JSON value. Foxglove and `ros2 bag` can
+    show them."""
     event = step.event if isinstance(step.event, dict) else {}
     kind = str(event.get("", ""))
     if kind == READING:

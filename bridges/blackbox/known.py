@@ -1,4 +1,4 @@
-"""The subjects' states that a ring already has, and the entries that add a state to the ring."""
+"""The subjects' states as the ring already holds them, and the entries that record the next states."""
 
 from typing import Any
 
@@ -10,8 +10,8 @@ AnyDecision = Decision[Any, Any, Any]
 
 
 class KnownSubject:
-    """The recorded state of a subject. `times`: the repeats of the last reading that are not yet in the
-    ring."""
+    """The state of a subject as the ring holds it. `times`: the times of readings that were equal to
+    the last reading, and are not yet in the ring."""
 
     def __init__(self, memory: object) -> None:
         self.memory = memory
@@ -34,8 +34,8 @@ class KnownSubject:
 
 
 def known(name: str, subject: KnownSubject, now: float, *, anew: bool = False) -> Known:
-    """Return an entry from which a replay of the subject can start. `anew`: the memory is not the one
-    that the last recorded decision left."""
+    """Return an entry from which a replay of the subject can start. `anew`: the memory does not come
+    from the last recorded decision."""
     return Known(
         now,
         name,

@@ -30,8 +30,8 @@ NOTES: Final = f"{OWN_TOPICS}notes"
 HEAD: Final = "rmf_bridge"
 CHUNK: Final = 256 * 1024
 MOST_CHANNELS: Final = 500
-"""The maximum number of channels. A file with so many channels does not name the publishers of further
-channels."""
+"""The maximum number of channels with a publisher's name. After that, further publishers share channels
+without a name."""
 QOS: Final = """\
 - history: 1
   depth: {depth}
@@ -126,11 +126,11 @@ class _Channels:
         self._channels: dict[tuple[str, ...], int] = {}
 
     def spoken(self, spoken: Spoken, steady: float, wall: float) -> None:
-        """Write a message of RMF with its bytes from the wire."""
+        """Write a message of RMF. Its bytes are those from the wire."""
         way = "sent" if spoken.sent else "heard"
         key = (spoken.topic, spoken.type, spoken.release, way, spoken.node)
         if key not in self._channels and len(self._channels) >= MOST_CHANNELS:
-            key = (*key[:-1], "")  # leave out the node, because so many nodes are invented
+            key = (*key[:-1], "")  # leave out the node's name, because somebody invents names
         if key not in self._channels:
             self._channels[key] = self._declare(spoken, way, key[-1])
         self._add(self._channels[key], spoken.cdr, steady, wall)

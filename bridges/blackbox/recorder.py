@@ -1,9 +1,8 @@
-"""The recorder: one process that writes recordings, which are files, from the rings of all daemons of a
-machine.
+"""The recorder: one process that makes recordings (files) of all daemons of a machine from their rings.
 
-The recorder has no devices, and no daemon waits for it. Each second it reads the new entries of each
-ring. An entry may trigger a recording (`triggers.py`). The recorder then waits until the ring has the
-next AFTER_S seconds too, and writes a file.
+A ring is a file in memory that holds a daemon's last minutes. The recorder has no devices, and no
+daemon waits for it. Each second it reads the new entries of each ring. An entry may trigger a recording
+(`triggers.py`). The recorder then waits for the entries of the next AFTER_S seconds, and writes a file.
 
 Without a trigger the recorder writes nothing, except for a daemon whose YAML has `keep: continuous`.
 """
@@ -30,11 +29,11 @@ from bridges.system.log import pairs
 log = logging.getLogger(__name__)
 
 LATE_S: Final = 60.0
-"""The maximum age (s) of a trigger when the recorder opens a ring. An earlier run of the recorder has
-recorded the older triggers."""
+"""The maximum age (s) of a trigger when the recorder opens a ring. Older triggers cause no recording,
+because an earlier run of the recorder has recorded them."""
 GRACE_S: Final = 2.0
-"""The time (s) between the end of a recording and its writing. By then the ring has every entry of the
-recording."""
+"""The time (s) for which the recorder waits after the last instant of a recording. By then the ring has
+every entry of the recording."""
 COUNTED_S: Final = 3600.0
 """The interval (s) at which the day's counts are written. The interval is long because each write wears
 the SD card."""
@@ -64,8 +63,8 @@ class Recorder:
         self._counted_at = now()
 
     def look(self) -> None:
-        """Read new entries, and write the recordings that are due. The caller calls this each second.
-        Raises nothing."""
+        """Read new entries, and write the recordings that are due. Call this method each second. Raises
+        nothing."""
         folders = list(self._folders())
         for folder in folders:
             self._look_at(folder)
@@ -77,8 +76,8 @@ class Recorder:
                 self._count(followed)
 
     def close(self) -> None:
-        """Write the recordings that have begun, although they are incomplete. Write the day's counts
-        too."""
+        """Write the recordings that have begun, although they are incomplete. Add the counts of the
+        devices to the file of daily counts."""
         for followed in self._followed.values():
             self._finish(followed)
         self._followed.clear()
@@ -98,7 +97,7 @@ class Recorder:
             self._take_died(folder / NAME)
 
     def _follow(self, folder: Path) -> "_Followed":
-        """Return the ring of the daemon's present run. Raises RingError."""
+        """Return the open ring of the run that the daemon is in now. Raises RingError."""
         followed = self._followed.get(folder)
         if followed is not None and not followed.is_replaced():
             return followed
@@ -113,15 +112,18 @@ class Recorder:
         self._count(followed)
 
     def _count(self, followed: "_Followed") -> None:
-        """Add the counts of the daemon's own devices to the day."""
+        """Add the counts of the daemon's own devices to the present day in the file of daily counts."""
         try:
             days.add(self._recordings.folder, date.today(), followed.counts())
         except OSError as error:
             log.warning(pairs("not_counted", folder=self._recordings.folder, reason=error))
 
     def _take_died(self, path: Path) -> None:
-        """Record a run that did not shut down cleanly. Record it only once, and only if it served. The
-        log explains a failed start."""
+        """Record the last minutes of a run that died, which means that it did not shut down cleanly.
+
+        Each run is recorded only once. A run that made no decision is not recorded, because the log
+        explains a failed start.
+        """
         try:
             identity = _identity(path)
             if identity in self._seen_dead:
@@ -138,8 +140,8 @@ class Recorder:
             self._put(Incident(read.head, part(entries, at - BEFORE_S, at), (note,)), DEATH)
 
     def _is_first(self, head: Head) -> bool:
-        """Return whether this death is not yet recorded. Return False if another death of this daemon
-        was recorded in the last AGAIN_S."""
+        """Return whether this run's death must be recorded. Return False if it is recorded already, or
+        if another death of the same daemon was recorded in the last AGAIN_S."""
         last = self._died_at.get(head.file, AGES_AGO)
         if self._recordings.has_death(head) or self._now() < last + AGAIN_S:
             return False
@@ -164,7 +166,7 @@ class Recorder:
 
 
 class _Followed:
-    """One ring that the recorder follows, and the recordings that have begun from the ring."""
+    """One ring that the recorder reads, and the recordings of this ring that have begun."""
 
     def __init__(self, path: Path, now: float) -> None:
         """Open the ring. Raises RingError."""
@@ -178,7 +180,7 @@ class _Followed:
         self._part: list[AnyEntry] = []
 
     def is_replaced(self) -> bool:
-        """Return whether the ring of another run has taken this path."""
+        """Return whether the file at this path is now the ring of another run."""
         return _identity(self._tail.path) != self._identity
 
     def take(self, now: float) -> None:
@@ -218,7 +220,7 @@ class _Followed:
         return Incident(read.head, entries, notes), reason(first.code, first.text)
 
     def _read(self) -> RingContent:
-        """Read the ring again. If the ring is gone, return the content that was read when the recording
+        """Read the ring again. If the ring is gone, return its content from the time when the recording
         began."""
         try:
             read = RingContent(self._tail.path)
@@ -230,8 +232,9 @@ class _Followed:
         return self._kept
 
     def _continuous(self, *, whole: bool) -> list[tuple[Incident, str]]:
-        """Return the entries since the last file, up to the last place from which a replay can start.
-        The next file then begins at that place, so a replay of that file needs no other file."""
+        """Return the entries since the last file, up to the last entry from which a replay can start.
+        The next file begins with that entry, so its replay needs no other file. With `whole`, return
+        all entries."""
         known = [at for at in range(1, len(self._part)) if begins(self._part, at)]
         end = len(self._part) if whole or not known else known[-1]
         entries, self._part = self._part[:end], self._part[end:]
@@ -244,8 +247,8 @@ def _last_words(entries: Sequence[AnyEntry]) -> str:
         if isinstance(entry, DaemonDied):
             return entry.reason
     if isinstance(entries[-1], DaemonEnded):
-        return "it ended, and not every output was verified off"
-    return "it left no last entry: it was killed, or the machine stopped"
+        return "the daemon ended, and not every output was verified off"
+    return "the daemon left no last entry: it was killed, or the machine stopped"
 
 
 def _runs(pid: int) -> bool:
@@ -260,7 +263,7 @@ def _runs(pid: int) -> bool:
 
 
 def begins(entries: Sequence[AnyEntry], at: int) -> bool:
-    """Return whether a replay of every subject can start at this place."""
+    """Return whether a replay of every subject can start at the entry with the index `at`."""
     following = entries[at + 1 : at + 2]
     return isinstance(entries[at], Clocks) and bool(following) and isinstance(following[0], Known)
 

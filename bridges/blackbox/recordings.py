@@ -1,11 +1,12 @@
-"""The store of recordings: the names of the files, and the limits that spare the SD card.
+"""The store of recordings: the names of the files, and the limits on their number and size. The limits
+keep the SD card from wearing out.
 
 All daemons of a machine share one store and one limit. Above the limit, files are removed in this
 order:
 
 1. files of `keep: continuous`
-2. repeats of a fault
-3. repeats of a death
+2. later recordings of the same fault
+3. later recordings of a death (a run without a clean shutdown)
 4. the first file of each cause
 5. the first death of each daemon
 
@@ -30,14 +31,14 @@ LEAST_FREE: Final = 100_000_000
 """The free space (bytes) that a disk must have. With less free space, no recording is written."""
 SUFFIX: Final = ".mcap"
 CONTINUOUS: Final = "all"
-"""The word that stands for the cause in the names of `keep: continuous` files."""
+"""The word in the names of `keep: continuous` files. In other names the cause stands in its place."""
 DEATH: Final = "died"
 _NAME: Final = re.compile(r"(.+)_(\d+-\d+-\d+_\d+-\d+-\d+)_([^_]+)_[^_]+")
 _TIME: Final = "%Y-%m-%d_%H-%M-%S"
 
 
 class DiskFull(OSError):
-    """The error of a disk that has too little room for a recording."""
+    """Error for a disk that has too little room for a recording."""
 
 
 class Named(NamedTuple):
@@ -50,7 +51,8 @@ class Named(NamedTuple):
 
     @property
     def cause(self) -> tuple[str, str]:
-        """Return the daemon and the reason. A later file with the same pair is a repeat."""
+        """Return the daemon and the reason. A later file with the same daemon and reason is a
+        repeat."""
         return self.daemon, self.why
 
 
@@ -81,7 +83,7 @@ class Recordings:
         return f"{Path(head.file).stem}_{when}_{why}_{head.run[:8]}{SUFFIX}"
 
     def has_death(self, head: Head) -> bool:
-        """Return whether a recording of this run's death already exists."""
+        """Return whether a recording already exists of this run's death (no clean shutdown)."""
         return any(self.folder.glob(f"*_{DEATH}_{head.run[:8]}{SUFFIX}"))
 
     def put(
@@ -140,7 +142,7 @@ def least_valuable_first(stored: Sequence[Stored], now: float) -> list[Stored]:
 
 
 def reason(code: str, text: str = "") -> str:
-    """Return the reason of a note as a part of a file's name, such as `fault-lift-door-stuck`."""
+    """Return the part of a file's name that gives a note's reason, such as `fault-lift-door-stuck`."""
     cause = text.partition(":")[0] if code in ("FAULT", "REFUSED") else ""
     return re.sub(r"[^a-z0-9]+", "-", f"{code} {cause}".lower()).strip("-")[:60]
 

@@ -1,15 +1,15 @@
-"""The ring: a file of fixed size on tmpfs that holds the last minutes of a daemon. The file is still
-there after a kill of the daemon.
+"""The ring: a file of fixed size on tmpfs that holds the last minutes of a daemon's messages and
+decisions. If the daemon is killed, the file stays.
 
-The file has a head and then SEGMENTS of equal size. The daemon fills the segments in turn. Each segment
-begins with its number and the state of every subject. The entries follow. Each entry has its length, a
-checksum and its content.
+The file has a head, which describes the daemon's run, and then SEGMENTS of equal size. The daemon fills
+the segments in turn. Each segment begins with its number and the state of every subject. The entries
+follow. Each entry has its length, a checksum and its content.
 
-The checksum also covers the segment's number. So an entry from an earlier turn is never valid. An entry
-that a kill has cut short is not valid either.
+The checksum also covers the segment's number. So an old entry is not valid after its segment has got a
+new number. An entry that a kill has cut short is not valid either.
 
-The daemon writes the file with `pwrite` and does not map it. If somebody truncated a mapped file, a
-signal would kill the daemon.
+The daemon writes the file with `pwrite` and does not map it. With a mapped file, somebody could kill
+the daemon by truncating the file, because access to a lost page raises a signal.
 """
 
 import os
@@ -41,7 +41,7 @@ DIED: Final = "ring.died"
 
 
 class RingError(Exception):
-    """The error of a file that is no ring, or that cannot be read."""
+    """Error for a file that is not a ring, or that cannot be read."""
 
 
 class Ring:
@@ -74,7 +74,7 @@ class Ring:
 
     @property
     def lives(self) -> bool:
-        """Return whether the file at the path is still this ring."""
+        """Return whether the path still leads to the file of this ring."""
         try:
             return os.path.samestat(os.fstat(self._file), self.path.lstat())
         except OSError:
@@ -82,11 +82,11 @@ class Ring:
 
     @property
     def room(self) -> int:
-        """The maximum size of an entry (bytes)."""
+        """The maximum size (bytes) of one entry."""
         return self._segment_size - MARK.size - 2 * FRAME.size
 
     def fits(self, length: int) -> bool:
-        """Return whether the present segment has room for this many bytes of framed entries."""
+        """Return whether `length` bytes of framed entries fit into the rest of the present segment."""
         return self._offset + length + FRAME.size <= self._segment_size
 
     def begin_segment(self) -> None:
@@ -107,7 +107,8 @@ class Ring:
         self._offset += len(frames)
 
     def close(self, *, ended: bool) -> None:
-        """Close the ring. `ended`: the run shut down cleanly, so nobody needs the ring."""
+        """Close the ring. `ended`: the run shut down cleanly, so the recorder does not keep the
+        ring."""
         try:
             if ended:
                 os.pwrite(self._file, b"\1", ENDED_AT)
@@ -120,7 +121,7 @@ class Ring:
 
 
 def _died(path: Path) -> bool:
-    """Return whether the path has a ring whose run did not shut down cleanly."""
+    """Return whether the file at the path is a ring of a run that did not shut down cleanly."""
     try:
         found = user_files.read(path, TOP.size - 1).content
     except OSError:
@@ -131,8 +132,8 @@ def _died(path: Path) -> bool:
 class RingContent:
     """The content of a ring at one time. `head` describes the run. `ended`: the run shut down cleanly.
 
-    `segments` holds the entries of each segment by the segment's number, in order. It has no incomplete
-    entries.
+    `segments` maps the number of each segment to its entries, the oldest segment first. It has no
+    incomplete entries.
     """
 
     def __init__(self, path: Path) -> None:
@@ -200,8 +201,8 @@ class Tail:
         return found
 
     def _start(self, ring: IO[bytes], turn: int) -> int:
-        """Return the number of the segment at this place. Return 0 if the place has no valid
-        segment."""
+        """Return the number of the segment at the index `turn` of the file. Return 0 if there is no
+        valid segment."""
         ring.seek(self._first + turn * self._size)
         start = ring.read(MARK.size)
         if len(start) < MARK.size:

@@ -1,7 +1,8 @@
-"""Finds the reasons for a recording in a daemon's entries. The module is pure. The reasons are:
+"""Finds the reasons for a recording in a daemon's entries. The functions of this file are pure. The
+reasons are:
 
 - A fault appears. A hazard is a fault too, because it takes the device away from RMF.
-- The daemon refuses a request. Refusals that every normal handover or start causes do not count.
+- The daemon refuses a request. Refusals at a normal handover or at a start do not count.
 - A request has waited longer than `waiting_s`.
 - The daemon reports that a defect in its program ends it.
 
@@ -32,8 +33,8 @@ FAULT, REFUSED, WAITING, DIED = "FAULT", "REFUSED", "WAITING", "DIED"
 class Triggers:
     """The finder of reasons to record one run of a daemon.
 
-    `waiting_s`: the length of a wait that is a reason. `tally` counts the actions of the devices, which
-    the messages show.
+    `waiting_s`: a requester that waits this long (s) is a reason for a recording. `tally` counts the
+    actions of the devices, such as rides, from the messages.
     """
 
     def __init__(self, waiting_s: float) -> None:
@@ -44,7 +45,7 @@ class Triggers:
         self.tally = SiteTally()
 
     def take(self, entry: AnyEntry) -> list[Note]:
-        """Return the new reasons for a recording in this entry."""
+        """Return the reasons for a recording that this entry gives, and that did not come lately."""
         return [note for note in self._all(entry) if self._is_new(note)]
 
     def _all(self, entry: AnyEntry) -> Iterator[Note]:
@@ -73,7 +74,8 @@ class Triggers:
             yield Note(step.at, REFUSED, step.refused, step.subject)
 
     def _spoken(self, spoken: Spoken) -> Iterator[Note]:
-        """Yield a note for each wait that is too long. Only the messages show a wait."""
+        """Yield a note for each requester that has waited too long. The decisions do not show who
+        waits, so this function reads the messages."""
         kind, release = MESSAGES.get(spoken.type), RELEASES.get(spoken.release)
         if kind is None or release is None:
             return

@@ -1,11 +1,13 @@
-"""Converts a core's values (events, memories, outputs, reports) to trees of plain values, and back.
+"""Converts the values of decision cores (events, memories, outputs, reports) to trees of plain values,
+and back.
 
 A tree holds None, bool, int, float, str, lists, and mappings with text as keys. A tuple becomes a list.
 Any other value becomes a mapping. Its key `""` has the name of the type, such as `lift.memory.Session`.
 The other keys are the value's fields, or the key `=` has the value's content.
 
-Only types with a name are written and created. `bridges/kinds/shared/recorded.py` and `RECORDED` of
-each kind list the names. So a recording cannot make this program call any other code.
+Only types in the list of names are written and created. `bridges/kinds/shared/recorded.py` and
+`RECORDED` of each kind have this list. So a recording cannot make this program create an object of any
+other type.
 """
 
 import math
@@ -22,7 +24,7 @@ from bridges.kinds.shared.recorded import SHARED
 
 if TYPE_CHECKING:
     Tree = None | bool | int | float | str | list["Tree"] | dict[str, "Tree"]
-else:  # msgspec has no recursive types; an untyped decoder makes only plain values
+else:  # msgspec knows no recursive types; with Any it decodes only plain values
     Tree = Any
 
 TYPE: Final = ""
@@ -34,7 +36,7 @@ PLAIN: Final = frozenset({type(None), bool, int, float, str})
 
 
 class UnknownValue(ValueError):
-    """The error of a tree that names a type, field or member that this version does not have."""
+    """Error for a tree that names a type, field or member that this version does not have."""
 
 
 class Struct(NamedTuple):
@@ -49,7 +51,7 @@ class Struct(NamedTuple):
 
 
 def tree(value: object) -> Tree:
-    """Return a value as a tree. Raises TypeError for a type that no core uses."""
+    """Return a value as a tree. Raises TypeError for a type that no decision core uses."""
     kind: type[Any] = type(value)
     if kind is float and value in ENDLESS:
         return {TYPE: NUMBER, HOLDS: str(value)}
@@ -121,10 +123,11 @@ _structs: dict[type[Any], Struct | None] = {}
 
 
 def first_difference(one: Tree, other: Tree, path: str = "") -> tuple[str, Tree, Tree] | None:
-    """Return the first difference as a path and both values. Return None for equal trees.
+    """Return the first difference of two trees as its path and both values. Return None for equal
+    trees.
 
-    A field that only one tree has is no difference, because another version of the program may have
-    more or fewer fields.
+    If only one tree has a field, that is no difference. Another version of the program may have more or
+    fewer fields.
     """
     if isinstance(one, dict) and isinstance(other, dict) and one.get(TYPE) == other.get(TYPE):
         names = [name for name in one if name in other]
@@ -164,8 +167,8 @@ def name_of(kind: type) -> str:
 
 @cache
 def _type(name: str) -> type[Any]:
-    """Return the type with this name. Load only the kind with which the name begins. Raises
-    UnknownValue."""
+    """Return the type with this recorded name. Import only the kind that the first word of the name
+    gives. Raises UnknownValue."""
     kind = name.partition(".")[0]
     known = recorded(kind) if kind in kind_names() else SHARED
     if name not in known:

@@ -5,12 +5,13 @@ The backup contains:
 - the device YAMLs, with the profiles and maps beside them
 - the options of page, exporter and notify
 - the page's users with the hashes of their passwords
-- the memories that supervisors and coordinators keep on disk
+- the files in which supervisors and coordinators keep their memory for a restart
 
-Any other file that only its owner may read is a secret. The command leaves secrets out and names them.
+Any other file that only its owner may read counts as a secret. The command leaves secrets out and names
+them.
 
-A memory is restored only if it is at most FRESH_S old. An older memory may say that a door is held, and
-nobody knows whether that is still true. A restored hold would open the door.
+A memory is restored only if it is at most FRESH_S old. An older memory may say that a robot holds a
+door, although the robot has left. If the daemon restored that hold, it would open the door.
 """
 
 import argparse
@@ -82,7 +83,8 @@ def _save(file: Path, root: Path, *, dry_run: bool) -> int:
 
 
 def _write_archive(file: Path, root: Path, kept: Iterable[Path]) -> None:
-    """Write a new archive. Raises OSError, also for an existing file, which may be another backup."""
+    """Write a new archive. Raises OSError, even if only the file exists already, because it may be
+    another backup."""
     opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     with open(opened, "wb") as out, tarfile.open(fileobj=out, mode="w:gz") as archive:
         for path in kept:
@@ -94,8 +96,8 @@ def _write_archive(file: Path, root: Path, kept: Iterable[Path]) -> None:
 
 
 def _is_secret(path: Path) -> bool:
-    """Return whether only the owner may read the file. Return False for a file of users and for a
-    memory."""
+    """Return whether only the owner may read the file. Return False for the file of the page's users,
+    and for a daemon's memory, because the backup must contain both."""
     if path.parent.name.endswith(".wants"):
         return False
     return not path.stat().st_mode & SECRET and USERS not in path.name and path.name != KEPT
@@ -109,8 +111,8 @@ def _found(root: Path) -> Iterator[Path]:
 
 
 def _read(file: Path) -> Iterator[tuple[PurePosixPath, tuple[bytes, float]]]:
-    """Yield each file's path, content and time. Raises ValueError for a path outside the folders of a
-    backup."""
+    """Yield the path, content and time of each file in the backup. Raises ValueError for a path that no
+    backup contains."""
     with tarfile.open(file) as archive:
         for member in archive:
             path = PurePosixPath(member.name)
@@ -152,7 +154,8 @@ def _restore(saved: dict[PurePosixPath, tuple[bytes, float]], args: argparse.Nam
 def _configs(
     saved: dict[PurePosixPath, tuple[bytes, float]], units: list[str], root: Path
 ) -> Iterator[Config]:
-    """Yield the YAMLs of the enabled services. Raises SettingsError before anything is written."""
+    """Yield the YAMLs of the enabled services. Raises SettingsError for an invalid YAML, before
+    anything is written."""
     for name in units:
         path = PurePosixPath(CONFIG) / f"{name.removeprefix(UNIT).removesuffix('.service')}.yaml"
         if name.startswith(UNIT) and path in saved:
@@ -160,7 +163,7 @@ def _configs(
 
 
 def _is_fresh(path: PurePosixPath, mtime: float) -> bool:
-    """Return whether a memory is at most FRESH_S old. Otherwise print that the memory is left out."""
+    """Return whether a daemon's memory is at most FRESH_S old. Otherwise print that it is left out."""
     fresh = time.time() - mtime <= FRESH_S
     if not fresh:
         print(f"left out, because it is older than {FRESH_S / 3600:g} h: /{path}")
@@ -168,7 +171,8 @@ def _is_fresh(path: PurePosixPath, mtime: float) -> bool:
 
 
 def _write(path: Path, content: bytes) -> int:
-    """Write a file. Only the owner of the folder may read users' passwords and memories."""
+    """Write a file. Passwords of users, and memories, belong to the owner of the folder, and only that
+    owner may read them."""
     private = USERS in path.name or path.name == KEPT
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 COORDINATOR, FLEET = "charger_coordinator", "fleet"
 NAMED_BY_GRAPH = ("lift", "door", "charger", COORDINATOR)
-RENEW = "after the end no TLS connection succeeds: renew the certificate, and restart the daemon"
+RENEW = "after that time no TLS connection succeeds: renew the certificate, and restart the daemon"
 NOTHING_BESIDE = (
     "this file is compared with YAMLs of a charger coordinator or lifts, and no such YAML is given"
 )
@@ -131,8 +131,11 @@ def _against(config: Config, building: "BuildingMap | None") -> tuple[list[Probl
 def _of_fleet(
     file: str, right: Mapping[str, tuple[Config, Findings]], found: Mapping[str, Findings]
 ) -> dict[str, Findings]:
-    """Compare a fleet's YAML with the RMF files that it names. Compare the YAMLs of the coordinator and
-    the lifts with these files too. Return the findings on all these YAMLs."""
+    """Compare a fleet's YAML with RMF's two files (config and graph) that this YAML names.
+
+    Compare the YAMLs of the coordinator and the lifts with RMF's two files too. Return the findings on
+    all these YAMLs.
+    """
     from bridges.settings.building_map import load_map
     from bridges.settings.fleet_site import read_site
 
@@ -159,8 +162,8 @@ def _beside_fleet(
     found: Mapping[str, Findings],
     building: "BuildingMap | None",
 ) -> dict[str, Findings]:
-    """Compare each coordinator and lift with a fleet adapter's file. Return their findings, with the
-    results added."""
+    """Compare the YAML of each coordinator and lift with a fleet adapter's `config.yaml`. Return the
+    findings on these YAMLs, together with the earlier findings."""
     from bridges.settings.fleet_config import load_fleet
     from bridges.settings.fleet_names import compared, emergency_levels
 
@@ -196,9 +199,9 @@ def _more(
 
 
 def _certificates(configs: Iterable[Config]) -> Iterator[Problem]:
-    """Yield a warning for each certificate that has ended or ends soon.
+    """Yield a warning for each certificate that has expired or expires soon.
 
-    If the end is unknown, yield nothing, because `check` may run on another machine than the daemon.
+    If the date is unknown, yield nothing, because `check` may run on another machine than the daemon.
     """
     uses = [
         ExclusiveUse(config, file, path)

@@ -28,7 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the service has stopped and its outputs are off. Return 77 without root."""
+    """Return 0 if the service has stopped and its outputs are off. Return 77 if the user is not
+    root."""
     name = Path(args.name).name.removesuffix(".yaml")
     if not INSTANCE.fullmatch(name):
         print(NO_INSTANCE.format(name), file=sys.stderr)

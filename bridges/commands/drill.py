@@ -1,4 +1,4 @@
-"""`rmf-bridge drill FILE`: let the robots stand for some time, as in an alarm, and then drive on."""
+"""`rmf-bridge drill FILE`: make the robots stop for some time, as in an alarm, and then drive on."""
 
 import argparse
 import os
@@ -23,8 +23,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the drill has begun or ended, 1 if no daemon runs, 4 if the order was refused, and 69
-    if the daemon does not answer or this user may not see or signal it."""
+    """Return 0 if the drill has begun or ended. Return 1 if no daemon runs, and 4 if the daemon
+    refused.
+
+    Return 69 if the daemon does not answer, or if this user may not see the daemon or send it a signal.
+    """
     for_s = 0.0 if args.end else args.for_s
     if not args.end and not 1.0 <= for_s <= LONGEST_S:
         args.usage(f"--for {for_s:g}: a drill lasts from 1 to {LONGEST_S:g} s")

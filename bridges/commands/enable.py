@@ -3,15 +3,16 @@
 The command takes these steps:
 
 1. It validates the file together with the files of this machine's other services.
-2. It stops a running instance, which switches the instance's outputs off. This comes first, because the
-   new drop-in may forbid access to the old relay.
+2. It stops a running instance, which switches the instance's outputs off. It must do so before step 5,
+   because the new drop-in (systemd's file of settings for one instance) may forbid access to the old
+   relay.
 3. It copies the file to /etc/rmf-bridges.
 4. It makes a user for the instance, and makes this user the owner of the file's secrets.
 5. It writes the instance's drop-in (`bridges/runtime/drop_in.py`).
 6. It starts the instance.
 
-If a step fails, the results of the earlier steps stay. The command then starts an instance again that
-ran before.
+If a step fails, the results of the earlier steps stay. If the instance ran before, the command then
+starts it again.
 """
 
 import argparse
@@ -55,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the service runs, 78 for an invalid file, and 77 without root."""
+    """Return 0 if the service runs, 78 for an invalid file, and 77 if the user is not root."""
     if not INSTANCE.fullmatch(args.file.stem):
         print(NO_INSTANCE.format(args.file.stem), file=sys.stderr)
         return os.EX_CONFIG
@@ -103,7 +104,8 @@ def groups(root: Path) -> set[str]:
 
 
 def _secrets(config: Config, root: Path) -> Iterator[Path]:
-    """Yield the secret files that exist. A link is left as it is, because its place may change."""
+    """Yield the secret files that exist. Leave out symbolic links, because a link may later lead to
+    another file."""
     for _, secret in named_files(config, SECRETS):
         path = root / secret.lstrip("/")
         if path.is_file() and not path.is_symlink():

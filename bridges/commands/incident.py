@@ -1,4 +1,4 @@
-"""`rmf-bridge incident FILE` records a daemon's last minutes when a person asks for the recording."""
+"""`rmf-bridge incident FILE` makes a recording of a daemon's last minutes when a person asks for it."""
 
 import argparse
 import os
@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=AFTER_S,
         metavar="S",
-        help=f"wait this long to record later events too (default: {AFTER_S:g} s)",
+        help=f"how long to wait for later events, which are recorded too (default: {AFTER_S:g} s)",
     )
     parser.add_argument(
         "--died",
@@ -43,9 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Return 0 if the recording is written.
 
-    Return 65 if the recording's YAML cannot be made anonymous, 69 without a readable ring, and 73 if
-    the recording cannot be written. Raises NotInstalled if `--anonymous` needs the workbench, which is
-    not installed.
+    Return 65 if the recording's YAML cannot be made anonymous. Return 69 if the ring (the file with the
+    daemon's last minutes) cannot be read. Return 73 if the recording cannot be written. Raises
+    NotInstalled if `--anonymous` needs the workbench, which is not installed.
     """
     try:
         from bridges.blackbox import mcap_write
@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _anonymous(incident: Incident) -> Incident:
-    """Return the incident without the site's names. Raises SettingsError."""
+    """Return the incident without the names of the site. Raises SettingsError."""
     hidden: Incident = of_workbench("workbench.replay.anonymous").anonymous(incident)
     return hidden
 
@@ -94,8 +94,8 @@ def _hint(*, died: bool) -> str:
 def _incident(ring: Path, args: argparse.Namespace, follows: bool) -> Incident:
     """Return the last 120 s of the daemon.
 
-    If `follows`, the daemon runs, so wait and add the later events. With `--died`, return the last 120
-    s of the dead run. Raises RingError.
+    If `follows` is True, the daemon runs. Then wait, and add the later events. With `--died`, return
+    the last 120 s of the previous run. Raises RingError.
     """
     before = RingContent(ring)
     if args.died:
@@ -120,7 +120,7 @@ def _notes(at: float, text: str) -> tuple[Note, ...]:
 
 
 def _wait(seconds: float) -> None:
-    """Wait. Ctrl-C ends the wait, and the command continues."""
+    """Wait. Ctrl-C ends only the wait: the command then writes the recording."""
     try:
         if seconds > 0:
             print(f"waiting {seconds:g} s for later events; Ctrl-C ends the wait")

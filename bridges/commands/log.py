@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     if name not in known:
         there = ", ".join(sorted(known)) or "none"
         print(
-            f"{name} is not a service here (services: {there}); its lines in the journal:",
+            f"{name} is not a service here (services: {there}); the journal's lines about {name}:",
             file=sys.stderr,
         )
     sys.stdout.flush()
@@ -64,7 +64,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def services() -> set[str]:
-    """Return this machine's services. A service has a YAML in /etc/rmf-bridges or a unit."""
+    """Return the names of this machine's services. Each has a YAML in /etc/rmf-bridges, or a systemd
+    unit."""
     return {file.stem for file in ETC.glob("*.yaml")} | set(units())
 
 
@@ -90,7 +91,8 @@ def command(args: argparse.Namespace) -> list[str]:
 
 
 def _pattern(event: str | None, device: str | None) -> str:
-    """Return a regular expression that finds our log lines, which have the form `event key=value …`."""
+    """Return a regular expression for the log lines of this event and this device. Our log lines have
+    the form `event key=value …`."""
     parts = [f"^{_literal(event)}\\b"] if event else []
     if device:
         _, written = pairs("", device=device).split(" ", 1)

@@ -1,9 +1,10 @@
 """`rmf-bridge outputs-off FILE` switches every output off after a daemon's death, from a new process.
 
-systemd runs this command as ExecStopPost. The guard runs it for a daemon that a person started by hand.
+systemd runs this command as ExecStopPost. For a daemon that a person started by hand, the daemon's
+guard process runs it.
 
-A service that stops cleanly leaves a mark that all outputs are off. If the command finds this mark, it
-ends without loading a driver.
+A service that stops cleanly leaves a mark. The mark says that the daemon has switched all outputs off.
+If the command finds this mark, it ends without loading a driver.
 """
 
 import argparse
@@ -20,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--all-records",
         action="store_true",
-        help="switch off the outputs of every service that left a record at a power cut or death;"
+        help="switch off the outputs of every service that died or lost power and left a record;"
         " takes 6 s at most",
     )
     parser.add_argument("--runtime-dir", metavar="DIR", help="the dead daemon's runtime directory")

@@ -1,4 +1,7 @@
-"""`rmf-bridge recorder` makes recordings, which are files, from the rings of this machine's daemons."""
+"""`rmf-bridge recorder` reads the rings of this machine's daemons and writes recordings to files.
+
+A ring is a file in memory that holds a daemon's last minutes.
+"""
 
 import argparse
 import os
@@ -35,9 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const=1,
         metavar="N",
-        help="print the rides, waits and availability of the last N days (default 1), and end",
+        help="print the rides, waits and availability of the last N days (default 1), and exit",
     )
-    parser.add_argument("--csv", action="store_true", help="print every day as CSV, and end")
+    parser.add_argument("--csv", action="store_true", help="print every day as CSV, and exit")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,4 +1,5 @@
-"""`rmf-bridge reset FILE` clears latched faults for an operator, if their cause is gone."""
+"""`rmf-bridge reset FILE` clears the daemon's latched faults whose cause is gone. An operator runs
+it."""
 
 import argparse
 import os
@@ -17,8 +18,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if every device took the reset, 1 if no daemon runs, 4 if the reset was refused, and 69
-    if the daemon does not answer or this user may not see or signal it."""
+    """Return 0 if every device accepted the reset. Return 1 if no daemon runs, and 4 if a device
+    refused.
+
+    Return 69 if the daemon does not answer, or if this user may not see the daemon or send it a signal.
+    """
     try:
         places = order.places_of(args.file, args.runtime_dir)
         if places is None:

@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--simulate",
         action="store_true",
-        help="serve fake hardware with the same daemon, on loopback only",
+        help="run the same daemon with fake hardware, on loopback only",
     )
     parser.add_argument(
         "--expose", action="store_true", help="with --simulate: let the network see the fake device"
@@ -50,8 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Validate the file, claim the outputs and serve. Return the exit code, which is 78 for an invalid
-    file.
+    """Validate the file, claim the devices and outputs for this process, and run the daemon. Return the
+    exit code, which is 78 for an invalid file.
 
     Raises NotInstalled if `--simulate` needs the fakes, which are not installed.
     """
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
         config = replace(config, rmf=overridden(config.rmf, args))
         if (
             config.kind == "fleet"
-        ):  # refuse RMF's bad files before anything starts; keep them for recordings
+        ):  # find errors in RMF's files before anything starts; recordings need their texts
             from bridges.settings.fleet_site import read_site
 
             read_site(config)
@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
     if wrong := drop_in.misfit(config, os.environ) or too_slow(config, watchdog_s()):
         logging.error(wrong)
         return os.EX_CONFIG
-    end = signals.End()  # needed before other processes find our pid at the lock and signal it
+    end = signals.End()  # must exist before others can read our pid from the lock and send a signal
     signals.ignore_reset()
     try:
         held = runtime.held(args.file, args.runtime_dir, serves=True, simulated=args.simulate)
@@ -98,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
 
 def too_slow(config: Config, watchdog: float | None) -> str:
     """Return an error if one call on a bus may take more than half of systemd's watchdog time. Return
-    "" without such a bus."""
+    "" if no bus is so slow."""
     for name, bus in config.buses.items():
         timeout_s: float = getattr(bus, "timeout_s", 0.0)
         if watchdog is not None and timeout_s > watchdog / 2:
@@ -118,7 +118,7 @@ def _serve(
         from bridges.runtime.daemon import Daemon
 
         outputs_off = guard.command(args.file, args.runtime_dir)
-        directories.work_somewhere(held.places)  # lgpio leaves a FIFO in the working directory
+        directories.work_somewhere(held.places)  # lgpio makes a FIFO in the working directory
         return Daemon(config, held, end, ros_args=args.ros_args, outputs_off=outputs_off).serve()
     simulate = of_workbench("hal_fakes.simulate")
     logging.warning("SIMULATED: no hardware moves, and RMF hears simulated states")

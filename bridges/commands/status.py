@@ -33,8 +33,8 @@ IN_USE: Final[Mapping[str, tuple[str, ...]]] = {
     "ingestor": ("mode", "queue"),
     "alarm": (),
 }
-"""The status keys that name a device's user, by kind. A kind that is not listed always counts as in
-use."""
+"""The keys of the status that tell by whom a device is used, for each kind. A device of any other kind
+always counts as in use."""
 FREE: Final = ("-", "off", "", "IDLE")
 IDLE, BUSY = 0, 4
 NOT_TOLD: Final = ("contacts", "counts", "faults", "input_age_s", "outputs", "refused")
@@ -81,8 +81,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def users(one: DaemonStatus) -> Iterator[str]:
-    """Yield each reason why a daemon must not be restarted now. A device is in use, or its use is
-    unknown."""
+    """Yield each reason why a daemon must not be restarted now. The reason is that a device is in use,
+    or that nobody knows whether it is in use."""
     if one.state == "stopped":
         return
     if one.state != "serving":
@@ -160,7 +160,10 @@ def _state(one: DaemonStatus) -> str:
             return "has died"
         case "died":
             file = one.status.get("file") or "FILE"
-            return f"has died; its next start, or `rmf-bridge outputs-off {file}`, tidies up"
+            return (
+                f"has died; its next start, or `rmf-bridge outputs-off {file}`, switches off what it"
+                " left on"
+            )
         case "left on":
             return "has died, and its outputs were not verified off"
         case "unknown":
@@ -179,8 +182,8 @@ def _told(device: Status) -> str:
 
 
 def _age(device: Status, snapshot_s: float) -> str:
-    """Return the present age of the device's input. Add the age of the status file, which is up to 1
-    s."""
+    """Return the time since the device's input was read. The result includes the age of the status
+    file, which is up to 1 s."""
     age_s = device.get("input_age_s")
     return "never read" if age_s is None else f"read {age_s + snapshot_s:.1f} s ago"
 

@@ -1,5 +1,5 @@
-"""`rmf-bridge workcell done|again|failed FILE` lets a person decide the outcome of a request in
-doubt."""
+"""`rmf-bridge workcell done|again|failed FILE` lets a person decide the outcome of a request in doubt.
+A request is in doubt if the daemon does not know whether the machine has moved the items."""
 
 import argparse
 import os
@@ -28,21 +28,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--request",
         default="",
         metavar="GUID",
-        help="decide only this request; default: every request in doubt, and a lost memory",
+        help="decide only this request; default: every request in doubt, and the loss of the memory",
     )
     parser.add_argument("--runtime-dir", metavar="DIR", help="the daemon's runtime directory")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the decision was obeyed, 1 if no daemon runs or nothing is in doubt, 4 if it was
-    refused, and 69 if the daemon does not answer or this user may not see or signal it."""
+    """Return 0 if the daemon accepted the decision. Return 1 if no daemon runs or nothing is in doubt,
+    and 4 if the daemon refused the decision.
+
+    Return 69 if the daemon does not answer, or if this user may not see the daemon or send it a signal.
+    """
     try:
         places = order.places_of(args.file, args.runtime_dir)
         if places is None:
             return 1
         status = order.status_of(places)
         if status is None:
-            print(f"no daemon of {args.file} has shown its state yet", file=sys.stderr)
+            print(f"no daemon of {args.file} has written its status yet", file=sys.stderr)
             return 1
         doubts = list(_doubts(status, args.device))
         verdict = DecidedByPerson(args.verdict, args.request)

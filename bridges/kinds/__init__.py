@@ -1,7 +1,7 @@
 """The kinds of devices. Each kind has a folder with its rules, and this file finds the folders.
 
-A YAML names its kind. An installation may lack a kind's folder. Therefore no table lists the kinds, and
-no other file imports a kind by its name.
+A device YAML names its kind, for example `kind: lift`. An installation may lack a kind's folder.
+Therefore no table lists the kinds, and no other file imports a kind by its name.
 """
 
 import importlib
@@ -26,8 +26,8 @@ def kind_names() -> list[str]:
 def holding(
     roots: Iterable[str], pattern: str, record: str, name: Callable[[Path], str]
 ) -> list[str]:
-    """List the names of the files that match `pattern` below `roots` and define `record`. `name(path)`
-    returns the name of a file."""
+    """List the names of the files that match `pattern` below `roots` and define `record`. The function
+    `name` turns the path of a file into the listed name."""
     return sorted({name(path) for path in _files(tuple(roots), pattern, record)})
 
 
@@ -47,8 +47,8 @@ def kind_called(name: str) -> "AnyKind":
 
 
 def recorded(kind: str) -> "Recorded":
-    """Return a kind's types by their names in recordings. A kind that uses only another kind's types
-    has no names."""
+    """Return a table that maps recorded names to the types of this kind. The table is empty for a kind
+    that uses only another kind's types."""
     found: Recorded = getattr(_package(kind), "RECORDED", {})
     return found
 

@@ -1,2 +1,2 @@
-"""RMF's messages: definitions, bytes, topics and QoS, and substitutes for messages that a release
-lacks."""
+"""RMF's messages: definitions, bytes, topics and QoS, and other messages in place of those that a
+release of RMF lacks."""

@@ -1,6 +1,6 @@
 """Converts messages to bytes and back. The encoding is plain CDR (XCDR1), which ROS 2 uses on the wire.
 
-A sample is the bytes of one message:
+The bytes of one message are called a sample:
 
 - The header has four bytes: `00 01 00 00` for little endian, `00 00 00 00` for big endian.
 - The fields follow in their order.
@@ -45,15 +45,15 @@ BYTES = ("uint8", "byte")
 
 
 class CdrError(ValueError):
-    """The error of bytes that are no message of the type, or of a message that cannot be encoded."""
+    """Error for bytes that are not a message of the type, or for a message that cannot be encoded."""
 
 
 def encode(message_type: type, message: object, release: Release = NEWEST) -> bytes:
     """Encode the message as little endian CDR with its header.
 
-    A NUL or half a surrogate pair cannot go on the wire and becomes `?`. Otherwise a strange text from
-    a device would block the device's state message. Raises CdrError for a number out of range, and for
-    a value of another type.
+    A NUL, and a lone half of a surrogate pair, cannot go on the wire. Each becomes `?`, because
+    otherwise such a character in a text from a device would block the device's state message. Raises
+    CdrError for a number out of range, and for a value of another type.
     """
     out = bytearray(LITTLE_ENDIAN)
     try:

@@ -9,8 +9,8 @@ from enum import IntEnum
 
 
 class LiftRequestType(IntEnum):
-    """LiftRequest.request_type has these values. LiftState has other numbers for modes: HUMAN is 1, AGV
-    is 2."""
+    """The values of LiftRequest.request_type. LiftState has other numbers for modes: HUMAN is 1, AGV is
+    2."""
 
     REQUEST_END_SESSION = 0
     REQUEST_AGV_MODE = 1
@@ -18,14 +18,14 @@ class LiftRequestType(IntEnum):
 
 
 class LiftRequestDoor(IntEnum):
-    """LiftRequest.door_state has these values."""
+    """The values of LiftRequest.door_state."""
 
     DOOR_CLOSED = 0
     DOOR_OPEN = 2
 
 
 class LiftDoor(IntEnum):
-    """LiftState.door_state has these values."""
+    """The values of LiftState.door_state."""
 
     DOOR_CLOSED = 0
     DOOR_MOVING = 1
@@ -33,7 +33,7 @@ class LiftDoor(IntEnum):
 
 
 class LiftMotion(IntEnum):
-    """LiftState.motion_state has these values."""
+    """The values of LiftState.motion_state."""
 
     MOTION_STOPPED = 0
     MOTION_UP = 1
@@ -42,7 +42,7 @@ class LiftMotion(IntEnum):
 
 
 class LiftMode(IntEnum):
-    """LiftState.current_mode has these values, and so has available_modes."""
+    """The values of LiftState.current_mode and LiftState.available_modes."""
 
     MODE_UNKNOWN = 0
     MODE_HUMAN = 1
@@ -53,7 +53,7 @@ class LiftMode(IntEnum):
 
 
 class DoorModeValue(IntEnum):
-    """DoorMode.value has these values."""
+    """The values of DoorMode.value."""
 
     MODE_CLOSED = 0
     MODE_MOVING = 1
@@ -63,8 +63,8 @@ class DoorModeValue(IntEnum):
 
 
 class ChargerStateValue(IntEnum):
-    """ChargerState.state has these values. The number 0 has no meaning, so a message with default
-    values is invalid."""
+    """The values of ChargerState.state. The number 0 has no meaning, so a message with default values
+    is invalid."""
 
     CHARGER_IDLE = 1
     CHARGER_ASSIGNED = 2
@@ -74,7 +74,7 @@ class ChargerStateValue(IntEnum):
 
 
 class WorkcellMode(IntEnum):
-    """DispenserState.mode has these values, and so has IngestorState.mode."""
+    """The values of DispenserState.mode and IngestorState.mode."""
 
     IDLE = 0
     BUSY = 1
@@ -82,7 +82,7 @@ class WorkcellMode(IntEnum):
 
 
 class WorkcellStatus(IntEnum):
-    """DispenserResult.status has these values, and so has IngestorResult.status."""
+    """The values of DispenserResult.status and IngestorResult.status."""
 
     ACKNOWLEDGED = 0
     SUCCESS = 1
@@ -90,7 +90,7 @@ class WorkcellStatus(IntEnum):
 
 
 class RobotModeValue(IntEnum):
-    """RobotMode.mode has these values."""
+    """The values of RobotMode.mode."""
 
     MODE_IDLE = 0
     MODE_CHARGING = 1
@@ -107,15 +107,15 @@ class RobotModeValue(IntEnum):
 
 
 class ChargingMode(IntEnum):
-    """ChargingAssignment.mode has these values. A robot charges at the waypoint, or waits there for a
-    charger."""
+    """The values of ChargingAssignment.mode. The robot charges at the assigned waypoint, or waits at
+    that waypoint until a charger is free."""
 
     MODE_CHARGE = 0
     MODE_WAIT = 1
 
 
 class AlertTier(IntEnum):
-    """Alert.tier has these values."""
+    """The values of Alert.tier."""
 
     TIER_INFO = 0
     TIER_WARNING = 1
@@ -123,7 +123,7 @@ class AlertTier(IntEnum):
 
 
 class DiagnosticLevel(IntEnum):
-    """DiagnosticStatus.level has these values."""
+    """The values of DiagnosticStatus.level."""
 
     OK = 0
     WARN = 1

@@ -1,9 +1,9 @@
 """RMF's messages as the `.msg` files define them. Each message has its fields in their order, with
 their types.
 
-The program has no other table of messages than this file and `constants.py`. The transports make their
-own types from this table, field by field, from the annotations. The RIHS01 type hashes are computed
-from this table too.
+This file and `constants.py` are the only table of messages in the program. The transports build their
+own message types from the annotations of this table, field by field. The RIHS01 type hashes are
+computed from this table too.
 
 The table holds the messages of all releases of RMF. `releases.py` lists the messages and fields that a
 release lacks.
@@ -333,7 +333,8 @@ Message = (
 )
 
 OF_WORKCELLS: Final = frozenset({"rmf_dispenser_msgs", "rmf_ingestor_msgs"})
-"""The packages that a machine with ROS needs only for workcells."""
+"""The packages with the messages of dispensers and ingestors. A machine with ROS needs these packages
+only if it serves such a device."""
 PACKAGES: Final[dict[type, str]] = {
     Time: "builtin_interfaces",
     Duration: "builtin_interfaces",

@@ -13,7 +13,8 @@ from bridges.messages.releases import RELEASES
 from bridges.messages.topics import EMERGENCY_SIGNAL, FIRE_ALARM_TRIGGER, AnyTopic
 
 INSTEAD: Final[dict[str, AnyTopic]] = {EMERGENCY_SIGNAL.name: FIRE_ALARM_TRIGGER}
-"""The substitute of a topic, by the topic's name. Every release has the substitutes."""
+"""The topic that replaces another topic, by that other topic's name. Every release has the replacing
+topics."""
 
 
 def converted(message: Message) -> Message | None:

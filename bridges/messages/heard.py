@@ -1,5 +1,5 @@
-"""One message of RMF's graph. A message has the same form in a live graph and in every kind of
-recording.
+"""A message that was heard on RMF's graph (the nodes and topics of RMF). A message has the same form in
+a live graph and in every kind of recording.
 
 A graph and its recording yield the same values in the same order. So the code that judges, explains or
 draws messages does not depend on their source.
@@ -21,7 +21,8 @@ FREE_TEXTS: Final = frozenset(
 """The message fields that hold sentences, not names."""
 LONGEST_SENTENCE: Final = 1000
 MOST_PARTS: Final = 500
-"""The maximum number of elements that are kept of a sequence. A legal FleetState has 200 robots."""
+"""The maximum number of elements that are kept of a sequence; the rest is cut off. A legal FleetState
+has 200 robots."""
 
 
 class Sender(Struct, eq=False):
@@ -29,7 +30,7 @@ class Sender(Struct, eq=False):
 
     `node`: the publisher's node, `/namespace/name`, or "" until discovery finds the node. Anybody can
     forge this name. `look`: a function that asks discovery for the node again, or None if this is
-    impossible. Any thread may call it.
+    impossible. Any thread may call `look`.
     """
 
     node: str = ""
@@ -39,9 +40,9 @@ class Sender(Struct, eq=False):
 class Heard(Struct, frozen=True):
     """A message with its topic's ROS name and the time of its arrival.
 
-    `at`: seconds on a clock that never steps. Zero on that clock means nothing. `wall`: seconds since
-    the epoch on the listening machine's clock, for comparison with stamps. `sender`: None if neither
-    the wire nor the recording names the publisher.
+    `at`: seconds on a clock that never steps. The zero of that clock is an arbitrary time. `wall`:
+    seconds since the epoch on the listening machine's clock, for comparison with stamps. `sender`: None
+    if neither the wire nor the recording names the publisher.
     """
 
     at: float
@@ -68,8 +69,8 @@ def bounded(part: Any, longest: int = LONGEST_NAME) -> Any:
     have megabytes.
 
     A name is cut after LONGEST_NAME characters, and a sentence after LONGEST_SENTENCE. A cut text ends
-    with its former length. A sequence is cut after MOST_PARTS elements. Parts within these limits are
-    not copied.
+    with its former length. A sequence is cut after MOST_PARTS elements. Parts that are short enough are
+    returned without a copy.
     """
     if isinstance(part, str):
         return part if len(part) <= longest else f"{part[:longest]}… ({len(part)} characters)"

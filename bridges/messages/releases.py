@@ -28,7 +28,7 @@ from bridges.messages.definitions import (
 
 class Release(Struct, frozen=True, eq=False):
     """One release. `lacks`: the messages that the release does not have. `without`: pairs of a message
-    and a field that it does not have in this release."""
+    and a field. In this release the message does not have the field."""
 
     name: str
     lacks: frozenset[type] = frozenset()

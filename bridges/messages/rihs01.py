@@ -97,8 +97,8 @@ def _field_type(kind: type) -> dict[str, object]:
 
 
 def _element(kind: type) -> type:
-    """Return the type of a sequence's elements. Return any other type unchanged, except that a number
-    becomes its ROS name."""
+    """Return the type of a sequence's elements, or else the type itself. Return the ROS name in place
+    of a type of number."""
     if typing.get_origin(kind) is tuple:
         kind = typing.get_args(kind)[0]
     return typing.get_args(kind)[1] if typing.get_origin(kind) is typing.Annotated else kind

@@ -11,7 +11,7 @@ and ends on 2038-01-19."""
 
 
 class ClockError(Exception):
-    """The error of a wall clock that shows a time after the end of RMF's Time."""
+    """Error for a wall clock that shows a later time than RMF's Time can hold."""
 
 
 def stamp(wall: float) -> Time:

@@ -21,12 +21,12 @@ DEEPEST: Final = 8
 """The maximum depth of nested types. A definition that contains itself would otherwise never end."""
 
 Shape = tuple[tuple[str, object], ...]
-"""Pairs of a field and its type. A type is a name, or the Shape of a nested type. A sequence is a name
-with `[]`, or a tuple of one Shape."""
+"""The fields of a message as pairs of a name and a type. A type is a name, or the Shape of a nested
+type. A sequence is a type name with `[]`, or a tuple of one Shape."""
 
 
 class UnknownDefinition(ValueError):
-    """The error of a text that is no definition of a message."""
+    """Error for a text that is not a definition of a message."""
 
 
 def text(message_type: type, release: Release) -> str:

@@ -61,16 +61,16 @@ DOOR_SUPERVISOR_HEARTBEAT = Topic("door_supervisor_heartbeat", d.SupervisorHeart
 CHARGER_STATES = Topic("charger_states", d.ChargerState)
 CHARGER_REQUESTS = Topic("charger_requests", d.ChargerRequest)
 CHARGER_CANCELS = Topic("charger_cancels", d.ChargerCancel)
-# Our own topic, because RMF has no message for the answer to a request.
+# Our own topic. It carries the reason for a refused request, because RMF has no message for it.
 CHARGER_REFUSALS = Topic("charger_refusals", d.DiagnosticStatus)
 # Our own topics for requests to the charger coordinator. RMF has no such topics.
 ADAPTER_CHARGER_REQUESTS = Topic("adapter_charger_requests", d.ChargerRequest)
 ADAPTER_CHARGER_CANCELS = Topic("adapter_charger_cancels", d.ChargerCancel)
-# A topic without messages. The coordinator that serves the graph declares a publisher. A second
-# coordinator sees this publisher and waits.
+# A topic without messages. Only one charger coordinator may serve RMF's ROS graph. The active
+# coordinator declares a publisher on this topic. A second coordinator sees this publisher and waits.
 CHARGER_COORDINATOR = Topic("charger_coordinator", d.Bool)
-# Humble to Lyrical have the same topics of workcells. The fleet adapter's endpoints have SystemDefaults
-# keep_last(100).
+# The topics of workcells (dispensers and ingestors) are the same in all RMF releases from Humble to
+# Lyrical. RMF's fleet adapter uses SystemDefaults with keep_last(100) for them.
 DISPENSER_REQUESTS = Topic("dispenser_requests", d.DispenserRequest)
 DISPENSER_STATES = Topic("dispenser_states", d.DispenserState)
 DISPENSER_RESULTS = Topic("dispenser_results", d.DispenserResult)

@@ -1,8 +1,9 @@
 """RMF's messages as one line of text, for `watch`, `send` and the demo.
 
-A word is the name of RMF's constant without its prefix, in lower case. So DOOR_OPEN is `open`. Only the
-modes of a lift are in upper case, such as `AGV` for MODE_AGV. A number without a constant stays a
-number. Control characters are escaped, because names come from the network.
+A word is the name of RMF's constant without its prefix, in lower case. For example, DOOR_OPEN is
+`open`. Only the modes of a lift are in upper case, such as `AGV` for MODE_AGV. A number without a
+constant is shown with a question mark, such as `7?`. Control characters are escaped, because names come
+from the network.
 """
 
 from collections.abc import Mapping
@@ -19,8 +20,8 @@ Stated = d.LiftState | d.DoorState | d.ChargerState | WorkcellStated
 Requested = d.LiftRequest | d.DoorRequest | d.ChargerRequest | d.ChargerCancel | WorkcellRequested
 Named = Stated | Requested | WorkcellResulted
 LONGEST_NAME: Final = 256
-"""The maximum length (characters) of a name in memory and on a display. Anybody can send a name of 1
-MB."""
+"""The maximum length (characters) of a name that we keep in memory or show. The limit is needed because
+anybody can send a name of 1 MB."""
 Kind = Literal["lift", "door", "charger", "dispenser", "ingestor"]
 KINDS: Final[tuple[Kind, ...]] = ("lift", "door", "charger", "dispenser", "ingestor")
 _NAMED: Final[Mapping[type, tuple[Kind, str]]] = {
@@ -82,8 +83,8 @@ def stamped_at(state: Stated) -> float:
 
 
 def condition(state: Stated) -> str:
-    """Describe the state without the device's holder, such as `car at L1, door open, mode AGV` or
-    `error: too hot`."""
+    """Describe the state, such as `car at L1, door open, mode AGV` or `error: too hot`. Leave out the
+    device's holder, which is the requester that has the device."""
     match state:
         case d.LiftState():
             return _lift_condition(state)
@@ -127,7 +128,7 @@ def _charger_condition(state: d.ChargerState) -> str:
 
 def holder(state: Stated) -> str:
     """Return the device's holder. This is a lift's session, a charger's robot and request, or a
-    workcell's queue. Return "" without a holder."""
+    workcell's queue. Return "" if the device has no holder."""
     match state:
         case d.LiftState():
             return printable(state.session_id)
@@ -169,7 +170,8 @@ def request(message: Requested) -> str:
 
 
 def items(message: WorkcellRequested) -> str:
-    """Describe the items of a request, such as `2 sheets in left`."""
+    """Describe the items of a request, such as `2 sheets in tray_a`, where `tray_a` is a
+    compartment."""
     places = [(one, f" in {one.compartment_name}") for one in message.items]
     each = (
         f"{one.quantity} {one.type_guid}{where if one.compartment_name else ''}"

@@ -1,7 +1,8 @@
-"""The alarms of the fleets: our daemons' statements on `/diagnostics`, and messages of other nodes.
+"""The alarms that stop the robots of fleets. Our daemons state their alarms on `/diagnostics`. Other
+nodes only publish alarm messages.
 
-RMF's fleet adapters obey the last word of any node. So a `false` ends the alarm of every node that
-makes no statements.
+RMF's fleet adapters obey the last alarm message of any node. So a message `false` of any node also ends
+the alarms of the other nodes. It does not end the alarms that our daemons state on `/diagnostics`.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -23,18 +24,23 @@ from bridges.observe.requesters import Moment
 Actor = Literal["a person", "nobody"]
 STANDS: Final = frozenset((*RAISED, "reset"))
 PUBLISHED: Final = "published"
-"""The state of an alarm that a node has published without a statement."""
+"""The state of an alarm that a node has published, but does not state on `/diagnostics`."""
 UNKNOWN: Final = "an unknown node"
 OLD_S: Final = 3.0
-"""The time (s) after the beginning in which a message may be an old one that its publisher retains."""
+"""The time (s) after the start of listening in which a message may be old. A publisher may have
+retained such a message."""
 MOST: Final = 50
 
 
 class ObservedAlarm(Struct, frozen=True):
-    """The alarm of a node. `state`: the statement (`quiet`, `alarm`, `drill` or `reset`), or PUBLISHED.
-    `fleets`: their names, "" for all. `current`: the daemon still makes statements. The alarm of a
-    daemon that falls silent goes on standing. `since`: the beginning of the state (s since the epoch);
-    None if it is unknown."""
+    """The alarm of a node.
+
+    - `state`: the statement on `/diagnostics` (`quiet`, `alarm`, `drill` or `reset`), or PUBLISHED
+    - `fleets`: the names of the stopped fleets, or "" for all fleets
+    - `current`: Does the daemon still state its alarm? If the daemon falls silent, its alarm stays
+      valid.
+    - `since`: the beginning of the state (s since the epoch), or None if unknown
+    """
 
     node: str
     state: str
@@ -45,35 +51,37 @@ class ObservedAlarm(Struct, frozen=True):
 
     @property
     def stands(self) -> bool:
-        """Return whether robots stand because of this alarm."""
+        """Return whether this alarm makes robots stand still."""
         return self.state == PUBLISHED or self.state in STANDS
 
     @property
     def condition(self) -> str:
-        """A few words on the alarm, such as `ALARM: fire_panel of Main panel; every fleet is to
-        stand`."""
+        """Return a few words about the alarm, such as `ALARM: fire_panel of Main panel; every fleet
+        must stand still`."""
         if not self.stands:
             return "no alarm"
         words = {"alarm": f"ALARM: {self.causes}", "drill": "DRILL", "reset": "reset, waits"}
         word = words.get(self.state, f"ALARM on {self.causes}")
-        return f"{word}; {self.fleets or 'every fleet'} is to stand"
+        return f"{word}; {self.fleets or 'every fleet'} must stand still"
 
     def because(self, clock: Callable[[float], str]) -> str:
-        """One sentence that says why the robots stand. `clock(wall)`: the text of a time."""
+        """Return one sentence that says why the robots must stand still. `clock(wall)` returns a time
+        as text."""
         robots = f"Every robot of {self.fleets}" if self.fleets else "Every robot"
         at = "at an unknown time" if self.since is None else f"at {clock(self.since)}"
         silent = "" if self.current else ", and has been silent since its last statement"
         why = {
             "alarm": f"because {self.causes} raised an alarm {at} and nobody has reset {self.node}",
             "drill": f"for a drill of {self.node}, which began {at} and ends by itself",
-            "reset": f"until another alarm ends: {self.node} was reset {at}",
+            "reset": f"until another alarm ends, although {self.node} was reset {at}",
         }.get(self.state, f"because {self.node} published an alarm on {self.causes} {at}")
-        return f"{robots} is to stand {why}{silent}."
+        return f"{robots} must stand still {why}{silent}."
 
     @property
     def ends(self) -> tuple[Actor, str]:
-        """The actor who lets the robots drive (`a person` or `nobody`), and what the actor must do."""
-        reset = f"when the cause is over and it is safe: `rmf-bridge reset FILE` of {self.node}"
+        """Return who can let the robots drive again (`a person` or `nobody`), and what this person must
+        do."""
+        reset = f"when the cause is over and it is safe: `rmf-bridge reset FILE` for {self.node}"
         if self.state == "drill":
             return "nobody", "the drill ends by itself"
         return "a person", {
@@ -83,14 +91,18 @@ class ObservedAlarm(Struct, frozen=True):
 
 
 class PublishedAlarms:
-    """The alarms that nodes have published, by node. A `false` ends them as it lets RMF's robots
-    drive. At first it may be an old one, and ends only its sender's alarm."""
+    """The alarms that nodes have published, by the node's name.
+
+    A message `false` ends the alarms of all nodes, as in RMF, where it lets the robots drive. Within
+    OLD_S after the start of listening a `false` may be an old, retained message. Therefore it then ends
+    only the alarm of its own sender.
+    """
 
     def __init__(self) -> None:
         self.found: dict[str, tuple[str, Fleets, Moment]] = {}
 
     def hear(self, heard: Heard, moment: Moment, began: float) -> None:
-        """Take a message, if it is about an alarm."""
+        """Note the message if it is about an alarm."""
         topic, message = heard.topic.rpartition("/")[2], heard.message
         if not alarming.is_alarm(topic, message):
             return
@@ -110,8 +122,8 @@ class PublishedAlarms:
 def alarms(
     nodes: Mapping[str, Diagnosis], published: PublishedAlarms, now: float
 ) -> Iterator[ObservedAlarm]:
-    """Yield the statement of each daemon that may raise an alarm, and the alarm of each other node.
-    `nodes`: the report of each daemon, by `<node>: daemon`."""
+    """Yield the stated alarm of each daemon that may raise an alarm, and the published alarm of each
+    other node. `nodes` maps the name `<node>: daemon` to the daemon's report."""
     stated = set()
     for name, said in sorted(nodes.items()):
         if STATE in said.values:

@@ -33,18 +33,18 @@ Key = tuple[words.Kind, str]
 
 
 class ObservedGraph(Generic[D]):
-    """All observed devices of a graph.
+    """All observed devices of RMF's ROS graph.
 
-    `known` has every device, by kind and name. It has at most `most` devices of a kind. If a kind has
-    no place left, only a device with states gets a place. It replaces a device that has no states, or
-    whose states stopped FORGOTTEN_S ago.
+    `known` maps a kind and a name to the device. For each kind, `known` has at most `most` devices.
+    Above this number, only a device that publishes states is added. The new device replaces a device
+    that has no states, or whose states stopped FORGOTTEN_S ago.
 
-    - `crowded`: the kinds with a device that got no place
-    - `steps`: the times at which the listener's clock stepped, and the size (s) of each step
-    - `nodes`: the reports of our daemons and coordinators on themselves, by `<node>: <device>`
+    - `crowded`: the kinds of which a device could not be added
+    - `steps`: the times at which the listener's wall clock was set, and the change (s) each time
+    - `nodes`: the reports of our daemons and coordinators on themselves, by the name `<node>: <device>`
     - `published`: the alarms that nodes have published
-    - `spoke`: the time when each fleet adapter last spoke. The key is `FLEET/ROBOT` for a robot's
-      request, `FLEET` for a robot's END, and `FLEET/` for a state of the fleet.
+    - `spoke`: the time of the last message of each fleet adapter. The key is `FLEET/ROBOT` for a
+      robot's request, `FLEET` for the end of a robot's request, and `FLEET/` for a state of the fleet.
     """
 
     makes: ClassVar[Mapping[words.Kind, Callable[[str, Moment], Any]]]
@@ -113,7 +113,7 @@ class ObservedGraph(Generic[D]):
         return self.now
 
     def pass_time(self, at: float, wall: float) -> None:
-        """Set the present time when no message has arrived."""
+        """Advance the present time while no message arrives."""
         self.now = Moment(max(at, self.now.at), wall)
         self.began = self.began or Moment(at, wall, seen=False)
 
@@ -124,7 +124,7 @@ class ObservedGraph(Generic[D]):
         return [one for one in every if kind in (None, one.kind) and one.state is not None]
 
     def alarms(self) -> list[ObservedAlarm]:
-        """Return the alarms of all nodes at the last message."""
+        """Return the alarms of all nodes, as of the last message."""
         return [*alarms(self.nodes, self.published, self.now.at)]
 
     def make(self, kind: words.Kind, name: str) -> D:
@@ -156,8 +156,8 @@ class ObservedGraph(Generic[D]):
     def device(
         self, kind: words.Kind, name: str, moment: Moment, *, stated: bool = False
     ) -> D | None:
-        """Return the device of this name. Make a new device if none is known and there is a place.
-        Otherwise return None."""
+        """Return the device of this name. If the device is unknown, add a new device. Return None if
+        there is no room for a new device."""
         found = self.known.get((kind, name))
         if found is not None or not name:
             return found
@@ -165,7 +165,7 @@ class ObservedGraph(Generic[D]):
             self.crowded |= {kind} if stated else set()
             return None
         made = self.known[kind, name] = self.make(kind, name)
-        if self._heartbeat is not None:  # RMF's supervisor sends a heartbeat only after requests
+        if self._heartbeat is not None:  # the next heartbeat may come late: only after a request
             at, wall = self._heartbeat.at, self._heartbeat.wall
             made.hear(Moment(at, wall, seen=False), "", self._heartbeat.message)
         return made

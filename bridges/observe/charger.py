@@ -15,12 +15,12 @@ CHARGING: Final = "charging"
 
 
 class ObservedCharger(ObservedDevice[d.ChargerState]):
-    """A charger as observed. A requester's name is the id of its request. The requester wants a robot
-    charged.
+    """A charger, as observed. A requester is a request for charging, and its name is the request's id.
 
-    `condition`: RMF's word for the charger's state. `robot`: the robot that has the charger. Nobody
-    knows this robot before the first state and during a silence. `request`: the id of the present
-    request.
+    - `condition`: RMF's word for the charger's state
+    - `robot`: the robot that has the charger. It is unknown before the first state, and while no states
+      arrive.
+    - `request`: the id of the present request
     """
 
     kind = "charger"
@@ -43,8 +43,8 @@ class ObservedCharger(ObservedDevice[d.ChargerState]):
         }
 
     def waits(self, now: Moment) -> Iterator[Wait]:
-        """Yield the wait of the robot to which the charger is assigned. RMF sends a charger's request
-        only once, so repeats cannot show this wait."""
+        """Yield the wait of the robot to which the charger is assigned. The wait is taken from the
+        charger's state, because RMF sends the request for a charger only once."""
         if self.condition.value == "assigned":
             since = max(self.condition.since, self.request.since, key=lambda one: one.at)
             yield Wait(self.request.value, "CHARGING", since)

@@ -1,4 +1,5 @@
-"""Observation of a device of any kind: its states, their pace and age, its requesters and waits."""
+"""Observation of a device of any kind: the rate and the age of its states, its requesters, and its
+waits."""
 
 from abc import ABC, abstractmethod
 from collections import deque
@@ -36,7 +37,8 @@ class Wait(NamedTuple):
 
 
 def reading_age(stamped_at: float, wall: float) -> str:
-    """Return the defect of a reading's age, such as `is old`. Return "" if the age is right."""
+    """Return a problem with the age of a reading, such as `is old`. Return "" if the reading is
+    recent."""
     if stamped_at <= 0.0:
         return "was never read"
     if wall - stamped_at > OLD_S:
@@ -45,12 +47,13 @@ def reading_age(stamped_at: float, wall: float) -> str:
 
 
 class ObservedDevice(ABC, Generic[T]):
-    """One device as observed. `id`: its name on the graph. `began`: the time when observation began.
+    """One device, as observed. `id`: its name in RMF. `began`: the time when observation began.
 
-    - `state`, `before`: the latest state, and the state before it. `gap_s`: the time between the two.
+    - `state`, `before`: the latest state, and the state before it. `gap_s`: the time (s) between these
+      states.
     - `first_state`, `last_state`: the time of the first state, and the time of the latest state
     - `changed`: the earlier values of the facts that the latest state changed
-    - `diagnoses`: the reports of our nodes on the device, by `<node>: <device>`
+    - `diagnoses`: the reports of our nodes on the device. The key is `<node>: <device>`.
     """
 
     kind: ClassVar[words.Kind]
@@ -79,9 +82,9 @@ class ObservedDevice(ABC, Generic[T]):
     def publishers(self, now: Moment) -> tuple[Sender, ...]:
         """Return the publishers of the device's states in the last SLOWEST_S.
 
-        Several publishers are returned only if they take turns, because then two nodes have one name.
-        The result is empty if the publisher is unknown, as in recordings and on `ros2`. In that case
-        use `steps_back`.
+        More than one publisher is returned only if the publishers alternate. In that case two nodes
+        publish under the name of one device. The result is empty if the publisher is unknown, as in
+        recordings and on `ros2`. Then use `steps_back` instead.
         """
         return self._publishers.at(now.at)
 

@@ -16,8 +16,8 @@ COORDINATOR: Final = "charger_coordinator"
 PANEL: Final = "alarm"
 FLEET: Final = "fleet"
 STATELESS: Final = (COORDINATOR, PANEL, FLEET)
-"""The kinds whose subjects publish no state that `ObservedGraph` knows. Only diagnostics tell of these
-subjects."""
+"""The kinds of things that are known only from diagnostics, because they publish no state that
+`ObservedGraph` knows."""
 REFUSED: Final = "refused "
 
 
@@ -41,8 +41,8 @@ def about(status: DiagnosticStatus) -> tuple[Kind, str] | None:
 
 
 def of_node(status: DiagnosticStatus) -> bool:
-    """Return whether the status is about a daemon of ours itself. Also return True for a subject of a
-    kind in STATELESS: a coordinator's site, an alarm panel, or a robot."""
+    """Return whether the status is about one of our daemons itself. Also return True for a status about
+    a coordinator's site, an alarm panel or a robot (the kinds in STATELESS)."""
     kind = kind_in(status)
     of_daemon = bool(kind) and status.name == f"{status.hardware_id}: daemon"
     return kind in STATELESS or of_daemon
@@ -50,13 +50,13 @@ def of_node(status: DiagnosticStatus) -> bool:
 
 @dataclass(slots=True)
 class Diagnosis:
-    """The latest report of one node on one device, or on the node itself.
+    """The latest report that one node has sent about one device, or about itself.
 
     - `kind`: the kind of the node's daemon
     - `name`: `<node>: <device>`
     - `last`: the time of the last status
-    - `faults`: the detail and the beginning of each fault, by code
-    - `refused`: the count and the last time of refusals, by reason
+    - `faults`: maps the code of each fault to its detail and its beginning
+    - `refused`: maps each reason for refusals to their number and the time of the last refusal
     """
 
     kind: str
@@ -101,7 +101,7 @@ class Diagnosis:
                 yield from self.refuses(moment, text(key.removeprefix(REFUSED)), int(value))
 
     def has(self, moment: Moment, codes: Mapping[str, str]) -> Iterator[News]:
-        """Take all faults that are present now, with their details. Yield the news."""
+        """Replace the faults by these faults (code -> detail). Yield the news."""
         over, new = self.faults.keys() - codes.keys(), codes.keys() - self.faults.keys()
         gone = [code for code in self.faults if code in over]
         self.faults = {
@@ -125,8 +125,9 @@ class Diagnosis:
 def report(
     known: dict[str, Diagnosis], most: int, status: DiagnosticStatus, moment: Moment
 ) -> Diagnosis | None:
-    """Return the diagnosis to which this status belongs, or make a new diagnosis. In a full table a new
-    diagnosis replaces a silent one. Return None if no diagnosis is silent."""
+    """Return the diagnosis to which this status belongs, or make a new diagnosis. If `known` is full,
+    the new diagnosis replaces a diagnosis without recent reports. Return None if all diagnoses have
+    recent reports."""
     if status.name not in known:
         silent = (name for name, one in known.items() if not one.is_current(moment.at))
         if len(known) >= most and known.pop(next(silent, ""), None) is None:

@@ -46,10 +46,12 @@ def door_close(heartbeat: str) -> tuple[Check, ...]:
 
 
 class ObservedDoor(ObservedDevice[d.DoorState]):
-    """A door as observed.
+    """A door, as observed.
 
-    `holders`: the requesters in the heartbeat, with the start of each hold. `asked`: the mode in the
-    last request on `door_requests`. `sender` sent that request, and last repeated it at `asked_last`.
+    - `holders`: the requesters that the supervisor's heartbeat lists, and the time since when it lists
+      each
+    - `asked`: the mode that the last request on `door_requests` asks for
+    - `sender`: the sender of that request, who last repeated it at `asked_last`
     """
 
     kind = "door"
@@ -84,8 +86,8 @@ class ObservedDoor(ObservedDevice[d.DoorState]):
         return self.asked is not None and now.at - self.asked_last.at <= REQUESTER_SILENT_S
 
     def waits(self, now: Moment) -> Iterator[Wait]:
-        """Yield each wait for OPEN. A supervisor may wait too. Without a heartbeat, an open door ends a
-        requester's wait."""
+        """Yield each requester's wait for OPEN, and also a supervisor's wait. If no heartbeat was ever
+        heard, a requester's wait ends when the door is open."""
         opened = self.mode.value == OPEN
         for one in self.asking(now):
             if one.wants == OPEN and not (opened and self.last_heartbeat is None):

@@ -1,5 +1,5 @@
-"""Observation of a lift: its requesters, its session, and the supervisor's request. It also lists the
-unmet conditions of RMF's RequestLift."""
+"""Observation of a lift: its requesters, its session, and the last request that RMF's supervisor sent
+to it. It also lists the unmet conditions of RMF's RequestLift."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -28,14 +28,14 @@ def request_lift(session: str, floor: str, door: str, who: str, wants: str) -> t
 
 
 class ObservedLift(ObservedDevice[d.LiftState]):
-    """A lift as observed.
+    """A lift, as observed. END is the request with which a robot gives the lift back.
 
-    - `adapters_heard`: a fleet adapter was heard.
+    - `adapters_heard`: Was a fleet adapter heard?
     - `supervisor`: the session in the supervisor's last request on `lift_requests`, or "" after an END
     - `supervisor_last`: the time of that request
-    - `idle_ends`: a count of successive ENDs for one session while the lift did not show that session.
-      The session and the time of the last such END follow the count.
-    - `taken_from`: the last session that lost the lift to another session without an END
+    - `idle_ends`: the number of successive ENDs of one session while the lift showed another session.
+      The tuple also has this session and the time of its last END.
+    - `taken_from`: the last session that sent no END, but lost the lift to another session
     """
 
     kind = "lift"
@@ -71,8 +71,8 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         return request_lift(self.session.value, self.floor.value, self.door.value, one.who, wants)
 
     def asking(self, now: Moment) -> list[DeviceRequester]:
-        """List the requesters that ask now, the earliest first. During a silence of the lift nobody
-        repeats a request. So every requester without an END then counts as asking."""
+        """List the requesters that ask now, the earliest first. While the lift sends no states, nobody
+        repeats a request. Therefore every requester that has sent no END then counts as asking."""
         stands = self.last_state is None or self.is_silent(now)
         asks = [
             one
@@ -82,13 +82,15 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         return sorted(asks, key=lambda one: one.first.at)
 
     def waits(self, now: Moment) -> Iterator[Wait]:
-        """Yield a `Wait` for each requester whose wish is unfulfilled in the lift's states."""
+        """Yield a `Wait` for each requester to which the lift's states do not yet show what it
+        wants."""
         for one in self.asking(now):
             if self.is_silent(now) or not self.matches(one):
                 yield Wait(one.who, one.wants, one.lacks)
 
     def not_passed_on(self, now: Moment) -> DeviceRequester | None:
-        """Return a robot that repeats a request or END although no message comes on `lift_requests`.
+        """Return a robot whose requests RMF's supervisor does not forward to the lift. The robot
+        repeats a request or an END, but no message comes on `lift_requests`.
 
         If a robot has the lift, only this robot counts, because RMF's supervisor drops the requests of
         all other robots (lift_supervisor/Node.cpp). If the lift is free, any robot counts.
@@ -150,7 +152,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
         if not holds and not passed_on and self.state is not None:
             count = self.idle_ends[0] if self.idle_ends[1] == who else 0
             self.idle_ends = count + 1, who, moment
-        if one is None and who and (holds or self.state is None):  # nobody heard its request
+        if one is None and who and (holds or self.state is None):  # its requests were not heard
             one, _ = self.requesters.ask(who, "", moment)
             one.granted, one.ended, one.own = self.session.since, moment, not passed_on
             one.end_last, one.end_passed_on = None if passed_on else moment, passed_on
@@ -164,7 +166,7 @@ class ObservedLift(ObservedDevice[d.LiftState]):
             return
         yield News("ends", moment, who, requester=one, passed_on=passed_on)
         if passed_on and one.own and not holds:
-            return  # only its fleet adapter knows whether the robot still waits
+            return  # the robot itself sent no END, so it may still wait
         one.ended = moment
         if not holds:
             yield self._over(moment, one)

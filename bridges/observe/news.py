@@ -8,14 +8,14 @@ from bridges.observe.requesters import DeviceRequester, Moment
 What = Literal[
     "first state",  # the device's first state has come
     "states again",  # a state has come after a silence of `gap_s`
-    "read",  # the age of the readings is now as `text` says
+    "read",  # the readings have become old or recent; `text` says which
     "changed",  # the state changes the facts in `changed`
-    "asks",  # a requester has a new wish; `text`: the mode it wants of a lift
+    "asks",  # a requester wants something new; `text`: the lift mode that it asks for
     "passed on",  # the supervisor sends a new request to the device
-    "ends",  # a requester sends END, or the supervisor if `passed_on`
+    "ends",  # a requester sends END; if `passed_on`, the supervisor sends it
     "has",  # a requester got the device
     "lost",  # `who` lost the device
-    "result",  # a workcell gives a request another result, `text`
+    "result",  # a workcell publishes a new result for a request; `text`: the result
     "met",  # RMF sees a requester's wish as fulfilled
     "gone",  # a requester has stopped asking, without END
     "over",  # a requester's visit has ended

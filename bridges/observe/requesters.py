@@ -11,8 +11,12 @@ from bridges.observe.limits import GIVEN_UP_S, MOST_REQUESTERS, REPEATS_S, REQUE
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """The time at which something begins. `at`: seconds on the clock of `Heard.at`. `wall`: seconds
-    since the epoch. `seen`: False if it began before we listened."""
+    """The time at which something begins.
+
+    - `at`: seconds on the clock of `Heard.at`
+    - `wall`: seconds since the epoch
+    - `seen`: False if it began before we started to listen
+    """
 
     at: float
     wall: float
@@ -36,8 +40,10 @@ class Fact:
 
 @dataclass(slots=True)
 class DeviceRequester:
-    """One requester of a device, and its wish. `wants`: a floor, a door's mode, or the like. A
-    requester's visit lasts from its first request to its END.
+    """One requester of a device, and its wish. `wants`: a floor, a door's mode, or the like.
+
+    A requester's visit lasts from its first request to its END, which is the request that gives the
+    device back.
 
     The times of requests:
 
@@ -51,19 +57,20 @@ class DeviceRequester:
     The times of effects:
 
     - `lacks`: the time since which the wish is unfulfilled
-    - `met`: the time when RMF saw the wish fulfilled
-    - `boarded`: the time when RMF first saw a wish of this visit fulfilled. `boarded_at` is that wish.
+    - `met`: the time when RMF saw the present wish fulfilled
+    - `boarded`: the first time at which RMF saw any wish of this visit fulfilled. `boarded_at` is that
+      wish.
     - `granted`: the time when the requester got the device
 
     Other facts:
 
     - `reached`: the last fulfilled wish
     - `given_up`: the wish before the present wish, if it was not fulfilled
-    - `end_passed_on`: the supervisor has sent END to the device.
-    - `gone`: the requester has stopped without END.
+    - `end_passed_on`: Has the supervisor sent END to the device?
+    - `gone`: Has the requester stopped asking without END?
     - `times`: the number of requests
-    - `own`: a message of the requester itself was heard, and not only the supervisor's messages.
-    - `stamp_age_s`: the age (s) of the last request by our clock. It is valid if that request was
+    - `own`: Was a message of the requester itself heard, and not only the supervisor's messages?
+    - `stamp_age_s`: the age (s) of the last request by our clock. It is valid only if that request was
       `stamped`.
     """
 
@@ -104,7 +111,7 @@ class DeviceRequester:
 
 
 class DeviceRequesters:
-    """All requesters of one device. If too many names come, the requester with the longest silence is
+    """All requesters of one device. If too many names come, the requester that was silent longest is
     dropped.
 
     `began`: the time when we began to listen.
@@ -124,10 +131,10 @@ class DeviceRequesters:
     def ask(
         self, who: str, wants: str, moment: Moment, keep: str = "", *, stands: bool = False
     ) -> tuple[DeviceRequester, bool]:
-        """Take a request. Return the requester, and whether the wish is new.
+        """Note a request. Return the requester, and whether the wish is new.
 
-        `keep`: a requester that must not be dropped. `stands`: no states arrive, so nobody repeats a
-        request.
+        `keep`: the name of a requester that must not be dropped. `stands`: Does the device send no
+        states, so that nobody repeats a request?
         """
         found = self._all.get(who)
         if found is not None and not stands and moment.at - found.last.at > GIVEN_UP_S:

@@ -1,4 +1,5 @@
-"""Robots of our fleets' daemons, and the lifts, doors and chargers that a robot waits for or has."""
+"""The robots that our fleet daemons report, and the lifts, doors and chargers that a robot waits for or
+uses."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple, TypeVar

@@ -1,7 +1,7 @@
 """Counts of each device's rides, waits, door cycles and charges, and of its time in service.
 
-The exporter and the recorder's daily figures count the same news. A wait or ride does not count if its
-beginning was not heard, because its length is unknown.
+The exporter's figures and the recorder's daily figures agree, because both count the same news. A wait
+or ride does not count if its beginning was not heard, because its duration is unknown.
 """
 
 from bisect import bisect_left
@@ -66,8 +66,8 @@ class DeviceCounts:
     - `rides`: the times from a request for the next floor until the robot may leave the lift
     - `cycles`: a door's openings, a charger's charges, or a lift's stops with an open door
     - `energy_j`: the energy (J) of a charger that reports volts and amps
-    - `watched_s`: the time (s) with states
-    - `served_s`: the time (s) in service
+    - `watched_s`: the time (s) in which the device published states
+    - `served_s`: the time (s) in which the device was in service
     """
 
     waits: DurationHistogram = field(default_factory=DurationHistogram)
@@ -88,8 +88,8 @@ class DeviceCounts:
 
 
 class DeviceTally:
-    """The counter of one device. `counts`: the counts since the beginning, or since they were last
-    taken out."""
+    """The counter of one device. `counts`: the counts since the last call of `SiteTally.take_out`, or
+    since the start."""
 
     def __init__(self) -> None:
         self.counts = DeviceCounts()
@@ -129,7 +129,8 @@ class DeviceTally:
         self._at = at
 
     def _charged(self, device: AnyDevice) -> None:
-        """Count the wait of a charger's request. RMF has no phase for this wait."""
+        """Count the wait of a charger's request. The charge itself ends this wait, because RMF has no
+        phase for it."""
         if not isinstance(device, ObservedCharger) or device.condition.value != CHARGING:
             return
         asked = device.requesters.get(device.request.value)

@@ -1,4 +1,4 @@
-"""Observation of a dispenser or ingestor: the requests, the queue, and the end of each request."""
+"""Observation of a dispenser or ingestor: its requests, its queue, and the result of each request."""
 
 from collections.abc import Iterator
 from typing import Final

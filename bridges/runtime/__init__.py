@@ -1,1 +1,2 @@
-"""The daemon that serves one YAML. It has loops, and devices or subjects on these loops."""
+"""The daemon that serves the devices or subjects of one YAML. Each bus, or each kind without a bus, has
+a loop in its own thread."""

@@ -1,9 +1,10 @@
-"""`outputs-off --all-records` switches off all outputs that the services' records name.
+"""`outputs-off --all-records` switches off all outputs that are named in the services' records
+(`record.py`).
 
 The command runs at boot, after a power cut and before the daemons start. It begins as root, and then
 forks a child for each service. Each child becomes the service's user before it reads the service's
-files. So a wire that hangs delays no other service, and a service's files can do no more than their
-owner could.
+files. So a bus that hangs delays no other service. And a service's files can do no more harm than the
+service's user could.
 
 This machine's pins come first, because they depend on no other device. The command has a time limit,
 because every daemon waits for the command. Each daemon switches off the remaining outputs when it
@@ -29,8 +30,8 @@ from bridges.yaml.problems import SettingsError
 from drivers.profiles import texts
 
 OWN_S, OTHERS_S = 4.0, 2.0
-"""The time limits (s) for this machine's own pins and for all other outputs. Every daemon waits during
-these times."""
+"""The time limit (s) for this machine's own pins, and the time limit (s) for all other outputs. Every
+daemon waits during both times."""
 LOOK_EVERY_S = 0.01
 OWN_PINS = re.compile(rb"\btype: *[\"']?gpio\b")
 """A pattern that finds a YAML whose outputs are this machine's pins. The pattern decides only which

@@ -1,5 +1,5 @@
-"""Refused requests that wait for an answer. At most MOST requests wait, so a flood of requests causes
-no flood of answers."""
+"""Refused requests that wait for an answer. At most MOST requests wait, so that a flood of requests
+causes no flood of answers."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -11,8 +11,8 @@ from bridges.runtime.clock import TELL_GAP_S
 from bridges.runtime.subject import Publish
 
 MOST: Final = 10
-"""The maximum number of requests that are answered every TELL_GAP_S. In a flood the latest requests are
-answered."""
+"""The maximum number of requests that are answered every TELL_GAP_S. In a flood only the latest
+requests are answered."""
 
 
 class RefusalAnswers:

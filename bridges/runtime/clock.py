@@ -1,5 +1,5 @@
-"""The clocks of a daemon, and the pace of its messages. A state is published each second, and at once
-after a change."""
+"""The clocks of a daemon, and the times at which it publishes a message. A state is published each
+second, and at once after a change."""
 
 import time
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from bridges.messages.definitions import Time
 
 TELL_EVERY_S = 1.0
 TELL_GAP_S = 0.1
-"""The minimum time (s) between two states, even if the state changes in between."""
+"""The minimum time (s) between two published states, however often the state changes."""
 
 
 class Clock(Struct, frozen=True):
@@ -36,20 +36,22 @@ class Clock(Struct, frozen=True):
 
 
 def machine_s() -> float:
-    """Return the time (s) since the machine's start. The machine's sleep counts too."""
+    """Return the time (s) since the machine's start, including the time in which the machine was
+    suspended."""
     return time.clock_gettime(time.CLOCK_BOOTTIME)
 
 
 class PublishPace:
-    """The pace of one message: each second, and at once after a change."""
+    """The times at which one message is published: each second, and at once after a change of its
+    content."""
 
     def __init__(self) -> None:
         self.told_at = AGES_AGO
         self._told: object = None
 
     def due_at(self, news: object, *, at_once: bool = False) -> float:
-        """Return the time (monotonic s) at which `news` must be published. `at_once`: do not wait for
-        the next second, even if `news` has not changed."""
+        """Return the time (monotonic s) at which the content `news` must be published. `at_once`:
+        publish before the next second, even if `news` has not changed."""
         unchanged = news == self._told and not at_once
         return self.told_at + (TELL_EVERY_S if unchanged else TELL_GAP_S)
 

@@ -39,7 +39,8 @@ class Contained(Generic[X, O]):
         self._name = name
         self._driver = driver
         self.contacts: Callable[[], Mapping[str, bool]] = dict
-        """The driver's `OnContacts.contacts`. For a driver without contacts it returns nothing."""
+        """The driver's method `OnContacts.contacts`. For a driver without contacts, this is a function
+        that returns an empty mapping."""
         if isinstance(driver, OnContacts):
             self.contacts = driver.contacts
         self._clock = clock
@@ -55,12 +56,12 @@ class Contained(Generic[X, O]):
         self._call(self._driver.open)
 
     def read(self) -> X:
-        """Read every input. After a defect of the driver, first claim the device again."""
+        """Read every input. If a defect of the driver came before, first claim the device again."""
         return self._call(self._read)
 
     def write(self, outputs: O) -> None:
-        """Set every output to its level. After a success, the next defect again begins with the
-        shortest pause."""
+        """Set every output to its level. A successful call resets the pause, so that the next defect
+        begins with the shortest pause."""
         self._call(lambda: self._write(outputs))
         self._pause_s = 0.0
 

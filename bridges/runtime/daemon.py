@@ -50,7 +50,8 @@ long."""
 
 
 class Daemon:
-    """One run of `rmf-bridge run`. `simulated`: status and diagnostics say that no hardware moves."""
+    """One run of `rmf-bridge run`. `simulated`: there is no hardware, and the status and the
+    diagnostics say so."""
 
     def __init__(
         self,
@@ -66,7 +67,7 @@ class Daemon:
         rmf: Any = None,
     ) -> None:
         """Prepare the daemon. `outputs_off`: the command that switches the outputs off after this
-        process has died. `rmf`: an object that stands in for RMF's fleet adapter.
+        process has died. `rmf`: an object that replaces RMF's fleet adapter in a simulation.
 
         Raises TransportError or HalError if a transport or bus cannot be opened.
         """
@@ -86,7 +87,8 @@ class Daemon:
         self._transport = open_transport(
             config.rmf, node_name, localhost=localhost, ros_args=ros_args
         )
-        # An old memory of devices would be worse than none. So a memory of devices has no second place.
+        # A memory of devices gets no second path. Two files could differ, and an old memory of devices
+        # is worse than no memory.
         instead = None if config.buses else runtime.path / KEPT
         path = runtime.path / KEPT if simulated else state_file(config.path)
         kept = MemoryFile(path, instead)
@@ -96,9 +98,9 @@ class Daemon:
             config, self._transport, open_bus, kept, unsafe, self._writer, new=simulated, rmf=rmf
         )
         self._loops = self._service.loops
-        # The record comes after the buses are open, because a daemon that cannot open a bus needs no
-        # record. The record comes before `serve`, because `serve` claims the outputs. `outputs-off`
-        # reads the record.
+        # The record of the claimed outputs is written here, for `outputs-off`. It is written after the
+        # buses are open, because a daemon that cannot open a bus needs no record. It is written before
+        # `serve`, because `serve` claims the outputs.
         if config.drives and not simulated:
             self._convenience("mark", partial(last_mark.leave, name=last_mark.CLAIMED))
             runtime.claim(ours)
@@ -112,7 +114,8 @@ class Daemon:
             self._diagnostics = self._transport.publisher(self._health_topic)
 
     def _writer_of(self, record: ClaimRecord) -> NoWriter:
-        """Return the writer of the daemon's ring. Return NOBODY if the YAML wants no recording."""
+        """Return the writer that records into the daemon's ring file. Return NOBODY, which records
+        nothing, if the YAML switches recording off."""
         keep = self._config.recording
         if keep.keep == "nothing":
             return NOBODY
@@ -136,7 +139,7 @@ class Daemon:
         off."""
         signals.on_reset(self._obey)
         self._service.subscribe()
-        self._obey(signalled=False)  # an order that was given during the start
+        self._obey(signalled=False)  # a person's order that came during the start
         log.info(pairs("serving", file=self._config.path, kind=self._config.kind, **self._about()))
         try:
             for loop in self._loops:
@@ -150,8 +153,8 @@ class Daemon:
         return 0 if safe else 1
 
     def _obey(self, *, signalled: bool = True) -> None:
-        """Obey a person: carry out the order in the runtime directory. If a signal has come without an
-        order, reset."""
+        """Carry out a person's order, which is a file in the runtime directory. If a signal has come
+        but there is no such file, reset every device."""
         given = order.take(self._runtime.path, self._config.path)
         if given is None:
             if signalled:
@@ -214,7 +217,8 @@ class Daemon:
         return safe
 
     def _left(self) -> list[str]:
-        """Return the names of dead daemons' records with outputs that are not verified off."""
+        """Return the names of the records that dead daemons left, because their outputs are not
+        verified off."""
         return self._predecessor.left() if self._predecessor else []
 
     def _convenience(self, what: str, do: Callable[[], None]) -> None:
@@ -231,19 +235,20 @@ class Daemon:
         return about | ({"SIMULATED": "no hardware moves"} if self._simulated else {})
 
     def _apart(self) -> list[dict[str, str]]:
-        """Return the transport's faults, which keep this node and other nodes from hearing each
+        """Return the transport's faults. Each of them keeps this node and other nodes from hearing each
         other."""
         return [{"code": code, "detail": detail} for code, detail in self._transport.faults()]
 
     def _slack(self) -> dict[str, float]:
-        """Return the smallest time (s) that remained until systemd's watchdog would act, since the last
-        call."""
+        """Return the shortest time (s), since the last call, that was left before systemd's watchdog
+        would have ended the daemon."""
         unfed_s, self._longest_unfed_s = self._longest_unfed_s, 0.0
         allowed_s = watchdog_s()
         return {"watchdog_slack_s": round(allowed_s - unfed_s, 3)} if allowed_s else {}
 
     def _answer(self) -> order.OrderAnswered | None:
-        """Return the answer to the last order; None until every device has taken it."""
+        """Return the answer to a person's last order. Return None until every device has decided about
+        the order."""
         given, refused = self._ordered, self._service.refusals()
         if given is None or refused is None:
             return None
@@ -277,10 +282,10 @@ class Daemon:
             found = diagnosis(self._transport.name, self._config.kind, daemon, devices, at)
             self._diagnostics.publish(found)
             self._told += 1
-            if self._told % max(1, len(devices)) == 0:  # recorded more seldom with more devices
+            if self._told % max(1, len(devices)) == 0:  # do not record every message
                 self._writer.spoken(self._health_topic.name, found, sent=True)
         except (
             TransportError,
             ClockError,
-        ) as error:  # only debug, because the outlet logs unpublished states as errors
+        ) as error:  # debug is enough, because `outlet.py` logs unpublished states as errors
             log.debug(pairs("not_published", topic=DIAGNOSTICS.name, reason=error))

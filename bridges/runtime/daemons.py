@@ -1,5 +1,5 @@
-"""The daemons on this machine, with their status files. Folders and systemd units show which daemons
-there are."""
+"""The daemons on this machine, with their status files. The daemons are found by their runtime
+directories and by their systemd units."""
 
 import json
 import shutil
@@ -51,7 +51,7 @@ class FaultStatus(msgspec.Struct):
 
 
 class DeviceStatus(msgspec.Struct):
-    """The keys in every device's status. Each kind has further keys."""
+    """The keys that the status of every device has. Each kind of device adds further keys."""
 
     faults: list[FaultStatus] = []
     input_age_s: float | None = None
@@ -74,11 +74,11 @@ class DaemonStatus(msgspec.Struct, kw_only=True):
 
     - `serving`: The daemon runs and writes its status.
     - `old`: The daemon runs, but its status is not fresh.
-    - `died`: The daemon has died, as a left-over status file shows.
+    - `died`: The daemon has died, because it has left its status file.
     - `left on`: The daemon has died, and its outputs are not verified off.
-    - `failed`: systemd does not start the daemon any more.
+    - `failed`: systemd has given up starting the daemon.
     - `stopped`: The daemon does not run.
-    - `unknown`: This user may not see the daemon.
+    - `unknown`: This user has no permission to read the daemon's files.
     """
 
     name: str
@@ -102,7 +102,7 @@ class DaemonStatus(msgspec.Struct, kw_only=True):
 
     @property
     def level(self) -> int:
-        """The exit code that a monitoring plugin gives for this daemon."""
+        """Return the exit code with which a monitoring plugin reports this daemon."""
         level = LEVEL_OF[self.state]
         parts = (self.status, *self.devices.values())
         return max(level, FAULTY) if any(part.get("faults") for part in parts) else level
@@ -146,7 +146,8 @@ def _daemon(folder: Path, by: str, unit: str, wall: float) -> DaemonStatus:
 
 
 def _unreleased(folder: Path) -> str:
-    """Return a remedy if a dead daemon may have left outputs on. Return "" if it left no record."""
+    """Return an instruction for the case that a dead daemon has left outputs on. Return "" if the
+    daemon left no record."""
     state = SERVICE_STATE if folder.parent == SERVICE_RUN else state_base()
     for path in paths(Directories(folder, state / folder.name)):
         if record := read(path):
@@ -177,8 +178,8 @@ def _read(path: Path, wall: float) -> tuple[dict[str, Any], float | None]:
 
 
 def units() -> dict[str, str]:
-    """Return the states of our units, such as `active (running)`, by instance. Return nothing without
-    systemd."""
+    """Return the state of each of our systemd units, such as `active (running)`. The key is the unit's
+    instance name. Return {} on a machine without systemd."""
     if shutil.which("systemctl") is None:
         return {}
     ask = ("systemctl", "list-units", "--all", "--plain", "--output=json", f"{UNIT}*")

@@ -1,8 +1,8 @@
 """Switches off a dead daemon's outputs from a new process, for `rmf-bridge outputs-off`.
 
-The dead daemon wrote a record before it claimed outputs. The record takes precedence over the YAML,
-because somebody may have edited the YAML since. A directory that is full, missing or read-only causes
-no delay.
+A daemon writes a record of its outputs before it claims them. After the daemon's death, this record
+takes precedence over the YAML, because somebody may have edited the YAML. This process does not wait
+for a directory that is full, missing or read-only.
 """
 
 import argparse
@@ -29,8 +29,8 @@ TIMEOUT_S = 5.0
 
 
 def switch_off(args: argparse.Namespace) -> int:
-    """Return 0 if every output is verified off, and 1 if an output is not. Return 69 if the daemon may
-    be alive."""
+    """Switch the outputs off. Return 0 if every output is verified off, otherwise 1. Return 69 if the
+    daemon may still be alive."""
     log.start()
     signals.ignore()
     file = args.file.absolute()
@@ -44,7 +44,7 @@ def switch_off(args: argparse.Namespace) -> int:
         return _off_by_yaml(file, {})
     answered = ages(places)
     records = Records(places, file)
-    if args.record:  # the calling daemon has the lock (`runtime/predecessor.py`)
+    if args.record:  # the daemon that started this process has the lock (`predecessor.py`)
         return _off_by_records(records, answered, args.record)
     claimed = last_mark.says_claimed(os.environ) and bool(records.unreleased())
     try:
@@ -54,7 +54,7 @@ def switch_off(args: argparse.Namespace) -> int:
     except runtime.AlreadyRunning as error:
         if claimed:
             logging.warning(
-                "%s. The outputs of the earlier run are not off yet, and are switched off now",
+                "%s. The outputs of the earlier run are not verified off, so they are switched off now",
                 error,
             )
             return _off_by_records(records, answered)
@@ -105,7 +105,7 @@ def _off_by_records(
     """Switch off the outputs of the records in `names`. If `names` is None, switch off the outputs of
     all records."""
     found = [r for r in records.unreleased() if names is None or r.name in names]
-    each_s = TIMEOUT_S / max(1, len(found))  # a record with a dead bus leaves time for the others
+    each_s = TIMEOUT_S / max(1, len(found))  # so one dead bus leaves time for others
     return _told(not [r for r in found if not _off_by_record(records, r, answered, each_s)])
 
 
@@ -115,7 +115,7 @@ def _off_by_record(
     try:
         config = record.config()
     except SettingsError as error:
-        _say(error)  # another version wrote the record; only the YAML can help
+        _say(error)  # another version wrote the record, so use the YAML instead
         _off_by_yaml(Path(record.file), answered)
         return False
     unsafe = _unsafe(config, record.safe, answered, within_s)
@@ -144,8 +144,8 @@ class _StatusFile(msgspec.Struct):
 
 
 def ages(places: Directories) -> Mapping[str, float]:
-    """Return the age (s) of each device's last answer, from the dead daemon's last status. Leave out
-    devices that never answered. Without a status, return nothing."""
+    """Return the age (s) of each device's last answer, as the dead daemon's last status shows it. Leave
+    out devices that never answered. Return nothing if there is no status file."""
     try:
         shown = msgspec.json.decode(read(places.runtime / STATUS, STATUS_MAX), type=_StatusFile)
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):

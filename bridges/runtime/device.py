@@ -1,7 +1,8 @@
-"""One device in service. A node scans the device's driver, and lets the device's subject decide.
+"""The node that serves one device. It scans the device's driver, and calls the device's core, which
+decides about the outputs and the state.
 
 A scan works as in a PLC: read the inputs, decide, write every output, and publish if a state is due.
-The loop of the device's bus calls `scan`. No function in this file waits or has a thread.
+The loop of the device's bus calls `scan`. No function in this file blocks or has its own thread.
 """
 
 import logging
@@ -51,8 +52,8 @@ class Node(Generic[S, L, M, X, E, O, R]):
 
     - `publish(topic, message)` sends a message to RMF and raises nothing.
     - `not_sent(topic, error)` notes a state that cannot be sent.
-    - `tell_alarm(name, causes)` gives the daemon's alarm the causes that the device sees. It is None if
-      the device raises no alarm.
+    - `tell_alarm(name, inputs)` passes the device's causes for an alarm to the daemon's alarm. It is
+      None if the device raises no alarm.
     """
 
     def __init__(
@@ -123,7 +124,8 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._answers.add(message, str(refusal))
 
     def was_suspended(self, for_s: float) -> None:
-        """Note that nothing was scanned for `for_s` (s), so that older readings no longer count."""
+        """Note that no input was read for `for_s` (s). Therefore the core no longer trusts older
+        readings."""
         self._decide(Suspended(f"nothing was read for {for_s:.1f} s"))
 
     def scan(self, events: Iterable[DeviceEvent[X, E]] = ()) -> None:
@@ -148,7 +150,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._log()
 
     def _is_nothing_new(self, reading: Sampled[X] | IoFailed, now: float) -> bool:
-        """Return whether this reading only repeats the last one, and nothing is due."""
+        """Return whether this reading only repeats the last reading, while no state or timer is due."""
         due = now >= self.wake_at or (self._tell_alarm is not None and now >= self._alarm_at)
         return not due and self.subject.read_again(reading)
 
@@ -157,7 +159,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
     ) -> None:
         self._decide(reading)
         for event in events:
-            if isinstance(event, OperatorReset):  # the next scan claims a failed device again
+            if isinstance(event, OperatorReset):  # claim a failed device again at the next scan
                 self._open = self._open and not self._io_fault
             self._decide(event)
         self._keep()
@@ -205,11 +207,11 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return Sampled(sample)
 
     def _keep(self) -> None:
-        """Write the memory to disk. Only then switch outputs and publish messages that follow from the
-        memory."""
+        """Write the core's memory to disk, before its decision takes effect. The outputs are switched
+        and the states are published only afterwards."""
         if self._keeper is not None:
             kept: Any = self._keeper.keep(self.subject.memory, self._clock.monotonic())
-            if kept is not None:  # every kind with `keeping` has this event
+            if kept is not None:  # every kind with `keeping` has such an event
                 self._decide(kept)
 
     def _write(self) -> None:
@@ -229,8 +231,8 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._logged_outputs = outputs if self._logged_outputs is None else self._logged_outputs
 
     def _alarm(self) -> None:
-        """Give the daemon's alarm the causes that the device sees. Do this each second, and at once
-        after a change."""
+        """Pass the device's causes for an alarm to the daemon's alarm, each second and at once after a
+        change."""
         if self._tell_alarm is None or self._kind.alarm_inputs is None:
             return
         assert self.subject.decision is not None
@@ -245,14 +247,14 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._counts.scanned(took_s, decision.outputs, failed=self._failing)
 
     def _tell(self) -> None:
-        """Publish the state and then the results, if the state is due. A request alone does not make
-        the state due."""
+        """Publish the state and then the results, if the state is due. A request does not make the
+        state due, unless the state changes."""
         subject, now = self.subject, self._clock.monotonic()
         assert subject.decision is not None
         report = subject.decision.report
         news, results = report.news(), self._kind.results(self.name, report)
         if now >= self._pace.due_at(news, at_once=bool(results)):
-            if self._send(report):  # a door lets robots in only after OPEN was published
+            if self._send(report):  # tell the core, because a robot may enter a lift after OPEN
                 self._send_results(results)
                 subject.published(self._kind.published(subject.memory, report))
                 results = ()
@@ -283,7 +285,8 @@ class Node(Generic[S, L, M, X, E, O, R]):
             self._publish(topic, self._kind.stamped(message, stamp))
 
     def _send(self, report: R) -> bool:
-        """Publish the state. Return False if it was not sent, or if RMF has no message for it."""
+        """Publish the state. Return False if the state was not sent, or if RMF has no message for this
+        kind of device."""
         topic, state_of = self._kind.states, self._kind.state_message
         if topic is None or state_of is None:
             return False
@@ -295,8 +298,8 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return self._publish(topic, state_of(self.name, self._settings, report, at)) is not False
 
     def _log(self) -> None:
-        """Log the changes. This is the last step of a scan, because a log line takes as long as a whole
-        scan."""
+        """Log the changes. Logging is the last step of a scan, because writing a log line takes as long
+        as the rest of the scan."""
         decision = self.subject.decision
         assert decision is not None
         if decision.outputs != self._logged_outputs:
@@ -317,12 +320,15 @@ class Node(Generic[S, L, M, X, E, O, R]):
         return self._io_fault
 
     def _identity(self, fault: Fault) -> object:
-        """Return a value that is equal in all reports of one fault. If the fault's detail is a bus's
-        error text, which varies, this value is the code alone. The core keeps the last error's text for
-        one more scan."""
+        """Return a value by which reports of one fault are recognised as equal.
+
+        The value is the fault's code alone if the fault's detail is an error text of a bus, because
+        such texts vary. Texts of the previous scan count too, because the core repeats the last text
+        for one more scan.
+        """
         bus_words = ("", self._io_fault, *self._bus_words)
         return fault.code if fault.detail in bus_words else fault
 
 
 AnyNode = Node[Any, Any, Any, Any, Any, Any, Any]
-"""A node whose types are unknown here, because its kind was found by name."""
+"""A node of a kind that was found by name. Therefore the type checker does not know its types."""

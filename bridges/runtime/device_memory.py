@@ -1,9 +1,9 @@
 """The memories of a daemon's devices that must survive a restart. All devices of a daemon share one
 file.
 
-A device's thread first writes the device's memory to the file. Only then does it switch an output or
-publish a state that follows from the memory. If writing fails, the thread gives the core the reason,
-and tries again each second.
+A device's thread first writes the device's memory to the file. Only then does the thread switch an
+output or publish a state that depends on this memory. If writing fails, the thread tells the device's
+core the reason, and tries again each second.
 """
 
 import logging
@@ -26,14 +26,14 @@ NO_FILE: Final = "no memory on disk: this is the first start, or the memory was 
 
 
 class KeptDevices(keep.Kept, frozen=True, forbid_unknown_fields=True):
-    """The content of the file. `devices`: the JSON text of each device's memory, in the form of its
-    kind."""
+    """The content of the file. `devices`: maps each device to its memory as JSON text. Each kind of
+    device defines the form of this text."""
 
     devices: dict[str, msgspec.Raw]
 
 
 class Unkept:
-    """A store that keeps nothing, for a test or for a kind without a memory on disk."""
+    """A store that keeps nothing. It serves for tests, and for kinds that keep no memory on disk."""
 
     def read(self) -> bytes | None:
         """Return None."""
@@ -46,7 +46,8 @@ class Unkept:
 class DeviceMemories:
     """The file of one daemon's devices. `lost`: the reason why the file cannot be read, or "".
 
-    `new`: a missing file means that the devices have no past. This is true only of a simulation.
+    `new`: Does a missing file mean that the devices have never run before? Only a simulation may assume
+    this.
     """
 
     def __init__(self, store: MemoryStore, *, new: bool = False) -> None:
@@ -93,8 +94,8 @@ class DeviceKeeper(Generic[M]):
         self._failing = False
 
     def restore(self, initial: M, now: float) -> M:
-        """Return the device's memory from disk, or `initial` for a new simulation. If the memory is
-        lost, log the reason and return the kind's memory for this case."""
+        """Return the device's memory from disk. For a new simulation return `initial`. If the memory is
+        lost, log the reason, and return the memory with which the kind begins after such a loss."""
         kept = self._memories.read(self._device)
         if kept is None and self._memories.new:
             return initial

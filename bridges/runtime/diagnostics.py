@@ -5,15 +5,16 @@ lifts or doors.
 
 - `name` is `<node>: <device>`, as ROS's aggregator expects.
 - `hardware_id` is the device's name.
-- `message` names the faults.
-- `values` come from the status file. The detail of a fault has the fault's code as its key.
+- `message` has the codes of the faults.
+- `values` come from the status file. For a fault, the key is the fault's code and the value is its
+  detail.
 
 LiftState, DoorState and ChargerState have no fields for faults, so diagnostics carry the faults.
 
     OK      the input is read, and there is no fault
-    WARN    the daemon is a simulation, or still only listens in its quiet start
+    WARN    the daemon is a simulation, or has just started and only listens for other nodes
     ERROR   the device or the daemon has faults; the daemon has a fault if it cannot publish, or if
-            another node does its work
+            another node publishes in its place
     STALE   the device's input has not been read yet
 """
 
@@ -35,14 +36,14 @@ from bridges.runtime.subject import Status
 from bridges.system.log import plain
 
 MOST: Final = 100
-"""The maximum number of devices in a message. Somebody on the network may send a supervisor many
-names."""
+"""The maximum number of devices in a message. The limit is needed because anybody on the network can
+send a supervisor many names."""
 CONTACTS: Final = "contacts"
 CERTIFICATE_FILES: Final = "certificate_files"
 BUSES: Final = "buses"
 NOT_SENT: Final = (CONTACTS, COUNTS, CERTIFICATE_FILES, BUSES)
 """Keys that stay in the status file and are not sent. Contacts and counts would be most of the traffic
-on the graph, and files are for this machine."""
+on the ROS graph. The paths of files are useful only on this machine."""
 
 
 def diagnosis(
@@ -83,8 +84,8 @@ def _values(status: Status) -> tuple[KeyValue, ...]:
 
 
 def _pairs(status: Status) -> Iterator[tuple[str, str]]:
-    """Yield the status as pairs of key and value. A fault gives its code and detail, and each entry of
-    a table gives one pair."""
+    """Yield the status as pairs of key and value. For a fault, the pair is its code and its detail. A
+    table becomes one pair for each of its entries."""
     for key, value in status.items():
         if key in NOT_SENT:
             continue

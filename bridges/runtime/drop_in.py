@@ -2,8 +2,8 @@
 one service's YAML.
 
 `rmf-bridge enable` writes the drop-in. Without a drop-in the unit permits access to no device. If the
-drop-in does not fit the needs of the YAML, `run` refuses to start. Otherwise the daemon could not open
-its relay, and could only report this each second.
+drop-in does not fit the needs of the YAML, `run` refuses to start. Otherwise the daemon would start,
+but could not open its relay.
 """
 
 import hashlib
@@ -18,8 +18,8 @@ from bridges.transports.zenoh.config import mode
 from drivers.hal import Needs
 
 FITS: Final = "RMF_BRIDGE_FITS"
-"""The environment variable in which the drop-in gives the result of `fits`. The unit itself gives
-`nothing`."""
+"""The environment variable in which the drop-in tells the daemon the hash from `fits`. In a unit
+without a drop-in, its value is `nothing`."""
 ROUND_S: Final = 1.25
 LEAST_S: Final = 3.0
 WITHOUT_OUTPUTS_S: Final = 10.0
@@ -28,10 +28,13 @@ LOCAL: Final = ("localhost", "multicast")
 
 def text(config: Config, groups: Collection[str], user: str = "") -> str:
     """Return the drop-in's text. `groups`: the machine's groups. `user`: the service's own user; "" for
-    the unit's user. A unit with an unknown user or group does not start, so the text names no other
-    group. The user is not one of the needs in `fits`, so a drop-in of an older version still fits."""
+    the unit's user.
+
+    A unit with an unknown user or group does not start, so the text names only groups of this machine.
+    The user is not one of the needs in `fits`, so a drop-in of an older version still fits.
+    """
     head = (
-        f"# Written by `rmf-bridge enable` for {config.path.name}. After a change enable it again."
+        f"# Written by `rmf-bridge enable` for {config.path.name}. If it changes, enable it again."
     )
     service = [f"Environment={FITS}={fits(config)}", *_service(config, groups)]
     service = [f"User={user}", *service] if user else service
@@ -39,14 +42,15 @@ def text(config: Config, groups: Collection[str], user: str = "") -> str:
 
 
 def fits(config: Config) -> str:
-    """Return a hash of the file's needs. Files with equal needs have equal hashes."""
+    """Return a hash of the buses, groups and durations that the file needs. Files with equal needs have
+    equal hashes."""
     needs = "\n".join([*_unit(config), *_service(config, GROUPS)])
     return hashlib.sha256(needs.encode()).hexdigest()[:16]
 
 
 def misfit(config: Config, environ: Mapping[str, str]) -> str:
-    """Return the error if no drop-in of our unit fits this file's needs. Return "" if the drop-in
-    fits."""
+    """Return an error text if the drop-in of our unit is missing or does not fit this file's needs.
+    Return "" if the drop-in fits."""
     met = environ.get(FITS, "")
     if met in ("", fits(config)):  # "": our unit did not start this process
         return ""
@@ -58,9 +62,9 @@ def watchdog_s(config: Config) -> float:
     """Return systemd's watchdog time (s). A daemon that hangs keeps its relays on for at most this
     time.
 
-    A loop finishes a step at least each second, when its states are due. One bus call may delay the
-    step by at most half of the watchdog time. A daemon without outputs gets a longer time, because a
-    slow disk may delay a step.
+    A loop finishes a step at least each second, because it publishes states each second. One bus call
+    may delay the step by at most half of the watchdog time. A daemon without outputs gets a longer
+    time, because a slow disk may delay a step.
     """
     slowest = max((getattr(bus, "timeout_s", 0.0) for bus in config.buses.values()), default=0.0)
     return max(LEAST_S, 1.75 * slowest + ROUND_S) if config.buses else WITHOUT_OUTPUTS_S
@@ -95,15 +99,15 @@ def _needs(config: Config) -> list[Needs]:
 
 
 def _each(found: Iterable[Iterable[str]]) -> list[str]:
-    """Return each word once. Leave out empty words."""
+    """Return all words without repetitions and without empty words."""
     return list(dict.fromkeys(word for words in found for word in words if word))
 
 
 def _hosts(rmf: Rmf, needs: Iterable[Needs]) -> list[str] | None:
-    """Return the addresses that the daemon talks to. Return None if an address is unknown before the
-    daemon runs.
+    """Return the addresses that the daemon talks to. Return None if at least one address cannot be
+    known in advance.
 
-    The addresses of a DDS site's nodes, of a zenoh peer's peers, and of host names are unknown.
+    These addresses cannot be known: the nodes of a DDS site, the peers of a zenoh peer, and host names.
     """
     hosts = [*_graph_hosts(rmf), *_each([n.host] for n in needs)]
     return None if not all(map(_is_address, hosts)) else _each([LOCAL, hosts])

@@ -40,8 +40,8 @@ def remedies() -> dict[str, Remedy]:
 
 
 def values(file: str, device: str) -> dict[str, str]:
-    """Return the values of a device's settings, by key, from the daemon's YAML. Return nothing for an
-    invalid YAML."""
+    """Return the settings of a device as text, by their keys, from the daemon's YAML. Return nothing
+    for an invalid YAML."""
     from bridges.settings.load import SettingsError, load
 
     try:
@@ -58,8 +58,8 @@ def values(file: str, device: str) -> dict[str, str]:
 
 
 def here(remedy: Remedy, file: str, device: str, known: Mapping[str, str]) -> Remedy:
-    """Return the remedy for this device. In the text, the device's own file, name and values replace
-    FILE, NAME and the names of settings."""
+    """Return the remedy for this device. In its text, replace FILE and NAME by this file and this
+    device, and replace the names of settings by the device's values."""
     names = {"FILE": shlex.quote(file)} if file else {}
     names |= (
         dict.fromkeys(("NAME", "LIFT", "DOOR", "CHARGER"), shlex.quote(device)) if device else {}

@@ -1,7 +1,8 @@
-"""Serves the alarm that a daemon's devices raise for the fleets. The alarm has its own thread.
+"""Serves the alarm that a daemon's devices raise to stop the robots of fleets. The alarm has its own
+thread.
 
-The devices' threads put their causes into this node's inbox. So a slow disk delays no scan. The memory
-is on disk before a message is published (`keeper.py`).
+The devices' threads put the causes that they see into this node's inbox. So a slow disk delays no scan
+of a device. The alarm's memory is written to disk before a message is published (`keeper.py`).
 """
 
 import logging
@@ -41,12 +42,12 @@ QUIET_S: Final = 3.0
 """The silence (s) after which another node of ours counts as dead. A node states its alarm each second,
 so three statements are missing."""
 ALARM: Final = "alarm"
-"""The name of the only subject, which is the alarm."""
+"""The name of this node's only subject, which is the alarm itself."""
 
 
 class MessagesOnly(NoWriter):
-    """A writer that records only messages, and no decisions. An alarm's decisions have values that a
-    recording of the daemon's kind cannot hold."""
+    """A writer that records only messages, and no decisions. A recording has the entries of the
+    daemon's own kind, and the alarm's decisions do not fit into such entries."""
 
     def __init__(self, writer: NoWriter) -> None:
         self._writer = writer
@@ -93,7 +94,7 @@ class FleetAlarmNode(
 ):
     """The alarm of one daemon.
 
-    `tells_nobody`: publish nothing if RMF's release has no alarm that names fleets.
+    `tells_nobody`: Is nothing published if RMF's release has no alarm message that can name fleets?
     """
 
     def __init__(
@@ -120,7 +121,7 @@ class FleetAlarmNode(
             self._add(ALARM, fleet_alarm.initial())
 
     def tell(self, device: str, inputs: AlarmInputs) -> None:
-        """Take the causes that a device sees now. Any thread may call this method."""
+        """Note the causes for an alarm that a device sees now. Any thread may call this method."""
         self.inbox.put(ALARM, (self._limits.topic, DeviceTells(device, inputs)), device)
 
     def subscribe(self) -> None:
@@ -132,7 +133,7 @@ class FleetAlarmNode(
 
     def look(self) -> None:
         """Subscribe to the alarm topics that RMF's release has, if they are not yet subscribed. The
-        release may change, so the daemon calls this method each second."""
+        daemon calls this method each second, because RMF may be upgraded to another release."""
         self._name_senders()
         for topic in alarming.TOPICS.values():
             if topic.name not in self._hears and self._transport.release.has(topic.type):
@@ -141,8 +142,8 @@ class FleetAlarmNode(
                 self._hears[topic.name] = self._transport.subscribe(name, hear, others_only=True)
 
     def round(self) -> None:
-        """Do the round of a node. After the end of an alarm, wait for RENEW_S and then withdraw the
-        retained `false`. Every node has heard it by then."""
+        """Run one round, as every node does. Also withdraw the message `false` that ended an alarm,
+        RENEW_S after its publication. By then every node has heard this retained message."""
         super().round()
         memory, now = self.subjects[ALARM].memory, self._clock.monotonic()
         if memory.told is not None:
@@ -160,10 +161,10 @@ class FleetAlarmNode(
         return min(super().wake_at, self._renew_at)
 
     def beside(self, status: Status) -> Status:
-        """Return this status with the alarm's statement, faults and connections. Any thread may call
-        this method."""
+        """Return `status` together with the alarm's statement, faults and connections. Any thread may
+        call this method."""
         decision, own = self.subjects[ALARM].decision, self.status()
-        assert decision is not None  # a subject decides when it is made
+        assert decision is not None  # a new subject decides at once
         statement = alarming.statement(decision.report, self._limits.fleets)
         if (since := decision.report.since) is not None:
             wall = self._clock.wall() - (self._clock.monotonic() - since)
@@ -184,7 +185,9 @@ class FleetAlarmNode(
     def _not_told(self) -> tuple[Fault, ...]:
         if not self._untold:
             return ()
-        text = "RMF's release has no emergency_signal, and without_fleets is tell_nobody"
+        text = (
+            "RMF's release has no emergency_signal, and the YAML says without_fleets: tell_nobody"
+        )
         return (Fault("ALARM_NOT_TOLD", text),)
 
     def _publish(self, topic: Topic[Message], message: Message) -> None:
@@ -198,7 +201,7 @@ class FleetAlarmNode(
             sender = self._transport.sender()
             names = self._names(sender, topic.name) or [self._unknown(sender, topic.name)]
             event = alarming.heard(message, names)
-            if event.senders != {self._transport.name}:  # else our earlier run sent it
+            if event.senders != {self._transport.name}:  # not by our earlier run
                 name = self._named(topic).name
                 self._writer.spoken(name, message, sent=False, sender=sender)
                 self.inbox.put(ALARM, (topic, event))
@@ -215,8 +218,8 @@ class FleetAlarmNode(
         return hears.senders() if hears else []
 
     def _unknown(self, sender: Sender | None, topic: str) -> str:
-        """Return a provisional name for a sender. `look` asks for the sender's real name each
-        second."""
+        """Return a provisional name for an unknown sender. Each second, `look` tries to find the
+        sender's real name."""
         for name, (known, on) in self._unnamed.items():
             if known is sender and on == topic:
                 return name

@@ -1,9 +1,9 @@
-"""Serves a kind without hardware. The node keeps a memory for each subject, and publishes on RMF's
-graph.
+"""Serves a kind without hardware, such as a supervisor. A subject is one lift, door or site that the
+node serves. The node keeps a memory for each subject, and publishes on RMF's ROS graph.
 
-A round takes the messages that have arrived, wakes the subjects that are due, and publishes their
-messages. The daemon calls rounds in a thread (`bridges/runtime/serving.py`). Tests call rounds in
-virtual time.
+A round takes the messages that have arrived, wakes the subjects whose time has come, and publishes
+their messages. The daemon runs the rounds in a thread (`bridges/runtime/serving.py`). Tests run the
+rounds in virtual time.
 """
 
 import logging
@@ -34,18 +34,20 @@ from bridges.transports.transport import Subscription, Transport
 log = logging.getLogger(__name__)
 
 MAX_SUBJECTS = 1000
-"""The maximum number of subjects. No site has more lifts or doors, so further names are invented."""
+"""The maximum number of subjects. No site has more lifts or doors, so somebody must have invented
+further names."""
 MAX_UNSHOWN = 100
 """The maximum number of lifts or doors that publish no state. Only requests name such devices."""
 MAX_REQUESTERS = 10_000
-"""The maximum number of requesters, without those of lifts and doors in the YAML. No site has as many
-robots. Without a limit invented requesters would accumulate, because a holder is never forgotten."""
+"""The maximum number of requesters, without those of lifts and doors in the YAML. No site has so many
+robots. Without this limit invented requesters would accumulate, because the node never forgets a
+holder."""
 DEFECT = "a defect"
 
 
 def _core(kind: GraphKind[S, L, M, E, R], limits: L) -> SubjectCore[M, GraphEvent[E], None, R]:
-    """Return the kind's core. Faults with the same code and detail are the same fault, because the
-    detail names the subject."""
+    """Return the kind's core. Its faults are compared by code and detail, because the detail names the
+    subject."""
 
     def itself(fault: Fault) -> Fault:
         return fault
@@ -117,20 +119,20 @@ class GraphNode(Generic[S, L, M, E, R]):
             )
 
     def obey(self, order: OperatorReset | E) -> None:
-        """Let every subject obey a person's order. Any thread may call this."""
+        """Pass a person's order to every subject. Any thread may call this."""
         self._orders.append(order)
         self.inbox.wake()
 
     @property
     def finished(self) -> int:
-        """The number of finished steps within a round. It is always 0, because nobody counts these
+        """The number of finished steps within a round. It is always 0, because this node does not count
         steps."""
         return 0
 
     @property
     def ready(self) -> bool:
-        """Return True. A node that must not publish is also ready, because another node does its
-        work."""
+        """Return True. This holds even if another node does the work, and this node must not
+        publish."""
         return True
 
     @property
@@ -169,7 +171,8 @@ class GraphNode(Generic[S, L, M, E, R]):
         return self._refusals.counts()
 
     def status(self) -> Status:
-        """Return the node's part of the status file: silence, rivals, refusals, faults, connections."""
+        """Return the node's part of the status file: whether it must not publish, rival publishers,
+        refusals, faults, connections."""
         return {
             "passive": not self.presence.may_speak,
             "other_publishers": self.presence.rivals,
@@ -205,8 +208,8 @@ class GraphNode(Generic[S, L, M, E, R]):
 
     @contextmanager
     def _counting(self, about: str, message: object = None) -> Iterator[None]:
-        """Count a refusal, or a failure from a defect of ours. After a failure the core's memory is
-        unchanged."""
+        """Count a refused message. Also count an unexpected exception of our own code, after which the
+        core's memory is unchanged."""
         try:
             yield
         except RequestRefused as refusal:
@@ -241,8 +244,8 @@ class GraphNode(Generic[S, L, M, E, R]):
         return MaySpeak(presence.may_speak, self._must_at_once(), alone, presence.waits)
 
     def _must_at_once(self) -> bool:
-        """Return whether a subject is too urgent to wait for the end of the quiet start. Return False
-        if a rival is present."""
+        """Return whether a subject must publish at once, although the node only listens after its
+        start. Return False if a rival node publishes."""
         if self.presence.may_speak or self.presence.rivals:
             return False
         return any(self._kind.urgent(subject.memory) for subject in self.subjects.values())
@@ -280,8 +283,8 @@ class GraphNode(Generic[S, L, M, E, R]):
         return found or self._add(name, self._kind.initial(name, self._started_at))
 
     def _has_room(self, name: str, shows_itself: bool) -> bool:
-        """Return whether this name has a place. Invented names must not take the places of names in the
-        YAML, or of names that publish states."""
+        """Return whether this name can be added. The limits keep room for the names in the YAML and for
+        names that publish states, because somebody may invent other names."""
         if name in self._reserved:
             return True
         if shows_itself:
@@ -295,15 +298,15 @@ class GraphNode(Generic[S, L, M, E, R]):
             raise RequestRefused("too many requesters", f"{who} at {subject.name}")
 
     def _remembered(self, subject: Subject[M, GraphEvent[E], None, R]) -> int:
-        """Return the number of the subject's requesters. Return 0 for a subject in the YAML, because
-        the core limits that number."""
+        """Return the number of the subject's requesters. Return 0 for a subject that the YAML names,
+        because its core limits the number."""
         if subject.name in self._reserved:
             return 0
         return len(self._kind.requesters(subject.memory))
 
     def _real(self, memories: Mapping[str, M]) -> Mapping[str, M]:
-        """Return the memories to write. In a flood of names, leave out names without a published state.
-        Otherwise the next start would restore the flood."""
+        """Return the memories to write. If there are too many names without a published state, leave
+        these names out. Otherwise the next start would restore all invented names."""
         if len(memories) - len(self._shown) < MAX_UNSHOWN:
             return memories
         real = self._shown | self._reserved
@@ -331,7 +334,7 @@ class GraphNode(Generic[S, L, M, E, R]):
             self._decide(subject, event)
 
     def _will_say(self, topic: Topic[Message], message: Message) -> None:
-        """Keep the message until the round has written the memories to disk."""
+        """Hold the message back until the round has written the memories to disk."""
         self._unsaid.append((topic, message))
 
     def _say(self) -> None:
@@ -350,4 +353,4 @@ class GraphNode(Generic[S, L, M, E, R]):
 
 
 AnyGraphNode = GraphNode[Any, Any, Any, Any, Any]
-"""A node whose types are unknown here, because its kind was found by name."""
+"""A node of a kind that was found by name. Therefore the type checker does not know its types."""

@@ -1,12 +1,12 @@
-"""The guard of a daemon that a person started by hand. After a kill -9 the guard switches the outputs
-off.
+"""The guard of a daemon that a person started by hand. If the daemon is killed (kill -9), the guard
+switches its outputs off.
 
-The guard is a shell, because it only waits. It has its own session, which neither Ctrl-C nor a closed
-terminal reaches.
+The guard is a shell process, because its only task is to wait. It has its own session, which neither
+Ctrl-C nor a closed terminal reaches.
 
-The guard reads a pipe, and only the daemon has the other end open. A word from the pipe means that the
-outputs are off. If the pipe ends without a word, the daemon is dead. Under systemd, ExecStopPost does
-the guard's work.
+The guard reads a pipe, and only the daemon has the other end open. The daemon writes `off` into the
+pipe when the outputs are off. If the pipe ends without this word, the daemon is dead. Under systemd no
+guard is needed, because ExecStopPost switches the outputs off.
 """
 
 import logging
@@ -38,16 +38,17 @@ done
 """
 """The shell's program.
 
-Exit code 1 of `outputs-off` means that hardware does not answer. The program then repeats `outputs-off`
-for minutes, with growing pauses, because nobody restarts this daemon.
+If `outputs-off` exits with 1, hardware does not answer. The program then repeats `outputs-off` for
+minutes, with growing pauses, because nobody restarts this daemon.
 
-EX_UNAVAILABLE means that the dead daemon's lock was not free yet, or that another daemon serves now. A
-daemon that serves switches the outputs off itself. The program repeats `outputs-off` once.
+If `outputs-off` exits with EX_UNAVAILABLE, another process still has the dead daemon's lock, or another
+daemon serves now. Such a daemon switches the outputs off itself. Therefore the program repeats
+`outputs-off` only once.
 """
 
 
 def command(file: Path, runtime_dir: str | None) -> list[str]:
-    """Return the command that switches off the outputs of this process after its death."""
+    """Return the command that switches off this process's outputs after its death."""
     given = ["--runtime-dir", os.path.abspath(runtime_dir)] if runtime_dir else []
     return [sys.executable, "-P", "-m", "bridges.cli", "outputs-off", str(file.absolute()), *given]
 

@@ -1,7 +1,7 @@
 """The holder of a daemon's directory. The holder is the living process that `holder.json` names.
 
-A process may look for the holder without a lock, and hinders no other process. But only the lock gives
-a right to the directory (`runtime_directory.py`).
+A process may look for the holder without a lock, because reading `holder.json` disturbs nobody. But
+only the process that has the lock may use the directory (`runtime_directory.py`).
 """
 
 import os
@@ -42,9 +42,11 @@ class LockHolder(msgspec.Struct, frozen=True):
 
     @property
     def lives(self) -> bool:
-        """Return whether the process is alive. A process with another start time is another process.
+        """Return whether the process is alive. If a process has the same pid but another start time, it
+        is another process.
 
-        /proc may hide the start time from another user. In that case only `boot` and `pid` count.
+        /proc may hide the start time from another user. In that case only `boot` and `pid` are
+        compared.
         """
         if self.boot != _boot() or not _is_there(self.pid):
             return False
@@ -64,11 +66,11 @@ def ourselves(file: Path, *, serves: bool) -> LockHolder:
 
 
 def look(places: Directories) -> LockHolder | None:
-    """Return the living holder of these directories. Return None without a holder. Raises
+    """Return the living holder of these directories. Return None if there is no holder. Raises
     PermissionError.
 
-    The runtime directory comes first, because on a read-only root the state directory names an old
-    holder.
+    The runtime directory comes first. On a read-only root the state directory cannot be updated, so it
+    may name an old holder.
     """
     found = (written(folder) for folder in reversed(places.folders))
     return next((one for one in found if one and one.lives), None) or shown(places)
@@ -113,8 +115,8 @@ def _is_there(pid: int) -> bool:
 
 
 def _started(pid: int) -> int:
-    """Return a process's start in ticks since boot. Return 0 if this user may not see the start, and -1
-    for a zombie."""
+    """Return a process's start in ticks since boot. Return 0 if this user has no permission to read it,
+    and -1 for a zombie."""
     try:
         told = Path(f"/proc/{pid}/stat").read_text("utf-8", "replace").rpartition(")")[2].split()
     except OSError:

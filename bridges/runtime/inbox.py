@@ -1,5 +1,5 @@
-"""The inbox of one thread. The inbox holds events for the thread's devices or subjects. A bell wakes
-the thread."""
+"""The inbox of one thread. It holds events for the devices or subjects that the thread serves, and
+wakes the thread."""
 
 import queue
 import threading
@@ -11,8 +11,8 @@ INBOX_SIZE = 512
 dropped and counted."""
 
 MOST_NAMES = 2000
-"""The maximum number of names with events. No site has more devices, so further names are invented.
-Their events are dropped."""
+"""The maximum number of names with events. No site has more devices, so somebody must have invented
+further names. Their events are dropped."""
 
 T = TypeVar("T")
 
@@ -20,8 +20,9 @@ T = TypeVar("T")
 class Inbox(Generic[T]):
     """An inbox. Any thread puts events in, and the serving thread takes them out.
 
-    A new event replaces a waiting event with the same `key`, because a request states a level, not a
-    pulse. So a flood of repeats costs a scan only one event. Events keep the order of their arrival.
+    A new event replaces a waiting event with the same `key`. Nothing is lost, because a request states
+    what the requester wants, and only its last request counts. So a flood of repeats costs a scan only
+    one event. Events keep the order of their arrival.
     """
 
     def __init__(self) -> None:
@@ -47,7 +48,8 @@ class Inbox(Generic[T]):
         self.wake()
 
     def wake(self) -> None:
-        """Wake the thread without an event. Do nothing if the bell already rings."""
+        """Wake the thread, even if there is no event. Do nothing if the thread has been woken
+        already."""
         if not self._rung:
             self._rung = True
             self._bell.put(None)
@@ -58,7 +60,7 @@ class Inbox(Generic[T]):
         self.wake()
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for the bell. Return False if the bell has not rung within `timeout_s`."""
+        """Wait until the thread is woken. Return False if `timeout_s` has passed without this."""
         try:
             self._bell.get(timeout=max(0.0, timeout_s))
         except queue.Empty:

@@ -1,4 +1,5 @@
-"""The memory on disk of a kind without hardware, and the message about all subjects of the kind.
+"""The memory on disk of a kind without hardware, such as a supervisor. The keeper also publishes the
+one message that is about all subjects of the kind, such as a supervisor's heartbeat.
 
 The memory is written before messages are published, because other nodes act on these messages. If
 writing fails, the kind continues to serve with the fault NOT_KEPT. It tries to write again each second.
@@ -32,8 +33,8 @@ class MemoryStore(Protocol):
 
 
 class Keeper(Generic[S, L, M, E, R]):
-    """The keeper of one node's memory. `kept`: the store, or None. `tell_at`: the time of the next
-    message."""
+    """The keeper of one node's memory. `kept`: the store of the memory, or None if the memory is not
+    kept. `tell_at`: the time at which the message about all subjects is due."""
 
     def __init__(
         self, kind: GraphKind[S, L, M, E, R], kept: MemoryStore | None, publish: Publish
@@ -62,8 +63,8 @@ class Keeper(Generic[S, L, M, E, R]):
 
     @property
     def wake_at(self) -> float:
-        """The time (monotonic s) of the next message, or of the next attempt to write after a
-        failure."""
+        """The time (monotonic s) at which the keeper has work: the next message about all subjects, or
+        the next attempt to write."""
         return min(self.tell_at, self._again_at if self._fault else NEVER)
 
     @property
@@ -87,7 +88,9 @@ class Keeper(Generic[S, L, M, E, R]):
             self._kept.write(kept)
         except OSError as error:
             self._again_at = now + AGAIN_S
-            self._fails(Fault(NOT_KEPT, f"a restart would forget the last messages: {error}"))
+            self._fails(
+                Fault(NOT_KEPT, f"the memory is not on disk, so a restart would lose it: {error}")
+            )
         else:
             self._bytes = kept
             self._keeps()

@@ -1,4 +1,5 @@
-"""Two marks that a service's run leaves for the `outputs-off` after that run.
+"""Two marks, which are files that a service's run leaves for the process `outputs-off` that systemd
+starts after it.
 
 The mark `claimed` says that the run was about to claim outputs. `outputs-off` then switches these
 outputs off, even if another process has the lock.
@@ -19,7 +20,7 @@ LONGEST: Final = 64
 
 
 def leave(environ: Mapping[str, str] = os.environ, name: str = MARK) -> None:
-    """Leave a mark, if a systemd unit started this process. Raises OSError."""
+    """Write a mark, if a systemd unit started this process. Raises OSError."""
     if path := _path(environ, name):
         mark = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o640)
         try:

@@ -1,16 +1,16 @@
 """The loop of one bus and the devices on the bus.
 
-RMF's callbacks put events into the loop's inbox. A GPIO edge wakes the loop. A change of an input on a
-device's other bus wakes the loop too.
+RMF's callbacks put events into the loop's inbox. A GPIO edge wakes the loop. If a device also has
+inputs on another bus, a change of these inputs wakes the loop too.
 
 A round scans each device that is due, has events, or may have changed. The devices that answered last
 time come first. The other devices follow, the longest overdue first.
 
 A round ends after one silent device. So a reading of a live device is at most as old as its period plus
-one silent device's timeout. This holds even in the first rounds. When a device falls silent, the loop
-once loses the time of that device's retries too.
+one silent device's timeout. This holds even in the first rounds. When a device falls silent, the bus
+repeats its calls, and this one round takes longer by these retries.
 
-When the loop ends, for any cause, it switches every output off. The devices that answer come first.
+When the loop ends, for any reason, it switches every output off. The devices that answer come first.
 """
 
 import logging
@@ -30,8 +30,8 @@ from drivers.hal import Bus
 log = logging.getLogger(__name__)
 
 SUSPENDED_S = 0.5
-"""The minimum delay (s) of a wake-up that shows a suspension of the process. During this delay the loop
-did not wait for its bus."""
+"""The minimum delay (s) of a wake-up that proves that the process was suspended. Only the delay while
+the loop sleeps counts. A slow bus does not count."""
 
 
 class Loop:
@@ -102,8 +102,8 @@ class Loop:
         return all(safe)
 
     def _notice_suspension(self) -> None:
-        """Note in every node that the process was stopped, or that the machine slept, during the loop's
-        idle time."""
+        """Tell every node that the process was stopped, or that the machine was suspended, while the
+        loop slept."""
         late_s = self._clock.monotonic() - max(self.wake_at, self._ran_at)
         if late_s > SUSPENDED_S:
             log.warning(pairs("suspended", bus=self.bus_name, for_s=f"{late_s:.1f}"))
@@ -144,8 +144,8 @@ class Loop:
         self.inbox.wake()
 
     def _take_edge(self) -> None:
-        """Make every device due if an edge has come. An edge during this round counts in the next
-        round."""
+        """Make every device due if an edge has come. An edge that comes during this round takes effect
+        in the next round."""
         if self._edge:
             self._edge = False
             self._due = dict.fromkeys(self._due, AGES_AGO)

@@ -1,8 +1,8 @@
 """A person's order to a running daemon: a reset, a drill, or a decision about a workcell's requests.
 
-A file in the runtime directory has the order, and a signal tells the daemon to read the file. The file
-names the daemon's process, so that no later daemon obeys it. A signal without a file is a reset. The
-daemon answers in its status file, when every device has taken the order.
+The order is a file in the runtime directory, and a signal tells the daemon to read the file. The file
+names the daemon's process, so that a daemon that starts later does not obey the order. A signal without
+a file is a reset. When every device has decided about the order, the daemon answers in its status file.
 """
 
 import json
@@ -37,16 +37,22 @@ log = logging.getLogger(__name__)
 ORDER: Final = "order.json"
 LONGEST: Final = 65536
 ANSWERS_WITHIN_S: Final = 10.0
-"""The time (s) in which the command waits for the daemon's answer. The daemon writes its status each
-second, and a device on a silent bus takes an order with its next scan."""
+"""The time (s) for which the command waits for the daemon's answer. It is long enough, because the
+daemon writes its status each second. Only a device on a silent bus takes longer, because it reads
+the order at its next scan."""
 LOOK_EVERY_S: Final = 0.05
 REFUSED: Final = 4
 """The exit code of a command whose order was refused."""
 
 
 class PersonsOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """An order, its device ("" for every device), and the daemon that must obey. Without `verdict` and
-    `drill_s` (s) the order is a reset. `id` names the order in the daemon's answer."""
+    """An order, and the daemon that must obey it.
+
+    - `device`: the device that must obey, or "" for every device
+    - `id`: the name of the order in the daemon's answer
+    - `verdict`, `drill_s` (s): the decision, or the duration of the drill. Without both, the order is a
+      reset.
+    """
 
     pid: int
     started: int
@@ -57,7 +63,7 @@ class PersonsOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def event(self) -> OrderedByPerson:
-        """The event for the cores."""
+        """The event that tells the devices' cores about the order."""
         if self.drill_s is not None:
             return DrillOrdered(self.drill_s)
         return self.verdict or OperatorReset()
@@ -83,13 +89,16 @@ def places_of(file: Path, given: str | None) -> Directories | None:
 
 
 def give(file: Path, places: Directories, **order: Any) -> int:
-    """Give an order (the fields of `PersonsOrder`) to the daemon of this file, and wait for its answer.
-    Print why it was not obeyed. Return the exit code. Raises PermissionError if this user may not see
-    or signal the daemon."""
+    """Give an order to the daemon of this file, and wait for the daemon's answer. `order` has fields of
+    `PersonsOrder`.
+
+    If the daemon does not obey, print the reason. Return the exit code. Raises PermissionError if this
+    user may not see or signal the daemon.
+    """
     found = holder.look(places)
     if found is None or not found.serves or not found.started:  # another process may have this pid
         why = (
-            f"{found}, which is not a daemon of this version"
+            f"held by {found}, which is not a daemon of this version"
             if found
             else "no process holds this directory"
         )
@@ -121,7 +130,8 @@ def _wait(file: Path, places: Directories, given: PersonsOrder) -> int:
 
 
 def status_of(places: Directories) -> Mapping[str, Any] | None:
-    """Return the status of the living daemon; None if it has not written one yet."""
+    """Return the status of the living daemon. Return None if the daemon has not written a status
+    yet."""
     daemon = holder.look(places)
     try:
         with opened(places.runtime):

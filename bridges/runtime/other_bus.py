@@ -1,9 +1,9 @@
-"""The inputs that a device has on another bus than its own. The other bus's thread reads the inputs,
-and the device's thread takes them.
+"""The inputs of a device that are on another bus than the device itself. The other bus's thread reads
+these inputs, and the device's thread takes the values.
 
-The two threads share one Handover. A dead bus delays no other bus, because the device's thread only
-looks at the last reading. If that reading is late or failed, the device counts as not read. The effect
-is that of a cut cable on the device's own bus.
+The two threads share one Handover, which holds the last reading. The device's thread never waits for a
+reading. So a dead bus delays no other bus. If the last reading is late or failed, the device counts as
+not read, as if a cable of the device's own bus were cut.
 """
 
 import logging
@@ -22,8 +22,12 @@ log = logging.getLogger(__name__)
 
 
 class OtherReading(Struct, frozen=True):
-    """One reading of the inputs. `shown`: for each signal, whether it is asserted. `read_at`: the time
-    before the reading (monotonic s). `why_not`: the reason why nothing was read, or ""."""
+    """One reading of the inputs.
+
+    - `shown`: for each signal, whether it is asserted
+    - `read_at`: the time (monotonic s) just before the reading
+    - `why_not`: the reason why nothing was read, or ""
+    """
 
     shown: Mapping[str, bool] = {}
     read_at: float = AGES_AGO
@@ -31,10 +35,11 @@ class OtherReading(Struct, frozen=True):
 
 
 class Handover:
-    """The last reading of one device's inputs on another bus. One thread writes it, and one thread
-    reads it.
+    """The last reading of one device's inputs on another bus. One thread writes the reading, and one
+    other thread reads it.
 
-    `lasts_s`: the time (s) for which a reading counts as present. The writer's thread calls `changed`.
+    `lasts_s`: the time (s) for which a reading is valid. `changed`: a callback that the writing thread
+    calls after a change.
     """
 
     def __init__(self, bus: str, lasts_s: float, clock: Clock) -> None:

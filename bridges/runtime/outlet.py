@@ -21,10 +21,11 @@ Named = Callable[[Topic[Message]], Topic[Message]]
 
 
 class Outlet:
-    """The publishers of one node. They are declared while the node may publish.
+    """The publishers of one node. They are declared only while the node may publish.
 
-    RMF's release may lack a message, and `bridges/messages/fallbacks.py` has substitutes. An alarm and
-    its end go out on the same topic, even if the release changes in between.
+    If RMF's release lacks a message, the outlet publishes a substitute
+    (`bridges/messages/fallbacks.py`). An alarm and its end are published on the same topic, even if the
+    release changes in between.
     """
 
     def __init__(self, transport: Transport, named: Named, writer: NoWriter = NOBODY) -> None:
@@ -44,8 +45,8 @@ class Outlet:
                 self._end(topic)
 
     def publish(self, topic: Topic[Message], message: Message) -> bool:
-        """Publish a message. Return False if the message was not sent. This is a fault until a later
-        message is sent."""
+        """Publish a message. Return False if the message was not sent. Then the node has a fault until
+        a later message of the topic is sent."""
         way, wanted = self._way(topic, message)
         if wanted is None:
             if isinstance(message, Alert):
@@ -61,7 +62,8 @@ class Outlet:
         return True
 
     def failed(self, topic: Topic[Message], error: Exception) -> None:
-        """Note that a message was not published. Log only the first such message."""
+        """Note that a message was not published. Log only the first of successive failures on a
+        topic."""
         self._once.failed(topic.name, error)
 
     @property
@@ -74,7 +76,8 @@ class Outlet:
     def _way(
         self, topic: Topic[Message], message: Message
     ) -> tuple[Topic[Message], Message | None]:
-        """Return the topic and the message to send. The message is None if it is only logged."""
+        """Return the topic and the message to send. Return None for the message if it must only be
+        logged."""
         if self._transport.release.has(topic.type) and topic.name not in self._instead:
             return topic, message
         if topic.name in INSTEAD:

@@ -1,14 +1,15 @@
-"""Switches off the outputs that a dead daemon left on, before this daemon claims outputs.
+"""Switches off the outputs that a dead daemon left on, before this daemon claims outputs. Each dead
+daemon has left a record of its outputs (`record.py`).
 
-The separate process `outputs-off` does the work, as after every death of a daemon. If that process
-hangs, this daemon does not hang. That process uses the dead daemon's profiles.
+The separate process `outputs-off` does the work, as after every death of a daemon. So this daemon does
+not hang if the process hangs. The process uses the profiles in the dead daemon's record.
 
-Devices that do not answer are reported. While this daemon serves, it tries again to switch them off.
-Devices in our own record are not tried again. `SafeFirst` switches such a device off when the device
-first answers.
+Devices that do not answer are reported. While this daemon serves, it repeats the attempts to switch
+them off. It does not repeat this for devices that are in its own record too. `SafeFirst` switches such
+a device off when the device first answers.
 
-Another process may already have tried the devices, after the death or at boot. In that case the start
-of this daemon does not try them.
+Another process may already have tried the devices, after the death or at boot. In that case this daemon
+does not try them again at its start.
 """
 
 import logging
@@ -25,7 +26,8 @@ from drivers import Driver
 log = logging.getLogger(__name__)
 
 PATIENCE_S = 15.0
-"""The longest wait (s) for `outputs-off`. It gives up after 5 s, but starts late on a slow machine."""
+"""The longest wait (s) for the process `outputs-off`. The process itself gives up after 5 s, but may
+need long to start on a slow machine."""
 PAUSE_FIRST_S, PAUSE_MOST_S = 5.0, 60.0
 
 
@@ -48,10 +50,10 @@ class Predecessor:
 
     def make_safe(self, wait: Callable[[float], bool]) -> frozenset[str]:
         """Switch off the outputs that dead daemons left on, before this daemon claims outputs. Return
-        the devices of our own record that are not verified off.
+        the devices in our own record that are not verified off.
 
-        Wait for the end of `outputs-off`, but at most PATIENCE_S. `wait(s)` returns True if the daemon
-        must end, and then the wait ends too.
+        Wait for the end of `outputs-off`, but at most PATIENCE_S. `wait(s)` waits, and returns True if
+        the daemon must end. In that case, stop waiting for `outputs-off`.
         """
         found = self._records.unreleased()
         if found:
@@ -78,7 +80,8 @@ class Predecessor:
             self._start(self.left())
 
     def close(self) -> None:
-        """End the attempts. The `outputs-off` after this daemon handles the remaining records."""
+        """Stop the attempts. The `outputs-off` that runs after this daemon's end handles the remaining
+        records."""
         if self._child is not None:
             self._child.kill()
             self._child.wait()
@@ -116,8 +119,9 @@ class Predecessor:
 
 
 class SafeFirst:
-    """A driver around the driver of a silent device. A dead daemon may have left this device on. When
-    the device first answers, its outputs are switched off before anything else happens."""
+    """A driver that wraps the driver of a silent device, because a dead daemon may have left this
+    device on. When the device first answers, its outputs are switched off before anything else
+    happens."""
 
     def __init__(self, name: str, driver: Driver[Any, Any]) -> None:
         self._name = name

@@ -1,7 +1,9 @@
-"""Decides whether a node without hardware may publish. Only one node may serve a graph.
+"""Decides whether a node without hardware may publish, because only one such node may serve RMF's ROS
+graph. A rival is another node that publishes on our topics.
 
-A node may publish after the kind's quiet time, if it was alone on its topics during that time. It
-declares its publishers only then. So a waiting node does not count as a rival.
+At first a node only listens. It may publish when it has seen no rival on its topics during the kind's
+quiet time. It declares its publishers only then, so a node that still listens does not count as a
+rival.
 """
 
 import logging
@@ -24,15 +26,15 @@ LOOK_EVERY_S = 0.25
 """The interval (s) between two looks for other nodes on the graph."""
 MOST_NAMED: Final = 3
 SPREAD_LEAST_S, SPREAD_MOST_S = 0.5, 3.0
-"""The limits (s) of a random time. A node that has met a rival listens longer by this time. Discovery
-needs less time."""
+"""The limits (s) of a random time. A node that has met a rival listens longer by this random time. Even
+the smallest random time is longer than discovery takes."""
 
 
 class Presence:
-    """The lookout for rivals. `kind`: a name for the log.
+    """The watch for rivals. `kind`: a name for the log.
 
-    `rivals`: the number of other nodes' publishers on our topics. `rivals_do`: the rivals and their
-    topics, such as `/desk publishes lift_requests`, or "" without rivals.
+    `rivals`: the number of other nodes' publishers on our topics. `rivals_do`: a text about the rivals
+    and their topics, such as `/desk publishes lift_requests`, or "" without rivals.
     """
 
     def __init__(self, kind: str, quiet_s: float) -> None:
@@ -53,19 +55,20 @@ class Presence:
 
     @property
     def waits(self) -> str:
-        """The reason for our silence, for requesters that wait for us."""
+        """Return the reason why this node does not publish. It is a text for requesters that wait for
+        this node."""
         return f"while {self.rivals_do}" if self.rivals else LISTENS
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """The fault PASSIVE if a rival keeps us silent. This is a fault because the rival may not do
-        our work."""
+        """Return the fault PASSIVE if a rival keeps this node from publishing. This is a fault, because
+        the rival may not do this node's work."""
         if not self.rivals:
             return ()
         return (Fault("PASSIVE", f"{self.rivals_do}, so this node only listens"),)
 
     def look(self, now: float) -> None:
-        """Look for rivals, if a look is due."""
+        """Look for rivals, if LOOK_EVERY_S has passed or the quiet time has ended."""
         if now < self.look_at:
             return
         self._count(now)
@@ -94,8 +97,8 @@ class Presence:
         return f"{who or 'another node'} publishes {' and '.join(heard)}"
 
     def _set(self, yes: bool) -> None:
-        """Start or stop publishing. If two nodes began at the same time, each node stops for a random
-        time."""
+        """Start or stop publishing. After a stop, draw a random time for the next quiet time. Without
+        it, two nodes that began at the same time would stop and start together."""
         if yes == self.may_speak:
             return
         self.may_speak = yes

@@ -3,11 +3,11 @@ off. The daemon writes the record before it claims outputs.
 
 The record holds the YAML and the validated settings. `outputs-off` uses the settings. If another
 version wrote the settings, they may be undecodable. Only in that case does `outputs-off` load and check
-the YAML. Keys that another version has added are ignored.
+the YAML. It ignores keys of a record that this version does not know.
 
-A record is a file, and its name is a hash of its content. So a daemon that restarts on the same YAML
-finds its record, and a daemon on another YAML overwrites no record. The file is in the daemon's state
-directory, or in its runtime directory if the state directory cannot be written.
+A record is a file, and the file's name is a hash of the record. So a daemon that restarts on the same
+YAML finds its record, and a daemon on another YAML overwrites no record. The file is in the daemon's
+state directory, or in its runtime directory if the state directory cannot be written.
 
 Records hold no tokens, because tokens are in files of their own.
 """
@@ -33,12 +33,12 @@ log = logging.getLogger(__name__)
 
 PATTERN = "claimed-*.json"
 SIZE_MAX = 64 << 20
-"""The maximum size (bytes) of a record. No YAML with its profiles and DBC files is as large."""
+"""The maximum size (bytes) of a record. No YAML with its profiles and DBC files is so large."""
 
 
 class ClaimedSettings(msgspec.Struct, frozen=True):
-    """The validated settings of a YAML, each as JSON. `version`: the version of the program that wrote
-    them."""
+    """The validated settings of a YAML. Each setting is encoded as JSON. `version`: the version of the
+    program that wrote the settings."""
 
     version: str
     kind: str
@@ -48,11 +48,13 @@ class ClaimedSettings(msgspec.Struct, frozen=True):
 
 
 class Claimed(msgspec.Struct, frozen=True):
-    """A record without settings. `file`: the YAML's path. `yaml`: the YAML's text. `texts`: each
-    profile or DBC file, by name.
+    """A record without settings. Every version can read the fields from `file` to `safe`.
 
-    `safe`: the devices that are verified off. Every version can read the fields from `file` to `safe`.
-    `tried`: a process has tried once to switch off all other devices.
+    - `file`: the YAML's path
+    - `yaml`: the YAML's text
+    - `texts`: maps the name of each profile or DBC file to its text
+    - `safe`: the devices that are verified off
+    - `tried`: Has a process already tried to switch off all other devices?
     """
 
     file: str
@@ -71,7 +73,7 @@ class ClaimRecord(Claimed, frozen=True):
     def name(self) -> str:
         """The name of the record's file, which is a hash of the claim."""
         claimed = msgspec.structs.asdict(self) | {"safe": ()}
-        del claimed["tried"]  # older versions lack this field and compute the same name
+        del claimed["tried"]  # older versions lack this field, but must compute the same name
         return f"claimed-{hashlib.sha256(msgspec.json.encode(claimed)).hexdigest()[:16]}.json"
 
     def config(self) -> Config:
@@ -89,7 +91,8 @@ class ClaimRecord(Claimed, frozen=True):
 
 
 def of(config: Config) -> ClaimRecord:
-    """Return the record of this config. The process must not have loaded another config."""
+    """Return the record of this config. The process must have loaded no other config, because the
+    record takes all profiles that are loaded."""
     known = dict(sorted(texts.all_known().items()))
     return ClaimRecord(named(config.path), config.text, known, claim=_claim(config))
 
@@ -111,7 +114,7 @@ def _claimed(record: ClaimRecord, claim: ClaimedSettings) -> Config:
         text=record.yaml,
         kind=claim.kind,
         driver=claim.driver,
-        rmf=Rmf(),  # RMF is not needed to switch outputs off
+        rmf=Rmf(),  # a connection to RMF is not needed
         buses={
             name: msgspec.json.decode(text, type=names.bus_called(kind).settings)
             for name, (kind, text) in claim.buses.items()
@@ -122,8 +125,8 @@ def _claimed(record: ClaimRecord, claim: ClaimedSettings) -> Config:
 
 
 def _device(claim: ClaimedSettings, text: bytes) -> msgspec.Struct:
-    """Return a device's settings, decoded for its driver. This is the device's own driver, or else the
-    file's driver."""
+    """Return a device's settings, decoded for the device's driver. The device may name its own driver.
+    Otherwise it has the file's driver."""
     own = msgspec.json.decode(text, type=_OwnDriver).driver or claim.driver
     device: msgspec.Struct = msgspec.json.decode(
         text, type=names.driver_called(claim.kind, own).settings
@@ -171,7 +174,7 @@ class Records:
         raise refused
 
     def still_unsafe(self, record: ClaimRecord, devices: Collection[str], config: Config) -> None:
-        """Write into the record that all devices are verified off, except `devices`. Raises OSError."""
+        """Note in the record that only `devices` are not yet verified off. Raises OSError."""
         safe = tuple(name for name in config.devices if name not in devices)
         self.write(msgspec.structs.replace(record, safe=safe, tried=True))
 
@@ -205,5 +208,5 @@ def _decoded(content: bytes) -> ClaimRecord:
     """Decode a record. Raises MsgspecError or UnicodeDecodeError."""
     try:
         return msgspec.json.decode(content, type=ClaimRecord)
-    except msgspec.ValidationError:  # another version wrote the settings; the YAML is enough
+    except msgspec.ValidationError:  # another version wrote these settings, so keep the YAML
         return ClaimRecord(**msgspec.structs.asdict(msgspec.json.decode(content, type=Claimed)))

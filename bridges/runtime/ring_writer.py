@@ -1,8 +1,8 @@
-"""Records a daemon's readings, decisions and messages in its ring.
+"""Records a daemon's readings, decisions and messages in its ring, which is a file of limited size.
 
 A scan only puts events into a queue, which takes less than a microsecond. After the outputs are written
-and the states are published, `flush` encodes the queue and appends it to the ring. A writer that fails
-loses entries, but raises nothing and delays no scan.
+and the states are published, `flush` encodes the events and appends them to the ring. If writing fails,
+entries are lost, but nothing is raised and no scan is delayed.
 """
 
 import struct
@@ -28,16 +28,17 @@ from bridges.runtime.clock import Clock
 from bridges.runtime.runtime_directory import Once
 
 KNOWN_EVERY_S: Final = 60.0
-"""The interval (s) at which all known state is written again. A recording can begin at such a place."""
+"""The interval (s) at which all known state is written again. A reader can begin to replay at each of
+these places."""
 MOST_WAITING: Final = 20_000
 SAME_AT_ONCE: Final = 20
-"""The number of unchanged readings in one entry. A kill of the daemon loses at most twice this number
-of readings of a device."""
+"""The number of unchanged readings that are written as one entry. If the daemon is killed, at most
+twice this number of readings of each device are lost."""
 LONGEST_SAME: Final = 400
 """The maximum size (bytes) of an entry with unchanged readings."""
 MOST_SPOKEN_PER_S: Final = 200.0
-"""The maximum rate (messages per second) of recorded messages. Further messages are only counted,
-because a flood must not delay a scan."""
+"""The maximum rate (messages per second) at which messages are recorded. Above this rate messages are
+only counted, because a flood must not delay a scan."""
 STEP_S: Final = 0.05
 AGAIN_S: Final = 10.0
 """The pause (s) between the failure of a ring and the next attempt to make a ring."""
@@ -50,7 +51,7 @@ class NoWriter:
         self, subject: str, before: object, event: object, now: float, decision: AnyDecision
     ) -> None:
         """Note a core's decision. `before`: the subject's memory before the decision. If a reading
-        changes nothing but its time, `event` is the same object as the last time."""
+        repeats the last reading, `event` must be the same object as the last time."""
 
     def published(self, subject: str, memory: object, now: float) -> None:
         """Note that a report was published. `memory`: the core's memory after the publication."""
@@ -65,8 +66,8 @@ class NoWriter:
         known."""
 
     def flush(self) -> None:
-        """Write the noted events. The daemon calls this method when nothing urgent waits. A few
-        repeated readings wait for the next call."""
+        """Write the noted events. The daemon calls this method when it has no urgent work. A few
+        repeated readings may stay in the queue until a later call."""
 
     def look(self) -> None:
         """Make a new ring if needed. The daemon's main thread calls this method each second."""
@@ -142,7 +143,7 @@ class RingWriter(NoWriter):
     def flush(self) -> None:
         if not self._news and len(self._waiting) < SAME_AT_ONCE:
             return
-        if self._lock.acquire(blocking=False):  # otherwise another thread is flushing
+        if self._lock.acquire(blocking=False):  # if not, another thread flushes
             try:
                 self._drain()
             except Exception as error:  # noqa: BLE001 - logged by _failed
@@ -158,7 +159,7 @@ class RingWriter(NoWriter):
                 self._again_at = now
             if self._ring is None and now >= self._again_at:
                 self._open(now)
-        self._news = True  # so that repeated readings wait for a second at most
+        self._news = True  # so that repeated readings are written within a second
         self.flush()
 
     def _open(self, now: float) -> None:
@@ -176,7 +177,7 @@ class RingWriter(NoWriter):
         self._fresh()
         if ring is not None:
             with suppress(OSError):
-                ring.close(ended=True)  # only the ring ends; the daemon continues
+                ring.close(ended=True)  # only the ring ends here, and the daemon continues
 
     def _fresh(self) -> None:
         """Reset the writer's state for an empty ring."""
@@ -199,8 +200,8 @@ class RingWriter(NoWriter):
         self._write()
 
     def _tell_time(self) -> None:
-        """Write the wall clock's time if that clock has stepped. After each KNOWN_EVERY_S, write all
-        known state."""
+        """Write the wall clock's time if that clock was set. Every KNOWN_EVERY_S, write all known state
+        instead."""
         now = self._clock.monotonic()
         offset_s = self._clock.wall() - now
         stepped = abs(offset_s - self._offset_s) > STEP_S
@@ -243,8 +244,8 @@ class RingWriter(NoWriter):
             self._say_same(name)
 
     def _say_same(self, name: str) -> None:
-        """Write the times at which the last reading was repeated. The segment has room for this
-        entry."""
+        """Write the times at which the last reading was repeated. `_fits` always reserves room for this
+        entry in the segment."""
         subject = self._same.pop(name, None)
         if subject is not None:
             times, subject.times = subject.times, []
@@ -318,8 +319,8 @@ class RingWriter(NoWriter):
         return self._ring.fits(len(self._out) + length + FRAME.size + reserved)
 
     def _know(self, now: float) -> None:
-        """Write all known state into this segment. If it has too little room, begin the next
-        segment."""
+        """Write all known state into this segment. If the segment has too little room, begin the next
+        segment with it."""
         self._say_all_same()
         known = self._all_known(now)
         if not self._fits(sum(len(content) + FRAME.size for content in known)):
@@ -330,8 +331,8 @@ class RingWriter(NoWriter):
             self._frame(content)
 
     def _next_segment(self, now: float) -> None:
-        """Begin the next segment with the known state. If the state needs more than half of the
-        segment, leave out the remaining subjects."""
+        """Begin the next segment with the known state. If the state would fill more than half of the
+        segment, leave out the subjects that do not fit."""
         assert self._ring is not None
         self._say_all_same()
         self._write()

@@ -1,6 +1,7 @@
 """Starts the daemon as a ROS node: `ros2 launch rmf_bridges <kind>.launch.py config:=FILE`.
 
-After any death of the daemon its guard runs `rmf-bridge outputs-off` (`bridges/runtime/guard.py`).
+After any death of the daemon, a shell process (its guard) runs `rmf-bridge outputs-off`
+(`bridges/runtime/guard.py`).
 
 Only the launch files in `ros/launch/` import this module. Each kind has one launch file. `ros2` runs
 this module with ROS's own Python. That Python has `launch` and `yaml`, but none of the other packages
@@ -19,7 +20,7 @@ __all__ = ["LaunchDescription", "daemon"]
 
 
 def daemon(kind: str) -> LaunchDescription:
-    """Return the launch description for one kind. A file of another kind starts nothing."""
+    """Return the launch description for one kind. If the YAML has another kind, nothing is started."""
     return LaunchDescription(
         [
             DeclareLaunchArgument("config", description=f"the YAML of the {kind}"),
@@ -27,7 +28,7 @@ def daemon(kind: str) -> LaunchDescription:
                 "simulate",
                 default_value="false",
                 choices=["true", "false"],
-                description="fake hardware, and this machine's nodes only",
+                description="use fake hardware, and talk only to this machine's nodes",
             ),
             OpaqueFunction(function=lambda context: _actions(kind, context)),
         ]

@@ -1,13 +1,14 @@
-"""A daemon's files while it runs: its lock, its name, its status and its record.
+"""The files of a daemon while it runs: its lock, its holder, its status and its record.
 
-- `holder.lock`: the lock of the daemon, of `outputs-off`, or of a walk. Other users may not open this
-  file, because they could then take the lock and block `outputs-off`.
-- `holder.json`: the name of the lock's holder, for other processes (`bridges/runtime/holder.py`)
+- `holder.lock`: the lock. Its holder is the daemon, `outputs-off`, or a walk (a test of the wiring by a
+  person). Other users may not open this file, because they could then take the lock and block
+  `outputs-off`.
+- `holder.json`: names the lock's holder, for other processes (`bridges/runtime/holder.py`)
 - `status.json`: the state of every device, for people and scripts
-- `claimed-….json`: the record (`bridges/runtime/record.py`)
+- `claimed-….json`: the record of claimed outputs (`bridges/runtime/record.py`)
 
-The daemon also serves without these files. It logs a failed write once and tries again each second,
-even after somebody has removed the directory.
+The daemon serves even if it cannot write these files. It logs a failed write once and tries again each
+second, even after somebody has removed the directory.
 """
 
 import fcntl
@@ -43,7 +44,8 @@ KEPT = "kept.json"
 KEPT_MAX = 64 << 20
 LOCK = "holder.lock"
 WAIT_S = 7.0
-"""The time (s) for which a starting daemon waits for `outputs-off`, which takes less."""
+"""The time (s) for which a starting daemon waits for `outputs-off`. `outputs-off` takes less time than
+this."""
 LOOK_EVERY_S = 0.05
 
 
@@ -52,7 +54,7 @@ class AlreadyRunning(Exception):
 
 
 def find(file: Path, given: str | None) -> Directories:
-    """Return the directories of this file's daemon. `bridges/system/directories.py` has the rule.
+    """Return the directories of this file's daemon, by the rule in `bridges/system/directories.py`.
 
     Raises PermissionError if the service's directory cannot be read.
     """
@@ -74,19 +76,19 @@ def _in_use(folder: Path, found: LockHolder | None) -> str:
         return f"{folder / LOCK} is locked by an unnamed program: end that program"
     if not found.serves:
         used = "a walk, a kill test or outputs-off"
-        return f"{folder} is in use by {found} ({used}): wait for its end"
+        return f"{folder} is in use by {found} ({used}): wait until that process has ended"
     stop = f"Ctrl-C where it runs, or kill {found.pid}"
     if folder.parent in (SERVICE_RUN, SERVICE_STATE):
         stop = f"sudo systemctl stop rmf-bridge@{folder.name}"
     return (
         f"{Path(found.file).name} is already running: {found}; rmf-bridge status shows it."
-        f" A device has one daemon. To stop this process: {stop}"
+        f" A device can have only one daemon. To stop this process: {stop}"
     )
 
 
 def state_file(file: Path) -> Path:
-    """Return the path of a file that outlives the daemon and a reboot. The file is in systemd's state
-    directory, or else in the user's state directory."""
+    """Return the path of a file that remains after the daemon's end and after a reboot. The file is in
+    systemd's state directory. Without systemd it is in the user's state directory."""
     given = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
     return Path(given or state_base() / file.stem).absolute() / KEPT
 
@@ -94,8 +96,8 @@ def state_file(file: Path) -> Path:
 class MemoryFile:
     """A file that is always replaced as a whole. When `write` returns, the content is on disk.
 
-    `instead`: the path to use if `path` cannot be written. If both paths have a file, the file at
-    `instead` is newer.
+    `instead`: the path to use if `path` cannot be written. If both files exist, the file at `instead`
+    is the newer one.
     """
 
     def __init__(self, path: Path, instead: Path | None = None) -> None:
@@ -131,12 +133,14 @@ def _replace(path: Path, content: bytes) -> None:
 
 
 class Once:
-    """A log filter for an action that is repeated. It logs the first of several failures, and then the
-    first success.
+    """A log filter for an action that is repeated. It logs only the first of successive failures, and
+    then the first success.
 
-    `fails` is the name of the failure's log event, and `again` that of the success. `key` is the log
-    key that names the action. `level` is the log level of a failure. `wrong` maps each action that
-    fails now to its error.
+    - `fails`: the log event for a failure
+    - `again`: the log event for the success after it
+    - `key`: the log key that names the action
+    - `level`: the log level of a failure
+    - `wrong`: maps each action that fails now to its error
     """
 
     def __init__(
@@ -164,7 +168,7 @@ class Once:
 class RuntimeDirectory:
     """The lock, the status and the record of one process.
 
-    `serves`: the process is a daemon, so it accepts a reset.
+    `serves`: Is the process a daemon, which obeys a person's orders?
     """
 
     def __init__(
@@ -202,7 +206,8 @@ class RuntimeDirectory:
                 self._once.failed("record", error)
 
     def write_status(self, json: bytes) -> None:
-        """Replace the status file. Also write any other file that is missing."""
+        """Replace the status file. Also write the lock, `holder.json` and the record again if they are
+        missing."""
         for folder in self.places.folders:
             self._lock(folder)
         self._sign(self._holder)
@@ -223,7 +228,7 @@ class RuntimeDirectory:
 
     def _unlock(self) -> None:
         for lock in self._locks.values():
-            fcntl.flock(lock, fcntl.LOCK_UN)  # a child has a copy, so closing is not enough
+            fcntl.flock(lock, fcntl.LOCK_UN)  # needed, because a child has a copy of `lock`
             os.close(lock)
         self._locks.clear()
 
@@ -251,7 +256,7 @@ class RuntimeDirectory:
             return True
 
     def _has(self, folder: Path) -> bool:
-        """Return whether we have the lock of the folder's present lock file."""
+        """Return whether we have the lock of the lock file that is now in the folder."""
         lock = self._locks.get(folder)
         try:
             return lock is not None and os.path.samestat(os.fstat(lock), os.lstat(folder / LOCK))
@@ -273,7 +278,8 @@ class RuntimeDirectory:
         return True
 
     def _sign(self, name: LockHolder) -> None:
-        """Write this name beside each lock that we have. Do nothing if the name is already there."""
+        """Write this holder into `holder.json` beside each lock that we have. Do nothing if it is
+        already there."""
         for folder in filter(self._has, self._locks):
             try:
                 if holder.written(folder) != name:
@@ -295,8 +301,8 @@ class RuntimeDirectory:
 
 
 def _lock_in(directory: int) -> int:
-    """Open the lock file for writing. If this user may not write it, open it for reading, which is
-    enough for a lock."""
+    """Open the lock file for writing. If this user may not write the file, open it for reading, because
+    that is enough for a lock."""
     flags = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
     try:
         return os.open(LOCK, flags | os.O_RDWR | os.O_CREAT, 0o600, dir_fd=directory)
@@ -307,8 +313,8 @@ def _lock_in(directory: int) -> int:
 def held(
     file: Path, given: str | None, *, serves: bool, simulated: bool = False
 ) -> RuntimeDirectory:
-    """Lock the directories for this file, and return them. A simulation never takes a service's
-    directories.
+    """Lock the directories for this file, and return them. A simulation never locks the directories of
+    a service.
 
     Raises AlreadyRunning or PermissionError.
     """

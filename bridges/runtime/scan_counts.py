@@ -11,7 +11,8 @@ change all the time."""
 
 
 class ScanCounts:
-    """The counts of one device. The device's thread counts, and the main thread reads the counts."""
+    """The counts of one device. The device's own thread changes the counts, and the main thread reads
+    them."""
 
     def __init__(self) -> None:
         self._scans = self._failed = 0
@@ -46,7 +47,8 @@ class ScanCounts:
         """Count each output that was switched on. In a group of outputs, also count a change to another
         output.
 
-        Only levels count. A charger's numbers of orders do not count, because they are no relays.
+        Only outputs that are switched on or off count. The numbers of a charger's orders do not count,
+        because they switch no relay.
         """
         for name, value in outputs.items():
             if value and isinstance(value, bool | str) and value != self._outputs.get(name):

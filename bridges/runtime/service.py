@@ -1,4 +1,5 @@
-"""The service of a daemon. It serves devices on buses, or a kind without hardware.
+"""The service of a daemon. It serves either devices on buses, or a kind without hardware, such as a
+supervisor.
 
 In both cases the service has threads, subscribes to RMF's topics, and reports a status.
 """
@@ -49,11 +50,11 @@ from drivers.hal.points import Points
 log = logging.getLogger(__name__)
 
 FIRST_S: Final = 0.5
-"""The time (s) for which a device's first scan waits for the first reading of the device's other
-bus."""
+"""The time (s) for which a device's first scan waits for a first reading of inputs on another bus."""
 
 NOBODY_OBEYS: Final = (
-    "no device of this file obeys this order: a drill needs `alarm`, a decision a workcell"
+    "no device of this file obeys this order: a drill needs a device with `alarm`, and a decision"
+    " needs a workcell"
 )
 
 OpenBus = Callable[[str], Bus]
@@ -73,8 +74,8 @@ class Service(Protocol):
         """Pass on a person's order to one device, or to every device ("")."""
 
     def refusals(self) -> Mapping[str, str] | None:
-        """Return the devices that have refused the last order, with their reasons; None until every
-        device has taken the order."""
+        """Return the devices that have refused the last order, with their reasons. Return None until
+        every device has decided about the order."""
 
     def look(self) -> None:
         """Look for other nodes on the graph. The daemon calls this method each second."""
@@ -111,11 +112,12 @@ def service(
 ) -> Service:
     """Return the service for this YAML. Raises HalError if a bus cannot be opened.
 
-    - `kept`: the store of the memory across restarts, or None. Not every kind has such a memory.
-    - `new`: a store without a file means that the devices have no past.
+    - `kept`: the store for the memory that survives restarts, or None. Not every kind has such a
+      memory.
+    - `new`: Does a missing file mean that the devices have never run before?
     - `unsafe`: the devices that a dead daemon may have left on
     - `writer`: the writer of the recording
-    - `rmf`: an object that stands in for RMF's fleet adapter, or None for that adapter
+    - `rmf`: an object that replaces RMF's fleet adapter in a simulation, or None for the real adapter
     """
     kind = kind_called(config.kind)
     named = partial(named_by, config)
@@ -149,13 +151,14 @@ class GraphService:
         self._order: OrderedByPerson = OperatorReset()
 
     def obey(self, order: OrderedByPerson, device: str = "") -> None:
-        """Pass on a reset. No kind without hardware obeys another order."""
+        """Pass on a reset. Ignore other orders, because no kind without hardware obeys them."""
         self._order = order
         if isinstance(order, OperatorReset):
             self._node.obey(order)
 
     def refusals(self) -> Mapping[str, str] | None:
-        """Return the refusals of the last order; None until every subject has taken it."""
+        """Return the reasons for which subjects have refused the last order. Return None until every
+        subject has decided about the order."""
         if not isinstance(self._order, OperatorReset):
             return {"": NOBODY_OBEYS}
         return refusals_of(self._order, list(self._node.subjects.values()))
@@ -211,8 +214,8 @@ class Devices:
             handover.changed = self._placed[device][1].stir
 
     def subscribe(self) -> None:
-        """Subscribe to requests, and to topics that are only recorded. Subscribe also to our devices'
-        states, which a rival may publish."""
+        """Subscribe to requests, and to topics that are only recorded. Also subscribe to our devices'
+        states, because a rival node may publish them."""
         for topic, accept in self._kind.requests.items():
             hear = self._to_inbox(topic, accept)
             self._hears[topic.name] = self._transport.subscribe(self._named(topic), hear)
@@ -225,7 +228,8 @@ class Devices:
             self._alarm.subscribe()
 
     def obey(self, order: OrderedByPerson, device: str = "") -> None:
-        """Pass on an order: a drill to the alarm, a decision to workcells, a reset to all of them."""
+        """Pass on an order. A drill goes to the alarm, and a decision goes to the workcells. A reset
+        goes to the alarm and to all devices."""
         subjects: list[AnySubject] = []
         if self._alarm and not isinstance(order, DecidedByPerson):
             self._alarm.obey(order)
@@ -240,13 +244,13 @@ class Devices:
         self._ordered = order, subjects
 
     def refusals(self) -> Mapping[str, str] | None:
-        """Return the refusals of the last order; None until every device has taken it."""
+        """Return the reasons for which devices have refused the last order. Return None until every
+        device has decided about the order."""
         order, subjects = self._ordered
         return refusals_of(order, subjects) if subjects else {"": NOBODY_OBEYS}
 
     def look(self) -> None:
-        """Tell each device when the first node appears that may send requests, and when the last such
-        node disappears."""
+        """Tell each device whether any node can send requests, when this changes."""
         if self._alarm:
             self._alarm.look()
         topic = self._kind.attended_by
@@ -304,7 +308,7 @@ class Devices:
         driver = driver_type.create(name, device, bus)
         handovers = [one for (owner, _), one in self._handovers.items() if owner == name]
         if handovers:
-            assert isinstance(driver, TakesInputs)  # in the YAML, only contacts have `bus`
+            assert isinstance(driver, TakesInputs)  # `bus` is a key of contacts only
             driver.take_inputs(partial(taken, handovers))
         if name in self._unsafe:
             driver = SafeFirst(name, driver)

@@ -1,4 +1,5 @@
-"""The steps by which `enable` and `disable` change a system. `--dry-run` prints the steps instead."""
+"""The steps with which `enable` and `disable` change a system. With `--dry-run` the steps are only
+printed."""
 
 import argparse
 import os
@@ -18,7 +19,7 @@ from bridges.system.files import replace
 
 CONFIG: Final = Path("etc/rmf-bridges")
 INSTANCE: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
-"""The pattern of a service's name. systemd needs no escapes for such a name."""
+"""The pattern of a service's name. It allows only characters that systemd does not escape."""
 NO_INSTANCE: Final = "{!r} is not a service name: use only letters, digits and _ . -"
 LEFT_ON: Final = (
     "the outputs of {} are not verified off, and a new drop-in may block access to them: mend the"
@@ -46,7 +47,8 @@ def drop_in_file(name: str) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A step that runs a command. `running_only`: take the step only on a running system."""
+    """A step that runs a command. `running_only`: skip this step if the system is only mounted and does
+    not run."""
 
     words: tuple[str, ...]
     running_only: bool = False
@@ -54,8 +56,8 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class SwitchOff:
-    """A step that runs `outputs-off` for a service. It does nothing if no dead daemon has left a
-    record."""
+    """A step that runs `outputs-off` for a service. The step does nothing if no dead daemon has left a
+    record of claimed outputs."""
 
     words: tuple[str, ...]
     state: Path
@@ -90,15 +92,15 @@ Step = Run | SwitchOff | WriteFile | GiveSecret | Remove
 
 
 def make_user(name: str) -> Run:
-    """Return the step that makes the service's own user, unless the user exists. Its group is the
-    common group, whose members may read the files of every service."""
+    """Return the step that makes the service's own user, if this user does not exist yet. The user's
+    group is common to all services, and its members may read the files of every service."""
     home = SERVICE_STATE / name
     line = f'u {user_of(name)} -:{SERVICE_USER} "Open-RMF bridge {name}" {home} /usr/sbin/nologin'
     return Run(("systemd-sysusers", "--inline", f"g {SERVICE_USER} -", line))
 
 
 def numbers(table: Path) -> dict[str, int]:
-    """Return the number of each user or group in a system's table; {} without a table."""
+    """Return the id number of each user or group in a system's table; {} without a table."""
     with suppress(OSError):
         rows = (line.split(":") for line in table.read_text("utf-8", "replace").splitlines())
         return {row[0]: int(row[2]) for row in rows if len(row) > 2 and row[2].isdecimal()}
@@ -114,7 +116,7 @@ def switch_off(name: str) -> SwitchOff:
 def carry_out(steps: Iterable[Step], args: argparse.Namespace, keeps: str = "") -> int:
     """Carry out or print the steps in order, until a step fails. Return the exit code.
 
-    `keeps`: the unit that is started again after a failed step, if it ran before.
+    `keeps`: a systemd unit. If it ran before and a step fails, it is started again.
     """
     live = args.root == Path("/")
     if live and not args.dry_run and os.geteuid() != 0:
@@ -148,7 +150,7 @@ def _show(step: Step) -> None:
         case Run(words):
             print(shlex.join(words))
         case SwitchOff(words, state):
-            print(f"{shlex.join(words)}   # if a record is left in {state}")
+            print(f"{shlex.join(words)}   # if a dead daemon left a record in {state}")
         case WriteFile(path, _, source) if source:
             print(shlex.join(["install", "-m", "644", str(source), str(path)]))
         case WriteFile(path, content):

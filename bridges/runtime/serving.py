@@ -14,14 +14,14 @@ from bridges.system.log import pairs
 log = logging.getLogger(__name__)
 
 LEAST_GAP_S = 0.001
-"""The minimum pause (s) before a round without an event."""
+"""The minimum time (s) to wait before a round, if no event has come."""
 
 
 class Rounds(Protocol):
-    """Work that is done in rounds. This is the work of a bus's devices, or of a kind without hardware.
+    """Work that is done in rounds. It is either the work of the devices on one bus, or the work of a
+    kind without hardware.
 
-    Only the work's own thread calls the methods. Tests call the methods without a thread, in virtual
-    time.
+    Only one thread calls the methods. Tests call the methods without such a thread, in virtual time.
     """
 
     @property
@@ -38,11 +38,11 @@ class Rounds(Protocol):
 
     @property
     def finished(self) -> int:
-        """The number of finished steps. It may grow within a round."""
+        """The number of finished steps. It may also grow during a round."""
 
     @property
     def ready(self) -> bool:
-        """Return whether the devices or the kind can serve."""
+        """Return whether the devices, or the kind without hardware, can serve."""
 
     def round(self) -> None:
         """Take the waiting events, and do the work that is due."""
@@ -84,7 +84,7 @@ class Serving:
     def ended(self, timeout_s: float) -> bool:
         """Wait for the thread's end. Return False if it does not end within `timeout_s` (s), or leaves
         an output on."""
-        if self._thread.ident is not None:  # otherwise it never started
+        if self._thread.ident is not None:  # otherwise the thread was never started
             self._thread.join(timeout_s)
         return not self._thread.is_alive() and self._safe
 
@@ -115,7 +115,7 @@ class Serving:
         except LeftOn as error:
             self.died = f"{serves.name}: {error}"
             log.critical(pairs("died", thread=serves.name, reason=error))
-        except Exception as error:  # a defect of ours: the daemon ends, and systemd restarts it
+        except Exception as error:  # our own defect: the daemon ends, and systemd restarts it
             self.died = f"{serves.name}: {type(error).__name__}: {error}"
             log.critical(pairs("died", thread=serves.name, reason=error), exc_info=True)
         finally:

@@ -1,11 +1,11 @@
-"""Handles signals. Many signals by default end or suspend a process. At each of these signals a daemon
+"""Handles signals. Many signals by default end or suspend a process. On each of these signals, a daemon
 switches its outputs off and ends.
 
-Signals of a crash are not caught, and neither is the watchdog's SIGABRT. Nobody can trust such a
-process any more, so `outputs-off` runs after its death.
+Two sorts of signals are not caught: those of a crash, and the SIGABRT of systemd's watchdog. After them
+the process cannot be trusted, so `outputs-off` runs after its death.
 
-SIGPIPE and SIGXFSZ stay ignored, as Python has set them. An unread log or a full disk must not end a
-daemon. SIGKILL and SIGSTOP cannot be caught.
+SIGPIPE and SIGXFSZ are ignored, which is Python's default. So an unread log or a full disk does not end
+a daemon. SIGKILL and SIGSTOP cannot be caught.
 """
 
 import os
@@ -42,8 +42,8 @@ ENDING: Final = frozenset(signal.valid_signals()) - {
 
 
 class End:
-    """A flag that the first signal of ENDING sets for ever. A threading.Event could hang, if a signal
-    arrives while the event's lock is taken."""
+    """A flag that the first signal of ENDING sets for good. A threading.Event would not do, because it
+    could hang if a signal arrives while the event's lock is held."""
 
     def __init__(self) -> None:
         """Begin to catch the signals. If the parent process ignores SIGHUP (nohup), the daemon ignores
@@ -58,9 +58,9 @@ class End:
         return bool(select.select([self._read], [], [], timeout_s)[0])
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        for each in TERMINAL:  # the last log lines of a background job would raise these again
+        for each in TERMINAL:  # in the background, a log line would raise these signals again
             signal.signal(each, signal.SIG_IGN)
-        with suppress(BlockingIOError):  # the pipe is full of earlier signals
+        with suppress(BlockingIOError):  # a full pipe already has signals
             os.write(self._write, b".")
 
 
@@ -70,11 +70,12 @@ def on_reset(reset: Callable[[], None]) -> None:
 
 
 def ignore() -> None:
-    """Ignore every signal except SIGKILL, in a short process that switches outputs off."""
+    """Ignore every signal that can be ignored. Only a short-lived process that switches outputs off
+    calls this."""
     for number in ENDING | {RESET}:
         signal.signal(number, signal.SIG_IGN)
 
 
 def ignore_reset() -> None:
-    """Ignore a reset until the daemon serves. By default this signal would end the process."""
+    """Ignore the signal RESET until the daemon serves. By default RESET would end the process."""
     signal.signal(RESET, signal.SIG_IGN)

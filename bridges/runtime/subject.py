@@ -1,6 +1,6 @@
-"""One subject of a core: a lift, a door, a charger, or a coordinator's site.
+"""One subject, about which a core decides: a lift, a door, a charger, or a coordinator's site.
 
-A `Subject` keeps the core's memory, acts on each decision, counts refusals and logs changes.
+A `Subject` keeps the core's memory, carries out each decision, counts refusals and logs changes.
 """
 
 import logging
@@ -34,11 +34,13 @@ V = TypeVar("V")
 class SubjectCore(Struct, Generic[M, V, O, R], frozen=True):
     """The core of a kind, with its limits, as the daemon calls it.
 
-    - `word`: the log's key for a subject's name
+    - `word`: the key under which the log shows a subject's name
     - `decide(memory, event, now)`: one step of the core
     - `summary(report, now)`: keys and values for the log and the status file
-    - `identity(fault)`: a value that is equal in all reports of one fault. So the fault is logged once.
-    - `repeated(memory, now)`: as in `Kind`; None if the core must decide on every event
+    - `identity(fault)`: a value that is equal in all reports of one fault, so that the fault is logged
+      once
+    - `repeated(memory, now)`: the memory after a repeated reading (see `Kind`), or None if the core
+      must decide on every event
     """
 
     word: str
@@ -49,8 +51,11 @@ class SubjectCore(Struct, Generic[M, V, O, R], frozen=True):
 
 
 class Subject(Generic[M, V, O, R]):
-    """One subject of a core, with its memory. `ordered`: a person's last order, and the reason if the
-    core refused it. Any thread may read it."""
+    """One subject of a core, with its memory.
+
+    `ordered`: a person's last order, and the core's reason if it refused this order, otherwise "". Any
+    thread may read `ordered`.
+    """
 
     def __init__(
         self,
@@ -100,8 +105,9 @@ class Subject(Generic[M, V, O, R]):
     def read_again(self, event: V) -> bool:
         """Note a reading that came before `wake_at`. Return False if the core must decide on it.
 
-        The core need not decide if the last event was an equal reading, and its decision only moved on
-        the reading's times. Until `wake_at` its answer would be the same.
+        The core need not decide on a repeated reading. The previous event must be an equal reading, and
+        the decision on it must have changed only the reading's times. Until `wake_at` the core would
+        decide the same again.
         """
         now, decision, repeated = self._clock.monotonic(), self.decision, self._core.repeated
         if not self._is_steady or event != self._event or decision is None or repeated is None:
@@ -114,7 +120,8 @@ class Subject(Generic[M, V, O, R]):
         return True
 
     def _is_as_before(self, event: V, decision: Decision[M, O, R], now: float) -> bool:
-        """Return whether this reading is equal to the last event, and has only moved on its times."""
+        """Return whether this reading equals the previous event, and the decision on it changes only
+        the reading's times."""
         last, repeated = self.decision, self._core.repeated
         if repeated is None or last is None or not isinstance(event, Sampled):
             return False
@@ -175,8 +182,8 @@ AnySubject = Subject[Any, Any, Any, Any]
 
 
 def refusals_of(order: OrderedByPerson, subjects: Sequence[AnySubject]) -> dict[str, str] | None:
-    """Return the subjects that have refused this order, with their reasons; None until every subject
-    has taken it."""
+    """Return the subjects that have refused this order, with their reasons. Return None until every
+    subject has decided about the order."""
     taken = {one.name: one.ordered for one in subjects}
     if any(given is not order for given, _ in taken.values()):
         return None

@@ -1,8 +1,7 @@
 """Switches off every output of a YAML or record, from a new process, with as few imports as possible.
 
-On each bus, the devices with the most recent answers to the dead daemon come first, because silent
-devices would use up the time. Each device first gets one short attempt. Then the failed devices get a
-second attempt.
+On each bus, the devices that answered the dead daemon last come first, because silent devices would use
+up the time. Each device first gets one short attempt. Then the failed devices get a second attempt.
 """
 
 import logging
@@ -28,8 +27,8 @@ def outputs_off(
     """Switch off every output of a file, except the outputs of the devices in `but`. Return the devices
     that are verified off. Give up after `timeout_s` (s) in total.
 
-    `ages`: the age (s) of each device's last answer to the dead daemon. Devices that never answered are
-    not in it.
+    `ages`: the age (s) of each device's last answer to the dead daemon. It lacks devices that never
+    answered.
     """
     results: dict[str, bool] = {}
     left = [name for name in config.devices if name not in but]
@@ -95,7 +94,8 @@ def _device_off(
 
 
 def _failed(name: str, error: Exception) -> None:
-    """Log the failure. A defect of ours is logged too, because it must not stop the other devices."""
+    """Log the failure. An unexpected exception of our own code is only logged too, so that the other
+    devices are still switched off."""
     if isinstance(error, DriverError):
         log.error(pairs("outputs_not_off", device=name, reason=error))
     else:

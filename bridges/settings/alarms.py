@@ -1,5 +1,5 @@
-"""Checks that the devices of a file raise one common alarm, and that other daemons can see this
-alarm."""
+"""Checks the fleet alarms of a file. The file's devices must raise one common alarm, and the daemons of
+other files must be able to hear of it."""
 
 from collections.abc import Mapping
 
@@ -10,18 +10,18 @@ from bridges.yaml.parsing import YamlFile
 from bridges.yaml.positions import Spot, locate
 
 UNSEEN = (
-    "an alarm needs diagnostics: daemons state their alarms on /diagnostics, so that the end of one"
-    " alarm does not end another alarm. Delete diagnostics: false"
+    "an alarm needs diagnostics: daemons state their alarms on /diagnostics. Without this statement,"
+    " the end of another alarm would end this alarm too. Delete diagnostics: false"
 )
 
 
 def note_alarms(
     page: YamlFile, devices: Mapping[str, DeviceSettings], rmf: Rmf, spot: Spot, of_rmf: Spot | None
 ) -> None:
-    """Note each alarm that contradicts another alarm of the file, and each alarm that other daemons
-    cannot see.
+    """Note each alarm that contradicts another alarm of the file, and each alarm of which other daemons
+    cannot hear.
 
-    `spot`: the section of the devices. `of_rmf`: the section `rmf`.
+    `spot`: the place of the section with the devices. `of_rmf`: the place of the section `rmf`.
     """
     found = {n: one for n, one in devices.items() if isinstance(one, AlarmingSettings)}
     for name, text in disagreements(found):

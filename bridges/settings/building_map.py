@@ -1,8 +1,8 @@
 """The names on RMF's map of a building: levels, lifts, doors, waypoints. Our files must use these
 names.
 
-Two sorts of file hold the map, and both are accepted. The traffic editor writes `*.building.yaml`. A
-parameter is a pair in this file: [number of the type, value].
+Two sorts of file hold the map, and both are accepted. The traffic editor writes `*.building.yaml`. In
+this file a parameter is the pair [number of its type, value].
 
     levels: {L1: {vertices: [[x, y, z, name, {is_charger: [4, true]}]],
                   doors: [[from, to, {name: [1, D1]}]]}}
@@ -30,11 +30,11 @@ from bridges.kinds.shared.kind import CHARGER, DOOR, FLOOR, LIFT, WAYPOINT
 from bridges.yaml.parsing import Sort, YamlFile, compose, read
 
 MAP = Sort("building map or navigation graph", "levels: ...", 1024 * 1024, 100_000)
-"""The limits of such a file. A file of the greatest size takes some seconds to read. Larger files are
-refused."""
+"""The limits of a map file. Larger files are refused, because even a file of this size takes some
+seconds to read."""
 
 Lines = dict[str, int]
-"""Name -> the line of its first occurrence."""
+"""A mapping from a name to the line on which the name first occurs."""
 Place = tuple[str, float, float]
 """A place: its level, x and y."""
 
@@ -42,8 +42,10 @@ Place = tuple[str, float, float]
 class BuildingMap(Struct, frozen=True):
     """The names of one file.
 
-    `named`: sort of name -> name -> line. `stops`: lift -> its floors. `places`: waypoint -> its level,
-    x and y (m). Only a navigation graph fills `places`, because traffic-editor's file has pixels.
+    - `named`: maps a sort of name (such as FLOOR) to the names of this sort and their lines
+    - `stops`: maps a lift to its floors
+    - `places`: maps a waypoint to its level, x and y (m). Only a navigation graph has them, because the
+      traffic editor's file has pixels.
     """
 
     file: str
@@ -64,7 +66,7 @@ def load_map(file: str) -> BuildingMap:
 
 
 class _MapReading:
-    """Collects the names of one file, and notes deviations from RMF's format on the page."""
+    """Collects the names of one file. It notes deviations from RMF's format as problems of the file."""
 
     def __init__(self, page: YamlFile) -> None:
         self.named: dict[str, Lines] = {w: {} for w in (FLOOR, LIFT, DOOR, CHARGER, WAYPOINT)}
@@ -110,8 +112,7 @@ class _MapReading:
             self._add_stop(lift, level)
 
     def _add(self, what: str, name: ScalarNode | None) -> None:
-        """Add a name. The empty name "" is left out, because vertices and doors without a name have
-        it."""
+        """Add a name. Leave out the empty name "", which vertices and doors without a name have."""
         if name is not None and name.value:
             self.named[what].setdefault(name.value, _line(name))
 
@@ -155,8 +156,8 @@ def _below(node: Node, key: str) -> Node | None:
 
 
 def _param(item: SequenceNode, key: str) -> ScalarNode | None:
-    """Return a parameter of a vertex or an edge. The last item of `item` has the parameters, as `V` or
-    `[type, V]`."""
+    """Return a parameter of a vertex or an edge. The last element of `item` is the mapping of
+    parameters. In it, a parameter is written as `V` or `[type, V]`."""
     found = _below(item.value[-1], key) if item.value else None
     if isinstance(found, SequenceNode) and len(found.value) == 2:
         found = found.value[1]

@@ -54,8 +54,8 @@ def read_bus(
 
 
 def _note_untyped(bus: MappingEntry, allowed: list[str], values: Values, page: YamlFile) -> None:
-    """Note that a bus has no `type`, or a misspelt `type`. The bus's other keys have no meaning without
-    a type."""
+    """Note that a bus has no `type`, or a misspelt `type`. Do not check its other keys, because only
+    the type gives them a meaning."""
     entries = {e.name: e for e in values.entries(bus.spot())}
     near = nearest("type", entries)
     if near is None:

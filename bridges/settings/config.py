@@ -18,20 +18,23 @@ from drivers.hal import AnyBus, Bus
 from drivers.hal.points import Wire
 
 LATE_S: Final = 0.1
-"""The time (s), on top of one scan of another bus, after which a reading of that bus no longer
-counts."""
+"""The extra time (s) for which a reading of another bus stays valid, after the duration of one scan of
+that bus."""
 
 
 class Config(Struct, frozen=True):
     """A valid file.
 
-    `text`: the file's bytes. `buses` and `devices`: name -> settings. Only the record of the bus type
-    or driver knows the type of these settings. `bus_types`: name of the bus -> its `type:`. `warnings`:
-    remarks on valid settings that may be a mistake. `old_keys`: warnings about keys that have a new
-    name. `notes`: remarks on intended settings whose effects the user should know. `section`: the
-    settings of a kind without devices (`bridges/kinds/shared/graph_kind.py`). Such a kind has no driver
-    and no buses. For any other kind, `section` holds the settings that its devices share, if there are
-    any.
+    - `text`: the file's bytes
+    - `buses`, `devices`: map a name to its settings. Only the module of the bus type or of the driver
+      knows the type of these settings.
+    - `bus_types`: maps the name of a bus to its `type:`
+    - `warnings`: remarks on valid settings that may be a mistake
+    - `old_keys`: warnings about keys that have a new name
+    - `notes`: remarks on intended settings whose effects the user should know
+    - `section`: for a kind without devices, its settings (`bridges/kinds/shared/graph_kind.py`); such a
+      kind has no driver and no buses. For any other kind, the settings that its devices share, if there
+      are any.
     """
 
     path: Path
@@ -50,7 +53,7 @@ class Config(Struct, frozen=True):
 
     @property
     def drives(self) -> bool:
-        """Return whether this file has outputs that must be off when its daemon is dead."""
+        """Return whether this file has outputs that must be switched off after the daemon's death."""
         kind = kind_called(self.kind)
         return not isinstance(kind, GraphKind) and kind.drives
 
@@ -78,26 +81,26 @@ class Config(Struct, frozen=True):
         return list(self.driver_type(device_name).wires(self.devices[device_name]))
 
     def wires_on(self, bus: str, device_name: str) -> list[Wire]:
-        """Return the part of a device's wiring table that is on this bus. The rows no longer name the
-        bus."""
+        """Return the rows of a device's wiring table that are on this bus. In the returned rows `bus`
+        is ""."""
         wires = ((wire, wire.bus or self.bus_of(device_name)) for wire in self.wires(device_name))
         return [replace(wire, bus="") for wire, name in wires if name == bus]
 
     def other_buses(self, device_name: str) -> list[str]:
-        """Return the buses that have inputs of the device, without the device's own bus."""
+        """Return the buses other than the device's own bus on which the device has inputs."""
         return list(dict.fromkeys(wire.bus for wire in self.wires(device_name) if wire.bus))
 
     def lasts_s(self, bus: str) -> float:
-        """Return the greatest age (s) at which a reading of this bus counts for a device on another
-        bus."""
+        """Return the age (s) up to which a reading of this bus is valid for a device on another bus."""
         scan_s: float = self.buses[bus].scan_s
         return scan_s + LATE_S
 
     def debounce(self, device_name: str) -> dict[str, float]:
-        """Return signal or group -> how long a change must last (s).
+        """Return a mapping from each signal or group to the time (s) that a change must last.
 
-        A device may have inputs on two buses. A reading of the other bus may be older by `lasts_s`. The
-        debounce of every input is longer by that age. Therefore no single reading counts twice.
+        If a device has inputs on another bus, a reading of that bus may be older by `lasts_s`. Two
+        scans of the device may then use the same reading. Therefore the debounce of every input is
+        longer by that age, so that no single reading counts as two.
         """
         late_s = max(map(self.lasts_s, self.other_buses(device_name)), default=0.0)
         found = self.driver_type(device_name).debounce(self.devices[device_name])

@@ -1,7 +1,8 @@
-"""Checks files against each other: places or names used twice, different domains, unknown names.
+"""Checks files against each other. It finds points or names that two files use, different ROS domains,
+and unknown names.
 
-Files that are checked together belong to one site. They are for one machine, unless the user says
-otherwise.
+Files that are checked together belong to one site. They count as files of one machine, unless the user
+says that they belong to several machines.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -28,9 +29,9 @@ class Found(Struct, frozen=True):
 
 
 class ExclusiveUse(Struct, frozen=True):
-    """A use of hardware, or of a name, that only one file may use.
+    """A use of hardware or of a name. Only one file may use such a thing.
 
-    `what`: the name of the used thing. `path`: the path of the key that uses it.
+    `what`: the name of the thing. `path`: the path of the YAML key that uses it.
     """
 
     config: Config
@@ -44,7 +45,7 @@ class ExclusiveUse(Struct, frozen=True):
         return page.problem(locate(Spot(root, root, ""), self.path).where(), "")
 
     def problem(self, text: str) -> Problem:
-        """Return a problem at this place. The text may quote any part of the file."""
+        """Return a problem with this text at the place of the use."""
         place = self.place()
         return Problem(place.file, place.line, place.column, text)
 
@@ -59,8 +60,8 @@ def across(configs: Sequence[Config], one_machine: bool = True) -> Found:
 
 
 def taken(configs: Sequence[Config], one_machine: bool = True) -> Iterator[Problem]:
-    """Yield a problem for each thing that two files use, although only one may. Such things are ports,
-    pins, points of a unit and RMF names."""
+    """Yield a problem for each thing that two files use, although only one file may use it. Such things
+    are ports, pins, points of a unit and RMF names."""
     lines = list(_twice(c for config in configs for c in _lines(config, one_machine)))
     busy = {claim.what for claim, _ in lines}
     claims = (c for config in configs for c in _claims(config, one_machine))
@@ -69,8 +70,8 @@ def taken(configs: Sequence[Config], one_machine: bool = True) -> Iterator[Probl
 
 
 def shared_secrets(configs: Sequence[Config]) -> Iterator[Problem]:
-    """Yield a problem for each secret file that two services use: a secret has one owner, and each
-    service has a user of its own."""
+    """Yield a problem for each secret file that two services use. Only one user can own a secret file,
+    and each service has its own user."""
     uses = (
         ExclusiveUse(config, file, path)
         for config in configs
@@ -105,7 +106,7 @@ def _buses(config: Config) -> Iterator[tuple[str, Where]]:
 
 
 def _lines(config: Config, one_machine: bool) -> Iterator[ExclusiveUse]:
-    """Yield the use of each port that only one daemon can open."""
+    """Yield one use for each port that only one daemon can open."""
     for name, where in _buses(config):
         if where.clients == "one" and one_machine:
             yield ExclusiveUse(config, where.text, ("buses", name))
@@ -119,7 +120,7 @@ def _gateways(config: Config) -> Iterator[ExclusiveUse]:
 
 
 def _claims(config: Config, one_machine: bool) -> Iterator[ExclusiveUse]:
-    """Yield the uses of names on RMF's graph and of places on buses."""
+    """Yield the uses of names in RMF, and of points and devices on buses."""
     kind = kind_called(config.kind)
     if isinstance(kind, GraphKind):
         yield ExclusiveUse(config, f"kind: {kind.name}", ("kind",))
@@ -137,7 +138,8 @@ def _claims(config: Config, one_machine: bool) -> Iterator[ExclusiveUse]:
 
 
 def _places(config: Config, bus: str, device: str) -> Iterator[tuple[str, Path]]:
-    """Yield every point and exclusive place of a device on this bus, in the bus's spelling."""
+    """Yield every point of a device on this bus, and every other thing on the bus that only this device
+    may use. The names are in the bus's own spelling."""
     hal = config.bus_type(bus)
     for wire in config.wires_on(bus, device):
         flash = [("flash", wire.flash.point)] if wire.flash is not None else []
@@ -154,7 +156,7 @@ def _shared(pair: tuple[ExclusiveUse, ExclusiveUse], claims: Sequence[ExclusiveU
     claim, other = pair
     both = _units(claim.config, claim.what, claims) & _units(other.config, claim.what, claims)
     units = f" for unit {', '.join(sorted(both))}" if both else ""
-    text = f"warning: {claim.what} is asked in {other.config.path} too{units}"
+    text = f"warning: {claim.what} is also polled in {other.config.path}{units}"
     return claim.problem(
         f"{text}: many gateways take only one client: use one file for each gateway"
     )

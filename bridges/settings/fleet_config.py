@@ -1,4 +1,5 @@
-"""The configuration file of a fleet adapter (EasyFullControl): the keys that our files must match.
+"""The configuration file of a fleet adapter (EasyFullControl). These are the keys that our files must
+match:
 
     rmf_fleet:
       name: tiny
@@ -12,8 +13,9 @@
     reference_coordinates: {L1: {rmf: [[x, y], ...], robot: [[x, y], ...]}}
 
 Older files have `robots:` beside `rmf_fleet:`, with `rmf_config: {charger: {waypoint: charger_a}}`.
-They have one pair of lists for all levels. rmf_demos has this pair below `fleet_manager`. All other
-keys are ignored. Source: open-rmf/fleet_adapter_template, config.yaml and fleet_adapter.py.
+Their `reference_coordinates` have no levels, so one list for `rmf` and one for `robot` serve all
+levels. rmf_demos has these lists below `fleet_manager`. All other keys are ignored. Source:
+open-rmf/fleet_adapter_template, config.yaml and fleet_adapter.py.
 """
 
 import cmath
@@ -39,7 +41,8 @@ T = TypeVar("T")
 
 
 class Charger(msgspec.Struct, frozen=True):
-    """A robot's charger, in a mapping. `waypoint`: the charger's name in the navigation graph."""
+    """A robot's charger, if it is written as a mapping. `waypoint`: the charger's name in the
+    navigation graph."""
 
     waypoint: str | None = None
 
@@ -89,7 +92,7 @@ class MapTransform(msgspec.Struct, frozen=True):
     scale: float = 1.0
 
     def similarity(self) -> Similarity:
-        """Return the same transform as a similarity."""
+        """Return this transform as a `Similarity`."""
         return Similarity(cmath.rect(self.scale, self.rotation), complex(*self.translation), 0.0)
 
 
@@ -111,7 +114,7 @@ class RmfFleet(msgspec.Struct, frozen=True):
 
 
 class Pairs(msgspec.Struct, frozen=True):
-    """Pairs of points. A pair is one place, as a point on RMF's map and as a point on the robot's
+    """Pairs of points. The two points of a pair are the same place on RMF's map and on the robot's
     map."""
 
     rmf: list[Point]
@@ -119,7 +122,7 @@ class Pairs(msgspec.Struct, frozen=True):
 
 
 class Manager(msgspec.Struct, frozen=True):
-    """The fleet manager's section, of which only the pairs concern us."""
+    """The fleet manager's section. We read only the pairs of points in it."""
 
     reference_coordinates: Pairs | None = None
 
@@ -193,7 +196,7 @@ def plain_values(page: YamlFile, root: MappingNode) -> dict[str, Any]:
 def converted(file: str, root: MappingNode, plain: dict[str, Any], wanted: type[T], asks: str) -> T:
     """Convert plain values to a struct. Raises SettingsError.
 
-    `asks`: the question to the user at the end of the problem's text.
+    `asks`: a question to the user, which is put at the end of the problem's text.
     """
     try:
         return msgspec.convert(plain, wanted, strict=False)

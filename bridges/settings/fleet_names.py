@@ -1,7 +1,9 @@
-"""Compares a coordinator's YAML with the configuration of a fleet's adapter, and with RMF's map.
+"""Compares the YAML of a charger coordinator with the configuration of a fleet adapter, and with RMF's
+map.
 
 Different people write these files, and RMF reports no mismatch. A robot with a mismatch waits for ever,
-or stays on a pad. This module reports each mismatch with its file, its line and the remedy.
+or never leaves its charging pad. This module reports each mismatch with its file, its line and the
+remedy.
 """
 
 import math
@@ -50,7 +52,8 @@ def compared(config: Config, fleet: FleetFile, building: BuildingMap | None) -> 
 
 
 def emergency_levels(lifts: Config, fleet: FleetFile) -> Compared:
-    """Compare the fleet's recall floors with the lifts that raise an alarm."""
+    """Check that the fleet has a recall floor for each lift that raises an alarm. At this floor a robot
+    in the car gets out. Also check that each recall floor is a floor of its lift."""
     found, path = Compared(), ("rmf_fleet", "lift_emergency_levels")
     theirs = fleet.fleet.lift_emergency_levels
     for name, lift in lifts.devices.items():
@@ -63,8 +66,9 @@ def emergency_levels(lifts: Config, fleet: FleetFile) -> Compared:
         elif level is None and lift.alarm != "none":
             text = (
                 f"'{name}' raises an alarm ({lift.alarm}) and has no recall floor here: a robot in its"
-                f" car would wait for its old floor. Write lift_emergency_levels: {{{name}: FLOOR}}; in"
-                " Humble the adapter calls set_lift_emergency_level"
+                " car would still wait for the floor to which it was going. Write"
+                f" lift_emergency_levels: {{{name}: FLOOR}}. In Humble let the adapter call"
+                " set_lift_emergency_level instead"
             )
             found.warnings.append(fleet.problem(path, f"warning: {text}"))
     return found
@@ -117,7 +121,7 @@ class _Comparing:
             self._theirs("errors", path, text)
         elif waypoint not in (*places, robot.waits_at):
             known = ", ".join((*places, robot.waits_at))
-            text = f"'{name}' charges or waits at {known}, but RMF drives it elsewhere at first"
+            text = f"'{name}' charges or waits at {known}, but RMF first drives it to '{waypoint}'"
             self._theirs("warnings", path, text)
 
     def percentages(self) -> None:
@@ -153,8 +157,8 @@ class _Comparing:
             self._theirs("errors", path, text)
         elif request in (None, "nothing"):
             text = (
-                "finishing_request: nothing leaves a charged robot on its pad until it gets a task, and"
-                " the next robot waits: write charge"
+                "with finishing_request: nothing, a charged robot stays on its pad until it gets a"
+                " task, and the next robot waits: write charge"
             )
             self._theirs("warnings", path if request else ("rmf_fleet",), text)
 
@@ -166,11 +170,12 @@ class _Comparing:
             text = f"{hz:g} Hz is too seldom for the coordinator to see the robots: write 1 or more"
             self._theirs("errors", ("rmf_fleet", "publish_fleet_state"), text)
         if self._fleet.fleet.account_for_battery_drain is False:
-            text = "without this key RMF never sends a robot to charge: write true"
+            text = "with false, RMF never sends a robot to charge: write true"
             self._theirs("errors", ("rmf_fleet", "account_for_battery_drain"), text)
 
     def positions(self, building: BuildingMap | None) -> None:
-        """Check the maps' transforms, and compare each waypoint with the navigation graph."""
+        """Check the transforms between the maps, and compare each waypoint with the navigation
+        graph."""
         transforms = dict(self._transforms())
         fleet = self._settings.fleets.get(self._name)
         if fleet is None:
@@ -196,12 +201,12 @@ class _Comparing:
             self.all.notes.append(
                 f"{self._file()}: transformation error estimate{of}: {found.mse:g}"
                 f" (turned by {found.rotation:.4f} rad, scaled by {found.scale:.5g},"
-                f" {found.error:.2f} m off on RMF's map)"
+                f" error {found.error:.2f} m on RMF's map)"
             )
             if found.error > self._settings.near_m:
                 text = (
-                    f"the pairs do not fit: {found.error:.2f} m off on RMF's map, and near_m is"
-                    f" {self._settings.near_m:g} m: a robot would not be seen at its waypoint"
+                    f"the pairs do not fit: they differ by {found.error:.2f} m on RMF's map, but near_m"
+                    f" is {self._settings.near_m:g} m: a robot would not be seen at its waypoint"
                 )
                 if estimate(pairs.rmf, _mirrored(pairs.robot)).error <= self._settings.near_m:
                     text = "one map is the other's mirror image: change the sign of every robot's y"

@@ -1,8 +1,8 @@
 """Reads the two RMF files that a fleet's YAML names, and compares them with that YAML.
 
-RMF's adapter stops or dies at many mistakes in these files. Therefore the daemon refuses such files
-before the adapter starts. The files' texts are stored with the daemon's claims, so that a recording can
-be decided again.
+RMF's adapter ends at many mistakes in these files. Therefore the daemon refuses such files before the
+adapter starts. A recording also holds the texts of the files, because a replay of its decisions needs
+them.
 """
 
 import math
@@ -52,10 +52,11 @@ beside its lane."""
 
 
 class FleetSite(Struct, frozen=True):
-    """A fleet's two files.
+    """The two RMF files of a fleet.
 
-    `transforms`: level -> transform from RMF's map to the robots' map. `estimated`: the levels whose
-    transform comes from pairs. The daemon must give these transforms to RMF.
+    - `transforms`: maps a level to the transform from RMF's map to the robots' map
+    - `estimated`: the levels whose transform we have estimated from pairs of points. RMF does not know
+      these transforms, so the daemon must give them to RMF.
     """
 
     fleet: FleetFile
@@ -79,8 +80,8 @@ class FleetSite(Struct, frozen=True):
         for level, found in self.transforms.items():
             of = f" for {level}" if level else ""
             yield (
-                f"{name}: the robots' map{of} is RMF's, turned by {found.rotation:.4f} rad and scaled"
-                f" by {found.scale:.5g}; the pairs are {found.error:.2f} m off on RMF's map"
+                f"{name}: the robots' map{of} is RMF's map, turned by {found.rotation:.4f} rad and"
+                f" scaled by {found.scale:.5g}; the pairs differ by {found.error:.2f} m on RMF's map"
             )
 
 
@@ -132,8 +133,8 @@ def _file(config: Config, path: str) -> Path:
 
 @cache
 def _folder(folder: str) -> Path:
-    """Return the absolute path of a folder. The cache keeps this path, even if the daemon later changes
-    its working directory."""
+    """Return the absolute path of a folder. The path is cached, so that it stays the same if the daemon
+    changes its working directory."""
     return Path(folder).absolute()
 
 
@@ -166,8 +167,8 @@ class _Comparing:
                 self.problems.append(fleet.problem(("rmf_fleet", section), text))
         for path, number in _numbers(fleet):
             least = number > 0 if path[1] in ("limits", "profile") else number >= 0
-            if not (least and number < math.inf):  # true for NaN too
-                text = "is no size of a robot: RMF's planner would fail"
+            if not (least and number < math.inf):  # so NaN is refused too
+                text = "is not possible for a robot: RMF's planner would fail"
                 self.problems.append(fleet.problem(path, text))
         asked = fleet.fleet.finishing_request
         if asked is not None and asked not in FINISHING:
@@ -185,7 +186,9 @@ class _Comparing:
                 self.problems.append(fleet.problem(path, str(error)))
                 continue
             if found[level].error > OFF_M:
-                text = f"the pairs do not fit: {found[level].error:.2f} m off on RMF's map"
+                text = (
+                    f"the pairs do not fit: they differ by {found[level].error:.2f} m on RMF's map"
+                )
                 self.problems.append(fleet.problem(path, text))
             if level and level not in graph.levels():
                 self.problems.append(fleet.problem(path, unknown("level", level, graph.levels())))
@@ -196,7 +199,8 @@ class _Comparing:
         return found
 
     def robots(self, fleet: FleetFile, graph: NavGraph) -> None:
-        """Compare the robots of both files, and their chargers with the graph."""
+        """Compare the robots of the YAML with the robots of the fleet's configuration. Compare the
+        robots' chargers with the navigation graph."""
         theirs = {name: (path, robot) for path, name, robot in fleet.robots()}
         ours = self._config.devices
         section = self._config.section
@@ -209,7 +213,7 @@ class _Comparing:
                 self._ours(("robots", name, "maps", level), text)
             for action in set(fleet.fleet.actions) - set(robot.known_actions()):
                 where = Path(fleet.file).name
-                text = f"{where} has the action '{action}': write how it begins below actions:"
+                text = f"{where} has the action '{action}': write below actions: how it is started"
                 self._ours(("robots", name), text)
             if name not in theirs:
                 text = f"{Path(fleet.file).name} has an {unknown('robot', name, theirs)}"
@@ -217,7 +221,7 @@ class _Comparing:
         for name, (path, robot) in theirs.items():
             if name not in ours:
                 where = Path(self._config.path).name
-                text = f"{where} does not say how '{name}' is reached: write it below robots:"
+                text = f"{where} has no robot '{name}': add it below robots:"
                 self.problems.append(fleet.problem(path, text))
             inner, charger = robot.waypoint()
             vertex = graph.called(charger) if charger else None
@@ -230,7 +234,8 @@ class _Comparing:
                 self.problems.append(fleet.problem((*path, *inner), text))
 
     def names(self, fleet: FleetFile, graph: NavGraph) -> None:
-        """Compare the recall floors with the graph's lifts."""
+        """Compare the fleet's recall floors with the stops of the graph's lifts. At its recall floor a
+        robot in the car gets out in an alarm."""
         lifts = {vertex.lift for vertex in graph.vertices if vertex.lift}
         for lift, level in fleet.fleet.lift_emergency_levels.items():
             path = ("rmf_fleet", "lift_emergency_levels", lift)

@@ -1,4 +1,5 @@
-"""Turns a device YAML into a Config, or raises a SettingsError with every problem and its place.
+"""Turns a device YAML into a Config. If the YAML has problems, it raises a SettingsError with each
+problem, its line and column.
 
     kind: lift              a folder of bridges/kinds/ that holds a KIND
     driver: dry_contact     a file of drivers/<kind>/; a device may name another driver with `driver:`
@@ -11,8 +12,8 @@
 A kind without hardware has only `kind`, `rmf`, `recording` and one section of its own.
 
 Structs define the content of each section, and `bridges/yaml/values.py` reads them. This module and
-`wiring.py` check the sections against each other. The daemon uses only the Config, and checks nothing
-again.
+`wiring.py` check the sections against each other. The daemon uses only the Config, and repeats no
+check.
 """
 
 from functools import partial
@@ -52,7 +53,7 @@ OF_RMF: Final = {
     "rmf_fleet": ("a fleet adapter's configuration", "--fleet-config"),
     "levels": ("RMF's building map or navigation graph", "--building-map"),
 }
-"""Top key of an RMF file -> (the sort of file, the option of `check` for this sort)."""
+"""For the first key of an RMF file: the sort of the file, and the option of `check` for this sort."""
 
 
 def load(path: Path | str) -> Config:
@@ -73,7 +74,8 @@ def understood(path: Path | str, text: bytes) -> Config:
 
 
 def _note_rmfs(page: YamlFile, root: MappingNode) -> None:
-    """Refuse an RMF file as a whole. Otherwise each of its keys would cause an error."""
+    """Note one problem if the file is one of RMF's files. Otherwise each of its keys would be a
+    problem."""
     for key, (what, option) in OF_RMF.items():
         entry = below(root, key)
         if entry and not below(root, "kind"):
@@ -171,8 +173,8 @@ class _DeviceReading:
             self._driver = named.driver_called(self._kind_name, name)
 
     def _read_own_drivers(self, devices: Node) -> None:
-        """Read the driver of each device that names its own driver. None stands for a driver that does
-        not exist."""
+        """Read the driver of each device that names its own driver. If the driver does not exist, note
+        None for it."""
         for key, value in devices.value if isinstance(devices, MappingNode) else ():
             own = below(value, "driver")
             if own and isinstance(key, ScalarNode) and not is_none(own.value):
@@ -254,8 +256,8 @@ class _DeviceReading:
                 self._page.note(self._buses[name].entry.key, text)
 
     def _without_sections(self, entries: list[MappingEntry]) -> list[MappingEntry]:
-        """Return the devices of the section. Note each key that stands beside a device, but belongs
-        into the device."""
+        """Return the entries of the section that are devices. Note a problem for each key of a device
+        that is not indented below the device."""
         keys = field_names(self._driver.settings) if self._driver else set()
         devices = [entry for entry in entries if entry.name not in keys]
         for entry in entries if devices else ():
@@ -269,8 +271,8 @@ class _DeviceReading:
         return devices
 
     def _can_stand(self, device: MappingEntry, bus: str | None, driver: AnyDriver) -> bool:
-        """Return whether the device's driver can use the device's bus. The file's own driver was
-        checked with the bus already."""
+        """Return whether the device's driver can use the device's bus. This matters only if the device
+        names its own driver, because the file's driver was checked before."""
         kind = self._buses[bus].type if bus else None
         if kind is None or kind in driver.buses:
             return True
@@ -346,8 +348,8 @@ class _DeviceReading:
             self._notes.append(self._page.problem(node, f"note: {spot.label}: {text}"))
 
     def _collect_bus_remarks(self) -> None:
-        """Collect remarks once for each bus. The subjects are outputs that stay on when this machine
-        fails, and a pace that is too slow."""
+        """Collect remarks about each bus. One remark is about outputs that stay on when this machine
+        fails. Another remark is about a bus that is read too slowly."""
         for name, bus in () if self._page.problems else self._buses.items():
             assert bus.hal
             unwatched = bus.hal.unwatched(bus.settings, self._written.get(name, ()))

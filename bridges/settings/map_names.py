@@ -33,8 +33,8 @@ def places(config: Config) -> list[Place]:
 
 
 def mismatches(config: Config, building: BuildingMap) -> list[Problem]:
-    """Return a problem for each name that the map lacks, and for each stop on the map that the file
-    lacks."""
+    """Return a problem for each name in the file that the map lacks. Also return a problem for each
+    stop of a lift on the map that the file lacks."""
     page = YamlFile(str(config.path))
     root = compose(page, config.text)
     top = Spot(root, root, "the file")

@@ -1,4 +1,4 @@
-"""The files that a device YAML names, by the keys that name them."""
+"""The files whose paths a device YAML gives, such as certificates and secrets."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
@@ -22,14 +22,16 @@ def certificate_files(config: Config) -> dict[str, str]:
 
 
 def named_files(config: Config, keys: Sequence[str]) -> Iterator[tuple[Path, str]]:
-    """Yield each file that a YAML names under one of these keys, at any depth, with the key's path."""
+    """Yield each file that a YAML gives as the value of one of these keys, at any depth, and the key's
+    path."""
     kind = kind_called(config.kind)
     sections = {"rmf": config.rmf, "buses": config.buses, kind.devices_key: config.devices}
     return _files_at(sections, keys)
 
 
 def _files_at(settings: Any, keys: Sequence[str], path: Path = ()) -> Iterator[tuple[Path, str]]:
-    """Yield each of these keys that has a value, with its path, at any depth of these settings."""
+    """Yield the path and the value of each of these keys that has a value. Look at any depth of these
+    settings."""
     if isinstance(settings, Struct):
         settings = asdict(settings)
     if isinstance(settings, Mapping):

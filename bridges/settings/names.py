@@ -1,7 +1,7 @@
 """Finds drivers and bus types by their names in a YAML. Each name is the name of a file.
 
-Only existing files are imported. Therefore no table lists them, and no other module imports a driver or
-a bus by its name.
+Drivers and bus types are found by looking for files, so no table lists them. No other module imports a
+driver or a bus by its name.
 """
 
 import importlib
@@ -15,14 +15,14 @@ from drivers.hal import AnyBus
 
 
 def driver_names(kind: str) -> list[str]:
-    """List the values of `driver:`, which are the names of the files `drivers/<kind>/<driver>.py` with
-    a `DRIVER`."""
+    """List the values of `driver:`. They are the names of the files `drivers/<kind>/<driver>.py` that
+    define a `DRIVER`."""
     return holding(drivers.__path__, f"{kind}/*.py", "DRIVER", lambda path: path.stem)
 
 
 def bus_types() -> list[str]:
-    """List the values of a bus's `type:`, which are the names of the files and folders in
-    `drivers/hal/` with a `BUS`."""
+    """List the values of a bus's `type:`. They are the names of the files and folders in `drivers/hal/`
+    that define a `BUS`."""
     files = holding(drivers.hal.__path__, "*.py", "BUS", lambda path: path.stem)
     folders = holding(drivers.hal.__path__, "*/__init__.py", "BUS", lambda path: path.parent.name)
     return sorted({*files, *folders})

@@ -7,9 +7,9 @@
     lifts: {Lift1: {...}}
     doors: {D1: {...}}
 
-A lane names its vertices by their places (from 0) in its level's list. RMF's adapter ends with an
-exception if a name occurs twice, if a lane joins two lifts, or if a vertex names a lift that `lifts`
-lacks. Source: open-rmf/rmf_ros2 9dedd0f,
+A lane names its two vertices by their index (from 0) in the list of its level. RMF's adapter ends with
+an exception in three cases: a name occurs twice, a lane joins two lifts, or a vertex names a lift that
+is missing in `lifts`. Source: open-rmf/rmf_ros2 9dedd0f,
 rmf_fleet_adapter/src/rmf_fleet_adapter/agv/parse_graph.cpp.
 """
 
@@ -95,9 +95,16 @@ def _problems(contents: GraphContents) -> Iterator[tuple[Path, str]]:
             if not (math.isfinite(x) and math.isfinite(y)):
                 yield path, "its x or y is no number"
             if has.name and seen.setdefault(has.name, f"{name} {i}") != f"{name} {i}":
-                yield path, f"a second waypoint '{has.name}': RMF's adapter ends at this graph"
+                yield (
+                    path,
+                    f"a second waypoint '{has.name}': RMF's adapter would end with an error",
+                )
             if has.lift and contents.lifts is not None and has.lift not in contents.lifts:
-                yield path, f"the lift '{has.lift}' is not below 'lifts': RMF's adapter ends there"
+                yield (
+                    path,
+                    f"the lift '{has.lift}' is not below 'lifts': RMF's adapter would end with an"
+                    " error",
+                )
         yield from _of_lanes(name, level)
 
 
@@ -106,11 +113,19 @@ def _of_lanes(name: str, level: GraphLevel) -> Iterator[tuple[Path, str]]:
     for i, (start, end, has) in enumerate(level.lanes):
         path = ("levels", name, "lanes", str(i))
         if not (0 <= start < known and 0 <= end < known):
-            yield path, f"joins vertices {start} and {end}, but '{name}' has {known} (from 0)"
+            yield (
+                path,
+                f"joins vertices {start} and {end}, but '{name}' has {known} vertices, numbered"
+                " from 0",
+            )
             continue
         lifts = {level.vertices[at][2].lift for at in (start, end)} - {""}
         if len(lifts) > 1:
-            yield path, f"joins the lifts {' and '.join(sorted(lifts))}: RMF's adapter ends there"
+            yield (
+                path,
+                f"joins the lifts {' and '.join(sorted(lifts))}: RMF's adapter would end with an"
+                " error",
+            )
         if has.orientation_constraint not in ("", "forward", "backward"):
             yield (
                 path,

@@ -10,9 +10,10 @@ from bridges.kinds.shared.remarks import Remarks
 from bridges.yaml.values import described
 
 RENEWED: Final = 3
-"""The least number of scans for which an output's timer must last."""
+"""The least number of scans that the watchdog timer of an output must outlast. Each scan restarts this
+timer."""
 LONG_S: Final = 1000.0
-"""The least duration (s) that is suspiciously long. Often milliseconds are meant."""
+"""The duration (s) from which a duration is suspicious. Often the user has written milliseconds."""
 
 
 def milliseconds(structs: Iterable[tuple[tuple[str, ...], object]]) -> Remarks:
@@ -42,7 +43,7 @@ def out_of_step(device: DeviceSettings, bus: object, others: Iterable[object] = 
     """Yield a problem for readings or commands that come too late, because the device's bus is too
     slow.
 
-    `others`: the settings of the device's other buses. Settings that are no valid struct count as fast.
+    `others`: the settings of the device's other buses. Invalid settings of a bus count as fast.
     """
     scan_s = getattr(bus, "scan_s", 0.0)
     slowest_s = max(scan_s, *(getattr(other, "scan_s", 0.0) for other in others), 0.0)
@@ -54,7 +55,8 @@ def out_of_step(device: DeviceSettings, bus: object, others: Iterable[object] = 
             text = f"{path[-1]} is {off_s:g}, but it is renewed every {scan_s:g} s (scan_s)"
             yield (
                 path,
-                f"{text}: write at least {lost_s:g}, so that one lost reply does not drop the output",
+                f"{text}: write at least {lost_s:g}, so that one lost reply does not switch off the"
+                " output",
             )
 
 

@@ -1,4 +1,5 @@
-"""Keys that had another name in an earlier version. One table serves to read, to warn and to rewrite.
+"""Keys that had another name in an earlier version. One table tells how to read old keys, how to warn
+about them, and how to rewrite them.
 
 Suppose that version 1.4 renames a key. Every version 1.x and 2.x then still reads the old name
 (docs/reference/promises.md). `check`, `enable` and `run` read such a file, and `rmf-bridge migrate`
@@ -18,8 +19,9 @@ from bridges.yaml.positions import MappingEntry, below
 class RenamedKey(Struct, frozen=True):
     """One key that was renamed or moved.
 
-    `was`: the old path from the top of the file. `now`: the new path. A `*` stands for any name, which
-    is the same in both paths. `since`: the version that renamed the key.
+    - `was`: the old path from the top of the file
+    - `now`: the new path. A `*` in a path stands for any name. This name is the same in both paths.
+    - `since`: the version that renamed the key
     """
 
     was: str
@@ -85,8 +87,8 @@ def _matches(root: MappingNode, row: RenamedKey) -> Iterator[OldKey]:
 def _below(
     node: Node, sections: Sequence[str], names: tuple[str, ...]
 ) -> Iterator[tuple[MappingNode, tuple[str, ...]]]:
-    """Yield (mapping, names) for each mapping at the path. `names`: the names for which the path's `*`
-    stand."""
+    """Yield (mapping, names) for each mapping at the path. `names`: the names that stand in the place
+    of each `*` of the path."""
     if not isinstance(node, MappingNode):
         return
     if not sections:
@@ -99,8 +101,8 @@ def _below(
 
 
 def _put(page: YamlFile, root: MappingNode, old: OldKey) -> None:
-    """Put the value at its new place, with the line and column of the old key. A section that is no
-    mapping stays unchanged, because the section's reader reports it."""
+    """Put the value at its new path, with the line and column of the old key. If the new section is not
+    a mapping, leave it unchanged, because its reader reports this."""
     node: Node = root
     *sections, key = old.path
     for part in sections:
@@ -110,7 +112,7 @@ def _put(page: YamlFile, root: MappingNode, old: OldKey) -> None:
     present = below(node, key)
     if present is None:
         node.value.append((_key(key, old), old.entry.value))
-    elif present.value is not old.entry.value:  # an alias may repeat the same value
+    elif present.value is not old.entry.value:  # with an alias, both keys may have the same value
         text = f"'{old.entry.name}' is the old name of '{key}', which the file has too: delete it"
         page.note(old.entry.key, text)
 

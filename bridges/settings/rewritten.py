@@ -1,8 +1,8 @@
-"""Rewrites the renamed keys in the text of a device YAML. Comments, order and layout stay.
+"""Rewrites the renamed keys in the text of a device YAML. Comments, order and layout stay unchanged.
 
-Only the text of a renamed key changes. A key that has moved to another section is cut out with the
-comment on its line. The key then becomes the first key of its new section. `rewritten` accepts the
-result only if the result has the same meaning as the original.
+Only the text of a renamed key changes. If a key has moved to another section, its line is cut out,
+together with the comment on it. The key then becomes the first key of its new section. `rewritten`
+accepts the result only if the result has the same meaning as the original.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,8 +19,7 @@ from bridges.yaml.positions import below
 
 
 class NeedsHand(Exception):
-    """The error of a text that a program cannot rewrite without a change of meaning. A person must
-    rewrite it."""
+    """The error for a text that a person must rewrite, because a program would change its meaning."""
 
 
 class _Edit(Struct, frozen=True, order=True):
@@ -94,7 +93,7 @@ def _cut(text: str, old: OldKey) -> tuple[_Edit, str]:
     last = len(text) if last < 0 else last
     behind = text[end:last].rstrip("\r")
     if text[first:start].strip() or (behind.strip() and not behind.lstrip().startswith("#")):
-        raise NeedsHand(f"line {old.entry.key.start_mark.line + 1} has more than this key")
+        raise NeedsHand(f"line {old.entry.key.start_mark.line + 1} has more text than this key")
     return _Edit(first, min(last + 1, len(text)), ""), behind.rstrip()
 
 

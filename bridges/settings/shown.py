@@ -1,4 +1,5 @@
-"""Shows the plain settings of a struct as text, with units, and with the default of each changed value.
+"""Shows the plain settings of a struct as text. A plain setting is a number, a word, or a list of
+these. Numbers have their unit. If a value differs from the default, the default is shown too.
 
 Wires, maps and code tables are left out, because their drivers describe them
 (`drivers/driver_type.py`).
@@ -10,8 +11,8 @@ import msgspec
 from msgspec import inspect as mi
 
 Row = tuple[str, str, str]
-"""A setting: its key with dots, its value with the unit, and its default. The default is "" if the
-value equals it."""
+"""A setting: its path as a key with dots (`limits.stale_after_s`), its value with the unit, and its
+default. The default is "" if the value is the default."""
 
 _LEAVES = (str, int, float, bool, type(None))
 
@@ -22,8 +23,8 @@ def plain(struct: object) -> list[Row]:
 
 
 def choices_of(device: object) -> list[Row]:
-    """Return the plain settings of a device and of its sections. A section with further sections inside
-    is left out."""
+    """Return the plain settings of a device and of its sections. Leave out a section that contains
+    further sections."""
     return list(_rows(device, (), deep=False))
 
 

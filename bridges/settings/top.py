@@ -20,8 +20,8 @@ MAPPING: Final = "a mapping (key: value)"
 
 
 def top_keys(kind: AnyKind | None) -> dict[str, str | None]:
-    """Return top key -> the form of its value; None for an optional key. `kind`: None if it is
-    unknown."""
+    """Return a mapping from each top key to a description of its value, or to None for an optional key.
+    `kind`: the file's kind, or None if it is unknown."""
     first = {"kind": either(kind_names())}
     if isinstance(kind, GraphKind):
         return {**first, "rmf": None, "recording": None, kind.devices_key: None}
@@ -51,7 +51,8 @@ def _sections(kind: AnyKind) -> dict[str, None]:
 
 
 def word(values: Values, entry: MappingEntry | None, words: list[str]) -> str | None:
-    """Return the entry's word; None if the entry is missing or its word is not in `words`."""
+    """Return the word that is the entry's value. Return None if the entry is missing or its word is not
+    in `words`."""
     if entry is None:
         return None
     found = values.make(LiteralType(tuple(words)), entry.spot())
@@ -59,7 +60,8 @@ def word(values: Values, entry: MappingEntry | None, words: list[str]) -> str | 
 
 
 def keys_below(kind: AnyKind | None, driver: AnyDriver | None) -> dict[str, str]:
-    """Return key -> its section, for each key that belongs into a section and not to the top."""
+    """Return a mapping from a key to its section, for each key that does not belong at the top of the
+    file."""
     below_top = {field.encode_name: "rmf" for field in fields(Rmf)}
     below_top |= {field.encode_name: "recording" for field in fields(RecordingSettings)}
     if isinstance(kind, GraphKind):

@@ -1,8 +1,8 @@
 """Checks the wires of a file against each other. It finds invalid points, points used twice, and unsafe
 wires.
 
-The bus type knows the spelling of its points and the impossible wires (`canonical` and `wire_problems`
-of its `BUS` in `drivers/hal/`).
+The module of the bus type defines how its points are spelt, and which wires are impossible (`canonical`
+and `wire_problems` of its `BUS` in `drivers/hal/`).
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -36,11 +36,14 @@ class Use(Struct, frozen=True):
 
 
 class WiringCheck:
-    """Collects and checks a device's points: first while the settings are read, and again as wires.
+    """Collects and checks the points of a device. It does this first while the settings are read, and
+    again when the driver has made wires from the settings.
 
-    `bus`: the device's own bus; "" if unknown. `buses`: all buses of the file. `usable`: the bus types
-    that the device's driver can use. `others`: the other buses that have inputs of the device.
-    `written`: the points that the daemon itself must switch off again.
+    - `bus`: the device's own bus; "" if unknown
+    - `buses`: all buses of the file
+    - `usable`: the bus types that the device's driver can use
+    - `others`: the other buses on which the device has inputs
+    - `written`: the points that stay on until the daemon itself switches them off
     """
 
     def __init__(
@@ -63,8 +66,8 @@ class WiringCheck:
         self.checks: dict[str, Check] = {"point": self._point, "other bus": self._other_bus}
 
     def _hal(self, bus: str) -> AnyBus | None:
-        """Return the type of a wire's bus; None if unknown. For "" return the type of the device's own
-        bus."""
+        """Return the type of the bus with this name; None if unknown. For the name "", return the type
+        of the device's own bus."""
         found = self._buses.get(bus or self._bus)
         return found.hal if found else None
 
@@ -107,7 +110,8 @@ class WiringCheck:
         return None
 
     def _where(self, point: str) -> str:
-        """Return a hint at another bus of the file that could have this point; "" if no bus could."""
+        """Return a hint that names another bus of the file on which this point could be; "" if there is
+        no such bus."""
         for name, bus in self._buses.items():
             if name != self._bus and bus.hal and bus.type in self._usable:
                 with suppress(ValueError):
@@ -116,8 +120,8 @@ class WiringCheck:
         return ""
 
     def wires(self, wires: Iterable[Wire], spot: Spot) -> None:
-        """Check a driver's wires. The wires replace the points that were collected while the settings
-        were read."""
+        """Check a driver's wires. Forget the points that were collected while the settings were read,
+        because the wires have the same points."""
         self.uses.clear()
         for wire in wires:
             places = [("point", wire.point)]
@@ -131,8 +135,8 @@ class WiringCheck:
                     self.written.append(hal.canonical(wire.point))
 
     def _stands(self, wire: Wire, key: str, text: str, spot: Spot) -> bool:
-        """Record the wire's use of this point. Return False, and note a problem, if the point is
-        invalid."""
+        """Record that the wire uses this point. If the point is invalid, note a problem and return
+        False."""
         entry = locate(spot, wire.path)
         point = below(entry.value, key)
         node = point.value if point else entry.where()
@@ -149,8 +153,8 @@ class WiringCheck:
                 yield locate(spot, wire.path).where(), f"'{wire.signal}': {text}"
 
     def claims(self, places: Iterable[tuple[str, tuple[str, ...]]], spot: Spot) -> None:
-        """Record the exclusive places of a device without wires. Each place comes with its path in the
-        YAML."""
+        """Record the things on the bus that only this device may use, such as CAN frames. A device
+        without wires has such things in place of points. Each comes with its path in the YAML."""
         for text, path in places:
             user = f"{self._device} {'.'.join(path)}"
             self.uses.append(Use(self._bus, text, text, user, locate(spot, path).where()))
@@ -169,15 +173,16 @@ class WiringCheck:
                 self._page.note(use.node, reason)
 
     def pace(self, settings: DeviceSettings, spot: Spot) -> None:
-        """Note each limit of the device that is too short for its buses."""
+        """Note each limit of the device that its buses cannot meet, because they are read too
+        seldom."""
         others = [self._buses[name].settings for name in self.others]
         own = self._buses[self._bus].settings if self._bus else BROKEN
         for path, text in out_of_step(settings, own, others):
             self._page.note(locate(spot, path).where(), text)
 
     def parts(self, structs: Iterable[tuple[tuple[str, ...], object]], spot: Spot) -> None:
-        """Check the inputs and outputs of a device one by one. The device has no wiring table, because
-        its other settings are invalid."""
+        """Check the inputs and outputs of a device one by one. This is for a device with other invalid
+        settings, because such a device has no wiring table."""
         for path, struct in structs:
             if isinstance(struct, Input):
                 wire = struct.wire(path[-1], path, struct.debounce_s)
@@ -194,7 +199,7 @@ class WiringCheck:
 
 
 def note_conflicts(page: YamlFile, uses: Iterable[Use]) -> None:
-    """Note each point that two signals use. The note stands at the second use in the file."""
+    """Note each point that two signals use. The problem is reported at the second use in the file."""
     first: dict[tuple[str, str], Use] = {}
     for use in sorted(uses, key=lambda u: (u.node.start_mark.line, u.node.start_mark.column)):
         other = first.setdefault((use.bus, use.point), use)

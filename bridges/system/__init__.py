@@ -1,1 +1,1 @@
-"""The machine of a daemon: its log, its folders and files, and its terminal."""
+"""Access to the machine on which a daemon runs: its log, its folders and files, and its terminal."""

@@ -1,4 +1,5 @@
-"""The ends of certificates in PEM files, read by the program openssl. No daemon imports this file."""
+"""The expiry dates of the certificates in PEM files. The program openssl reads them. No daemon imports
+this file."""
 
 import os
 import re
@@ -12,7 +13,7 @@ from msgspec import Struct
 
 DAY_S: Final = 86400
 SOON_S: Final = 30 * DAY_S
-"""A certificate that ends so soon (s) must be renewed."""
+"""The remaining validity (s) below which a certificate must be renewed."""
 URGENT_S: Final = 7 * DAY_S
 CHAIN_MAX: Final = 1 << 20
 READ_S: Final = 5.0
@@ -21,8 +22,8 @@ Stamp = tuple[int, int, int]
 
 
 class CertificateEnd(Struct, frozen=True):
-    """The end of a file's certificate (wall s), of the first to end if the file has several. `reason`:
-    why the end is unknown; then `at` is None."""
+    """The expiry of a file's certificate (wall s). If the file has several certificates, the earliest
+    expiry counts. `reason`: the reason why the expiry is unknown. In this case `at` is None."""
 
     at: float | None
     reason: str = ""
@@ -34,13 +35,13 @@ def listing(file: object) -> tuple[str, ...]:
 
 
 def first_end(shown: str) -> CertificateEnd:
-    """Return the first end in the text of `listing`."""
+    """Return the earliest expiry in the text that `listing` shows."""
     ends = [ssl.cert_time_to_seconds(found) for found in END.findall(shown)]
     return CertificateEnd(min(ends)) if ends else CertificateEnd(None, "it has no certificate")
 
 
 def told(name: str, end: CertificateEnd, now: float) -> str:
-    """Say when the certificate `name` ends, for people."""
+    """Return a sentence that tells a person when the certificate `name` expires."""
     if end.at is None:
         return f"{name} cannot be read: {end.reason}"
     left, day = end.at - now, time.strftime("%Y-%m-%d", time.gmtime(end.at))
@@ -55,13 +56,14 @@ def _days(seconds: float) -> str:
 
 
 class CertificateReader:
-    """Reads the ends of certificates. A file with a known end is read again when it has changed."""
+    """Reads the expiry of certificates. If the expiry of a file is known, the file is read again only
+    after a change."""
 
     def __init__(self) -> None:
         self._read: dict[str, tuple[Stamp, CertificateEnd]] = {}
 
     def end(self, file: str) -> CertificateEnd:
-        """Return the end of this file's certificate."""
+        """Return the expiry of this file's certificate."""
         try:
             found = Path(file).stat()
             stamp = (found.st_mtime_ns, found.st_ino, found.st_size)

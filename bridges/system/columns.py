@@ -9,10 +9,12 @@ from typing import TextIO
 
 
 def aligned(rows: Sequence[Sequence[str]], columns: int | None = None) -> list[str]:
-    """Return rows of equal length as lines, with two spaces between columns.
+    """Return rows with equal numbers of cells as lines, with two spaces between the columns of the
+    table.
 
-    If a line would be longer than `columns`, the cells of the widest columns are wrapped between words.
-    If the lines are still too long, only one space stands between columns, and long words are cut.
+    If a line would be longer than `columns` characters, the cells of the widest columns are wrapped
+    between words. If the lines are still too long, only one space stands between columns, and long
+    words are cut.
     """
     columned = [*zip(*rows, strict=True)]
     widths, gap = [max(map(width, column)) for column in columned], 2
@@ -28,8 +30,8 @@ def aligned(rows: Sequence[Sequence[str]], columns: int | None = None) -> list[s
 
 
 def _fitted(widths: Sequence[int], words: Sequence[int], columns: int) -> list[int]:
-    """Return the widths of the columns. Reduce the widest columns until all columns fit into `columns`.
-    Cut a word only if the columns would otherwise not fit."""
+    """Return the widths for the table's columns. Reduce the widest ones until their sum is at most
+    `columns` characters. Cut a word only if the table would otherwise not fit."""
     for least in (words, [1] * len(words)):
         for most in range(max(widths), 0, -1):
             fitted = [min(w, max(most, one)) for w, one in zip(widths, least, strict=True)]

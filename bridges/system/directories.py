@@ -2,13 +2,13 @@
 
 1. the directory that the command line gives
 2. in a systemd unit, the directories that systemd gives
-3. the service's directories, if their lock or record names this file
+3. the service's directories, if the lock or the record in them names this file
 4. the directories of a daemon that a person started by hand. For root, the directories of the user who
    called sudo come before root's own.
 
 `runtime` holds the lock and the status, and is lost at a reboot. `state` holds the record of claimed
-outputs. It survives a reboot, because a Modbus relay stays on during a power cut of the Pi. A directory
-from the command line serves as `runtime` and as `state`.
+outputs. The record must survive a reboot, because a Modbus relay stays on during a power cut of the Pi.
+A directory from the command line serves as `runtime` and as `state`.
 """
 
 import grp
@@ -28,15 +28,16 @@ SERVICE_STATE = Path("/var/lib/rmf-bridge")
 USERS_RUN = Path("/run/user")
 TMP = Path("/tmp")
 SERVICE_USER = "rmf-bridge"
-"""The user of the recorder, and of a service whose drop-in names no user. The group of this name may
-read the files of every service."""
+"""The name of a user and of a group. The recorder runs as this user, and so does a service whose
+drop-in names no user. The group may read the files of every service."""
 GROUPS = ("gpio", "dialout")
 """The additional groups that a drop-in may give a service's user (`drop_in.py`)."""
 _OF_SERVICE = re.compile(SERVICE_USER + "(-[0-9a-f]{8})?")
 
 
 def user_of(service: str) -> str:
-    """Return the name of a service's own user. A hash keeps the name short and free of capitals."""
+    """Return the name of a service's own user. A hash makes the name short, and avoids capital
+    letters."""
     return f"{SERVICE_USER}-{hashlib.sha256(service.encode()).hexdigest()[:8]}"
 
 
@@ -95,7 +96,8 @@ def everywhere(file: Path) -> Iterator[Directories]:
 
 
 def _of_user(uid: int, file: Path) -> Iterator[Directories]:
-    """Yield this user's directories, if the user owns them."""
+    """Yield the directories of the user `uid` for this file. Leave out directories that another user
+    owns."""
     for base in (USERS_RUN / str(uid), TMP / f"rmf-bridge-{uid}"):
         runtime = base / "rmf-bridge" / file.stem
         try:
@@ -135,9 +137,10 @@ def cannot_be_seen(folder: Path, error: OSError) -> PermissionError:
 def opened(folder: Path, *, ours: bool = False, make: bool = False) -> Iterator[int]:
     """Yield a descriptor of a daemon's directory. If `make`, make a missing directory.
 
-    The directory is safe: only its owner or root can have made it, and no other user can write it. If
-    `ours`, the owner is this user. Each parent directory is checked in the same way, from the top down.
-    So the caller may use the directory's path. Raises Distrusted, and other OSErrors.
+    The directory is checked first. Only its owner or root can have made it, and no other user can write
+    it. If `ours`, the owner must be this user. Each parent directory is checked in the same way, from
+    the top down. Therefore the caller may use the directory's path as well as the descriptor. Raises
+    Distrusted if a check fails, and other OSErrors.
     """
     folder = folder.absolute()
     owner = _owner(folder, ours=ours or make)
@@ -156,7 +159,7 @@ def opened(folder: Path, *, ours: bool = False, make: bool = False) -> Iterator[
 
 
 def _owner(folder: Path, *, ours: bool) -> int:
-    """Return a directory's owner. If `ours` and another user is the owner, raises Distrusted."""
+    """Return a directory's owner. Raises Distrusted if `ours` is set and the owner is another user."""
     try:
         owner = folder.lstat().st_uid
     except FileNotFoundError:
@@ -170,8 +173,8 @@ def _owner(folder: Path, *, ours: bool) -> int:
 
 
 def _distrusted(place: Path, owner: int, *, last: bool) -> str:
-    """Return the reason why a user other than root or the owner may have made this directory or link.
-    Return "" without such a reason."""
+    """Return the reason for distrust, if another user than root or the owner may have made this
+    directory or link. Otherwise return ""."""
     found = place.lstat()
     if found.st_uid not in (Path("/").stat().st_uid, owner):
         return "belongs to another user"
@@ -184,11 +187,11 @@ def _distrusted(place: Path, owner: int, *, last: bool) -> str:
 
 
 def act_as_owner(places: Directories) -> None:
-    """Change permanently from root to the owner of the directories, with the unit's groups.
+    """Change permanently from root to the owner of the directories, with the groups that the unit has.
 
-    After that, a file in the directories can do no more harm than the owner could. Raises
-    PermissionError if another user could have made the directories. A user who is not root must be the
-    owner. Otherwise PermissionError is raised too.
+    After that, files in the directories can cause no more harm than their owner could. If this process
+    is the owner's already, nothing changes. Raises PermissionError if another user could have made the
+    directories, or if this process is neither root's nor the owner's.
     """
     for folder in places.folders:
         with suppress(FileNotFoundError, NotADirectoryError):
@@ -225,8 +228,8 @@ def owner_of(path: Path) -> str:
 
 
 def work_somewhere(places: Directories) -> None:
-    """Change to a directory in which lgpio can make its FIFO. This is one of `places`, or else a
-    temporary directory."""
+    """Change to a directory in which the library lgpio can make its FIFO. Try the directories in
+    `places` first, and then temporary directories."""
     for folder in (places.runtime, places.state, TMP, Path("/dev/shm"), Path("/var/tmp")):
         probe = folder / f".rmf-bridge-{os.getpid()}"
         try:

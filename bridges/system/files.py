@@ -8,7 +8,7 @@ from pathlib import Path
 def replace(path: Path, content: bytes) -> None:
     """Replace a file, and write the file and its folder to disk. Make the folder if it is missing.
 
-    Raises OSError, and then the old file remains.
+    Raises OSError. In this case the old file is unchanged.
     """
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     new = path.with_name(f".{path.name}.new")
@@ -32,7 +32,7 @@ def show(path: Path, content: bytes) -> None:
 def read(path: Path, longest: int) -> bytes:
     """Return the file's content, up to `longest` bytes. Raises OSError, also for a symbolic link.
 
-    If a FIFO is in the file's place, do not wait for it.
+    If the path is a FIFO, do not wait for data.
     """
     flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
     with open(os.open(path, flags), "rb") as source:

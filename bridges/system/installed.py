@@ -1,9 +1,9 @@
-"""Imports the optional packages: the workbench, the fakes and the page's library. No daemon needs these
-packages. `bridges` imports them only through this module.
+"""Imports the optional packages: the workbench, the hardware fakes, and the library for the web page.
+No daemon needs these packages. `bridges` imports them only through this module.
 
-Each version of an optional Debian package has its own folder. The daemons' tree has a `.pth` file,
-which names the folder of the tree's own version (deb/scripts/rmf-bridges.postinst). For pip, all
-packages are one distribution.
+Each version of an optional Debian package has its own folder. The folder of the daemons has a `.pth`
+file, which names the package folder of the same version (deb/scripts/rmf-bridges.postinst). With pip,
+one distribution contains all packages.
 """
 
 import importlib
@@ -21,7 +21,7 @@ class NotInstalled(Exception):
 
 
 def is_there(package: str) -> bool:
-    """Return whether `workbench` or `hal_fakes` is installed in the daemons' version."""
+    """Return whether `workbench` or `hal_fakes` is installed in the same version as the daemons."""
     return importlib.util.find_spec(package) is not None
 
 
@@ -45,6 +45,7 @@ def how_to_install(part: str, site: Path = SITE) -> str:
         if other != place:
             return (
                 f"{package} is {other.name}, and these daemons are {place.name}: both must be the same"
-                f" version. After an upgrade that was refused: sudo dpkg --configure -a; else {command}"
+                " version. If an upgrade was refused, run sudo dpkg --configure -a; otherwise run"
+                f" {command}"
             )
     return command

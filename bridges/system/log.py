@@ -13,7 +13,7 @@ from enum import Enum
 import msgspec
 
 ESCAPED = "unicode_escape"
-codecs.lookup(ESCAPED)  # loads the codec now; later there may be no free file descriptor
+codecs.lookup(ESCAPED)  # loads the codec now, because later all file descriptors may be in use
 _PRIORITY = {"DEBUG": 7, "INFO": 6, "WARNING": 4, "ERROR": 3, "CRITICAL": 2}
 
 
@@ -36,8 +36,8 @@ def pairs(event: str, **values: object) -> LogLine:
 def plain(value: object) -> str:
     """Return a value as text for people, such as `agv_request yes, call L3`.
 
-    Leave out the fields of a record that are not set. None becomes `-`. A record without set fields
-    becomes `-` too.
+    Leave out the fields of a struct that have no value. None becomes `-`. A struct in which no field
+    has a value becomes `-` too.
     """
     match value:
         case None:
@@ -118,10 +118,11 @@ def _as_json(value: object) -> object:
 
 
 class _OthersOnce(logging.Filter):
-    """A filter that passes each log call of a library only once, as `library logger=… text=…`.
+    """A filter for the log calls of libraries. It passes each log call (a line of a library's code)
+    only once, as `library logger=… text=…`.
 
-    Without this filter anybody could cause endless lines with bad frames or datagrams. Our own code
-    already logs each event once.
+    Without this filter anybody could cause endless log lines by sending bad frames or datagrams. The
+    filter passes all lines of our own code, which already logs each event once.
     """
 
     OURS = ("root", "bridges", "drivers", "hal_fakes", "workbench")
@@ -145,11 +146,11 @@ class _OthersOnce(logging.Filter):
 
 class Seldom(logging.Filter):
     """A filter for repeated lines. It passes the first OFTEN lines of a series. Then it passes one line
-    in AGAIN_S (s), with the number of lines left out. A pause longer than PAUSE_S (s) ends the
-    series.
+    in each AGAIN_S (s), with the number of suppressed lines. A pause longer than PAUSE_S (s) ends
+    the series.
 
-    Without this filter a device that is lost and found each second would fill the disk. Lines that
-    differ only in a number of seconds count as equal. `now` returns the time (monotonic s).
+    Without this filter, a device that is lost each second and found again would fill the disk. Lines
+    that differ only in a number of seconds count as equal. `now` returns the time (monotonic s).
     """
 
     OFTEN, PAUSE_S, AGAIN_S, MOST = 6, 10.0, 600.0, 1000
@@ -165,7 +166,7 @@ class Seldom(logging.Filter):
         run = self._runs.pop(text, None)
         if run is None or now - run.last_at > self.PAUSE_S:
             run = _Run()
-        self._runs[text] = run  # the newest series is the last
+        self._runs[text] = run  # at the end, because the oldest is first
         if len(self._runs) > self.MOST:
             del self._runs[next(iter(self._runs))]
         run.times, run.last_at = run.times + 1, now

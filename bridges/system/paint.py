@@ -1,5 +1,5 @@
-"""Colours, and lines that are drawn in place. Colours are used only on a terminal, and only without
-NO_COLOR (https://no-color.org)."""
+"""Colours, and lines that overwrite earlier lines. Colours are used only on a terminal, and only
+without NO_COLOR (https://no-color.org)."""
 
 import os
 from collections.abc import Iterable
@@ -28,7 +28,7 @@ def bold(text: str, out: TextIO) -> str:
 
 
 def repainted(lines: Iterable[tuple[str, str]], before: int) -> str:
-    """Return a text that replaces the `before` lines above the cursor by `lines`. `lines`: pairs of a
-    text and its style."""
+    """Return a text that overwrites lines on the terminal. `before`: the number of lines above the
+    cursor to overwrite. `lines`: pairs of a new text and its style."""
     up = f"\x1b[{before}A" if before else ""
     return up + "".join(f"\r\x1b[K{styled(*line)}\n" for line in lines) + "\x1b[J"

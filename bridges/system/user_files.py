@@ -1,8 +1,8 @@
-"""Files that a user names. Only regular files are read, and always as a whole. Secrets have stricter
-rules.
+"""Files that a user names in a YAML or on the command line. Only regular files are read, and always as
+a whole. A FIFO would block a daemon for ever, and a device file may never end.
 
-A FIFO in a file's place would stop a daemon for ever, and a device may have no end. A secret comes from
-a file that only the daemon's user can read. A secret is never in a YAML.
+Secrets have stricter rules. A secret comes from a file that only the daemon's user can read, and is
+never in a YAML.
 """
 
 import errno
@@ -16,8 +16,8 @@ LONGEST_SECRET: Final = 4096
 
 
 class SecretError(Exception):
-    """The error of a secret's file. The file cannot be read, or other users can read it, or it does not
-    hold one secret."""
+    """The error for the file of a secret. The file cannot be read, or other users can read it, or it
+    does not hold one secret."""
 
 
 class Content(NamedTuple):

@@ -1,4 +1,4 @@
-"""The error text and the exit code for a file that a user wants, but that cannot be written."""
+"""The error text and the exit code for an output file that cannot be written."""
 
 import errno
 import os

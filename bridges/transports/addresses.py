@@ -6,7 +6,7 @@ import socket
 import struct
 
 Addresses = frozenset[tuple[int, str]]
-"""Pairs of an interface's number and its IPv4 address, for the interfaces that can reach other
+"""Pairs of an interface's index and its IPv4 address, for the interfaces that can reach other
 machines."""
 
 GET_FLAGS, GET_ADDRESS = 0x8913, 0x8915

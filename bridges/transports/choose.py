@@ -52,7 +52,7 @@ def open_transport(
     network = "localhost" if loopback else "subnet"
     release = RELEASES.get(rmf.release)
     log.info(pairs("transport", speaks=speaks, domain_id=domain, network=network, reason=reason))
-    node_name = re.sub(r"\W", "_", node_name, flags=re.ASCII)  # ROS allows no other characters
+    node_name = re.sub(r"\W", "_", node_name, flags=re.ASCII)  # a ROS name has no other characters
     if speaks == "ros2":
         return _open_ros2(node_name, domain, loopback=loopback, ros_args=ros_args)
     if set(ros_args) - {"--ros-args", "--"}:
@@ -91,7 +91,7 @@ def stays_on_loopback(rmf: Rmf, environ: Mapping[str, str], peers: Sequence[str]
     if text not in ("SUBNET", "SYSTEM_DEFAULT", "LOCALHOST"):
         raise TransportError(
             f"ROS_AUTOMATIC_DISCOVERY_RANGE is {text!r}: use SUBNET or LOCALHOST. With OFF"
-            " this node would find no other node; further values are unknown"
+            " this node would find no other node, and other values are unknown"
         )
     return text == "LOCALHOST" and not peers
 
@@ -114,8 +114,8 @@ def _choice(rmf: Rmf) -> tuple[str, str]:
 
 
 def _best_without(ros: str) -> tuple[str, str]:
-    """Return the transport that `auto` chooses without ROS, and the reason. `ros` names the missing
-    part of ROS."""
+    """Return the transport that `auto` chooses on a machine without ROS, and the reason. `ros`: a text
+    that says which part of ROS is missing."""
     missing = missing_of_dds()
     return ("zenoh", f"{ros}; {missing}") if missing else ("dds", ros)
 

@@ -1,8 +1,8 @@
-"""Configurations of Cyclone DDS for `dds`, and for ROS on Cyclone. One uses the network, and the other
-stays on this machine."""
+"""Configurations of Cyclone DDS, for the transport `dds` and for ROS nodes that use Cyclone. One
+configuration is for nodes on the network. The other configuration keeps a node on this machine."""
 
 from collections.abc import Mapping
-from html import escape  # the same in XML; xml.sax.saxutils would load urllib, http and ssl
+from html import escape  # also right for XML; xml.sax.saxutils would load urllib, http and ssl
 from typing import Final
 
 from bridges.messages.cdr import LONGEST
@@ -16,21 +16,23 @@ INTERNAL: Final = (
     "<PrimaryReorderMaxSamples>1</PrimaryReorderMaxSamples>"
     "<SecondaryReorderMaxSamples>1</SecondaryReorderMaxSamples></Internal>"
 )
-"""Settings with which a node leaves at once, even when its address has gone.
+"""Settings with which a node can leave DDS without delay, even if the machine has lost its network
+address.
 
-By default Cyclone 0.10 ends its receive threads with a datagram to that address, and waits minutes for
-this datagram (q_receive.c, trigger_recv_threads). Every writer also waits 1 s for acknowledgements that
-do not come. During these waits rclpy holds Python's lock, and the whole daemon stops.
+By default Cyclone 0.10 ends its receive threads by sending a datagram to the machine's own address. If
+the machine has lost this address, Cyclone waits minutes for the datagram (q_receive.c,
+trigger_recv_threads). Every writer also waits 1 s for acknowledgements that do not come. During these
+waits rclpy holds Python's global lock, and the whole daemon stops.
 
 A sample longer than LONGEST is dropped at its first fragment. For each writer, memory holds at most one
 incomplete sample and one sample that came too early. Cyclone's defaults are 16 incomplete samples and
 128 early samples. After a loss the node asks the writer to send again.
 """
 FOUND_AGAIN: Final = "<SPDPInterval>2 s</SPDPInterval>"
-"""The interval at which a node announces itself. Other nodes may forget the node in a network failure
-longer than a lease (10 s). With the short interval they soon find it again.
+"""The interval between two announcements of a node. If the network fails for longer than a lease (10
+s), other nodes may forget the node. With a short interval they soon find it again.
 
-The default in Cyclone 0.10 is 8 s. In Cyclone 11 the default towards a lost peer is 30 s.
+The default in Cyclone 0.10 is 8 s. In Cyclone 11 the default is 30 s if the other node was lost.
 """
 NEVER_FORGOTTEN: Final = (
     "<InitialLocatorPruneDelay>inf</InitialLocatorPruneDelay>"
@@ -47,18 +49,18 @@ LOOPBACK: Final = (
     "<MaxAutoParticipantIndex>30</MaxAutoParticipantIndex>"
     '<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>'
 )
-"""A configuration that keeps a node on this machine. It uses unicast on `lo`, for up to 31
+"""A configuration that keeps a node on this machine. It uses unicast on `lo`, and allows up to 31
 processes."""
 
 
 def configuration(environ: Mapping[str, str]) -> str:
-    """Return the configuration of a node on the network. Our settings come before the settings in
-    CYCLONEDDS_URI.
+    """Return the configuration of a node on the network. If a setting is also in CYCLONEDDS_URI, the
+    value in CYCLONEDDS_URI wins, because it comes later.
 
     The rules are those of rmw_cyclonedds (ROS 2 Jazzy, rmw_node.cpp):
 
-    - The node uses multicast, and reaches static peers by unicast. Peers can guess its participant
-      index.
+    - The node uses multicast, and reaches static peers by unicast. Its participant index is small, so
+      that peers can guess it.
     - With LOCALHOST the node reaches this machine and the static peers, without multicast.
     - With SYSTEM_DEFAULT Cyclone decides on discovery.
     """

@@ -1,5 +1,5 @@
-"""The transports' log lines about samples and peers. All transports share these lines. Each cause is
-logged once."""
+"""Log lines about samples and other nodes. All transports use these lines. Each sort of problem is
+logged once for each topic."""
 
 import logging
 
@@ -12,7 +12,7 @@ from bridges.transports.transport import Receive
 log = logging.getLogger(__name__)
 
 FAILURES = 5
-"""The number of failed reads in a row after which a transport ends its thread. Then the daemon ends
+"""The number of successive failed reads after which a transport ends its thread. Then the daemon ends
 too."""
 NOT_HEARD = "a publisher is not heard"
 NOT_SERVED = "a subscription is not served"

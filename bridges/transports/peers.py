@@ -1,11 +1,13 @@
-"""The announced ends of other nodes. An end is a publisher or a subscription. The transports report the
-ends. The ends show RMF's release, and types that do not fit our types.
+"""The publishers and subscriptions that other nodes have announced. Both are called ends. The
+transports report the ends to this module. The ends show RMF's release, and message types that do not
+match ours.
 
-A fleet adapter shows the release. It publishes FleetState. In newer releases it also subscribes to
-EmergencySignal. Our daemons do neither.
+RMF's fleet adapter shows the release. It publishes FleetState. In newer releases it also subscribes to
+EmergencySignal. Our daemons do not do this.
 
-With `auto` we speak the release of the fleet adapters. Without a fleet adapter we speak the default
-release. Fleet adapters of two releases are a fault, and then we keep our present release.
+With `auto` we use the messages of the fleet adapters' release. Without a fleet adapter we use the
+default release. If there are fleet adapters of two releases, this is a fault, and we do not change our
+release.
 """
 
 import logging
@@ -25,22 +27,24 @@ from bridges.transports import notices
 log = logging.getLogger(__name__)
 
 MOST: Final = 5000
-"""The maximum number of ends in memory. No site has more."""
+"""The maximum number of ends in memory. No site has more ends."""
 WITNESSES: Final = {
     (type_name(FleetState), True),
     (type_name(EmergencySignal), False),
     (type_name(Alert), False),
 }
-"""The message types whose ends only RMF's own nodes have. True stands for publishers, and False for
-subscriptions."""
+"""The message types that show RMF's release, because only RMF's own nodes publish them (True) or
+subscribe to them (False)."""
 MISFIT: Final = "TYPE_MISFIT"
 MIXED: Final = "TWO_RELEASES"
 
 
 class Announced(Struct, frozen=True):
-    """An announced end of any node. `topic`: the topic's name without the first slash.
+    """An announced publisher or subscription of any node.
 
-    `type`: the message's name in the form `package/msg/Name`. `hash`: the type hash, or "" if unknown.
+    - `topic`: the topic's name without the first slash
+    - `type`: the message's name in the form `package/msg/Name`
+    - `hash`: the type hash, or "" if unknown
     """
 
     topic: str
@@ -89,14 +93,15 @@ class Peers:
         return True
 
     def name_misfits(self) -> None:
-        """Log each topic on which other nodes have another type. Log a topic only once."""
+        """Log each topic on which other nodes use a type that differs from ours. Log each topic only
+        once."""
         for end in list(self._ends.values()):
             if self._misfits(end):
                 self.name(self._ours[end.topic, not end.publishes], published=end.publishes)
 
     def name(self, topic: AnyTopic, *, published: bool) -> None:
-        """Log that other nodes use another type on a topic. Log this only once. `published`: the other
-        nodes publish the topic. Otherwise they subscribe to it."""
+        """Log that other nodes use a type on this topic that differs from ours. Log each topic only
+        once. `published`: Do the other nodes publish the topic? Otherwise they subscribe to it."""
         key = topic.name.strip("/"), published
         if key not in self._named:
             self._named.add(key)
@@ -112,7 +117,7 @@ class Peers:
         heard = sorted(release.name for release in self._heard())
         found = [(MIXED, f"{' and '.join(heard)} are both on this graph")] if len(heard) > 1 else []
         counts = Counter(end.topic for end in list(self._ends.values()) if self._misfits(end))
-        what = f"of another definition than ours ({self.release.name})"
+        what = f"peer(s) with another definition than ours ({self.release.name})"
         return found + [(MISFIT, f"{topic}: {n} {what}") for topic, n in sorted(counts.items())]
 
     def _heard(self) -> set[Release]:

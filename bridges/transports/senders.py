@@ -9,19 +9,20 @@ from typing import Final
 from bridges.messages.heard import Sender
 
 MOST: Final = 1000
-"""The maximum number of publishers in memory. Above this number, the publisher heard longest ago is
-forgotten."""
+"""The maximum number of publishers in memory. Above this number, the publisher that was silent longest
+is forgotten."""
 AGAIN_S: Final = 1.0
 """The pause (s) between two attempts to find the node of a publisher."""
 
 
 class Senders:
-    """The publishers that one transport has heard, by their identities on the transport's wire.
+    """The publishers that one transport has heard. The key is the publisher's identity in the
+    transport's protocol.
 
-    Before a subscription delivers a message, it sets two attributes. `key` is the publisher's identity,
-    or None if unknown. `node_of` finds the node of an identity, or "" if unknown.
+    Before a subscription delivers a message, it sets two attributes here. `key` is the publisher's
+    identity, or None if unknown. `node_of(key)` returns the publisher's node, or "" if unknown.
 
-    A daemon without a listener never asks for a publisher. In that case nothing more happens.
+    Only `now` looks up a node. A daemon that never calls `now` has no further work.
     """
 
     def __init__(self) -> None:

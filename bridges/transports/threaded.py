@@ -19,21 +19,21 @@ from bridges.transports.transport import TransportError
 log = logging.getLogger(__name__)
 
 LOOK_EVERY_S: Final = 1.0
-"""The interval (s) at which a transport checks the machine's addresses. The libraries do not check
-them. A library that starts when only `lo` is up stays on `lo` for ever. No library notices a changed
-address."""
+"""The interval (s) at which a transport checks the machine's addresses, because the libraries do not
+check them. A library that starts when only `lo` is up stays on `lo` for ever. No library notices a
+changed address."""
 SET_BACK_S: Final = 1.0
-"""The largest step back (s) of the clock that does no harm. Cyclone renews a lease of 10 s every 8
-s."""
+"""The largest step back (s) of the clock that does no harm. Cyclone renews a lease of 10 s every 8 s,
+so it may be up to 2 s late."""
 
 
 class WallClock:
-    """A watch that notices when the wall clock is set back. It is needed because Cyclone DDS waits by
-    the wall clock.
+    """A watch that notices when the wall clock is set back. Cyclone DDS needs it, because its threads
+    measure their waiting time by the wall clock.
 
     Cyclone 0.10.5 (ROS 2 Jazzy) always waits by the wall clock
-    (github.com/eclipse-cyclonedds/cyclonedds, issue 1995). Cyclone 11.0.1 does so in the wheel on PyPI,
-    which is built without pthread_condattr_setclock.
+    (github.com/eclipse-cyclonedds/cyclonedds, issue 1995). Cyclone 11.0.1 also waits by the wall clock
+    in the wheel on PyPI, which is built without pthread_condattr_setclock.
 
     When the clock is set back, Cyclone's threads sleep longer by the size of the step. During this
     sleep a node renews no lease, and other nodes forget the node after 10 s. The node does not answer
@@ -51,8 +51,7 @@ class WallClock:
     def set_back_s(self, ahead_s: float) -> float:
         """Return by how much (s) the clock was set back. Return 0 for a step of SET_BACK_S or less.
 
-        Small steps add up until they exceed SET_BACK_S, because several steps may come during one sleep
-        of a thread.
+        Several small steps count as one step, because they may all come while a thread sleeps.
         """
         self._most_s = max(self._most_s, ahead_s)
         back_s = self._most_s - ahead_s
@@ -63,16 +62,16 @@ class WallClock:
 
 
 def ahead_s() -> float:
-    """Return the wall clock minus the time since the machine's start (s). The machine's sleep counts in
-    that time."""
+    """Return the wall clock minus the time since the machine's start (s). That time includes the time
+    in which the machine was suspended."""
     return time.time() - time.clock_gettime(time.CLOCK_BOOTTIME)
 
 
 class Threaded:
-    """A node on the graph with one thread. On DDS a second thread watches the clock.
+    """A node on the ROS graph with one thread. On DDS a second thread watches the clock.
 
-    `refusals`: the library's exceptions. `release`: the release to speak, or None to follow RMF's
-    release.
+    `refusals`: the exceptions of the transport's library. `release`: the RMF release whose messages the
+    node uses, or None to use the release of RMF's own nodes.
     """
 
     refusals: ClassVar[tuple[type[Exception], ...]]
@@ -94,7 +93,7 @@ class Threaded:
 
     @property
     def release(self) -> Release:
-        """The release of RMF's messages that the node speaks now."""
+        """The RMF release whose messages the node uses now."""
         return self._peers.release
 
     def faults(self) -> list[tuple[str, str]]:
@@ -103,7 +102,7 @@ class Threaded:
         return self._peers.faults()
 
     def sender(self) -> Sender | None:
-        """Return the publisher of the message that a callback now receives. Return None if the wire
+        """Return the publisher of the message that a callback now receives. Return None if the protocol
         does not name the publisher, as with rclpy (Jazzy)."""
         return self._senders.now()
 
@@ -125,7 +124,8 @@ class Threaded:
         """Start a thread that watches the wall clock. When the clock is set back, this thread sets
         `_set_back` and wakes the transport's thread.
 
-        The transport's thread cannot watch the clock itself, because it may wait by the wall clock.
+        The transport's thread cannot watch the clock itself. It may be waiting, and the step makes this
+        wait longer.
         """
         run, name = self._look_at_clock, f"{self.name}-clock"
         self._clock_thread = threading.Thread(target=run, name=name, daemon=True)
@@ -140,10 +140,11 @@ class Threaded:
                     self._wake()
 
     def _wake(self) -> None:
-        """End the wait of the transport's thread, if the node has joined. The caller holds the lock."""
+        """Wake the transport's thread, if the node has joined. The caller holds the lock."""
 
     def _look_is_due(self) -> bool:
-        """Return whether the next look at the network is due. If it is due, plan the look after it."""
+        """Return whether LOOK_EVERY_S has passed since the last check of the network. If so, count this
+        call as the new check."""
         now = time.monotonic()
         if now < self._look_at:
             return False
@@ -151,7 +152,7 @@ class Threaded:
         return True
 
     def _network_changed(self) -> bool:
-        """Return whether the machine's addresses have changed since the node joined. If so, log the new
+        """Return whether the machine's addresses have changed since the last check. If so, log the new
         addresses."""
         found = addresses.addresses()
         if found == self._addresses:

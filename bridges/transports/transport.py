@@ -21,8 +21,7 @@ Receive = Callable[[Message], None]
 
 
 def any_type(received: Callable[[M], None]) -> Receive:
-    """Return a subscription's callback as a callback for any message type. Transports store callbacks
-    of that type.
+    """Return a subscription's callback as a `Receive`. Transports store all callbacks as this type.
 
     The cast is safe, because a transport decodes each message as the type of the subscription's topic.
     """
@@ -30,8 +29,8 @@ def any_type(received: Callable[[M], None]) -> Receive:
 
 
 class TransportError(Exception):
-    """The error of a transport that cannot be opened or is lost. A network, a library or a domain is
-    missing."""
+    """The error of a transport that cannot be opened or is lost, because a network, a library or a ROS
+    domain is missing."""
 
 
 class Publisher(Protocol[M_contra]):
@@ -65,8 +64,8 @@ class Transport(Protocol):
     """One node on the RMF graph. `speaks`: the transport's name in a YAML. `domain_id`: the node's ROS
     domain.
 
-    The transport's own thread calls `received`. This callback must only append to an inbox, and must
-    not raise.
+    The transport's own thread calls the callback `received` of a subscription. This callback must only
+    append to an inbox, and must not raise.
 
     A sample is dropped if it does not decode, or if its callback raises. `dropped` counts the dropped
     samples by the topic's name. The first dropped sample of each topic is logged.
@@ -79,7 +78,7 @@ class Transport(Protocol):
 
     @property
     def release(self) -> Release:
-        """The release of RMF's messages that the node speaks now."""
+        """The RMF release whose messages the node uses now."""
 
     def faults(self) -> list[tuple[str, str]]:
         """Return the code and the detail of each present fault that keeps this node and other nodes
@@ -97,8 +96,8 @@ class Transport(Protocol):
         """
 
     def sender(self) -> Sender | None:
-        """Return the publisher of the message that `received` now takes. Return None if the wire does
-        not name it. Only the callback `received` may call this method."""
+        """Return the publisher of the message that `received` now takes. Return None if the protocol
+        does not name the publisher. Only the callback `received` may call this method."""
 
     @property
     def lives(self) -> bool:
@@ -110,4 +109,5 @@ class Transport(Protocol):
         time."""
 
     def close(self) -> None:
-        """Leave the graph at once, so that no ghost endpoint remains. A second call does nothing."""
+        """Leave the graph at once, so that other nodes do not still see a dead endpoint. A second call
+        does nothing."""

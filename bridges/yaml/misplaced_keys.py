@@ -1,4 +1,5 @@
-"""Finds keys in the wrong place: below another section, indented wrongly, or glued to their value."""
+"""Finds keys in the wrong place: below another section, with a wrong indent, or without a space before
+their value."""
 
 from collections.abc import Mapping
 
@@ -11,13 +12,13 @@ from bridges.yaml.spelling import short
 
 
 def bare(wanted: Type) -> Type:
-    """Return the type without its bounds and description."""
+    """Return the type that msgspec describes, without its bounds."""
     return wanted.type if isinstance(wanted, Metadata) else wanted
 
 
 def sections_of(wanted: StructType) -> dict[str, str]:
-    """Return key -> the name of its section, for the keys in the sections of a struct. A key of the
-    struct itself has the section ""."""
+    """Return a mapping from each key in the sections of a struct to the name of its section. A key of
+    the struct itself has the section ""."""
     own = {field.encode_name for field in wanted.fields}
     types = [(f.encode_name, bare(f.type)) for f in wanted.fields]
     inner = [
@@ -34,7 +35,7 @@ def sections_of(wanted: StructType) -> dict[str, str]:
 def misplaced(
     entry: MappingEntry, before: MappingEntry | None, elsewhere: Mapping[str, str]
 ) -> str:
-    """Describe the typing slip behind an unknown key; "" if no slip is found."""
+    """Describe the typing mistake that explains an unknown key; "" if none is found."""
     empty = before is not None and _is_empty(before.value)
     if before is not None and empty and not _is_empty(entry.value):
         return (
@@ -57,7 +58,7 @@ def is_decimals(entry: MappingEntry, before: MappingEntry) -> bool:
 
 
 def glued(entry: MappingEntry) -> str:
-    """Describe a key that is glued to its value, as in `active:high`; "" for any other key."""
+    """Describe a key without a space before its value, as in `active:high`; "" for any other key."""
     key, colon, value = entry.name.partition(":")
     if not (colon and value and _is_empty(entry.value)):
         return ""

@@ -23,8 +23,8 @@ from bridges.yaml.problems import SettingsError as SettingsError
 
 MAX_DEPTH = 32
 HALVES = re.compile("[\ud800-\udfff]")
-"""A pattern for surrogates. A surrogate is one half of a UTF-16 pair, and no UTF-8 text can hold
-one."""
+"""A pattern for surrogates. A surrogate is one half of a UTF-16 pair, and cannot be encoded in
+UTF-8."""
 
 
 class Sort(Struct, frozen=True):
@@ -51,7 +51,8 @@ class YamlFile:
         self.problems: list[Problem] = []
 
     def problem(self, where: Node | Mark | None, text: str) -> Problem:
-        """Return a problem at the start of a node. The text may quote any part of the file."""
+        """Return a problem at the start of a node. Control characters in the text are escaped, because
+        the text may quote any part of the file."""
         mark = where.start_mark if isinstance(where, Node) else where
         if mark is None:
             return Problem(self.file, 1, 1, printable(text))
@@ -68,7 +69,7 @@ class YamlFile:
 
 
 class _Refused(MarkedYAMLError):
-    """The error of valid YAML that we do not accept."""
+    """The error for YAML that is valid, but that we do not accept."""
 
     def __init__(self, mark: Mark, text: str) -> None:
         super().__init__(None, None, text, mark)
@@ -179,8 +180,8 @@ def _root(page: YamlFile, text: str, sort: Sort) -> Node | None:
         told = str(error.problem) if isinstance(error, _Refused) else typo_hints.reason(error, text)
         raise SettingsError([*page.problems, page.problem(mark, told)]) from None
     except (ValueError, OverflowError):
-        # PyYAML raises these errors if the number of a character, as in "\U00110000", or of a YAML
-        # version does not exist.
+        # PyYAML raises these errors for numbers that it cannot convert. One is the number of a
+        # character that does not exist, as in "\U00110000". The other is a number in a %YAML directive.
         assert composer is not None
         reason = "not YAML: a number too large, in an escape ('\\U...') or a directive ('%YAML')"
         raise SettingsError([page.problem(composer.get_mark(), reason)]) from None
@@ -192,5 +193,5 @@ def _problem_after(page: YamlFile, before: str, text: str) -> Problem:
 
 
 def is_plain(node: ScalarNode) -> bool:
-    """Return whether the scalar is written without quotes. If so, its text decides its type."""
+    """Return whether the scalar is written without quotes. YAML then derives its type from its text."""
     return node.style is None

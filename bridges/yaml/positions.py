@@ -1,5 +1,5 @@
-"""Places in a YAML file: the places of values, and the places at which errors about values are
-shown."""
+"""Places of values in a YAML file, and the places (line and column) at which errors about these values
+are reported."""
 
 from collections.abc import Iterable
 
@@ -14,8 +14,9 @@ from bridges.yaml.spelling import short
 class Spot(Struct, frozen=True):
     """A node that will become a value.
 
-    `at`: the place for errors about the whole value. This place is the value's key. `label`: the
-    value's name in errors. `path`: the value's path below the top struct.
+    - `at`: the value's key, at which errors about the whole value are reported
+    - `label`: the value's name in error texts
+    - `path`: the value's path below the top struct
     """
 
     node: Node
@@ -36,8 +37,8 @@ class MappingEntry(Struct, frozen=True):
         return Spot(self.value, self.key, f"'{short(self.name)}'", (*path, self.name))
 
     def where(self) -> Node:
-        """Return the place for errors about the value. This place is the value itself for a scalar,
-        else the key."""
+        """Return the node at which errors about the value are reported. This is the value itself for a
+        scalar, and the key for any other value."""
         node = self.value
         if isinstance(node, ScalarNode) and (node.value or not is_plain(node)):
             return node

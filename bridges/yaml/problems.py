@@ -1,5 +1,5 @@
-"""Problems in a file, with their places. This module loads no YAML library, because some code only
-reports problems."""
+"""Problems in a file, with their places. This module imports no YAML library, so that code that only
+reports problems need not load one."""
 
 from collections.abc import Iterable
 

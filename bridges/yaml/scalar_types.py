@@ -1,8 +1,8 @@
-"""Converts one YAML scalar to a text, number, boolean or choice. A scalar that does not fit raises
-WrongScalar with the reason.
+"""Converts one YAML scalar to a text, number, boolean or choice. If the scalar does not fit,
+WrongScalar is raised with the reason.
 
-msgspec decides whether the type allows the value. A text must be a text in every version of YAML. A
-number must be written unambiguously (`scalars.py`).
+msgspec decides whether the type allows the value. A text without quotes must not be a number, boolean
+or date in any version of YAML. A number must be written unambiguously (`scalars.py`).
 """
 
 from collections.abc import Callable, Mapping
@@ -38,8 +38,8 @@ and the name of its `check`."""
 
 
 class WrongScalar(Exception):
-    """The error of a scalar that does not fit its type. The error's text continues a sentence that
-    begins with the value's name ("is …"). The text has no full stop."""
+    """The error of a scalar that does not fit its type. The error's text begins with a verb ("is …"),
+    because the caller puts the value's name before it. The text has no full stop at its end."""
 
 
 def looks(node: Node) -> str:
@@ -107,7 +107,8 @@ def _rank(wanted: Type) -> int:
 
 
 def _annotation(wanted: Type) -> object:
-    """Return a type that `convert` accepts, with the bounds of msgspec's description."""
+    """Return a type that `convert` accepts. It has the same bounds as `wanted`, which is msgspec's
+    description of the type."""
     if isinstance(wanted, EnumType):
         return wanted.cls
     if isinstance(wanted, LiteralType):
@@ -120,7 +121,7 @@ _PLAIN: dict[type[Type], type] = {StrType: str, IntType: int, FloatType: float, 
 
 def _read(wanted: Type, node: ScalarNode, extra: Extra) -> object:
     """Return the value if its spelling is unambiguous. Raises WrongScalar."""
-    if isinstance(wanted, LiteralType | EnumType):  # the text counts as it is written
+    if isinstance(wanted, LiteralType | EnumType):  # here the text itself is the value
         return choices(wanted).get(node.value, node.value)
     if isinstance(wanted, StrType):
         _check_text(node, extra)
@@ -158,8 +159,7 @@ def _reason(wanted: Type, node: ScalarNode, extra: Extra, length: bool) -> str:
 
 
 def _too_little(wanted: Type, node: ScalarNode, extra: Extra) -> str:
-    """Return the reason for the type's least value, if the value is below the least value; otherwise
-    ""."""
+    """Return the reason why the type has a least value, if this value is less. Otherwise return ""."""
     value, least = number(node.value), getattr(wanted, "ge", None)
     small = value is not None and least is not None and value < least
     return f"; {extra['least']}" if small and "least" in extra else ""
@@ -189,8 +189,8 @@ def _check_text(node: ScalarNode, extra: Extra) -> None:
 
 
 def _misread(wanted: Type, node: ScalarNode, extra: Extra) -> WrongScalar:
-    """Return the error for a text that is no plain number or boolean. The error's text shows the right
-    spelling."""
+    """Return the error for a text that is not a plain number or boolean. The error's text shows the
+    right spelling."""
     text, asked = short(node.value), wanted_text(wanted, extra)
     whole = isinstance(wanted, IntType)
     if not is_plain(node):

@@ -1,7 +1,9 @@
-"""Finds texts without quotes that YAML reads as other values. Accepts only unambiguous numbers.
+"""Finds texts without quotes that YAML reads as other values, such as numbers. Accepts only unambiguous
+numbers.
 
-YAML 1.1 (PyYAML), YAML 1.2 and people read `017`, `1:30`, `no` or `1e3` differently. Therefore a name
-without quotes must be the same text for all three. A number must have the same value for all three.
+`017`, `1:30`, `no` or `1e3` mean different things to YAML 1.1 (PyYAML), to YAML 1.2 and to people.
+Therefore a name without quotes must be the same text for all three. A number must have the same value
+for all three.
 """
 
 import math
@@ -44,7 +46,7 @@ def is_null(text: str) -> bool:
 
 
 def is_null_word(text: str) -> bool:
-    """Return whether the text is a word for null. An empty text is no word."""
+    """Return whether the text is one of the words for null. An empty text is not such a word."""
     return text in _NULL_WORDS
 
 
@@ -52,7 +54,8 @@ def reads_as(text: str) -> str | None:
     """Describe how YAML 1.1 or 1.2 reads a text without quotes. Return None if both read the text
     unchanged.
 
-    >>> reads_as("017"), reads_as("no"), reads_as("L1") ('the number 15', 'false', None)
+        >>> reads_as("017"), reads_as("no"), reads_as("L1")
+        ('the number 15', 'false', None)
     """
     if is_null(text):
         return "nothing"
@@ -71,7 +74,7 @@ def _reads_as_number(text: str) -> str | None:
             try:
                 value = reading(text)
                 return value if isinstance(value, str) else f"the number {_short(value)}"
-            except ValueError:  # the text has only underscores, or more digits than Python converts
+            except ValueError:  # Python converts no text of underscores, and not so many digits
                 return "a number"
     return None
 

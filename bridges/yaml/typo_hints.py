@@ -1,7 +1,8 @@
-"""Gives hints at typing slips that PyYAML does not name, such as wrong indents, commas and invisible
-spaces.
+"""Gives hints about typing mistakes that PyYAML does not name, such as wrong indents, commas and
+invisible spaces.
 
-`reason` rephrases PyYAML's error for a file that is not YAML. The other functions judge one text each.
+`reason` rephrases PyYAML's error for a file that is not YAML. Each of the other functions checks one
+text.
 """
 
 import re
@@ -41,8 +42,8 @@ _CURLY = ("\u201c", "\u201d", "\u201e", "\u2018", "\u2019", "\u201a", "\u00ab", 
 
 
 def reason(error: MarkedYAMLError, text: str) -> str:
-    """Return the reason for PyYAML's error, in one line. If a common slip is the cause, return the
-    remedy."""
+    """Return the reason for PyYAML's error, in one line. If a common typing mistake is the cause, the
+    reason says how to correct it."""
     problem, where = str(error.problem), error.problem_mark or error.context_mark
     lines = text.splitlines()
     since = error.context_mark or where
@@ -128,13 +129,15 @@ def odd_space(text: str) -> str:
 
 
 def cleaned(text: str) -> str:
-    """Return the text without unusual spaces and quotation marks."""
+    """Return the text with ordinary spaces in place of unusual spaces. Remove unusual spaces between
+    digits, and quotation marks at the ends of the text."""
     joined = re.sub(f"(?<=[0-9]){_ODD.pattern}(?=[0-9])", "", text)
     return _ODD.sub(" ", joined).strip("".join((" ", *_CURLY)))
 
 
 def number_meant(text: str, whole: bool) -> str:
-    """Return YAML's spelling of a number that only a person can read; "" if the text is no number."""
+    """Return the spelling that YAML requires for a number that is written for people, such as `1,000`.
+    Return "" if the text is no number."""
     digits = "".join(str(unicodedata.digit(c, c)) for c in text)
     plain = re.sub(r"(?<=\d)['\u2019 ](?=\d{3}(\D|$))", "", digits)
     grouped = re.fullmatch(r"[-+]?\d{1,3}([.,]\d{3})+", plain)

@@ -33,7 +33,7 @@ from bridges.yaml.scalars import is_null
 from bridges.yaml.spelling import either, nearest, short, unknown
 
 VERBS = ("is", "has", "needs", "must", "says")
-"""The first words of problem texts that lack a subject. Their subject is the key."""
+"""The first words of problem texts that have no subject. In these texts the key becomes the subject."""
 
 T = TypeVar("T")
 
@@ -70,10 +70,10 @@ def _node_of(wanted: Type) -> type[Node]:
 
 
 class _Around(NamedTuple):
-    """A section of the YAML that is being read.
+    """A section of the YAML, while it is read.
 
-    `fields`: the section's keys, in the form that `known` takes. `column`: the column at which its keys
-    begin.
+    `fields`: the section's keys and the form of their values (see `known`). `column`: the column at
+    which the keys begin.
     """
 
     spot: Spot
@@ -82,16 +82,18 @@ class _Around(NamedTuple):
 
 
 Check = Callable[[str, Spot], str | None]
-"""A function that checks a text at its place. It returns the problem's text; None without a problem."""
+"""A function that checks a text, and gets its place too. It returns the text of a problem, or None if
+there is no problem."""
 
 
 class Values:
-    """Converts one file's nodes to values, and notes problems on its page.
+    """Converts one file's nodes to values. It notes problems of the file.
 
-    `checks`: name -> check, for texts whose type has `Meta(extra={"check": name})`. Such a text is
-    taken as written, and only its check accepts or refuses it. `owner(key)`: tells where a key belongs
-    that the outermost struct does not have; "" if nobody knows the key. `structs`: every struct made so
-    far, with its path.
+    - `checks`: maps a name to a check, for texts whose type has `Meta(extra={"check": name})`. Only
+      this check accepts or refuses such a text.
+    - `owner(key)`: returns a text about an unknown key of the outermost struct. The text says where the
+      key belongs; "" if this is unknown.
+    - `structs`: every struct made so far, with its path
     """
 
     def __init__(
@@ -115,7 +117,8 @@ class Values:
     def make(self, cls: object, spot: Spot, besides: tuple[str, ...] = ()) -> object:
         """Convert a node to a `cls`. Return BROKEN if this fails.
 
-        `cls`: a type, or msgspec's description of a type. `besides`: keys that the caller itself reads.
+        `cls`: a type, or msgspec's description of a type. `besides`: keys that are allowed too, because
+        the caller reads them itself.
         """
         wanted = cls if isinstance(cls, Type) else described(cls)
         if isinstance(wanted, StructType):
@@ -124,7 +127,7 @@ class Values:
 
     def entries(self, spot: Spot) -> list[MappingEntry]:
         """Return a mapping's valid entries. Note each duplicate key, each merge key and each key that
-        is no text."""
+        is not text."""
         if not isinstance(spot.node, MappingNode):
             self._mismatch(spot, "a mapping (key: value)")
             return []
@@ -150,10 +153,12 @@ class Values:
     ) -> dict[str, MappingEntry]:
         """Return the entries whose keys are in `fields`, and note the other entries.
 
-        `fields`: key -> form of its value; None for an optional key. `elsewhere`: key -> the section to
-        which the key belongs. `refused`: key -> the reason why the key cannot stand here.
+        - `fields`: maps a key to a description of its value, or to None for an optional key
+        - `elsewhere`: maps a key to the section to which it belongs
+        - `refused`: maps a key to the reason why it is not allowed here
 
-        A missing key is not reported if an unknown key resembles it, so that one slip is one problem.
+        If an unknown key resembles a missing key, only the unknown key is reported. So one typing
+        mistake is one problem.
         """
         found = {e.name: e for e in entries}
         near = {nearest(name, fields) for name in found if name not in fields}
@@ -161,7 +166,7 @@ class Values:
         for before, entry in zip([None, *entries], entries, strict=False):
             if entry.name not in fields:
                 if before and is_decimals(entry, before):
-                    cut.add(before.name)  # a comma has cut this number, so its value is wrong
+                    cut.add(before.name)  # its decimals became this key, so its value is wrong
                 self._page.note(
                     entry.key,
                     refused.get(entry.name)
@@ -183,15 +188,15 @@ class Values:
         return self._owner(entry.name)
 
     def _too_deep(self, entry: MappingEntry) -> str:
-        """Describe a key that belongs to a section around the present section; "" for any other key.
-        Delete the problem that the outer section lacks this key."""
+        """Describe a key that belongs to one of the outer sections; "" for any other key. Delete the
+        problem that the outer section lacks this key."""
         for around in reversed(self._around):
             if entry.name in around.fields:
                 missing = _missing(around.spot, entry.name, around.fields[entry.name] or "")
                 self._page.problems[:] = [p for p in self._page.problems if p.text != missing]
                 return (
                     f"'{short(entry.name)}' is indented too far: it belongs to {around.spot.label},"
-                    f" {around.column} spaces from the left"
+                    f" so write {around.column} spaces before it"
                 )
         return ""
 
@@ -209,8 +214,8 @@ class Values:
         return self._leaf([wanted], spot, extra or {})
 
     def _union(self, wanted: UnionType, spot: Spot, extra: Extra | None) -> object:
-        """Convert the node to the member of the union that fits the node's form. Among several scalar
-        types, the first that accepts the scalar counts."""
+        """Convert the node to the member of the union that fits the node's form (scalar, list or
+        mapping). If several scalar types fit, the first one that accepts the scalar is used."""
         members = [t for t in wanted.types if not isinstance(t, NoneType)]
         if len(members) < len(wanted.types) and is_none(spot.node):
             return None
@@ -337,8 +342,8 @@ def _missing(spot: Spot, name: str, wanted: str) -> str:
 
 
 def _of_subject(path: tuple[str, ...], name: str, label: str, text: str) -> str:
-    """Return the text with its key as the subject. Return the text unchanged if it names the key
-    already."""
+    """Put the key before the text as its subject. If the text names the key already, return it
+    unchanged."""
     if text.partition(" ")[0] in VERBS:
         return f"'{short(name)}' {text}" if name else f"{label} {text}"
     key = name

@@ -1,9 +1,9 @@
 """An alarm panel on contacts or registers. Each source of the alarm is one point of the GPIO header, of
 a Modbus module, or of a controller's registers.
 
-A fire panel's contact is wired normally closed, so that a cut loop reads as an alarm. The daemon
-refuses a wiring whose cut loop reads as clear. The YAML's `accept_unsafe` can accept such a wiring. A
-bit of a register has no cable of its own, so this check does not apply to bits.
+A fire panel's contact is wired normally closed, so that a cut loop reads as an alarm. If a cut loop
+would read as no alarm, the daemon refuses the wiring, unless the YAML accepts it with `accept_unsafe`.
+A bit of a register has no cable of its own, so this check does not apply to bits.
 """
 
 from collections.abc import Iterator, Mapping
@@ -66,15 +66,15 @@ def debounce(settings: DryContactPanelSettings) -> Mapping[str, float]:
 
 
 def warnings(settings: DryContactPanelSettings) -> Remarks:
-    """Yield a warning, with its path in the YAML, for each valid setting to review before the panel
-    goes into service."""
+    """Yield a warning, with its path in the YAML, for each valid setting that a person should review
+    before the panel goes into service."""
     yield from slow_alarms(w for w in wires(settings) if w.signal != DRILL)
     yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
 
 
 def tables(settings: DryContactPanelSettings) -> Iterator[Table]:
-    """Yield a table with the fleets that each source stops, and with the reading of each cut loop. A
-    row shows the effect of a panel that no longer answers."""
+    """Yield a table with the fleets that each source stops, and with the value that a cut loop reads
+    as. One row shows what happens when the panel no longer answers."""
     fleets = ", ".join(settings.fleets) or "every fleet"
     reads = {None: "anything", True: "an alarm", False: "clear"}
     rows = [
@@ -90,7 +90,7 @@ def tables(settings: DryContactPanelSettings) -> Iterator[Table]:
 
 
 def create(name: str, settings: DryContactPanelSettings, bus: PointsBus) -> "DryContactPanel":
-    """Make the panel's driver on its bus. The driver touches nothing before `open`."""
+    """Make the panel's driver on its bus. The driver accesses no hardware before `open`."""
     return DryContactPanel(Points(wires(settings), bus))
 
 

@@ -40,7 +40,8 @@ class HttpPanelSettings(PanelSettings, frozen=True, kw_only=True, forbid_unknown
 
 
 def describe(settings: HttpPanelSettings, bus: http.HttpSettings) -> Iterator[tuple[str, str]]:
-    """Yield rows for `check` about the reading and about each source's field."""
+    """Yield rows for `check`. The first row is about the request that reads the panel. Each other row
+    is about a source's field."""
     api = http.base(bus.api_base)
     yield "state", f"GET {api.url(settings.state_path)} every {bus.scan_s:g} s"
     for name, place in settings.sources.items():

@@ -2,11 +2,12 @@
 receive periodic frames.
 
 A map gives the frames' meanings (`can_map.py`). The charger charges only while it receives the map's
-frames at the map's periods. When these frames cease, the charger stops by itself. So the scan loop
-sends each frame itself, and the driver starts no cyclic sender. If the daemon hangs, the frames cease.
+frames at the map's periods. When these frames cease, the charger stops by itself. Therefore the scan
+loop sends each frame itself, and the driver does not let the kernel repeat frames. So if the daemon
+hangs, the frames cease.
 
-While the charger's own frames are missing, the driver sends only the frames for power off and the map's
-wake frames. A map need not have wake frames.
+While the charger's own frames are missing, the driver sends only two sorts of frames: those that switch
+the power off, and those that wake the charger. A map may have no wake frames.
 """
 
 import functools
@@ -91,7 +92,8 @@ def _setpoint_problems(settings: FrameChargerSettings) -> Remarks:
 
 
 def _beyond(setpoints: Mapping[str, float]) -> Remarks:
-    """Yield a problem for a setpoint above its own limit, such as volts above max_volts."""
+    """Yield a problem for each setpoint above its limit in the same list, such as volts above
+    max_volts."""
     for name, value in setpoints.items():
         most = setpoints.get(f"max_{name}", value)
         if value > most:
@@ -123,7 +125,7 @@ def claims(settings: FrameChargerSettings) -> Iterator[tuple[str, tuple[str, ...
     """Yield each frame that no other device may use, with its path in the YAML. Yield nothing while the
     map has problems.
 
-    The claims leave out CANopen's NMT frame, because all devices share this frame.
+    CANopen's NMT frame is left out, because all devices share this frame.
     """
     if any(PROFILE.problems(settings.profile, settings.map)):
         return
@@ -243,7 +245,7 @@ class FrameDriver:
         except HalError:
             for wake in self._map.wake:
                 payload = functools.partial(self._dbc.encode, wake.frame, wake.says)
-                with suppress(HalError):  # the reading's own error follows, and tells more
+                with suppress(HalError):  # the reading's error is raised below, and says more
                     self._frames.feed(self._dbc.id(wake.frame), wake.every_s, payload)
             raise
 
@@ -282,7 +284,7 @@ def _meant(found: FrameMap, values: Values) -> Meant:
 
 
 def _errors(found: FrameMap, values: Values, activity: Activity) -> Found:
-    """Return the errors that the received frames report, whatever the state.
+    """Return the errors that the received frames report, in any state of the charger.
 
     The signal `out_of_range` counts as an error only in an error state. In other states the signal
     shows the robot's position.
@@ -315,11 +317,11 @@ def _measured(found: FrameMap, frames: dbc.Dbc, values: Values) -> Measured:
 
 
 def _sequel(found: FrameMap) -> Sequel:
-    """Return the error frames to wait for. The charger may send an error frame after the frame of its
-    state.
+    """Return the error frames for which a reading must wait. The charger may send an error frame after
+    the frame of its state.
 
-    Without the error frames, the driver cannot know whether the station or the robot has the error. The
-    error would count as the station's, and RMF would no longer use the station.
+    Without the error frames, the driver could not know whether the station or the robot has the error.
+    It would report an error of the station, and RMF would no longer use the station.
     """
     return Sequel(
         first=found.state_frames()[0],
@@ -349,7 +351,7 @@ def _said(found: FrameMap, frames: dbc.Dbc) -> dict[str, Said]:
 
 def _heard(values: Values, signal: str) -> float:
     if signal not in values:
-        raise DriverError(f"no frame with {signal} has come, and a rule tests its value")
+        raise DriverError(f"no frame with {signal} has come, but a rule of the map needs its value")
     return values[signal]
 
 

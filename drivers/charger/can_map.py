@@ -20,7 +20,9 @@ from drivers.charger.state_codes import Codes
 from drivers.hal.can import named
 from drivers.profiles import Profile
 
-STATE_IS_NEEDED: Final = "needs state (a signal, and the meanings of its numbers), or rules"
+STATE_IS_NEEDED: Final = (
+    "is missing: give a signal and the meanings of its numbers here, or give rules"
+)
 Signal = Annotated[
     str,
     msgspec.Meta(
@@ -59,7 +61,7 @@ class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     ] = None
     setpoints: Annotated[
         dict[Name, Name],
-        tells("signal -> the name of the setpoint that this signal has while charging is allowed."),
+        tells("signal -> the setpoint whose value this signal carries while charging is allowed."),
     ] = {}
     off: Annotated[
         dict[Name, float] | None,
@@ -75,8 +77,8 @@ class Sent(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
             yield (), "is never sent: give on, or off, or both"
 
     def values(self, on: bool, setpoints: Mapping[str, float]) -> dict[str, float] | None:
-        """Return the value of each signal for power on (`on`) or for power off. Return None if the
-        driver does not send the frame then."""
+        """Return the value of each signal, with the power on (`on`) or off. Return None if the driver
+        sends no such frame in this case."""
         if not on:
             return self.off
         if self.on is None:
@@ -95,12 +97,14 @@ class Wake(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The map of one make's frames."""
+    """The map of the CAN frames of one make of charger."""
 
-    dbc: Annotated[Name, tells("the DBC file, in drivers/profiles/ or by its absolute path.")]
+    dbc: Annotated[
+        Name, tells("the DBC file: the name of a file in drivers/profiles/, or an absolute path.")
+    ]
     masks: Annotated[
         dict[Name, Mask],
-        tells("frame -> the bits to compare in its id, if the id contains a node id."),
+        tells("frame -> the bits of its id that identify it, if the id contains a node id too."),
     ] = {}
     state: Annotated[State | None, tells("the state as a number; not needed with `rules`.")] = None
     state_timeout_s: Annotated[
@@ -114,25 +118,26 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     amps: Annotated[Signal | None, tells("the current into the battery.")] = None
     receiver: Annotated[
         Signal | None,
-        tells("""the receiver's id, or 0 for no receiver. Without this signal's frame there is no
-        reading."""),
+        tells("""the receiver's id, or 0 for no receiver. If this signal's frame is missing, reading
+        the charger fails."""),
     ] = None
     out_of_range: Annotated[
         Signal | None,
-        tells("""not 0 while the robot stands out of the charger's range. If `errors` has this
-        signal too, the signal counts as an error only in an error state, because a robot that has
-        not arrived yet is no error."""),
+        tells("""not 0 while the robot is out of the charger's range. If `errors` has this signal
+        too, the signal counts as an error only in an error state. In other states it only means
+        that the robot has not arrived yet."""),
     ] = None
     range_ok: Annotated[
         Signal | None,
-        tells("""not 0 while the robot stands within the charger's range. Give this signal if the
-        charger always reports it. While the signal is 0 there is no power, and without its frame
-        there is no reading."""),
+        tells("""not 0 while the robot is within the charger's range. Give this signal if the charger
+        reports it at all times. While the signal is 0 the daemon keeps the power off. If the
+        signal's frame is missing, reading the charger fails."""),
     ] = None
     at_height: Annotated[
         Signal | None,
         tells("""not 0 while the charger's moving pad is in its charging position. While the signal
-        is 0 there is no power, and without its frame there is no reading."""),
+        is 0 the daemon keeps the power off. If the signal's frame is missing, reading the charger
+        fails."""),
     ] = None
     temperatures: Annotated[
         dict[Name, Signal],
@@ -140,8 +145,8 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = {}
     rules: Annotated[
         list[Rule],
-        tells("""rules that give the state from other signals. The driver tries them before the
-        codes."""),
+        tells("""rules that give the state from other signals. The driver tries the rules before the
+        codes of `state`."""),
     ] = []
     errors: Annotated[StationErrors, tells("signals that mean an error in any state.")] = (
         StationErrors()
@@ -214,8 +219,8 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return {signal.split(".")[0] for _, signal in self.errors.places()}
 
     def state_frames(self) -> list[str]:
-        """Return the frames that give the state. The state's number is in a frame, and rules test
-        signals of further frames."""
+        """Return the frames that give the state. These are the frame with the state's number, and the
+        frames whose signals the rules test."""
         signals = [self.state.at] if self.state else []
         signals += [signal for _, signal in by_rules.places(self.rules)]
         return list(dict.fromkeys(signal.split(".")[0] for signal in signals))
@@ -240,8 +245,8 @@ def _lacks(found: dbc.Dbc, path: tuple[str, ...], frame: str, signal: str = "") 
 
 
 def rows(found: FrameMap) -> Iterator[tuple[str, str]]:
-    """Yield rows for `check`, each a subject and its meaning, about the signals that the driver
-    reads."""
+    """Yield rows for `check` about the signals that the driver reads. Each row is a pair of a subject
+    and its meaning."""
     frames = dbc.load(found.dbc)
     yield "frames", str(dbc.path(found.dbc))
     for path, signal in found.signals():
@@ -269,7 +274,7 @@ def tables(found: FrameMap, setpoints: Mapping[str, float]) -> Iterator[Table]:
         (*sent, *woken),
     )
     yield Table(
-        "frames that are read, by samples (other signals 0)",
+        "frames that the driver reads, for sample values (all other signals 0)",
         ("frame", "id", "bytes", "reads as"),
         tuple(_samples(found, frames)),
     )

@@ -53,7 +53,7 @@ OBJECTS: Final[Mapping[str, Object]] = {
 class CanOpenChargerSettings(
     ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True
 ):
-    """One receiver."""
+    """The settings of one receiver, which a robot carries."""
 
     node: Annotated[
         int,
@@ -64,7 +64,7 @@ class CanOpenChargerSettings(
         Literal["required", "none"], tells("`none` for old firmware, which sends no heartbeat.")
     ] = "required"
     heartbeat_timeout_s: Annotated[
-        BeatTimeout, tells("the time after the last heartbeat when the receiver counts as lost.")
+        BeatTimeout, tells("the receiver counts as lost after this time without a heartbeat.")
     ] = 0.5
 
 
@@ -101,7 +101,7 @@ def create(name: str, settings: CanOpenChargerSettings, bus: can.CanBus) -> xner
 
 
 class Objects:
-    """Access to the objects of one node (`xnergy.ReceiverAccess`). The temperatures are missing,
+    """Access to the objects of one node (`xnergy.ReceiverAccess`). The driver reads no temperatures,
     because the maker publishes no objects for temperatures."""
 
     reads = xnergy.ALWAYS
@@ -114,8 +114,8 @@ class Objects:
         self.now = bus.now
 
     def alive(self) -> bool:
-        """Check the heartbeat. Return True if the node has restarted after the last call. Raises
-        HalError."""
+        """Check the heartbeat. Return True if the node has restarted since the last call of `alive`.
+        Raises HalError."""
         self._node.alive()
         before, self._starts = self._starts, self._node.starts
         return before != self._starts

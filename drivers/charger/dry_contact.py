@@ -30,11 +30,11 @@ from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted, unsafe_wires
 CUT_MUST_READ: Final = {
     "fault": (True, "a fault of the station is not seen"),
     "ready": (False, "a station that is not ready reads ready"),
-    "at_height": (False, "a lowered pad reads as raised, and is energised"),
-    "range_ok": (False, "a badly placed robot reads in range, and is energised"),
+    "at_height": (False, "a lowered pad reads as raised, so the station energises it"),
+    "range_ok": (False, "a badly placed robot reads as in range, so the station energises its pad"),
 }
-"""The safe reading of each signal's cut wire (True: asserted), and the danger of the opposite
-reading."""
+"""The reading that a cut wire must give, for each signal (True: asserted). The text names the danger if
+a cut wire reads the opposite."""
 ENABLE: Final = "enable"
 
 
@@ -50,12 +50,13 @@ class ChargerInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unkno
     fault: Annotated[Input | None, tells("the station is out of order.")] = None
     at_height: Annotated[
         Input | None,
-        tells("""the station's moving pad is in its charging position. Without this signal there is
-        no power. A loss of the signal while current flows is a fault."""),
+        tells("""the station's moving pad is in its charging position. While this contact is off the
+        relay stays off. If the contact goes off while current flows, this is a fault."""),
     ] = None
     range_ok: Annotated[
         Input | None,
-        tells("the robot stands where charging is possible. Otherwise the relay stays off."),
+        tells("""the robot stands where charging is possible. While this contact is off the relay
+        stays off."""),
     ] = None
 
 
@@ -77,7 +78,10 @@ class DryContactChargerSettings(
         """Yield problems that involve more than one field."""
         yield from super().problems()
         if self.on_death == "keep":
-            yield ("on_death",), "without the daemon the relay is off: delete on_death"
+            yield (
+                ("on_death",),
+                "has no effect, because the relay is always off without the daemon: delete on_death",
+            )
         if self.receivers:
             yield ("receivers",), "contacts cannot give a receiver's id: delete receivers"
         yield from unaccepted(_unsafe(self), self.accept_unsafe)
@@ -94,8 +98,8 @@ def _unsafe(settings: DryContactChargerSettings) -> Iterator[Unsafe]:
 
 
 def tables(settings: DryContactChargerSettings) -> Iterator[Table]:
-    """Yield tables of the contacts and of the relay. The tables show each combination, and each
-    combination with a wire cut."""
+    """Yield a table of the contacts, and a table of the relay. The table of contacts shows how each
+    combination of contacts reads, and how it reads with one wire cut."""
     table = {wire.signal: wire for wire in wires(settings) if wire.direction == "in"}
     rows = []
     for on in itertools.product((False, True), repeat=len(table)):
@@ -130,10 +134,10 @@ def warnings(settings: DryContactChargerSettings) -> Remarks:
             )
         if wire.bus:
             text = (
-                f"while the bus '{wire.bus}' is not read, the relay keeps its state and a charge"
-                " goes on"
+                f"while the bus '{wire.bus}' is not read, the relay keeps its state, so a charge"
+                " continues"
             )
-            yield (*wire.path, "bus"), f"{text}, and '{wire.signal}' cannot end the charge"
+            yield (*wire.path, "bus"), f"{text} even if the contact '{wire.signal}' changes"
     if settings.inputs.fault is None:
         yield ("inputs",), "without a fault contact a station that is out of order reads as idle"
     yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
@@ -164,7 +168,7 @@ class DryContactCharger(OnPoints):
         self._points.write({ENABLE: self._enabled})
 
     def make_safe(self) -> None:
-        """Switch the relay off and verify it."""
+        """Switch the relay off, and verify that the relay is off."""
         self._enabled = False
         super().make_safe()
 

@@ -1,6 +1,7 @@
 """A charging station that speaks HTTP and JSON.
 
-The defaults fit the first station (a wall-mounted transmitter, TPU), which has this interface:
+The defaults fit the station for which this driver was first written (a wall-mounted transmitter, TPU).
+That station has this interface:
 
     GET  http://{api_base}/state        ->  200 {"state": 238, "error_msg": "foreign object"}
     POST http://{api_base}/clear_error  ->  2xx
@@ -8,8 +9,8 @@ The defaults fit the first station (a wall-mounted transmitter, TPU), which has 
 This interface has no start, no stop and no receiver id. So the driver can only observe the station, and
 the station itself decides which robot it charges. For other makes the YAML gives paths and fields.
 
-`codes` gives the meanings of the maker's states. A state that `codes` does not list counts as an error.
-The driver never passes a maker's state on as an RMF state.
+`codes` gives the meanings of the maker's states. A state that `codes` does not list counts as a fault
+of the station. The driver never passes a maker's state on as an RMF state.
 """
 
 from collections.abc import Iterator, Mapping
@@ -71,8 +72,8 @@ def create(name: str, settings: HttpChargerSettings, bus: Calls) -> JsonCharger:
 
 
 def claims(settings: HttpChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield the place of the station's state and of each command, with its path in the YAML. No other
-    charger may use these places."""
+    """Yield the station's state (a field of a path) and each command, with its path in the YAML. No
+    other charger may use the same state or command."""
     yield f"{settings.fields.state} of {settings.state_path}", ("state_path",)
     for name in ("start", "stop"):
         if call := getattr(settings, name):

@@ -30,12 +30,13 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     error_text: Annotated[
         Field,
         tells("""the field of the station's error text. Any text means an error, whatever the state
-        is."""),
+        is, unless `error_texts` gives `none` for this text."""),
     ] = "error_msg"
     error_texts: Annotated[
         dict[Word, TextMeans],
-        tells("""text -> the side of the error, `station` or `robot`. Write `none` for a text that
-        means no error (`OK`). For any other text `codes` may give the side."""),
+        tells("""error text -> the side that is at fault, `station` or `robot`. Write `none` for a
+        text that means no error (`OK`). For a text that is not listed here, `codes` may give the
+        side."""),
     ] = {}
     receiver_id: Annotated[
         Field | None,
@@ -46,13 +47,14 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     )
     range_ok: Annotated[
         JsonFlag | None,
-        tells("""the robot stands within the station's range. Give this flag if the station always
-        reports it. There is power only while the flag is true."""),
+        tells("""the robot is within the station's range. Give this flag if the station reports it at
+        all times. The daemon switches the power on only while the flag is true."""),
     ] = None
     at_height: Annotated[
         JsonFlag | None,
-        tells("""the station's moving pad is in its charging position. There is power only while the
-        flag is true. A loss of the flag while current flows is a fault."""),
+        tells("""the station's moving pad is in its charging position. The daemon switches the power
+        on only while the flag is true. If the flag becomes false while current flows, this is a
+        fault."""),
     ] = None
     volts: Annotated[JsonNumber | None, tells("the voltage at the battery.")] = None
     amps: Annotated[JsonNumber | None, tells("the current into the battery.")] = None
@@ -82,8 +84,8 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         return code
 
     def error(self, answer: Answer) -> tuple[str, FaultSide]:
-        """Return the text of the station's error, and the side (station or robot) that has the error.
-        Raises DriverError."""
+        """Return the text of the error that the station reports, and the side that is at fault (station
+        or robot). Raises DriverError."""
         said = json_fields.text(answer, self.error_text)
         means = self.error_texts.get(said)
         return ("", "") if means == "none" else (said, means or "")
@@ -105,8 +107,8 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         )
 
     def rows(self, has_codes: bool) -> Iterator[tuple[str, str]]:
-        """Yield rows for `check`. Yield no row if all fields have their defaults, which fit the first
-        station."""
+        """Yield rows for `check` about the fields. Yield no row if all fields have their defaults
+        (`drivers/charger/http.py`)."""
         for name in self.__struct_fields__ if self != Fields() else ():
             place = getattr(self, name)
             if place and not isinstance(place, dict) and (has_codes or name != "state"):
@@ -120,8 +122,8 @@ class Fields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 def _number(
     answer: Answer, number: JsonNumber | None, most: float = math.inf, bounds: str = ""
 ) -> float | None:
-    """Return the value in this code's unit. Raises DriverError for a value that is not a number, or
-    that is out of bounds."""
+    """Return the value, scaled to the unit that the driver uses. Raises DriverError for a value that is
+    not a number, or that is out of bounds."""
     value = json_fields.number(answer, number.field, number.scale) if number else None
     if number and value is not None and bounds and not 0 <= value <= most:
         raise json_fields.wrong(number.field, value, bounds)

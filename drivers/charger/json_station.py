@@ -1,8 +1,8 @@
-"""A charging station that answers with JSON over HTTP or MQTT. This file has its fields, its rules and
-its driver.
+"""A charging station that answers with JSON over HTTP or MQTT. This file has the station's settings,
+the checks of these settings, and the driver.
 
-`codes` gives the meanings of the maker's states. A state that `codes` does not list counts as an error.
-The driver never passes a maker's state on as an RMF state.
+`codes` gives the meanings of the maker's states. A state that `codes` does not list counts as a fault
+of the station. The driver never passes a maker's state on as an RMF state.
 """
 
 from collections.abc import Iterator, Mapping
@@ -51,8 +51,8 @@ class JsonChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unk
     ] = None
 
     def command(self, name: StationCommand) -> Any:
-        """Return this command in the form of the bus. Return None if the station has no such
-        command."""
+        """Return this command as the bus sends it: an HTTP call or an MQTT message. Return None if the
+        station has no such command."""
         return getattr(self, name)
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
@@ -62,8 +62,8 @@ class JsonChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unk
         return None if self.switches_off_after_s is None else (self.switches_off_after_s, path)
 
     def can_stop(self) -> bool:
-        """Return whether the driver can switch the power off. The driver needs `stop` in the YAML for
-        this."""
+        """Return whether the driver can switch the power off. It can do so only if the YAML gives
+        `stop`."""
         return self.command("stop") is not None
 
     def problems(self) -> Remarks:
@@ -83,7 +83,10 @@ class JsonChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unk
         if self.command("range_check") and self.fields.in_range is None:
             yield ("fields", "in_range"), "range_check needs the field with the check's result"
         if self.on_death == "keep" and self.command("stop") is None:
-            yield ("on_death",), "the driver cannot stop this station: delete on_death"
+            yield (
+                ("on_death",),
+                "has no effect, because the driver cannot stop this station: delete on_death",
+            )
 
 
 def _place_problems(settings: JsonChargerSettings) -> Remarks:
@@ -95,8 +98,8 @@ def _place_problems(settings: JsonChargerSettings) -> Remarks:
 
 
 def _timer_problems(settings: JsonChargerSettings) -> Remarks:
-    """Yield problems with the relay's timer. When the network is gone, only this timer can switch the
-    power off."""
+    """Yield problems with the station's timer, which switches the power off. When the network is gone,
+    only this timer can switch the power off."""
     timer = settings.switches_off_after_s
     if timer and not settings.command("start"):
         yield (
@@ -104,7 +107,11 @@ def _timer_problems(settings: JsonChargerSettings) -> Remarks:
             "start sets this timer: give start, or delete switches_off_after_s",
         )
     if timer and settings.on_death == "keep":
-        yield ("on_death",), "the station switches off when start is not repeated: delete on_death"
+        yield (
+            ("on_death",),
+            "has no effect, because the station switches off by itself when start is not repeated:"
+            " delete on_death",
+        )
     if settings.command("start") and settings.codes is None and timer is None:
         text = (
             "when the network dies nothing switches the power off: let start set the"
@@ -114,8 +121,8 @@ def _timer_problems(settings: JsonChargerSettings) -> Remarks:
 
 
 def rows(settings: JsonChargerSettings) -> list[tuple[str, str]]:
-    """Return rows for `check`, each a subject and its meaning, about the fields and about the meanings
-    of states."""
+    """Return rows for `check` about the fields, and about the meanings of states. Each row is a pair of
+    a subject and its meaning."""
     found = [*settings.fields.rows(has_codes=settings.codes is not None)]
     found += [(f"word {word}", str(code)) for word, code in settings.state_words.items()]
     found += rules.rows(settings.rules, settings.errors)
@@ -131,15 +138,14 @@ def power_off(settings: JsonChargerSettings, scan_s: float) -> Iterator[tuple[st
     """Yield a row about the timer that switches the power off, if the station has such a timer."""
     if settings.switches_off_after_s:
         after = f"{settings.switches_off_after_s:g} s without a new start"
-        yield "power off", f"by itself after {after}, sent every {scan_s:g} s"
+        yield "power off", f"by itself after {after}; the driver sends start every {scan_s:g} s"
 
 
 def warnings(settings: JsonChargerSettings, unseen_timer: Remarks = ()) -> Remarks:
     """Yield a warning, with its path in the YAML, for each missing ability. Yield a warning for each
     valid setting that may be a mistake.
 
-    `unseen_timer` is the warning about a `start` command without the time after which the station must
-    switch off by itself.
+    `unseen_timer` is the warning about a `start` command that does not contain the timer's time.
     """
     missing = [name for name in ("receiver_id", "stop") if _lacks(settings, name)]
     consequences = {
@@ -157,7 +163,7 @@ def warnings(settings: JsonChargerSettings, unseen_timer: Remarks = ()) -> Remar
     if settings.codes and not settings.codes.error:
         yield (
             ("codes",),
-            "no code is listed as an error, so an error will be shown as an unknown state",
+            "no code is listed under error, so an error of the station shows as an unknown state",
         )
 
     known = settings.codes.meanings() if settings.codes else {}
@@ -190,15 +196,15 @@ class JsonStation(Protocol):
         """Return the station's present state."""
 
     def send(self, name: StationCommand, safe: bool = False) -> None:
-        """Send this command once, if the station has it. `safe` means that the command switches the
-        power off."""
+        """Send this command once. Send nothing if the station has no such command. `safe` means that
+        the command switches the power off."""
 
 
 class JsonCharger:
     """The driver of one station (`drivers.Driver`).
 
-    The driver treats the power as a level. It repeats `start` while the station stays idle, and `stop`
-    while the station still charges.
+    The driver knows only whether the power should be on or off. So it repeats `start` while the station
+    stays idle, and repeats `stop` while the station still charges.
     """
 
     def __init__(self, settings: JsonChargerSettings, station: JsonStation) -> None:
@@ -233,10 +239,11 @@ class JsonCharger:
         )
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Send the commands that the outputs need. A stop is sent first, and a start last.
+        """Send the commands that the outputs need: first `stop`, then the other commands, and last
+        `start`.
 
-        The driver sends the command to clear errors once for each request, even if the answer is lost.
-        The same holds for the range check. So the driver counts a command as done before it sends the
+        For each request the driver sends `clear_error` and `range_check` at most once, even if the
+        answer is lost. So the driver counts each of these two commands as done before it sends the
         command.
         """
         if outputs.power is False:

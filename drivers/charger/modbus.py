@@ -33,18 +33,18 @@ PLACES: Final[Mapping[str, str]] = {
 
 
 class ModbusChargerSettings(ChargerSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One receiver."""
+    """The settings of one receiver, which a robot carries."""
 
     unit: Annotated[Unit, tells("the receiver's Modbus unit id; the maker's default is 16.")]
 
 
 def points(settings: ModbusChargerSettings) -> dict[str, Point]:
-    """Return the register or coil of each name."""
+    """Return the register or coil for each name of PLACES."""
     return {name: at(settings.unit, place) for name, place in PLACES.items()}
 
 
 def claims(settings: ModbusChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield each coil of the receiver with its path in the YAML. No other device may use these
+    """Yield each coil that the driver writes, with its path in the YAML. No other device may use these
     coils."""
     for name in (xnergy.ENABLE, xnergy.CHECK_RANGE):
         yield str(points(settings)[name]), ("unit",)
@@ -80,8 +80,8 @@ class Registers:
         self.now = bus.now
 
     def alive(self) -> bool:
-        """Return False, because Modbus has no heartbeat that would show a restart. Only a failed read
-        shows that the unit is gone."""
+        """Return False, because Modbus has no heartbeat, which would show a restart. Only a failed read
+        shows that the unit does not answer."""
         return False
 
     def read(self, names: Iterable[str]) -> dict[str, int]:

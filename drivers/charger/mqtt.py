@@ -1,8 +1,10 @@
-"""A charging station behind an MQTT broker. Its states are JSON or plain values on topics.
+"""A charging station behind an MQTT broker. The station publishes its states as JSON or as plain
+values.
 
-`topics` gives each state topic a name. A field begins with this name, as in `status.charger.state`. If
-the payload is a plain value, the field is the name alone. The meanings of the fields are written as for
-a station on HTTP. For a reading, every topic needs a live message that is not stale.
+`topics` gives each state topic a name. The path of a field begins with this name, as in
+`status.charger.state`. If the payload is a plain value, the path is the name alone. The YAML gives the
+meanings of the fields with the same keys as for a station on HTTP. A reading succeeds only if every
+topic has a live message that is not stale.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -39,7 +41,7 @@ class MqttChargerSettings(
     topics: Annotated[
         dict[Key, StateTopic],
         msgspec.Meta(min_length=1, max_length=32),
-        tells("name -> a topic with states; the fields begin with this name."),
+        tells("name -> a state topic. The path of each of its fields begins with this name."),
     ]
     start: Annotated[Message | None, tells("switches the power on for the robot on the pad.")] = (
         None
@@ -62,7 +64,7 @@ class MqttChargerSettings(
             message = self.command(command)
             if message and message.topic in states:
                 text = (
-                    f"{message.topic} is a state topic: the daemon would take the command for a"
+                    f"{message.topic} is a state topic: the daemon would read the command as a"
                     " state"
                 )
                 yield (command, "topic"), text
@@ -71,7 +73,7 @@ class MqttChargerSettings(
         for path, field in _fields(self):
             if field.split(".")[0] not in self.topics:
                 text = unknown("topic", field.split(".")[0], self.topics)
-                yield path, f"{field} begins with the name of a topic: {text}"
+                yield path, f"{field} must begin with the name of a topic in topics: {text}"
 
 
 def _fields(settings: MqttChargerSettings) -> Iterator[tuple[tuple[str, ...], str]]:
@@ -132,7 +134,7 @@ class MqttStation:
         self._bus.await_first(topics, self._asks)
 
     def answer(self) -> Mapping[str, object]:
-        """Return the last message on each topic, by the topic's name."""
+        """Return the last message on each topic. The keys are the topics' names in the YAML."""
         self._bus.ask(self._asks)
         return {
             name: decoded(

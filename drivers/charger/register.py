@@ -1,7 +1,8 @@
 """A charging station of any make on Modbus registers. A register map describes the station.
 
-The driver treats the power as a level. It writes the wanted level while the station shows a different
-level. At the daemon's start the driver writes nothing, so a restart does not end a charge.
+The driver knows only whether the power should be on or off. It writes the power command while the
+station shows the opposite. At the daemon's start the driver writes nothing, so a restart does not end a
+charge.
 """
 
 from collections.abc import Iterator, Mapping
@@ -37,8 +38,8 @@ class RegisterChargerSettings(
     map: Annotated[ChargerMap | None, tells("the map, written here instead of a profile.")] = None
 
     def can_stop(self) -> bool:
-        """Return whether the driver can switch the power off. The driver needs `power` in the map for
-        this."""
+        """Return whether the driver can switch the power off. It can do so only if the map gives
+        `power`."""
         return charger_map(self).power is not None
 
     def problems(self) -> Remarks:
@@ -49,10 +50,13 @@ class RegisterChargerSettings(
         if before:
             return
         if self.receivers and "receiver" not in charger_map(self).values:
-            text = "the map needs the value receiver: the id of the receiver that the station sees"
+            text = "the map needs a value 'receiver', the id of the receiver that the station sees"
             yield ("receivers",), text
         if self.on_death == "keep" and not self.can_stop():
-            yield ("on_death",), "the driver cannot stop this station: delete on_death"
+            yield (
+                ("on_death",),
+                "has no effect, because the driver cannot stop this station: delete on_death",
+            )
 
 
 def charger_map(settings: RegisterChargerSettings) -> ChargerMap:
@@ -61,19 +65,19 @@ def charger_map(settings: RegisterChargerSettings) -> ChargerMap:
 
 
 def cells(settings: RegisterChargerSettings) -> dict[str, list[Point]]:
-    """Return the registers, coil or discrete input that hold each value."""
+    """Return, for each value, its registers, or its coil or discrete input."""
     found: Mapping[str, RegisterNumber] = charger_map(settings).values
     return {name: [at(settings.unit, p) for p in n.places()] for name, n in found.items()}
 
 
 def orders(settings: RegisterChargerSettings) -> dict[str, Point]:
-    """Return the place where the driver writes each command."""
+    """Return the register or coil where the driver writes each command."""
     return {n: at(settings.unit, text) for n, text in charger_map(settings).orders().items()}
 
 
 def claims(settings: RegisterChargerSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield each place that the driver writes, with its path in the YAML. Yield nothing while the map
-    has problems."""
+    """Yield each register or coil that the driver writes, with its path in the YAML. Yield nothing
+    while the map has problems."""
     if any(PROFILE.problems(settings.profile, settings.map)):
         return
     for name, text in charger_map(settings).orders().items():
@@ -83,7 +87,8 @@ def claims(settings: RegisterChargerSettings) -> Iterator[tuple[str, tuple[str, 
 
 
 def describe(settings: RegisterChargerSettings, bus: object) -> Iterator[tuple[str, str]]:
-    """Yield rows for `check` about the places of values, the commands, and the meanings of numbers."""
+    """Yield rows for `check` about the registers of the values, the commands, and the meanings of
+    numbers."""
     found = charger_map(settings)
     for name, points in cells(settings).items():
         number = found.values[name]
@@ -94,7 +99,7 @@ def describe(settings: RegisterChargerSettings, bus: object) -> Iterator[tuple[s
     if found.power:
         yield (
             POWER,
-            f"{written[POWER]}: {found.power.start} may charge, {found.power.stop} must not",
+            f"{written[POWER]}: {found.power.start} allows a charge, {found.power.stop} forbids it",
         )
         yield (
             "end of the daemon",
@@ -117,9 +122,9 @@ def warnings(settings: RegisterChargerSettings) -> Remarks:
     yield from PROFILE.warnings(settings.profile, "watch the first charge")
     found = charger_map(settings)
     if found.power is None:
-        yield (), "observe-only: the map has no command power, so no fault switches the station off"
+        yield (), "observe-only: without power in the map, no fault switches the station off"
     elif not found.power.read_back:
-        yield (), "the command power cannot be read back: switching off is not verified"
+        yield (), "power cannot be read back, so the driver cannot verify that the power went off"
     if not settings.receivers:
         yield (), "without receivers the robot on the pad is not verified"
 
@@ -130,8 +135,8 @@ def create(name: str, settings: RegisterChargerSettings, bus: ModbusBus) -> "Reg
 
 
 class RegisterCharger:
-    """The driver of one station (`drivers.Driver`). `_power` is the present level of the power, or None
-    while the level is unknown."""
+    """The driver of one station (`drivers.Driver`). `_power` is True while the power is on, False while
+    the power is off, and None while this is unknown."""
 
     def __init__(self, settings: RegisterChargerSettings, bus: ModbusBus) -> None:
         self._settings = settings
@@ -163,8 +168,12 @@ class RegisterCharger:
         return decode(self._map, values)
 
     def write(self, outputs: ChargerOutputs) -> None:
-        """Write the commands that the outputs need. Switching off comes first. The driver writes the
-        commands to clear errors and to check the range once for each change of their counts."""
+        """Write the commands that the outputs need. Write the command that switches the power off
+        before the other commands.
+
+        `outputs` counts the requests to clear errors, and the requests to check the range. Write the
+        command once when its count has changed.
+        """
         if outputs.power is False:
             self._switch(on=False)
         if outputs.clear_errors != self._cleared:
@@ -188,8 +197,8 @@ class RegisterCharger:
                     raise DriverError(f"{point} is not off after {command.stop} was written")
 
     def close(self) -> None:
-        """Make the station safe if the driver ever wrote the power, and the power may be on. Does not
-        raise."""
+        """Switch the power off if the driver ever wrote the power command, and the power is not known
+        to be off. Does not raise."""
         if self._touched and self._power is not False:
             self._bus.insist()
             try:

@@ -1,5 +1,5 @@
-"""A charger's register map, from a YAML or a profile. The map gives the places of values and the
-meanings of numbers."""
+"""A charger's register map, from a YAML or a profile. For each value of the station the map gives its
+place (the Modbus table and address) and the meanings of its numbers."""
 
 from collections.abc import Mapping
 from typing import Annotated, Final, Literal
@@ -23,7 +23,7 @@ KNOWN: Final = ("state", "receiver", "in_range", "range_ok", "at_height", *MEASU
 
 
 class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One value of the station, with its place and form."""
+    """One value of the station: its place (Modbus table and address) and its encoding."""
 
     words: Annotated[Literal[1, 2], tells("the number of registers: 2 for 32 bits.")] = 1
     low_first: Annotated[bool, tells("the first of the two registers holds the low word.")] = False
@@ -38,8 +38,8 @@ class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ] = 1.0
 
     def problems(self) -> Remarks:
-        """Yield a problem for an invalid place. Yield a problem for options that do not fit the place's
-        table or width."""
+        """Yield a problem for an invalid place. Yield a problem for each option that does not fit the
+        table of the place, or the number of registers."""
         yield from super().problems()
         of_registers = (self.words, self.signed, self.bit) != (1, False, None)
         if of_registers and self.is_in("coil", "discrete input"):
@@ -57,7 +57,8 @@ class RegisterNumber(Placed, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         return found[::-1] if self.low_first else found
 
     def value(self, words: list[int]) -> float:
-        """Return the value of these words, in the order of `places`."""
+        """Return the value that these registers hold. `words` has the registers' contents, the high
+        word first."""
         raw, bits = 0, BITS * self.words
         for word in words:
             raw = raw << BITS | word
@@ -81,15 +82,15 @@ class Power(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_fields=True
     OFF = "stop"
 
     start: Annotated[Word, tells("the value that lets the station charge.")]
-    stop: Annotated[Word, tells("the value that keeps the station from charging.")]
+    stop: Annotated[Word, tells("the value that forbids the station to charge.")]
     read_back: Annotated[
         bool,
-        tells("false if the command cannot be read back. Then every scan writes the command."),
+        tells("false if the command cannot be read back. In this case every scan writes it."),
     ] = True
 
 
 class Order(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A command that the driver writes once for each request."""
+    """A command that the driver writes once each time the daemon requests it."""
 
     write: Annotated[Word, tells("the value that the driver writes.")] = 1
 
@@ -100,12 +101,13 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     values: Annotated[
         dict[Name, RegisterNumber],
         msgspec.Meta(min_length=1),
-        tells("""name -> its place. `state` is the number that `codes` lists. `volts`, `amps`,
-        `battery_percent` and `time_to_full_s` are shown. `receiver` is the id of the receiver on
-        the pad, 0 for none. `in_range` is not 0 while a robot stands within the station's range.
-        `range_ok` is the same for a station that reports the range without a range check.
-        `at_height` is not 0 while the station's moving pad is in its charging position. While
-        `range_ok` or `at_height` is 0 there is no power. Rules and errors may use any name."""),
+        tells("""name of a value -> its place. These names have a fixed meaning. `state` is the number
+        that `codes` lists. `volts`, `amps`, `battery_percent` and `time_to_full_s` are shown.
+        `receiver` is the id of the receiver on the pad, 0 for none. `in_range` is not 0 while a robot
+        is within the station's range. A station that reports the range without a range check has
+        `range_ok` in place of `in_range`. `at_height` is not 0 while the station's moving pad is in
+        its charging position. While `range_ok` or `at_height` is 0 the daemon keeps the power off.
+        Rules and errors may use other names too."""),
     ]
     codes: Annotated[
         Codes | None, tells("the meanings of `state`'s numbers; not needed with `rules`.")
@@ -136,8 +138,8 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     ] = None
 
     def problems(self) -> Remarks:
-        """Yield a problem for each name that `values` lacks, for each unused name, and for a map
-        without a state."""
+        """Yield a problem for each name that rules, errors or temperatures use but `values` lacks.
+        Yield a problem for each name in `values` that nothing uses, and for a map without a state."""
         yield from by_rules.problems(self.rules, self.codes is not None)
         if self.codes and "state" not in self.values:
             yield ("values",), "needs 'state', because the map has codes"
@@ -151,13 +153,13 @@ class ChargerMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         for name in self.values:
             if name not in KNOWN and name not in used:
                 text = unknown("value", name, KNOWN)
-                yield ("values", name), f"{text}; rules and errors do not use it either"
+                yield ("values", name), f"{text}; no rule, error or temperature uses this name"
         if self.range_check and "in_range" not in self.values:
             needs = "needs the value `in_range`, which tells the result of the range check"
             yield ("range_check",), needs
 
     def orders(self) -> Mapping[str, str]:
-        """Return the place of each command that the map gives."""
+        """Return the register or coil of each command that the map gives."""
         names = ("power", "clear_error", "range_check")
         return {name: part.at for name in names if (part := getattr(self, name)) is not None}
 

@@ -1,5 +1,5 @@
-"""The table of a station's values for `check`. For a sample of each value, the table shows the contents
-of the registers."""
+"""The table of a station's values for `check`. For a sample value of each name, the table shows what
+the registers then hold."""
 
 from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
@@ -10,8 +10,8 @@ from drivers.hal.modbus.points import Point
 
 
 class ShownValue(NamedTuple):
-    """A sample of a value, with its unit. The sample shows the value's scale and the order of its
-    words."""
+    """A sample value, with its unit. The table row for this sample reveals the scale and the word
+    order."""
 
     value: float
     unit: str
@@ -37,7 +37,7 @@ def samples(found: ChargerMap, cells: Mapping[str, list[Point]]) -> Table:
 
 
 def _meanings(found: ChargerMap, name: str, is_bit: bool) -> Iterator[tuple[float, str]]:
-    """Yield the samples of a value with their meanings."""
+    """Yield sample values for this name, with the meaning of each sample."""
     if name == "state" and found.codes:
         for code, (activity, side) in found.codes.meanings().items():
             means = f"{side}'s error" if side else str(activity)

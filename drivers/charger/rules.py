@@ -1,8 +1,9 @@
-"""Rules that give a charger's state, and tables of its errors, for HTTP, MQTT, Modbus and CAN.
+"""Rules that find out a charging station's state, and the errors that the station reports. HTTP, MQTT,
+Modbus and CAN stations use these rules.
 
-A rule tests values at places. A place is a field of a JSON answer, a name in a register map's `values`,
-or a signal of a CAN frame. The driver tries the rules in their order, and before `codes`. A rule holds
-if all its tests hold. The first rule that holds gives the state.
+A rule tests the values of named places. A place is a field of a JSON answer, a name in a register map's
+`values`, or a signal of a CAN frame. The driver tries the rules in their order, and before `codes`. A
+rule holds if all its tests hold. The first rule that holds gives the state.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -32,7 +33,7 @@ UNKNOWN: Final[Meaning] = (Activity.UNKNOWN, "")
 
 
 class Test(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A test of one value. The test holds if every condition in the YAML holds."""
+    """A test of one value. The test holds if every condition that the YAML gives for it holds."""
 
     one_of: Annotated[list[Value], tells("the values that pass the test.")] = []
     above: Annotated[float | None, tells("the value must be greater than this number.")] = None
@@ -65,9 +66,9 @@ class Test(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class Rule(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One rule for the station's state."""
+    """One rule. If the rule holds, `means` is the station's state."""
 
-    means: Annotated[str, tells("the state, which is the name of a list of `codes` (`charging`).")]
+    means: Annotated[str, tells("the state: one of the keys of `codes`, such as `charging`.")]
     when: Annotated[
         dict[Name, Test],
         tells("place -> the test of its value. Without `when` the rule always holds."),
@@ -83,8 +84,8 @@ class Rule(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """An error that the station gives as one number. `check` and the status show an unlisted number
-    without a text."""
+    """An error that the station gives as one number. `check` and the status show a number that the YAML
+    does not list as `error N`."""
 
     at: Annotated[Name, tells("the place of the number.")]
     well: Annotated[tuple[int, ...], tells("the numbers that mean no error.")] = (0,)
@@ -115,7 +116,7 @@ class ErrorNumber(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 class ErrorBits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Errors that the station gives as bits of one number, such as a flag byte. `check` and the status
-    show an unlisted bit by its number."""
+    show a bit that the YAML does not list as `error bit N`."""
 
     at: Annotated[Name, tells("the place of the number.")]
     ignore: Annotated[list[LongBit], tells("bits that mean no error.")] = []
@@ -153,7 +154,8 @@ class StationErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     ] = {}
     robot: Annotated[
         dict[Name, Name],
-        tells("place -> text, for faults of the robot, of its receiver or of its position."),
+        tells("""place -> text. A value other than 0 means this fault of the robot, of its receiver or
+        of its position."""),
     ] = {}
     codes: Annotated[
         list[ErrorNumber], tells("errors that the station gives as one number each.")
@@ -179,8 +181,8 @@ class StationErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         return sorted([*flags, *numbers], key=lambda error: order.index(error[0]))
 
     def places(self) -> Iterator[tuple[tuple[str, ...], str]]:
-        """Yield the path and the place of each value that this section reads. The path begins below
-        this section of the YAML."""
+        """Yield each value that this section of the YAML reads, as a pair of its path and its place.
+        The path is relative to this section."""
         for side in ("station", "robot"):
             for at in getattr(self, side):
                 yield (side, at), at
@@ -190,8 +192,8 @@ class StationErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
 
 def places(rules: list[Rule]) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Yield the path and the place of each value that the rules test. The path begins below `rules` in
-    the YAML."""
+    """Yield each value that the rules test, as a pair of its path and its place. The path is relative
+    to `rules` in the YAML."""
     for n, rule in enumerate(rules):
         for at in rule.when:
             yield (str(n), "when", at), at
@@ -203,11 +205,11 @@ def judge(rules: list[Rule], read: Read) -> Rule | None:
 
 
 class JudgedState(msgspec.Struct, frozen=True):
-    """The station's state, as rules, codes and errors give it together.
+    """The station's state, after the driver has applied rules, codes and errors.
 
     `activity` is ERROR whenever there is an error. `does` is the activity that the station would have
-    without its errors. `side` is the side (station or robot) that has the error. `code` is the maker's
-    state for messages, and `text` holds the errors' texts.
+    without its errors. `side` is the side that is at fault (station or robot). `code` is the maker's
+    state, which messages show. `text` holds the texts of the errors.
     """
 
     activity: Activity
@@ -225,19 +227,19 @@ class JudgedState(msgspec.Struct, frozen=True):
 def judged(
     station: "StateRules", read: Read, code: int | str | None, told: FaultSide = ""
 ) -> JudgedState:
-    """Return the state that follows from rules, codes and errors.
+    """Return the state that follows from rules, codes and errors. Raises DriverError.
 
-    `code` is the maker's state, or None if the station has no codes. `told` is the side that the
-    station's own error text gives. A present error of `errors` makes any state an error. Raises
-    DriverError.
+    `code` is the maker's state, or None if the station has no codes. `told` is the side at fault
+    (station or robot) according to the station's own error text. If one of `station.errors` is present,
+    the state is an error.
     """
     meant = meaning(station.rules, station.codes, read, code)
     return with_errors(meant, station.errors.found(read), station.codes, told)
 
 
 class Meant(NamedTuple):
-    """The state that follows from rules and codes. `code` is for messages. `text` is the text of the
-    rule that holds."""
+    """The state that follows from rules and codes. Messages show `code`, which is the maker's state or
+    the number of the rule. `text` is the text of the rule that holds."""
 
     activity: Activity
     side: FaultSide
@@ -258,7 +260,8 @@ def meaning(rules: list[Rule], codes: Codes | None, read: Read, code: int | str 
 def with_errors(
     meant: Meant, errors: Found, codes: Codes | None = None, told: FaultSide = ""
 ) -> JudgedState:
-    """Combine the state with the errors. `told` is the side that the station's own error text gives."""
+    """Combine the state with the errors. `told` is the side at fault (station or robot) according to
+    the station's own error text."""
     wrong: Found = [(meant.side, meant.text), *errors] if meant.text else errors
     shown = Activity.ERROR if wrong else meant.activity
     side = first_side([meant.side, told, *(whose for whose, _ in wrong)])
@@ -299,10 +302,13 @@ def rows(rules: list[Rule], errors: StationErrors) -> Iterator[tuple[str, str]]:
 
 
 def problems(rules: list[Rule], has_codes: bool) -> Remarks:
-    """Yield a problem for rules that the driver never reaches, and for a missing state. Each path
-    begins below the station in the YAML."""
+    """Yield a problem for rules that the driver never reaches. Yield a problem if rules and codes
+    cannot give the state. Each path is relative to the station's section of the YAML."""
     if not rules and not has_codes:
-        yield ("codes",), "needs codes (the meanings of the maker's state numbers), or rules"
+        yield (
+            ("codes",),
+            "is missing: give the meanings of the maker's state numbers here, or give rules",
+        )
     for n, rule in enumerate(rules[:-1]):
         if not rule.when:
             yield (

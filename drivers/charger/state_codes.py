@@ -1,6 +1,6 @@
-"""The meanings of a charger's state numbers. The YAML lists the numbers of each meaning.
+"""The meanings of a charger's state numbers. For each meaning the YAML lists the maker's numbers.
 
-A number that the YAML does not list counts as an error, and the error's text shows the number. The
+A number that the YAML does not list counts as a fault, and the fault's text shows the number. The
 driver never passes a maker's number on as an RMF state.
 """
 
@@ -21,8 +21,8 @@ ROBOT_ERROR: tuple[Activity, FaultSide] = (Activity.ERROR, "robot")
 
 
 class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The meanings of the maker's state numbers. A number that is not listed counts as an error, and
-    the error's text shows the number."""
+    """The meanings of the maker's state numbers. A number that no key lists counts as a fault, and the
+    fault's text shows the number."""
 
     idle: Annotated[
         list[Code], msgspec.Meta(min_length=1), tells("nothing is on the pad: a robot may come.")
@@ -38,13 +38,13 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     ] = []
     error: Annotated[
         list[Code],
-        tells("""out of service, by an error or by hand. With `robot_error`, list only errors of the
-        station here."""),
+        tells("""the station is out of service, because of an error or by hand. If you give
+        `robot_error`, list only errors of the station here."""),
     ] = []
     station_error: Annotated[
         list[Code],
-        tells("""out of service by an error that the maker assigns to the station. With this key,
-        `error` may list errors of either side."""),
+        tells("""the station is out of service because of an error that the maker assigns to the
+        station. If you give this key, `error` may list errors of the station and of the robot."""),
     ] = []
     robot_error: Annotated[
         list[Code], tells("an error of the robot, with the station itself in order.")
@@ -65,13 +65,17 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return made
 
     def unnamed_side(self, code: object) -> FaultSide:
-        """Return the side of a number in `error`. If only `robot_error` is given, the number is the
-        station's error. Otherwise the side is unknown, and the function returns ""."""
+        """Return the side that is at fault for a number in `error`.
+
+        If the YAML gives `robot_error` without `station_error`, a number in `error` is a fault of the
+        station. Otherwise the side is unknown, so return "".
+        """
         told_apart = self.robot_error and not self.station_error
         return "station" if told_apart and code in self.error else ""
 
     def lists(self) -> Mapping[Activity, list[Code]]:
-        """Return the states of each meaning, without the lists `station_error` and `robot_error`."""
+        """Return the maker's numbers for each activity. The numbers in `station_error` and
+        `robot_error` are not included."""
         return {
             Activity.IDLE: self.idle,
             Activity.HANDSHAKE: self.handshake,
@@ -99,7 +103,7 @@ class Codes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 def first_side(sides: Collection[FaultSide]) -> FaultSide:
-    """Return the side of an error that several sources report. The station comes before the robot.
-    Return "" if no source names a side."""
+    """Return the side at fault for an error that several sources report. If the sources name both
+    sides, return the station. Return "" if no source names a side."""
     known: tuple[FaultSide, ...] = ("station", "robot")
     return next((side for side in known if side in sides), "")

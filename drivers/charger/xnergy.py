@@ -1,17 +1,19 @@
-"""Xnergy's receiver (RCU), on any bus. This file has the meanings of its numbers and its commands.
+"""Xnergy's receiver (RCU), on any bus. This file has the meanings of the receiver's numbers, and the
+commands to the receiver.
 
 `canopen.py` and `modbus.py` have the addresses of the numbers. The maker publishes no address for
 clearing an error. An error ends by itself, or when somebody cycles the receiver's power.
 
 The source is the maker's published ROS driver (`xnergy-charger-rcu`): state codes, error bits,
-addresses, scales, and the range check before a start. Nobody has tried these facts on the hardware.
-This code does not copy three faults of the maker's driver:
+addresses, scales, and the range check before a start. Nobody has tried these facts on the hardware. The
+maker's driver has three defects, which this code avoids:
 - The maker's driver decodes the high error word only when this word is zero.
 - The maker's driver never compares an SDO reply with its request.
 - The maker's driver shows an RCU that does not answer as state 250. The RCU itself never sends 250.
 
-Each error has a side. Errors of the transmitter (TPU, on the wall) and objects on the pad are the
-station's errors. All other errors are the robot's, because they concern its receiver or its position.
+For each error this file says which side is at fault. The transmitter (TPU, on the wall) and objects on
+the pad are on the station's side. All other errors concern the receiver or its position, so they are on
+the robot's side.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -34,9 +36,9 @@ from drivers import DriverError
 ALWAYS: Final = ("state", "error_low", "error_high", "volts", "amps", "range")
 IN_ERROR: Final = ("latched_low", "latched_high")
 TEMPERATURES: Final[Mapping[str, str]] = {"device_c": "device", "coil_c": "coil"}
-"""Names of the numbers to read. Every scan reads ALWAYS. In an error state the scan also reads
-IN_ERROR, the error that the receiver latched. If the bus has TEMPERATURES (°C), every scan reads
-TEMPERATURES too."""
+"""The names of the numbers that the driver reads. Every scan reads ALWAYS. In an error state the scan
+also reads IN_ERROR, the error that the receiver has latched. Every scan reads TEMPERATURES (°C) too,
+if the receiver gives them on this bus."""
 ENABLE: Final = "enable"
 CHECK_RANGE: Final = "check_range"
 """The names of the numbers that the driver writes. The driver writes 1 or 0 to ENABLE, and 1 to
@@ -91,7 +93,7 @@ ERROR_BITS: Final[Mapping[int, tuple[FaultSide, str]]] = {
     0x0002_0000: ("station", "foreign object on the pad"),
     0x0010_0000: ("robot", "a temperature sensor of the receiver has failed"),
 }
-"""The bits of the error number. It has 32 bits, and its upper half is the high word."""
+"""The bits of the 32-bit error number. Its upper half is the receiver's high error word."""
 
 IN_RANGE: Final = 1
 """The range check's result for a robot in range. The other results are 0 (the check still runs), 2 (out
@@ -107,8 +109,8 @@ def activity(code: int) -> Activity:
 def sample(words: Words, settled: bool = True) -> ChargerSample:
     """Decode one reading. Never raises. `words` has at least `state`, `error_low` and `error_high`.
 
-    An error bit makes any state an error. `settled` is True if the range result belongs to the last
-    range check (see the function `settled`).
+    If an error bit is set, the activity is ERROR, whatever the state code says. `settled` is True if
+    the range result belongs to the last range check (see the function `settled`).
     """
     found, does = errors(error_number(words)), activity(words["state"])
     return ChargerSample(
@@ -175,16 +177,17 @@ def _units(word: int | None) -> float | None:
 # ---- starting and stopping
 
 RANGE_SETTLE_S: Final = 1.0
-"""The time (s) after a range check when the result is valid. Before this time the receiver shows the
-previous result."""
+"""The time (s) from a range check until its result is valid. Until then the receiver shows the previous
+result."""
 
 
 class Written(Struct, frozen=True):
     """The last commands that the driver wrote to the receiver. `enabled` is the last ENABLE, or None
     while it is unknown.
 
-    `range_checks` is the number of checks that were requested. `asked_at` is the time of the last check
-    (monotonic seconds). `asked_at` is inf while a check waits to be sent.
+    `range_checks` is the number of range checks that were requested. `asked_at` is the time of the last
+    check (monotonic seconds). It is -inf before the first check, and inf while a requested check has
+    not been sent yet.
     """
 
     enabled: bool | None = None
@@ -211,8 +214,9 @@ def steer(
     """Return the commands for state `code`, and the new `Written`. The new `Written` becomes valid when
     the driver has written the commands.
 
-    The receiver gets a start or a range check only in state idle, and each only once. It gets a stop
-    again while it still charges. If `power` is None, the receiver gets neither start nor stop.
+    The receiver gets a start or a range check only in state idle, and only once for each request. It
+    gets a stop repeatedly while it still charges. If `power` is None, the receiver gets neither start
+    nor stop.
     """
     ask = outputs.range_checks != written.range_checks
     if ask and code == IDLE:
@@ -233,7 +237,7 @@ def _charges(code: int) -> bool:
     return activity(code) is Activity.CHARGING
 
 
-# ---- on a wire
+# ---- the driver, and its access to the receiver
 
 
 class ReceiverAccess(Protocol):
@@ -244,8 +248,8 @@ class ReceiverAccess(Protocol):
         """The names of the numbers that every scan reads."""
 
     def alive(self) -> bool:
-        """Return True if the receiver has restarted after the last call. Raises DriverError if the
-        receiver does not answer."""
+        """Return True if the receiver has restarted since the last call of `alive`. Raises DriverError
+        if the receiver does not answer."""
 
     def read(self, names: Iterable[str]) -> dict[str, int]:
         """Read the words of these names now. Raises DriverError."""
@@ -255,7 +259,7 @@ class ReceiverAccess(Protocol):
         DriverError."""
 
     def insist(self) -> None:
-        """Let the next request skip the backoff."""
+        """Let the next request skip the backoff (the pause after a failure)."""
 
     def now(self) -> float:
         """Return monotonic seconds."""
@@ -297,13 +301,13 @@ class Receiver:
         self._written = written
 
     def make_safe(self) -> None:
-        """Stop the receiver, and require its acknowledgement. With `on_death: keep` do nothing."""
+        """Stop the receiver. Raises DriverError if the receiver does not acknowledge the stop. With
+        `on_death: keep` do nothing."""
         if self._settings.on_death == "stop":
             self._enable(False)
 
     def close(self) -> None:
-        """Make the receiver safe if the driver ever commanded it and the receiver may be on. Does not
-        raise."""
+        """Stop the receiver if the driver ever commanded it, and it may be on. Does not raise."""
         if self._touched and self._written.enabled is not False:
             self._wire.insist()
             try:
@@ -341,14 +345,14 @@ def _state_rows() -> Iterator[tuple[str, str]]:
 
 def warnings(settings: ChargerSettings, wire: str) -> Remarks:
     """Yield a warning, with its path in the YAML, for each valid setting that may be a mistake. `wire`
-    names the cable that the test unplugs."""
+    names the plug that one of the warnings asks people to pull."""
     text = (
         "nobody has tried the maker's published numbers on hardware: watch the first"
         " charge, and pull"
     )
     yield (), f"{text} the {wire} plug during a charge"
     name = "an RCU rides on a robot and is not a station"
-    yield (), f"{name}: the device is named after the waypoint where that robot charges"
+    yield (), f"{name}: give the device the name of the waypoint where that robot charges"
     if settings.receivers:
         yield (
             ("receivers",),

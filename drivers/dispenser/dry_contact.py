@@ -24,12 +24,15 @@ from drivers.unsafe import Unsafe, needlessly_accepted, unaccepted, unsafe_wires
 DEBOUNCE_S: Final = 0.05
 
 CUT_MUST_READ: Final = {
-    "done": (False, "every request counts as done, and RMF sends robots off unloaded"),
+    "done": (
+        False,
+        "every request counts as done, so RMF sends robots away before they are loaded",
+    ),
     "ready": (False, "a workcell that is not ready is started"),
     "fault": (True, "a fault of the workcell is not seen"),
 }
-"""The safe reading of each signal's cut wire (True: asserted), and the danger of the opposite
-reading."""
+"""The reading that a cut wire must give, for each signal (True: asserted). The text names the danger if
+a cut wire reads the opposite."""
 
 
 class WorkcellInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -40,7 +43,7 @@ class WorkcellInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unkn
         tells("the cycle has succeeded. The contact is off before a cycle and on at its end."),
     ]
     busy: Annotated[
-        Input | None, tells("a cycle runs. If it ends without `done`, it has failed.")
+        Input | None, tells("a cycle runs. A cycle that ends without `done` has failed.")
     ] = None
     ready: Annotated[
         Input | None,
@@ -53,7 +56,7 @@ class WorkcellInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unkn
 class WorkcellOutputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The relays that the driver switches."""
 
-    start: Annotated[Output, tells("starts one cycle. `pulse_s` sets how long it is on.")]
+    start: Annotated[Output, tells("starts one cycle. `pulse_s` sets how long the relay is on.")]
     select: Annotated[
         dict[Name, Output],
         tells("type_guid -> the relay that selects this sort while its cycle runs."),
@@ -78,7 +81,7 @@ class DryContactWorkcellSettings(
             if len(asked.compartments) > 1:
                 yield ("items", name, "compartments"), "contacts can serve one compartment only"
             if len(self.items) > 1 and name not in select:
-                text = f"needs a relay for {name}: without it the start is the same for every item"
+                text = f"needs a relay for {name}, because otherwise every item has the same start"
                 yield ("outputs", "select"), text
         for name in select.keys() - self.items.keys():
             yield ("outputs", "select", name), "is not one of items"
@@ -94,7 +97,7 @@ def wires(settings: DryContactWorkcellSettings) -> list[Wire]:
 
 
 def debounce(settings: DryContactWorkcellSettings) -> Mapping[str, float]:
-    """Return the debounce time of each input (s), by signal."""
+    """Return the debounce time (s) of each input. The keys are the inputs' signals."""
     return {w.signal: w.debounce_s for w in wires(settings) if w.debounce_s is not None}
 
 
@@ -106,8 +109,8 @@ def warnings(settings: DryContactWorkcellSettings) -> Remarks:
 
 
 def items_table(settings: WorkcellSettings) -> Iterator[Table]:
-    """Yield a table of the requests that RMF may make. The daemon answers every other request with
-    FAILED."""
+    """Yield a table of the items that the YAML lists, so that RMF may request them. The daemon answers
+    a request for any other item with FAILED."""
     rows = tuple(
         (name, str(one.most), ", ".join(one.compartments) or "-")
         for name, one in settings.items.items()
@@ -130,8 +133,8 @@ def create(name: str, settings: DryContactWorkcellSettings, bus: PointsBus) -> "
 
 
 class DryContactWorkcell(OnPoints):
-    """The driver of one dispenser or ingestor (`drivers.Driver`). `_selected` is the guid of the
-    request whose sort the relays select."""
+    """The driver of one dispenser or ingestor (`drivers.Driver`). While a relay selects a sort,
+    `_selected` is the guid of the request that needs this sort."""
 
     def __init__(self, points: Points) -> None:
         super().__init__(points)
@@ -143,8 +146,8 @@ class DryContactWorkcell(OnPoints):
         return WorkcellSample(read("done"), read("busy"), read("ready"), read("fault"))
 
     def write(self, outputs: WorkcellOutputs) -> None:
-        """Set the relays. At the beginning of a cycle, switch the relay of the sort on before the start
-        relay."""
+        """Set the relays. At the beginning of a cycle, first switch on the relay that selects the sort,
+        and then the start relay."""
         relays = {f"select_{outputs.item.type_guid}": True} if outputs.guid else {}
         if outputs.guid != self._selected:
             self._points.write(relays)

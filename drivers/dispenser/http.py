@@ -1,9 +1,9 @@
-"""A dispenser or ingestor behind HTTP and JSON. `start` begins a cycle. The answer to `state_path`
-shows whether the cycle runs, has ended or has failed.
+"""A dispenser or ingestor behind HTTP and JSON. The call `start` begins a cycle. The answer to
+`state_path` shows whether the cycle runs, has ended or has failed.
 
 The body of `start` may contain the texts $guid, $type_guid, $quantity and $compartment as values. The
-driver replaces each text by the value of the request. The driver sends one start for each cycle, even
-if the answer is lost. A second start could dispense twice.
+driver replaces each text with the value from RMF's request. The driver sends only one start for each
+cycle, even if the answer is lost, because a second start could dispense twice.
 """
 
 from collections.abc import Iterator
@@ -34,7 +34,7 @@ class WorkcellInputFields(msgspec.Struct, frozen=True, kw_only=True, forbid_unkn
         tells("the cycle has succeeded. The flag is off before a cycle and comes on at its end."),
     ]
     busy: Annotated[
-        JsonFlag | None, tells("a cycle runs. If it ends without `done`, it has failed.")
+        JsonFlag | None, tells("a cycle runs. A cycle that ends without `done` has failed.")
     ] = None
     ready: Annotated[
         JsonFlag | None, tells("a cycle may start. Without this field a cycle may always start.")
@@ -54,7 +54,7 @@ class HttpWorkcellSettings(WorkcellSettings, frozen=True, kw_only=True, forbid_u
     ]
     stop: Annotated[
         Call | None,
-        tells("ends a cycle and its start, and does nothing to a workcell at rest."),
+        tells("ends a running cycle. If no cycle runs, this call must do nothing."),
     ] = None
 
     def problems(self) -> Remarks:
@@ -71,17 +71,20 @@ class HttpWorkcellSettings(WorkcellSettings, frozen=True, kw_only=True, forbid_u
                     path = ("items", name, key) if key else ("items",)
                     yield (
                         path,
-                        f'the body of start does not contain this value: put "{mark}" there',
+                        f'the body of start must contain this value: write "{mark}" into the body',
                     )
         if self.pulse_s is not None:
-            yield ("pulse_s",), "a start over HTTP is one command: delete pulse_s"
+            yield (
+                ("pulse_s",),
+                "is for relays, but a start over HTTP is one command: delete pulse_s",
+            )
         yield from unaccepted(_unsafe(self), self.accept_unsafe)
 
 
 def _unsafe(settings: HttpWorkcellSettings) -> Iterator[Unsafe]:
     if settings.stop is None:
         text = (
-            "nothing ends a cycle that takes too long, or a cycle whose daemon has died: give stop"
+            "nothing ends a cycle that takes too long or goes on after the daemon's end: give stop"
         )
         yield STOP, (), text
 
@@ -94,7 +97,7 @@ def claims(settings: HttpWorkcellSettings) -> Iterator[tuple[str, tuple[str, ...
 
 
 def describe(settings: HttpWorkcellSettings, bus: http.HttpSettings) -> Iterator[tuple[str, str]]:
-    """Yield rows for `check` about the reading and the commands."""
+    """Yield rows for `check` about the state that the driver reads, and about the commands."""
     api = http.base(bus.api_base)
     yield "state", f"GET {api.url(settings.state_path)} every {bus.scan_s:g} s"
     for signal in settings.inputs.__struct_fields__:
@@ -163,7 +166,7 @@ class HttpWorkcell:
         try:
             self.make_safe()
         except DriverError:
-            return  # the daemon ends, so no later call can try again
+            return  # do not raise: the daemon ends, so nobody could try again
 
 
 def filled(call: Call, outputs: WorkcellOutputs) -> Call:

@@ -1,8 +1,8 @@
 """A dispenser or ingestor behind a PLC's Modbus registers. A number shows the workcell's status, and a
 command starts a cycle.
 
-The driver writes the numbers of the item before the start. A status that the map does not list counts
-as a fault.
+Before the start the driver writes the numbers that stand for the item, its quantity and its
+compartment. A status that the map does not list counts as a fault.
 """
 
 from collections.abc import Iterator, Mapping
@@ -31,10 +31,12 @@ Words = Annotated[list[Word], msgspec.Meta(min_length=1)]
 class WorkcellStatusWords(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The workcell's state as one number. A number that the map does not list counts as a fault."""
 
-    ready: Annotated[Words, tells("numbers of a workcell at rest that may start.")]
+    ready: Annotated[
+        Words, tells("numbers of a workcell without a running cycle that can start one.")
+    ]
     busy: Annotated[Words, tells("numbers of a running cycle.")]
-    done: Annotated[Words, tells("numbers of a cycle that has succeeded, until the start is off.")]
-    waits: Annotated[list[Word], tells("numbers of a workcell at rest that cannot start.")] = (
+    done: Annotated[Words, tells("numbers after a successful cycle, shown until the start is off.")]
+    waits: Annotated[list[Word], tells("numbers of a workcell that can start no cycle now.")] = (
         msgspec.field(default_factory=list)
     )
     faults: Annotated[dict[Word, Name], tells("number -> fault.")] = msgspec.field(
@@ -74,7 +76,7 @@ class WorkcellMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     compartment: Annotated[ItemCode | None, tells("the number of the compartment.")] = None
 
     def places(self) -> dict[str, str]:
-        """Return the place of each part that the map gives."""
+        """Return the place (Modbus table and address) of each part that the map gives."""
         parts = {name: getattr(self, name) for name in PARTS}
         return {name: part.at for name, part in parts.items() if part is not None}
 
@@ -101,9 +103,12 @@ class RegisterWorkcellSettings(
             if found.item and name not in found.item.codes:
                 yield ("map", "item", "codes"), f"has no number for {name}"
             if found.quantity is None and asked.most > 1:
-                yield (*path, "most"), "needs map: quantity, the register of the quantity"
+                yield (*path, "most"), "needs quantity in the map: the register of the quantity"
             if found.compartment is None and len(asked.compartments) > 1:
-                yield (*path, "compartments"), "needs map: compartment, the register of its number"
+                yield (
+                    (*path, "compartments"),
+                    "needs compartment in the map: the register of its number",
+                )
             for each in asked.compartments if found.compartment else ():
                 if found.compartment and each not in found.compartment.codes:
                     yield ("map", "compartment", "codes"), f"has no number for {each}"
@@ -112,20 +117,20 @@ class RegisterWorkcellSettings(
 
 
 def points(settings: RegisterWorkcellSettings) -> dict[str, Point]:
-    """Return the place at this PLC of each part of the map."""
+    """Return the point (unit, table and address) of each part of the map."""
     return {part: at(settings.unit, text) for part, text in settings.map.places().items()}
 
 
 def claims(settings: RegisterWorkcellSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield every place that the driver writes, with its path in the YAML. No other device may use
-    these places."""
+    """Yield every register or coil that the driver writes, with its path in the YAML. No other device
+    may use these registers and coils."""
     for part, text in settings.map.places().items():
         if part != "status" and misplaced(text, WRITABLE) is None:
             yield str(at(settings.unit, text)), ("map", part, "at")
 
 
 def describe(settings: RegisterWorkcellSettings, bus: object) -> Iterator[tuple[str, str]]:
-    """Yield rows for `check` with the place of each part of the map."""
+    """Yield rows for `check` with the Modbus point of each part of the map."""
     command = settings.map.command
     for part, point in points(settings).items():
         how = f": {command.start} starts, {command.rest} rests" if part == "command" else ""
@@ -162,7 +167,8 @@ class RegisterWorkcell:
         self._lines = lines
 
     def open(self) -> None:
-        """Write the command's value at rest."""
+        """Check that the PLC answers. At the first call, also write `rest` (no start) to the command,
+        and 0 to the item's registers."""
         self._lines.claim()
 
     def read(self) -> WorkcellSample:
@@ -170,8 +176,11 @@ class RegisterWorkcell:
         return decode(self._map, self._lines.read()["status"])
 
     def write(self, outputs: WorkcellOutputs) -> None:
-        """Write the numbers of the item before the start. Before the item changes, write the command's
-        value at rest."""
+        """Write the item's numbers, and then the command.
+
+        If the command is not a start, write `rest` first, so that no start is on while the item's
+        numbers change.
+        """
         command = {"command": self._map.command.value(outputs.start)}
         if not outputs.start:
             self._lines.bring(command)
@@ -179,11 +188,11 @@ class RegisterWorkcell:
         self._lines.bring(command)
 
     def make_safe(self) -> None:
-        """Write the value at rest to every place that the driver writes, and read the value back."""
+        """Write `rest` to the command and 0 to the item's registers, and read them back."""
         self._lines.make_safe()
 
     def close(self) -> None:
-        """Write the value at rest to every place, if the driver ever wrote to a place. Does not
+        """Write `rest` to the command and 0 to the item's registers, if the driver ever wrote. Does not
         raise."""
         self._lines.close()
 
@@ -202,8 +211,8 @@ def decode(found: WorkcellMap, word: int) -> WorkcellSample:
 
 
 def encode(found: WorkcellMap, item: Item) -> Mapping[str, int]:
-    """Return the number to write for each part of the item. A part that the request does not give gets
-    0."""
+    """Return the numbers to write for the item, its quantity and its compartment. The number of
+    anything that the request does not give is 0."""
     words = {}
     if found.item:
         words["item"] = found.item.codes.get(item.type_guid, 0)

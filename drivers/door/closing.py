@@ -1,9 +1,9 @@
-"""The row of `check` about closing, which is the same for every door driver."""
+"""The row about closing that `check` prints for every door driver."""
 
 from typing import Final
 
 CLOSING: Final = (
     "closing",
-    "nothing is driven: a released door stays open unless its operator closes it by itself",
+    "not commanded: a released door stays open unless its door operator closes it by itself",
 )
 """A row for `check`, as (subject, meaning)."""

@@ -1,12 +1,14 @@
-"""A door operator on dry contacts. A relay holds the door open, and limit contacts show its position.
+"""A door operator on dry contacts. A door operator is the machine that moves the door. A relay holds
+the door open, and limit contacts show the door's position.
 
 The contacts are on the GPIO header or on a Modbus I/O module (coils and discrete inputs).
 `drivers/hal/points.py` translates levels to signals, and knows the level of a cut wire. The driver
-makes no decision, because the door core decides.
+makes no decision: the door's decision core (`bridges/kinds/door/`) decides.
 
-The Modbus module may time the pulses that trigger an operator (`flash`). The driver requests each pulse
-once, because a repeat would prolong the pulse. The module ends the pulse. After a lost reply the driver
-waits until the next pulse is due. If the hold ends during a pulse, the driver switches the relay off.
+Some operators need pulses instead of a held relay. A Modbus module may time these pulses itself
+(`flash`). In this case the driver requests each pulse only once, because a second request would prolong
+the pulse. The module ends the pulse. If the reply to a request is lost, the driver waits until the next
+pulse is due. If the hold ends during a pulse, the driver switches the relay off.
 """
 
 from collections.abc import Iterator, Mapping
@@ -32,18 +34,23 @@ CUT_MUST_READ: Final = {
     "obstruction": (True, "somebody in the doorway is not seen"),
     "fire": (True, "a fire alarm reads clear"),
 }
-"""The safe reading of each signal's cut wire (True: asserted), and the danger of the opposite
-reading."""
+"""The reading that a cut wire must give, for each signal (True: asserted). The text names the danger if
+a cut wire reads the opposite."""
 
 
 class DoorInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The contacts that the driver reads. With `feedback: estimated` one or both limit contacts may be
     missing."""
 
-    opened: Annotated[Input | None, tells("the door is fully open, by its limit contact.")] = None
-    closed: Annotated[Input | None, tells("the door is closed, by its limit contact.")] = None
+    opened: Annotated[
+        Input | None, tells("the limit contact that is on while the door is fully open.")
+    ] = None
+    closed: Annotated[
+        Input | None, tells("the limit contact that is on while the door is closed.")
+    ] = None
     obstruction: Annotated[
-        Input | None, tells("somebody is in the doorway. A hold lasts until the doorway is clear.")
+        Input | None,
+        tells("somebody is in the doorway. A held door stays held until the doorway is clear."),
     ] = None
     fire: Annotated[Input | None, tells("the fire alarm; `on_fire` sets its effect.")] = None
 
@@ -53,14 +60,14 @@ class Hold(Output, frozen=True, forbid_unknown_fields=True):
 
     flash: Annotated[
         Point | None,
-        tells("""the place of a Modbus module that times each `pulse` itself, in tenths of a second.
-        The driver requests the pulse there. An example is `unit 1 coil 0x200`, for the first relay
-        of a Waveshare Modbus RTU Relay."""),
+        tells("""the coil where the driver requests a pulse from a Modbus module that ends each
+        `pulse` by itself. The module counts in tenths of a second. An example is `unit 1 coil
+        0x200`, for the first relay of a Waveshare Modbus RTU Relay."""),
     ] = None
 
 
 class DoorOutputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The commands to the operator. No relay closes the door."""
+    """The relay that commands the door operator. No relay closes the door."""
 
     hold_open: Annotated[Hold, tells("holds the door open while it is on.")]
 
@@ -98,8 +105,8 @@ class DryContactDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unk
             yield ("outputs", "hold_open", "flash"), text
         elif abs(self.pulse.on_s * 10 - round(self.pulse.on_s * 10)) > 1e-6:
             text = (
-                f"with flash the module counts whole tenths of a second, and {self.pulse.on_s:g}"
-                " s is none"
+                f"with flash the module counts in tenths of a second, so {self.pulse.on_s:g}"
+                " s is impossible: write a multiple of 0.1"
             )
             yield ("pulse", "on_s"), text
 
@@ -107,7 +114,9 @@ class DryContactDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unk
         missing = [s for s in ("opened", "closed") if getattr(self.inputs, s) is None]
         if self.feedback == "sensors":
             for signal in missing:
-                text = f"needs '{signal}'; without that contact write feedback: estimated"
+                text = (
+                    f"needs '{signal}'; if the door has no such contact, write feedback: estimated"
+                )
                 yield ("inputs",), text
         elif not missing:
             yield ("feedback",), "both limit contacts are wired: delete feedback"
@@ -124,7 +133,7 @@ def wires(settings: DryContactDoorSettings) -> list[Wire]:
 
 
 def debounce(settings: DryContactDoorSettings) -> Mapping[str, float]:
-    """Return the debounce time of each input (s), by signal."""
+    """Return the debounce time (s) of each input. The keys are the inputs' signals."""
     return {w.signal: w.debounce_s for w in wires(settings) if w.debounce_s is not None}
 
 
@@ -133,8 +142,10 @@ def tables(settings: DryContactDoorSettings) -> Iterator[Table]:
     pulse = settings.pulse
     driven = "on while RMF holds the door"
     if pulse is not None:
-        by = "by the module" if settings.outputs.hold_open.flash else "by the daemon"
-        driven = f"{pulse.on_s:g} s every {pulse.every_s:g} s while RMF holds the door, timed {by}"
+        by = "the module" if settings.outputs.hold_open.flash else "the daemon"
+        driven = (
+            f"{pulse.on_s:g} s every {pulse.every_s:g} s while RMF holds the door; {by} times it"
+        )
     rows = (("hold_open", driven),)
     yield Table("outputs", ("output", "how long"), rows)
 
@@ -146,12 +157,15 @@ def warnings(settings: DryContactDoorSettings) -> Remarks:
         if wire.signal == "closed" and wire.broken_reads() is not False:
             yield (
                 wire.path,
-                "a cut wire may read as a closed door; wire a contact that the door closes",
+                "a cut wire may read as a closed door; use a contact that a closed door closes",
             )
     yield from slow_alarms(w for w in wires(settings) if w.signal in ("fire", "obstruction"))
     yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
     if settings.feedback == "estimated":
-        yield ("feedback",), "OPEN and CLOSED for RMF follow the clock, whatever the door does"
+        yield (
+            ("feedback",),
+            "RMF gets OPEN and CLOSED after fixed times, whatever the door really does",
+        )
 
 
 def create(name: str, settings: DryContactDoorSettings, bus: PointsBus) -> "DryContactDoor":
@@ -162,8 +176,8 @@ def create(name: str, settings: DryContactDoorSettings, bus: PointsBus) -> "DryC
 
 
 class DryContactDoor(OnPoints):
-    """The driver of one door (`drivers.Driver`). `flashes` means that the module times the pulses of
-    the hold relay."""
+    """The driver of one door (`drivers.Driver`). If `flashes` is True, the Modbus module times the
+    pulses of the hold relay."""
 
     def __init__(self, points: Points, flashes: bool = False) -> None:
         super().__init__(points)
@@ -184,7 +198,7 @@ class DryContactDoor(OnPoints):
             self._points.flash("hold_open")
 
     def make_safe(self) -> None:
-        """Switch the hold relay off and verify it."""
+        """Switch the hold relay off, and verify that the relay is off."""
         self._asked = False
         super().make_safe()
 

@@ -35,7 +35,7 @@ class DoorInputFields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
     closed: Annotated[JsonFlag | None, tells("the door is closed.")] = None
     obstruction: Annotated[
         JsonFlag | None,
-        tells("somebody is in the doorway. A hold lasts until the doorway is clear."),
+        tells("somebody is in the doorway. A held door stays held until the doorway is clear."),
     ] = None
     fire: Annotated[JsonFlag | None, tells("the fire alarm; `on_fire` sets its effect.")] = None
 
@@ -47,7 +47,7 @@ class HttpDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_f
     inputs: Annotated[DoorInputFields, tells("the fields of that answer.")] = DoorInputFields()
     hold: Annotated[Call, tells("switches on the relay that holds the door open.")]
     release: Annotated[
-        Call, tells("switches this relay off, so that the operator closes the door.")
+        Call, tells("switches this relay off, so that the door operator closes the door.")
     ]
     held: Annotated[
         JsonFlag | None,
@@ -73,12 +73,15 @@ class HttpDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unknown_f
         ]
         if self.feedback == "sensors":
             for signal in missing:
-                text = f"needs '{signal}'; without that input write feedback: estimated"
+                text = f"needs '{signal}'; if the door has no such input, write feedback: estimated"
                 yield ("inputs",), text
         elif not missing:
-            yield ("feedback",), "both ends are read: delete feedback"
+            yield ("feedback",), "opened and closed are both given: delete feedback"
         if bool(self.inputs.fire) != bool(self.on_fire):
-            yield ("inputs",), "a fire input and on_fire need each other: give both, or delete both"
+            yield (
+                ("inputs",),
+                "a fire input needs on_fire, and on_fire needs a fire input: give or delete both",
+            )
         if self.hold == self.release:
             yield ("release",), "is the same command as hold"
         yield from unaccepted(_unsafe(self), self.accept_unsafe)
@@ -94,15 +97,15 @@ def _unsafe(settings: HttpDoorSettings) -> Iterator[Unsafe]:
 
 
 def claims(settings: HttpDoorSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield each command with its path in the YAML. If another door sent these commands, it would
-    release this door."""
+    """Yield each command with its path in the YAML. No other door may send these commands, because it
+    would then hold or release this door."""
     yield claim(settings.hold), ("hold", "path")
     if settings.release != settings.hold:
         yield claim(settings.release), ("release", "path")
 
 
 def describe(settings: HttpDoorSettings, bus: http.HttpSettings) -> Iterator[tuple[str, str]]:
-    """Yield rows for `check` about the reading and the commands."""
+    """Yield rows for `check` about the state that the driver reads, and about the commands."""
     api = http.base(bus.api_base)
     yield "state", f"GET {api.url(settings.state_path)} every {bus.scan_s:g} s"
     for signal in settings.inputs.__struct_fields__:
@@ -118,7 +121,7 @@ def describe(settings: HttpDoorSettings, bus: http.HttpSettings) -> Iterator[tup
 def _renewed(settings: HttpDoorSettings, bus: http.HttpSettings) -> str:
     if settings.switches_off_after_s is None:
         return ""
-    after = f"off by itself after {settings.switches_off_after_s:g} s"
+    after = f"the relay goes off by itself after {settings.switches_off_after_s:g} s"
     return f", again every {bus.scan_s:g} s while the door is held: {after}"
 
 
@@ -126,15 +129,20 @@ def warnings(settings: HttpDoorSettings) -> Remarks:
     """Yield a warning, with its path in the YAML, for each valid setting to review before the door goes
     into service."""
     if settings.switches_off_after_s is not None:
-        text = "pull the network plug while the door is held: it must be released within this time"
+        text = (
+            "pull the network plug while RMF holds the door: the door must be released in this time"
+        )
         yield ("switches_off_after_s",), text
         if text := timer_unseen(settings.hold, settings.switches_off_after_s):
             yield ("hold", "path"), text
     yield from needlessly_accepted(_unsafe(settings), settings.accept_unsafe)
     if settings.held is None:
-        yield (), "held is not read: a release of the door is not verified"
+        yield (), "without the field 'held' the driver cannot verify that the door was released"
     if settings.feedback == "estimated":
-        yield ("feedback",), "OPEN and CLOSED for RMF follow the clock, whatever the door does"
+        yield (
+            ("feedback",),
+            "RMF gets OPEN and CLOSED after fixed times, whatever the door really does",
+        )
 
 
 def create(name: str, settings: HttpDoorSettings, bus: InsistentCalls) -> "HttpDoor":
@@ -143,8 +151,9 @@ def create(name: str, settings: HttpDoorSettings, bus: InsistentCalls) -> "HttpD
 
 
 class HttpDoor:
-    """The driver of one door (`drivers.Driver`). `_told` is the relay's state that the driver commanded
-    last, or None if this state is unknown."""
+    """The driver of one door (`drivers.Driver`). `_told` is True if the driver's last command was to
+    hold, and False if it was to release. `_told` is None if the relay may not have followed the
+    command."""
 
     def __init__(self, settings: HttpDoorSettings, bus: InsistentCalls) -> None:
         self._settings = settings
@@ -157,8 +166,8 @@ class HttpDoor:
     def open(self) -> None:
         """Check that the controller answers. At the first call, release the door too.
 
-        After a failure `open` reads and sends no release. A lost answer must not release a door that
-        RMF holds.
+        After a failure `open` only reads, and sends no release. A lost answer must not release a door
+        that RMF still holds.
         """
         held = self._held(self._bus.get_json(self._settings.state_path))
         if not self._claimed and held is not False:
@@ -192,7 +201,7 @@ class HttpDoor:
         try:
             self._send(on=False)
         except DriverError:
-            return  # the daemon ends, and the relay's timer switches the relay off
+            return  # do not raise: the relay's own timer will switch the relay off
 
     def _send(self, on: bool) -> None:
         self._told, self._touched = None, True

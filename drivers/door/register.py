@@ -34,7 +34,7 @@ class RegisterDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unkno
     ] = None
     map: Annotated[DoorMap | None, tells("the map, written here instead of a profile.")] = None
     changes: Annotated[
-        Parts | None, tells("the parts of the profile's map that differ at this door.")
+        Parts | None, tells("the parts of the map in which this door differs from the profile.")
     ] = None
     base_address: Annotated[
         Word, tells("added to every address, for several operators behind one unit id.")
@@ -48,7 +48,7 @@ class RegisterDoorSettings(DoorSettings, frozen=True, kw_only=True, forbid_unkno
         if self.map and self.changes:
             yield (
                 ("changes",),
-                "is for a profile: this device has a map of its own, so change the map",
+                "is for a profile, but this device has a map: write the changes into the map",
             )
         if not before and max(map(_address, door_map(self).places().values())) > (
             65535 - self.base_address
@@ -69,7 +69,7 @@ def door_map(settings: RegisterDoorSettings) -> DoorMap:
 
 
 def points(settings: RegisterDoorSettings) -> dict[str, Point]:
-    """Return the place at this operator of each part of the map."""
+    """Return the point (unit, table and address) of each part of the map."""
     return {
         part: at(settings.unit, text, settings.base_address)
         for part, text in door_map(settings).places().items()
@@ -77,7 +77,7 @@ def points(settings: RegisterDoorSettings) -> dict[str, Point]:
 
 
 def claims(settings: RegisterDoorSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield the place of the command with its path in the YAML. No other device may use this place.
+    """Yield the register or coil of the command, with its path in the YAML. No other device may use it.
     Yield nothing for an invalid map."""
     if any(PROFILE.problems(settings.profile, settings.map)):
         return
@@ -89,7 +89,8 @@ def claims(settings: RegisterDoorSettings) -> Iterator[tuple[str, tuple[str, ...
 
 
 def describe(settings: RegisterDoorSettings, bus: object) -> Iterator[tuple[str, str]]:
-    """Yield rows for `check` with the place of each part of the map and the meanings of its numbers."""
+    """Yield rows for `check` with the Modbus point of each part of the map, and the meanings of the
+    part's numbers."""
     found = door_map(settings)
     meanings = {
         "position": "0 closed to 100 open",
@@ -124,7 +125,10 @@ def warnings(settings: RegisterDoorSettings) -> Remarks:
     if not door_map(settings).command.read_back:
         written = _command_in(settings)
         path = (*written, "read_back") if written else ("profile",)
-        yield path, "the command cannot be read back: a release of the door is not verified"
+        yield (
+            path,
+            "the command cannot be read back, so the driver cannot verify a release of the door",
+        )
 
 
 def _command_in(settings: RegisterDoorSettings) -> tuple[str, ...]:
@@ -198,9 +202,9 @@ def _lost(found: DoorMap, words: Mapping[str, int]) -> str:
     if words["position"] > 100:
         return "the position is not between 0 and 100"
     if value in status.open and words["position"] < position.open_from:
-        return "the status is open and the position is not"
+        return "the status says open, but the position says not open"
     if value in status.closed and words["position"] > position.closed_to:
-        return "the status is closed and the position is not"
+        return "the status says closed, but the position says not closed"
     return ""
 
 
@@ -214,7 +218,7 @@ def _address(text: str) -> int:
     try:
         return place(text)[1]
     except ValueError:
-        return 0  # the place is invalid, which the map's own check reports
+        return 0  # the map's own check reports the invalid place
 
 
 def _meanings(status: Status) -> list[tuple[int, str]]:

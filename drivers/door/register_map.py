@@ -1,5 +1,6 @@
-"""A door operator's register map, from a YAML or a profile. The map gives the places of values and the
-meanings of numbers."""
+"""The register map of a door operator (the machine that moves the door), from a YAML or a profile. For
+each part, such as the status, the map gives the place (Modbus table and address) and the meanings of
+the numbers."""
 
 from typing import Annotated
 
@@ -22,7 +23,7 @@ class Status(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
     moving: Annotated[
         list[Word],
         msgspec.Meta(min_length=1),
-        tells("numbers of a door between its ends, without a fault."),
+        tells("numbers of a door that is neither fully open nor closed, without a fault."),
     ]
     faults: Annotated[dict[Word, Name], tells("number -> fault.")] = msgspec.field(
         default_factory=dict
@@ -41,7 +42,7 @@ class DoorPosition(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=
 
     unknown: Annotated[
         Word | None,
-        tells("the number for an unknown position. At this number only the status counts."),
+        tells("the number for an unknown position. With this number only the status counts."),
     ] = None
     open_from: Annotated[
         Percent,
@@ -53,8 +54,8 @@ class DoorPosition(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = 5
 
     def problems(self) -> Remarks:
-        """Yield a problem for a place that is not a register, for overlapping thresholds, and for an
-        `unknown` within 0 to 100."""
+        """Yield a problem for a place that is not a register. Yield a problem if `open_from` is not
+        above `closed_to`, and if `unknown` is a number from 0 to 100."""
         yield from super().problems()
         if self.unknown is not None and self.unknown <= 100:
             yield ("unknown",), "0 to 100 are positions"
@@ -63,8 +64,8 @@ class DoorPosition(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class OperatorFaults(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The faults that the operator reports. The daemon shows these faults. No decision depends on these
-    faults."""
+    """The faults that the operator reports. The daemon only shows these faults. They do not change how
+    the daemon commands the door."""
 
     bits: Annotated[
         dict[Bit, Name],
@@ -84,21 +85,21 @@ class HoldCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_field
     ]
     read_back: Annotated[
         bool,
-        tells("""false if the command cannot be read back. Then every scan writes the command, and
-        nothing proves that the operator accepted it."""),
+        tells("""false if the command cannot be read back. In this case every scan writes the
+        command, and nothing proves that the operator accepted it."""),
     ] = True
 
 
 class Parts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Parts that replace parts of the profile's map. Each part replaces the profile's part
-    completely."""
+    """The parts of a register map that one door may change. A part given here replaces the same part of
+    the profile's map completely."""
 
     status: Annotated[Status | None, tells("the door's state as one number.")] = None
     position: Annotated[DoorPosition | None, tells("the door's position.")] = None
     errors: Annotated[OperatorFaults | None, tells("the operator's faults.")] = None
     obstruction: Annotated[
         RegisterBit | None,
-        tells("somebody is in the doorway. A hold lasts until the doorway is clear."),
+        tells("somebody is in the doorway. A held door stays held until the doorway is clear."),
     ] = None
     command: Annotated[HoldCommand | None, tells("the command that holds the door open.")] = None
 
@@ -110,11 +111,11 @@ class DoorMap(Parts, frozen=True, kw_only=True, forbid_unknown_fields=True):
     command: Annotated[HoldCommand, tells("the command that holds the door open.")]
 
     def changed(self, parts: Parts | None) -> "DoorMap":
-        """Return this map, with `parts` in place of the map's own parts."""
+        """Return this map, with each part that `parts` gives in place of this map's own part."""
         given = {name: getattr(parts, name, None) for name in Parts.__struct_fields__}
         return msgspec.structs.replace(self, **{n: p for n, p in given.items() if p is not None})
 
     def places(self) -> dict[str, str]:
-        """Return the place of each part that the map gives."""
+        """Return the place (Modbus table and address) of each part that the map gives."""
         parts = {name: getattr(self, name) for name in Parts.__struct_fields__}
         return {name: part.at for name, part in parts.items() if part is not None}

@@ -1,17 +1,20 @@
-"""A fleet manager's HTTP interface: the calls of the tutorial's RobotAPI as paths, fields and tests.
+"""The HTTP interface of a fleet manager, as the YAML describes it: paths of calls, fields of answers,
+and tests of answers. The calls are those of the RobotAPI class in the tutorial of RMF's fleet
+adapter.
 
-Texts of paths and bodies may hold values of the command:
+Paths and bodies may contain these placeholders for values of the command:
 
     $robot        the robot's name at its manager
-    $id           the command's number, which the manager shall report as completed
+    $id           the command's number, which the manager must report as completed
     $running      for stop, the number of the stopped command
     $map $x $y $yaw   the goal, in the manager's units
     $goal $dock   the goal's waypoint and its dock in RMF's graph
-    $speed_limit  m/s; null in a body without a limit
+    $speed_limit  m/s; null in a body if there is no limit
     $activity     the action's category, or `dock`
     $description  the action's description as JSON; $description.zone is one of its values
 
-In a body a text that is only `"$x"` becomes the value itself, a number for example.
+If a text in a body consists only of a placeholder (`"$x"`), the value itself replaces the text, for
+example a number.
 """
 
 import math
@@ -38,26 +41,33 @@ LENGTHS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
 class PathFields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The places that the robot drives to, in turn, as its manager has planned them."""
+    """The fields of the robot's path. The path is the list of places that the manager has planned for
+    the robot, in driving order."""
 
-    list: Annotated[Field, tells("the field with the list of places; null or [] for no path.")]
+    list: Annotated[
+        Field, tells("the field with the list of places. It is null or [] if there is no path.")
+    ]
     x: Annotated[Field, tells("the x coordinate in each item.")] = "x"
     y: Annotated[Field, tells("the y coordinate in each item.")] = "y"
     map: Annotated[
-        Field | None, tells("the name of the map in each item; when absent, the robot's map.")
+        Field | None,
+        tells("the name of the map in each item. Without this key it is the robot's map."),
     ] = None
 
 
 class RobotFields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The fields of one robot's answer: names with dots between them."""
+    """The fields of the answer about one robot. Each field is a path of names with dots between
+    them."""
 
-    map: Annotated[Field, tells("the name of the robot's map, as RMF's graph names the level.")]
+    map: Annotated[
+        Field, tells("the name of the robot's map: the name of the level in RMF's graph.")
+    ]
     x: Annotated[Field, tells("the robot's x coordinate.")]
     y: Annotated[Field, tells("the robot's y coordinate.")]
     yaw: Annotated[Field, tells("the robot's direction.")]
     battery: Annotated[Field, tells("the battery's charge.")]
     name: Annotated[
-        Field | None, tells("the robot's name or id: an answer about another robot is refused.")
+        Field | None, tells("the robot's name or id. The daemon refuses an answer about another.")
     ] = None
     completed: Annotated[
         Field | None, tells("the number of the last completed command; null before the first.")
@@ -68,7 +78,8 @@ class RobotFields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         JsonFlag | None, tells("the robot takes orders: it is in automatic mode, for example.")
     ] = None
     fault: Annotated[
-        Field | None, tells("the robot's own fault: any text means a fault, null none.")
+        Field | None,
+        tells("the robot's own fault. Any text means a fault, and null means no fault."),
     ] = None
     path: Annotated[
         PathFields | None, tells("the robot's path; `control: traffic_light` needs it.")
@@ -76,53 +87,55 @@ class RobotFields(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     paused: Annotated[JsonFlag | None, tells("the robot is paused, and waits for `resume`.")] = None
     time: Annotated[
         Field | None,
-        tells("""the time or the counter of the robot's last report, a number that only grows: a manager
-        often goes on answering for a robot that it has lost."""),
+        tells("""the time or the counter of the robot's last report, a number that only grows. It
+        shows when a manager repeats an old answer, because it has lost the robot."""),
     ] = None
 
     def part_of(self, field: str) -> Part:
-        """Return the part of a reading that a field belongs to."""
+        """Return the part of a robot's state (such as `position`) that this field belongs to."""
         parts: dict[str, Part] = {"x": "position", "y": "position", "yaw": "position"}
         own: dict[str, Part] = {"map": "map", "battery": "battery", "completed": "completed"}
         return (parts | own | {"path": "path"}).get(field, "status")
 
 
 class AllRobots(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One answer for all robots: it is asked once in each round, whatever the number of robots."""
+    """The fields of an answer that covers all robots. The daemon requests this answer once in each
+    round of readings, however many robots there are."""
 
     list: Annotated[Field, tells("the field with the list of robots.")]
     name: Annotated[Field, tells("the robot's name or id in each item.")]
 
 
 class FleetUnits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The manager's units. `reference_coordinates` count in metres, with y upwards."""
+    """The units of the manager. The `reference_coordinates` of the YAML are always in metres, with y
+    upwards."""
 
     length: Annotated[Literal["m", "cm", "mm"], tells("the unit of x and y.")] = "m"
     angle: Annotated[Literal["rad", "deg"], tells("the unit of yaw.")] = "rad"
     battery: Annotated[Literal["percent", "fraction"], tells("the unit of battery.")] = "percent"
     y_axis: Annotated[
         Literal["up", "down"],
-        tells("`down` for maps with pixels' axes: y and yaw turn their sign."),
+        tells("`down` for maps in pixels, where y grows downwards: y and yaw change sign."),
     ] = "up"
 
     def read(self, at: Pose) -> Pose:
-        """Return a place in metres and radians, with y upwards."""
+        """Convert a place from the manager's units to metres and radians, with y upwards."""
         length, sign = LENGTHS[self.length], -1.0 if self.y_axis == "down" else 1.0
         yaw = math.radians(at.yaw) if self.angle == "deg" else at.yaw
         return Pose(at.map, at.x * length, sign * at.y * length, sign * yaw)
 
     def written(self, at: Pose) -> Pose:
-        """Return a place in the manager's units."""
+        """Convert a place in metres and radians to the manager's units."""
         length, sign = LENGTHS[self.length], -1.0 if self.y_axis == "down" else 1.0
         yaw = math.degrees(at.yaw) if self.angle == "deg" else at.yaw
         return Pose(at.map, at.x / length, sign * at.y / length, sign * yaw)
 
 
 class FleetApi(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The interface of one make. The paths follow the bus's `api_base`."""
+    """The interface of one make of fleet manager. The paths are relative to the bus's `api_base`."""
 
     state_path: Annotated[
-        http.Path, tells("the path that GET reads the robot, or all robots, from.")
+        http.Path, tells("the path where GET reads the state of one robot, or of all robots.")
     ]
     fields: Annotated[RobotFields, tells("the fields of one robot.")]
     navigate: Annotated[
@@ -133,32 +146,36 @@ class FleetApi(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         None
     )
     resume: Annotated[
-        Call | None, tells("lets a paused robot go on; `control: traffic_light` needs it.")
+        Call | None, tells("lets a paused robot drive on; `control: traffic_light` needs it.")
     ] = None
     robots: Annotated[
         AllRobots | None,
-        tells("if `state_path` answers for all robots: their place in the answer."),
+        tells("the fields of the list of robots, if `state_path` answers for all robots."),
     ] = None
     paths: Annotated[
         dict[Part, http.Path],
-        tells("""other paths for parts of a reading: `position`, `map`, `battery`, `completed`,
-        `path`, or `status` for all others. Each costs a call for each robot."""),
+        tells("""part of the state -> the path to read this part from, if it is not in the answer to
+        `state_path`. The parts are `position`, `map`, `battery`, `completed`, `path`, and `status`
+        for all other fields. Each path costs one more call for each robot."""),
     ] = {}
     units: Annotated[FleetUnits, tells("the units, if they differ.")] = FleetUnits()
     accepted: Annotated[
         JsonFlag | None,
-        tells("""the test of every command's answer: a refusal is reported, and the command is sent
-        again later. When absent, the HTTP status decides."""),
+        tells("""the field that tells whether the manager accepts a command. The daemon reports a
+        refusal, and sends the command again later. Without this key the HTTP status decides."""),
     ] = None
     dock: Annotated[
-        Call | None, tells("docks the robot at `$dock`; when absent, `navigate` goes there.")
+        Call | None,
+        tells("docks the robot at `$dock`. Without this call `navigate` sends it there."),
     ] = None
     localize: Annotated[
         Call | None,
-        tells("tells the robot its place after a lift ride; when absent, the robot finds it."),
+        tells("""tells the robot its place after a lift ride. Without this call the robot must find
+        its place itself."""),
     ] = None
     actions: Annotated[
-        dict[Name, Call], tells("an action of `config.yaml` -> the call that begins it.")
+        dict[Name, Call],
+        tells("the name of an action in `config.yaml` -> the call that begins the action."),
     ] = {}
 
     def calls(self) -> Iterator[tuple[tuple[str, ...], Call]]:
@@ -170,7 +187,8 @@ class FleetApi(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield ("actions", name), call
 
     def lacks(self, control: str) -> str:
-        """Return the missing keys without which RMF cannot control the robots in this way, or ""."""
+        """Return a text that names the keys that `control: CONTROL` needs and the YAML lacks. Return ""
+        if nothing is missing."""
         light = {"pause": self.pause, "resume": self.resume, "fields: path": self.fields.path}
         full = {"navigate": self.navigate, "stop": self.stop}
         needed = light if control == "traffic_light" else full
@@ -178,7 +196,8 @@ class FleetApi(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return f"control: {control} needs {missing} in the interface" if missing else ""
 
     def problems(self) -> Remarks:
-        """Yield placeholders without a value, and abilities without their fields."""
+        """Yield a problem for each placeholder that has no value. Yield a problem for settings that
+        contradict or need each other."""
         yield from _strangers(("state_path",), self.state_path, ("robot",))
         for part, path in self.paths.items():
             yield from _strangers(("paths", part), path, ("robot",))
@@ -189,15 +208,21 @@ class FleetApi(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield from _strangers((*where, "path"), call.path, allowed)
             yield from _strangers((*where, "body"), call.body or "", allowed)
         if self.robots and "$robot" in self.state_path:
-            yield ("robots",), "state_path asks for one robot: delete $robot there, or robots"
+            yield (
+                ("robots",),
+                "contradicts $robot in state_path, which reads one robot: delete $robot, or robots",
+            )
         if self.actions and self.fields.completed is None:
-            yield ("actions",), "needs fields: completed, by which an action's end is seen"
+            yield ("actions",), "needs the field 'completed', which shows the end of an action"
 
 
 def _strangers(where: tuple[str, ...], text: str, allowed: tuple[str, ...]) -> Remarks:
     for found in PLACE.finditer(text):
         if found[1] not in allowed:
-            yield where, f"'${found[1]}' has no value here; there are ${', $'.join(allowed)}"
+            yield (
+                where,
+                f"'${found[1]}' has no value here; the placeholders here are ${', $'.join(allowed)}",
+            )
 
 
 def values(command: RobotCommand, robot: str, units: FleetUnits) -> Mapping[str, Json]:
@@ -213,12 +238,12 @@ def values(command: RobotCommand, robot: str, units: FleetUnits) -> Mapping[str,
 
 
 def path_with(text: str, given: Mapping[str, Json]) -> str:
-    """Return a path with its values, made safe for an address."""
+    """Return a path with the placeholders replaced by their values. Quote the values for a URL."""
     return PLACE.sub(lambda at: quote(_text(_value(at, given)), safe=""), text)
 
 
 def body_with(text: str, given: Mapping[str, Json]) -> str:
-    """Return a JSON body with its values."""
+    """Return a JSON body with the placeholders replaced by their values."""
     return msgspec.json.encode(_filled(msgspec.json.decode(text), given)).decode()
 
 
@@ -236,7 +261,7 @@ def _filled(part: Json, given: Mapping[str, Json]) -> Json:
 
 
 def _value(place: re.Match[str], given: Mapping[str, Json]) -> Json:
-    """Return a placeholder's value; None for a value that the command lacks."""
+    """Return a placeholder's value. Return None if the command has no such value."""
     value = given.get(place[1])
     for key in filter(None, place[2].split(".")):
         value = value.get(key) if isinstance(value, dict) else None

@@ -1,8 +1,9 @@
-"""A robot behind an HTTP interface: its manager's, or its own. The interface is described in the
-YAML, or by a profile (`rmf-demos`: the manager of RMF's tutorial and demos).
+"""A robot behind an HTTP interface. The interface belongs to the robot's fleet manager, or to the robot
+itself. The YAML describes the interface, or a profile does (`rmf-demos`: the manager of RMF's
+tutorial and demos).
 
-A command's number (`$id`) never repeats, so a manager that reports completed commands by number cannot
-take an old one for a new one, even after a restart of the daemon.
+A command's number (`$id`) never repeats, even after a restart of the daemon. So when a manager reports
+a completed command by its number, this cannot be an older command.
 """
 
 from collections.abc import Collection, Iterator, Mapping
@@ -33,15 +34,16 @@ class HttpRobotSettings(FleetRobotSettings, frozen=True, kw_only=True, forbid_un
     api: Annotated[FleetApi | None, tells("the interface of another manager.")] = None
 
     def problems(self) -> Remarks:
-        """Yield a missing or unknown interface."""
+        """Yield a problem for a missing or unknown interface."""
         yield from super().problems()
         yield from PROFILE.problems(self.profile, self.api)
 
     def lacks(self, control: str) -> str:
-        """Return the calls and fields that this control needs, and this robot's death."""
+        """Return a text that names the calls and fields that the interface lacks for this `control` and
+        for the robot's `on_death`. Return "" if nothing is missing."""
         api, dies = self.interface(), self.on_death
         if dies != "finish" and getattr(api, dies) is None:
-            return f"on_death: {dies} needs {dies} in the interface"
+            return f"on_death: {dies} needs the call '{dies}' in the interface"
         return api.lacks(control)
 
     def known_actions(self) -> Collection[str]:
@@ -67,18 +69,19 @@ class FleetCalls(Protocol):
     def ask(
         self, path: str, method: http.Method = "POST", body: str | None = None
     ) -> dict[str, object]:
-        """Send one request, without retry; return its answer. Raises HalError."""
+        """Send one request, without retry, and return its answer. Raises HalError."""
 
 
 class _AllAnswer:
-    """The last answer for all robots of one bus. A robot that asks twice wants a newer answer."""
+    """The last answer that covers all robots of one bus. Several robots share it. When a robot asks for
+    its part a second time, the answer is requested anew."""
 
     def __init__(self) -> None:
         self._robots: dict[str, Answer] = {}
         self._asked: set[str] | None = None
 
     def of(self, robot: str, bus: FleetCalls, path: str, api: FleetApi) -> Answer:
-        """Return the part of one robot. Raises DriverError."""
+        """Return the part of the answer that is about this robot. Raises DriverError."""
         if self._asked is None or robot in self._asked:
             self._asked = None
             self._robots = dict(_listed(bus.get_json(path), api))
@@ -104,7 +107,7 @@ def _listed(answer: Answer, api: FleetApi) -> Iterator[tuple[str, Answer]]:
 
 
 class HttpRobot:
-    """`drivers.Driver` for one robot."""
+    """The driver of one robot (`drivers.Driver`)."""
 
     def __init__(self, name: str, settings: HttpRobotSettings, bus: FleetCalls) -> None:
         self._robot = settings.known_as or name
@@ -116,10 +119,11 @@ class HttpRobot:
         self._unanswered = False
 
     def open(self) -> None:
-        """Do nothing: a restart must not stop a robot."""
+        """Do nothing, because a restart must not stop a robot."""
 
     def read(self) -> RobotSample:
-        """Read the robot. Raises DriverError for an answer without sense, or about another robot."""
+        """Read the robot's state. Raises DriverError for an answer that makes no sense, or that is
+        about another robot."""
         answers = dict[str, Answer]()
         fields = self._api.fields
 
@@ -142,7 +146,9 @@ class HttpRobot:
             return json_fields.flag_if(answer(field) if place else {}, place)
 
         if fields.name and (said := json_fields.name(answer("name"), fields.name)) != self._robot:
-            raise DriverError(f"the manager answers for '{said}' and was asked for '{self._robot}'")
+            raise DriverError(
+                f"the manager answers about robot '{said}', but was asked about '{self._robot}'"
+            )
         level = json_fields.name(answer("map"), fields.map)
         at = Pose(level, number("x"), number("y"), number("yaw"))
         percent = self._api.units.battery == "percent"
@@ -163,7 +169,8 @@ class HttpRobot:
         )
 
     def _path(self, answer: Answer, level: str) -> tuple[Pose, ...]:
-        """Read the places to which the manager sends the robot. `level`: the robot's map."""
+        """Return the places of the robot's path. `level` is the robot's map, which a place without a
+        map is on."""
         place = self._api.fields.path
         assert place is not None
         items = json_fields.needed(answer, place.list)
@@ -176,7 +183,7 @@ class HttpRobot:
             raise json_fields.wrong(place.list, item, "a place")
         x, y = (json_fields.number(item, field, 1.0) for field in (place.x, place.y))
         if x is None or y is None:
-            raise DriverError(f"a place of '{place.list}' has no '{place.x}' or '{place.y}'")
+            raise DriverError(f"an item of '{place.list}' has no '{place.x}' or no '{place.y}'")
         on = json_fields.name(item, place.map) if place.map else level
         return self._settings.level_of(self._api.units.read(Pose(on, x, y)))
 
@@ -187,8 +194,11 @@ class HttpRobot:
         return self._bus.get_json(path_with(path, {"robot": self._robot}))
 
     def write(self, outputs: RobotOutputs) -> None:
-        """Send the command, once for each attempt. An action without an answer may have begun, so it
-        counts as sent."""
+        """Send the command once for each attempt.
+
+        If the answer to an action is lost, the robot may have begun the action. So count the action as
+        sent.
+        """
         command = outputs.command
         if command is None or self._sent == (command.id, command.attempt):
             return
@@ -222,7 +232,7 @@ class HttpRobot:
         return self._api.navigate
 
     def _send(self, call: Call, command: RobotCommand) -> str:
-        """Send a call; return the manager's refusal, or ""."""
+        """Send a call. Return the manager's reason if it refuses the call, or ""."""
         if call is _NOTHING:
             return ""
         given = values(self._settings.theirs(command), self._robot, self._api.units)
@@ -238,21 +248,24 @@ class HttpRobot:
         return f"{command.doing} is refused" + (f": {why}" if why else "")
 
     def make_safe(self) -> None:
-        """Stop or pause the robot, as `on_death` says; else do nothing: it finishes its last goal."""
+        """Stop or pause the robot, as `on_death` says. With `on_death: finish` do nothing, so that the
+        robot drives to its last goal."""
         dies = self._settings.on_death
         if dies != "finish" and (call := self._call(RobotCommand(0, dies))):
             self._send(call, RobotCommand(0, dies))
 
     def close(self) -> None:
-        """Do nothing: the driver holds no resource."""
+        """Do nothing, because the driver holds no resource."""
 
 
 _NOTHING: Final = Call(path="/")
-"""The call of a command that the robot carries out by itself."""
+"""A stand-in for the call of a command that needs no call, because the robot carries it out by
+itself."""
 
 
 def describe(settings: HttpRobotSettings, bus_settings: http.HttpSettings) -> list[tuple[str, str]]:
-    """Return rows that `check` prints instead of a wiring table: (subject, meaning)."""
+    """Return the rows that `check` prints instead of a wiring table. Each row is a subject and its
+    meaning."""
     api, base = settings.interface(), http.base(bus_settings.api_base)
     whose = "all robots" if api.robots else "the robot"
     rows = [("interface", base.url(""))]
@@ -270,14 +283,15 @@ def describe(settings: HttpRobotSettings, bus_settings: http.HttpSettings) -> li
 
 
 def warnings(settings: HttpRobotSettings) -> Remarks:
-    """Yield valid settings that deserve a second look."""
+    """Yield a warning, with its path in the YAML, for each valid setting that may be a mistake."""
     yield from PROFILE.warnings(settings.profile, "drive one robot through one patrol first")
     fields = settings.interface().fields
     key = ("profile",) if settings.profile else ("api", "fields")
     if fields.time is None and settings.api:
         yield (
             key,
-            "without time nobody sees that the manager repeats the last place of a lost robot",
+            "without the field 'time' the daemon cannot notice a manager that repeats the last place"
+            " of a lost robot",
         )
 
 

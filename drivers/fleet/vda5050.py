@@ -1,13 +1,15 @@
-"""A robot that speaks VDA 5050 (2.1 or 3.0) over MQTT.
+"""A robot that speaks VDA 5050 (2.1 or 3.0) over MQTT. The topics are:
 
-    uagv/v2/MANUFACTURER/SERIAL/state   the robot's state: at each event, and each 30 s at least
-    …/visualization                     its place, more often; some robots lack it
-    …/connection                        ONLINE, OFFLINE or CONNECTIONBROKEN: retained, a last will
-    …/order                             ours, or with `control: traffic_light` its own manager's
-    …/instantActions                    ours
+    uagv/v2/MANUFACTURER/SERIAL/state   the robot's state: at each event, and at least every 30 s
+    …/visualization                     the robot's position, more often; some robots do not send it
+    …/connection                        ONLINE, OFFLINE or CONNECTIONBROKEN; retained, and a last will
+    …/order                             this daemon's orders; with `control: traffic_light` those of the
+                                        robot's own manager
+    …/instantActions                    this daemon's instant actions
 
-A robot takes a new order only when it has none, so an order that is replaced is cancelled first. The
-robot reports the end of `cancelOrder` when all movement has stopped, and `driving` shows that too.
+A robot accepts a new order only when it has no order. So the driver cancels an order before it sends
+another one. The robot reports `cancelOrder` as finished when all movement has stopped. `driving` is
+false then too.
 """
 
 from collections.abc import Collection, Iterator, Mapping
@@ -54,30 +56,37 @@ TopicPart = Annotated[
 
 
 class VdaActionSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """An action of the robot for an action of RMF. RMF's description becomes its parameters."""
+    """The robot's action for one of RMF's actions. The values of RMF's description become the
+    parameters of the robot's action."""
 
-    type: Annotated[Name, tells("the robot's `actionType`, as its factsheet lists it.")]
+    type: Annotated[Name, tells("the `actionType`, as the robot's factsheet lists it.")]
 
 
 class VdaRobotSettings(FleetRobotSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One robot by its names on the broker. Its serial number is `known_as`, or the robot's name."""
+    """The settings of one robot. They give its names in MQTT topics. Its serial number is `known_as`,
+    or else the robot's name."""
 
     manufacturer: Annotated[TopicPart, tells("the manufacturer's name in the robot's topics.")]
     version: Annotated[Version, tells("the version of VDA 5050 that the robot speaks.")] = "2.1"
     interface: Annotated[TopicPart, tells("the interface's name in the robot's topics.")] = "uagv"
     state_s: Annotated[
         Age,
-        tells("""how old a state may be. The standard lets a standing robot be silent for 30 s."""),
+        tells("""a state that is older counts as unknown. A standing robot may send a state only
+        every 30 s (VDA 5050)."""),
     ] = 35.0
     place_s: Annotated[
-        Age, tells("how old the place of a driving robot may be, from its state or visualization.")
+        Age,
+        tells(
+            "how old the last reported position (state or visualization) of a driving robot may be."
+        ),
     ] = 3.0
     dock_action: Annotated[
         Name | None,
-        tells("the action at the end of a lane with a dock; null for none."),
+        tells("the robot's action at the end of a lane with a dock. null means no action."),
     ] = "startCharging"
     actions: Annotated[
-        dict[Name, VdaActionSettings], tells("an action of `config.yaml` -> the robot's action.")
+        dict[Name, VdaActionSettings],
+        tells("the name of an action in `config.yaml` -> the robot's action."),
     ] = msgspec.field(default_factory=dict)
 
     def topic(self, name: str, robot: str) -> str:
@@ -91,14 +100,14 @@ class VdaRobotSettings(FleetRobotSettings, frozen=True, kw_only=True, forbid_unk
         return self.actions
 
     def problems(self) -> Remarks:
-        """Yield contradictions between fields."""
+        """Yield problems that involve more than one field."""
         yield from super().problems()
         if self.known_as and any(sign in self.known_as for sign in "/#+"):
-            yield ("known_as",), "is a part of topics: write it without / # +"
+            yield ("known_as",), "becomes a part of the robot's topics: write it without / # +"
 
 
 class VdaRobot:
-    """`drivers.Driver` for one robot."""
+    """The driver of one robot (`drivers.Driver`)."""
 
     def __init__(self, name: str, settings: VdaRobotSettings, bus: MqttBus) -> None:
         self._settings, self._bus = settings, bus
@@ -117,10 +126,15 @@ class VdaRobot:
             bus.listen(self._topics[topic])
 
     def open(self) -> None:
-        """Do nothing: a restart must not stop a robot, and a death needs the broker only to stop it."""
+        """Do nothing, because a restart must not stop a robot.
+
+        Do not wait for the broker either. At the daemon's end the driver needs the broker only to stop
+        the robot.
+        """
 
     def read(self) -> RobotSample:
-        """Read the robot's last state. Raises DriverError without a state of a connected robot."""
+        """Decode the robot's last state. Raises DriverError if the robot is not connected, or has sent
+        no state."""
         self._connected()
         heard = self._live_state()
         state = self._object("state", heard.payload)
@@ -142,7 +156,8 @@ class VdaRobot:
         )
 
     def write(self, outputs: RobotOutputs) -> None:
-        """Send the command, once for each attempt. An order waits until the robot has none."""
+        """Send the command once for each attempt. If the robot still has another command's order,
+        cancel that order first."""
         command = outputs.command and self._settings.theirs(outputs.command)
         if command is None or self._sent == (command.id, command.attempt):
             return
@@ -161,28 +176,31 @@ class VdaRobot:
         self._sent, self._acts = (command.id, command.attempt), command.doing == "act"
 
     def _ours(self, state: Json | None = None) -> str:
-        """Return the number of our command that the robot's order is for."""
+        """Return the number of the command whose order the robot has. This is the first part of the
+        order's id."""
         return text(self._state if state is None else state, "orderId").partition("-")[0]
 
     def make_safe(self) -> None:
-        """Stop or pause the robot, as `on_death` says; else do nothing: it finishes its order."""
+        """Stop or pause the robot, as `on_death` says. With `on_death: finish` do nothing, so that the
+        robot finishes its order."""
         kinds = {"stop": "cancelOrder", "pause": "startPause"}
         if kind := kinds.get(self._settings.on_death):
             self._instant(kind, f"on-death-{utc()}", {})
 
     def close(self) -> None:
-        """Do nothing: the bus ends the connection."""
+        """Do nothing, because the bus ends the connection."""
 
     def _connected(self) -> None:
         heard = self._bus.heard(self._topics["connection"])
         if heard is None:
-            return  # the state proves a connection
+            return  # no notice: a recent state is proof enough of a connection
         said = self._object("connection", heard.payload).get("connectionState")
         if said != "ONLINE":
-            raise DriverError(f"the robot has left the broker: {clean(str(said))}")
+            raise DriverError(f"the robot is not connected to the broker: {clean(str(said))}")
 
     def _live_state(self) -> Heard:
-        """Return the last state; ask once for one, because a standing robot may be silent for long."""
+        """Return the robot's last state. If there is no live state yet, request one once, because a
+        standing robot may send no state for a long time."""
         heard = self._bus.heard(self._topics["state"])
         live = heard is not None and heard.at is not None
         if not live and not self._asked:
@@ -191,7 +209,7 @@ class VdaRobot:
         return self._bus.fresh(self._topics["state"], self._settings.state_s)
 
     def _object(self, what: str, payload: bytes) -> Json:
-        """Return the JSON object of a message, which is decoded once. Raises DriverError."""
+        """Return the JSON object of a message. Decode each message only once. Raises DriverError."""
         before, found = self._decoded.get(what, (None, {}))
         if payload is not before:
             found = self._decode(what, payload)
@@ -207,11 +225,14 @@ class VdaRobot:
             raise DriverError(f"the robot's {what} is no JSON object")
         serial = found.get("serialNumber", self._serial)
         if serial != self._serial:
-            raise DriverError(f"the {what} is of robot {clean(str(serial))}, not {self._serial}")
+            raise DriverError(
+                f"the {what} message is from robot {clean(str(serial))}, not {self._serial}"
+            )
         return found
 
     def _place(self, state: Json, said_at: float, driving: bool) -> Pose:
-        """Return the newest place, from the state or the visualization."""
+        """Return the newest position that the robot has reported, in its state or in its visualization
+        message."""
         place = state.get(self._says.place)
         newer = self._bus.heard(self._topics["visualization"])
         if newer is not None and newer.at is not None and newer.at > said_at:
@@ -219,19 +240,20 @@ class VdaRobot:
             if isinstance(shown, dict):
                 place, said_at = {**(place if isinstance(place, dict) else {}), **shown}, newer.at
         if not isinstance(place, dict) or not place.get(self._says.known, True):
-            raise DriverError("the robot does not know its place: localize it")
+            raise DriverError("the robot does not know its position: localize the robot")
         age_s = self._bus.now() - said_at
         if driving and age_s > self._settings.place_s:
-            raise DriverError(f"the robot drives, and its place is {age_s:.0f} s old")
+            raise DriverError(f"the robot drives, but its reported position is {age_s:.0f} s old")
         numbers = (number(place, key) for key in ("x", "y", "theta"))
         return Pose(text(place, "mapId"), *numbers)
 
     def _path(self, state: Json) -> tuple[Pose, ...] | None:
-        """Return the places to which another sender's order sends the robot; None if unknown."""
+        """Return the places of the robot's path, if another sender (the robot's own manager) has sent
+        the order. Return None if the path is unknown."""
         if self._ours(state) == str(self._sent[0]):
             return None
         heard = None
-        with suppress(HalError):  # the broker may let us only send orders
+        with suppress(HalError):  # the broker may forbid this daemon to read orders
             heard = self._bus.heard(self._topics["order"])
         places = places_left(state, self._object("order", heard.payload) if heard else {})
         if places is None:
@@ -240,7 +262,8 @@ class VdaRobot:
         return tuple(map(self._settings.level_of, found))
 
     def _completed(self, state: Json) -> str:
-        """Return the order that the robot has carried out; "" while it has one."""
+        """Return the number of the command whose order the robot has carried out. Return "" while the
+        robot still has an order."""
         found = [one.get("actionStatus") == "FINISHED" for one in order_actions(state)]
         done = all(found) and (bool(found) or not self._acts)
         ours = self._ours(state)
@@ -255,7 +278,7 @@ class VdaRobot:
         return "; ".join(found)
 
     def _refused(self, state: Json) -> str:
-        """Return the robot's errors and failed actions that refer to our last order."""
+        """Return the robot's errors and failed actions that refer to the driver's last order."""
         ours = str(self._sent[0])
         about = (e for e in errors(state) if ours in {r.partition("-")[0] for r in references(e)})
         found = [told(error) for error in about]
@@ -319,13 +342,15 @@ class VdaRobot:
 
 
 def claims(settings: VdaRobotSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield the robot's orders, which no other device or file may send."""
+    """Yield the topic of the robot's orders, with its path in the YAML. No other device, of this or
+    another YAML, may send orders to this robot."""
     if settings.known_as:
         yield settings.topic("order", settings.known_as), ("known_as",)
 
 
 def describe(settings: VdaRobotSettings, bus: MqttSettings) -> list[tuple[str, str]]:
-    """Return rows that `check` prints instead of a wiring table: (subject, meaning)."""
+    """Return the rows that `check` prints instead of a wiring table. Each row is a subject and its
+    meaning."""
     serial = settings.known_as or "ROBOT"
     rows = [
         (what, settings.topic(what, serial))

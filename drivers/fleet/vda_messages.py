@@ -2,8 +2,9 @@
 
 Source: VDA5050/VDA5050, tags 2.1.0 and 3.0.0: VDA5050_EN.md and json_schemas/.
 
-Each goal of RMF is an order of its own, with the robot's present place as its first node and the goal
-as its second, both released: a robot that loses the broker drives to its goal and waits there.
+The driver sends a separate order for each goal of RMF. The order's first node is the robot's present
+place, and its second node is the goal. Both nodes are released, so a robot that loses the broker still
+drives to its goal, and waits there.
 """
 
 import math
@@ -17,11 +18,13 @@ from bridges.kinds.fleet.signals import Goal, Pose, RobotCommand
 Version = Literal["2.1", "3.0"]
 Json = dict[str, object]
 START_WITHIN_M: Final = 1.0
-"""The deviation that the first node allows: the robot has moved on since its last state."""
+"""The deviation (m) that the order's first node allows. The robot may have moved since it sent its last
+state."""
 
 
 class VdaDialect(msgspec.Struct, frozen=True):
-    """The names that differ between the versions. `number`: the version in a message's header."""
+    """The names that differ between the versions of VDA 5050. `number` is the version in a message's
+    header."""
 
     number: str
     topics: str
@@ -64,15 +67,15 @@ DIALECTS: Final[Mapping[Version, VdaDialect]] = {
 
 
 def action(kind: str, action_id: str, parameters: Mapping[str, object], blocking: str) -> Json:
-    """Return an action. `blocking`: NONE, SOFT or HARD."""
+    """Return an action. `blocking` is NONE, SOFT or HARD."""
     given = [{"key": key, "value": value} for key, value in parameters.items()]
     found: Json = {"actionType": kind, "actionId": action_id, "blockingType": blocking}
     return {**found, "actionParameters": given} if given else found
 
 
 def order_id(command: RobotCommand) -> str:
-    """Return an order's id: the command's number, and that of a later attempt. A robot ignores an order
-    that it has had before."""
+    """Return the id of a command's order. It is the command's number, and from the second attempt on
+    also the number of the attempt. A robot ignores an order whose id it has already received."""
     return str(command.id) if command.attempt == 1 else f"{command.id}-{command.attempt}"
 
 
@@ -84,9 +87,9 @@ def order(
     deviation_m: float,
     actions: tuple[Sequence[Json], Sequence[Json]],
 ) -> Json:
-    """Return the order for a command. `last_node`: the node that the robot stood on last.
-    `deviation_m`: how near it must come to the goal. `actions`: those of the first node, and of the
-    last one."""
+    """Return the order for a command. `last_node` is the last node that the robot has reached.
+    `deviation_m` is how close (m) the robot must come to the goal. `actions` are the actions at the
+    first node, and the actions at the last node."""
     first = _node(version, last_node or "start", 0, here, START_WITHIN_M, actions[0])
     if command.goal is None:
         first["actions"] = [*actions[0], *actions[1]]

@@ -1,4 +1,5 @@
-"""Reads the fields of a state of VDA 5050. A field that is missing or of a wrong type is named."""
+"""Reads the fields of a VDA 5050 state. If a field is missing or has a wrong type, the error names the
+field."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -8,20 +9,23 @@ from drivers.fleet.vda_messages import Json
 from drivers.json_fields import clean
 
 INSTANT: Final = ("cancel-", "place-", "state-", "on-death", "pause-", "resume-")
-"""The beginnings of the ids of our instant actions."""
+"""The beginnings of the ids that this daemon gives to its instant actions."""
 ENDED: Final = ("FINISHED", "FAILED")
 AUTOMATIC: Final = ("AUTOMATIC", "SEMIAUTOMATIC")
 
 
 def taken_out(state: Json) -> str:
-    """Return why the robot takes no orders; "" if it does."""
+    """Return the reason why the robot accepts no orders. Return "" if it accepts orders."""
     mode = text(state, "operatingMode")
     return "" if mode in AUTOMATIC else f"operating mode {mode}"
 
 
 def order_actions(state: Json) -> Iterator[Json]:
-    """Yield the states of the order's actions. Those of instant actions stay for ever in 2.1, so an
-    action that is not an order's is left out by its id."""
+    """Yield the states of the actions that belong to the robot's order.
+
+    Leave out instant actions, which their ids reveal. In version 2.1 the states of instant actions stay
+    in the list for ever.
+    """
     for one in listed(state, "actionStates"):
         ours = str(one.get("actionId", ""))
         if ours and not ours.startswith(INSTANT):
@@ -29,7 +33,7 @@ def order_actions(state: Json) -> Iterator[Json]:
 
 
 def has_order(state: Json) -> bool:
-    """Has the robot an order? Nodes, edges and unfinished actions are left of it."""
+    """Has the robot an order? It has one while nodes, edges or unfinished actions remain."""
     left = state.get("nodeStates") or state.get("edgeStates")
     return bool(left) or any(a.get("actionStatus") not in ENDED for a in order_actions(state))
 
@@ -40,7 +44,7 @@ def errors(state: Json) -> Iterator[Json]:
 
 
 def told(error: Json) -> str:
-    """Return an error in words."""
+    """Return an error as text for people."""
     more = clean(str(error.get("errorDescription") or ""))
     return clean(str(error.get("errorType"))) + (f": {more}" if more else "")
 
@@ -51,14 +55,14 @@ def references(error: Json) -> list[str]:
 
 
 def listed(state: Json, field: str) -> list[Json]:
-    """Return the objects of a list; [] if there is no list."""
+    """Return the objects of a list. Return [] if there is no list."""
     found = state.get(field)
     return [one for one in found if isinstance(one, dict)] if isinstance(found, list) else []
 
 
 def places_left(state: Json, order: Json) -> list[Json] | None:
-    """Return the places of the remaining nodes of the robot's order. Nodes that the manager only plans
-    belong to the order. Return None if neither the state nor the order has the places."""
+    """Return the places of the nodes that the robot has not reached yet. Nodes that the manager has
+    planned but not yet released are included. Return None if the place of a node is unknown."""
     same = order.get("orderId") == state.get("orderId")
     known = {n.get("sequenceId"): n.get("nodePosition") for n in listed(order, "nodes") if same}
     nodes = listed(state, "nodeStates")
@@ -71,7 +75,7 @@ def part(state: Json, field: str) -> Json:
     """Return an object of the state. Raises DriverError."""
     found = state.get(field)
     if not isinstance(found, dict):
-        raise DriverError(f"the robot's state has no {field}: is `version` right?")
+        raise DriverError(f"the robot's state has no {field}: is `version` in the YAML right?")
     return found
 
 
@@ -79,7 +83,7 @@ def number(state: Json, field: str) -> float:
     """Return a number of the state. Raises DriverError."""
     found = state.get(field)
     if isinstance(found, bool) or not isinstance(found, int | float):
-        raise DriverError(f"the robot's {field} is {clean(str(found))}, and a number is expected")
+        raise DriverError(f"the robot's {field} is {clean(str(found))}, but must be a number")
     return float(found)
 
 
@@ -87,7 +91,7 @@ def flag(state: Json, field: str) -> bool:
     """Return a flag of the state. Raises DriverError."""
     found = state.get(field)
     if not isinstance(found, bool):
-        raise DriverError(f"the robot's {field} is {clean(str(found))}, not true or false")
+        raise DriverError(f"the robot's {field} is {clean(str(found))}, but must be true or false")
     return found
 
 
@@ -95,5 +99,5 @@ def text(state: Json, field: str) -> str:
     """Return a text of the state. Raises DriverError."""
     found = state.get(field)
     if not isinstance(found, str):
-        raise DriverError(f"the robot's {field} is {clean(str(found))}, and a text is expected")
+        raise DriverError(f"the robot's {field} is {clean(str(found))}, but must be a text")
     return found

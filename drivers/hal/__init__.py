@@ -1,5 +1,5 @@
-"""Buses, each in its own file or folder. Only these files import vendor libraries, and only when a bus
-needs such a library.
+"""Buses, each in its own file or folder. Only these files import vendor libraries. They import a
+library only when a bus needs it.
 
 The file or folder is named after the bus `type:` of the YAML and defines a `BUS`. A bus belongs to one
 thread. Every failure is a HalError, raised within the bus's I/O timeout. After a failure the bus pauses
@@ -34,11 +34,12 @@ Settings = TypeVar("Settings", bound=msgspec.Struct)
 
 
 class Where(NamedTuple):
-    """The place of a bus in the building. Two files with the same `Where` use the same hardware.
+    """The hardware that a bus uses: a port, an address or the header's pins. If two device YAMLs have
+    the same `Where`, they use the same hardware.
 
-    `text` names the place for a person. `local` is True if the place belongs to this machine, as a
-    serial port does. `clients` tells whether one or many daemons can use the place at once. `clients`
-    is None if this depends on the make.
+    `text` names the hardware for a person. `local` is True if it belongs to this machine, as a serial
+    port does. `clients` tells whether one or many daemons can use it at the same time. `clients` is
+    None if this depends on the make.
     """
 
     text: str
@@ -49,8 +50,8 @@ class Where(NamedTuple):
 class Needs(NamedTuple):
     """The permissions that a daemon needs from systemd for a bus (`bridges/runtime/drop_in.py`).
 
-    - `devices` lists paths, or classes whose devices may come and go (`char-ttyUSB`), as for
-      DeviceAllow.
+    - `devices` lists paths, or classes whose devices may come and go (`char-ttyUSB`), in the form of
+      systemd's DeviceAllow.
     - `modules` lists the kernel modules of these classes.
     - `group` is the group with access to the devices.
     - `family` is an address family that the bus needs in addition to IP.
@@ -65,7 +66,8 @@ class Needs(NamedTuple):
 
 
 class UnwatchedOutputs(NamedTuple):
-    """Remarks about outputs that keep their value when the daemon's machine or the network dies."""
+    """The remarks of `check` about outputs that keep their value when the daemon's machine or the
+    network dies."""
 
     warnings: Sequence[Remark] = ()
     notes: Sequence[Remark] = ()
@@ -83,7 +85,7 @@ class Bus:
 
     @cached_property
     def units(self) -> UnitCalls:
-        """The calls by unit. A bus whose devices only speak by themselves, or on pins, has none."""
+        """The counts of calls to each unit. A bus that calls no unit, such as GPIO, has no counts."""
         return UnitCalls()
 
     def on_edge(self, wake: Callable[[], None]) -> None:
@@ -91,11 +93,12 @@ class Bus:
         calls `wake`."""
 
     def scanned(self) -> None:
-        """Report a finished scan. A bus with a dead-man switches its outputs off when these reports
-        cease."""
+        """Report a finished scan. If these reports cease, a bus with a dead-man (a watchdog of the
+        loop) switches its outputs off."""
 
     def insist(self) -> None:
-        """Let the next call skip the backoff, because outputs are about to go off."""
+        """Let the next call skip the backoff. The daemon calls this before it switches outputs off for
+        the last time."""
 
     def close(self) -> None:
         """Release the bus. Does not raise. The caller may call `close` twice."""
@@ -116,12 +119,12 @@ class BusType(msgspec.Struct, Generic[Settings], frozen=True):
     - `open_bus(settings)` makes the bus. The bus sends nothing before its first call. Raises HalError.
     - `open_to_switch_off(settings)` makes a bus that loads faster, for a process that only switches
       outputs off. It is None if there is no such bus.
-    - `where(settings)` gives the bus's place in the building. It gives None if two files never share
-      such a bus.
+    - `where(settings)` gives the hardware that the bus uses (`Where`). It gives None if two device
+      YAMLs never share such a bus.
     - `needs(settings)` gives the permissions that the bus needs in addition to IP.
     - `warnings(settings)` gives (path, text) for each valid setting that may be a mistake.
-    - `fake` names the module that simulates the far side (`hal_fakes/fake.py`). Without a name there is
-      no simulation.
+    - `fake` names the module that simulates the devices on the bus (`hal_fakes/fake.py`). If `fake` is
+      empty, there is no simulation.
     - `fake_inside` is True if the fake must run inside the daemon's process, as simulated pins must.
     - `unwatched(settings, places)` gives remarks about the outputs that keep their value when the
       daemon's machine or the network dies. `places` are all places that the daemon writes.
@@ -132,8 +135,8 @@ class BusType(msgspec.Struct, Generic[Settings], frozen=True):
 
     A bus with points also has these functions:
 
-    - `canonical(point)` gives the canonical spelling of a point. Its ValueError gives the right
-      spelling.
+    - `canonical(point)` gives the canonical spelling of a point. For an invalid point it raises
+      ValueError with the right spelling.
     - `describe(point)` gives every spelling of the point, for the electrician's table.
     - `wire_problems(wire)` gives the errors of this wire on this bus.
     - `wire_warnings(wire)` gives valid properties of the wire that may be a mistake.
@@ -141,8 +144,8 @@ class BusType(msgspec.Struct, Generic[Settings], frozen=True):
       canonical point.
     - `unfit(settings, point, direction)` gives the reason why the point cannot be an input (`in`) or an
       output (`out`).
-    - `place(settings, point)` gives the hardware at this canonical point that no other file may use. It
-      gives None if every file may use the point.
+    - `place(settings, point)` names the hardware at this canonical point, which no other device YAML
+      may use. It gives None if every device YAML may use the point.
     """
 
     settings: type[Settings]

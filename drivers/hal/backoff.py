@@ -9,8 +9,8 @@ from drivers.hal.points import HalError
 BACKOFF_FIRST_S: Final = 0.5
 BACKOFF_MAX_S: Final = 30.0
 JITTER: Final = 0.2
-"""The longest random cut of a pause, as a fraction of the pause. The cut keeps many daemons from
-calling at the same moment."""
+"""The largest part of a pause that is cut off at random. Because of the cut, many daemons do not call
+at the same moment."""
 
 
 class Backoff:
@@ -38,12 +38,13 @@ class Backoff:
 
     @property
     def probing(self) -> bool:
-        """Return whether the next attempt is a probe after a failure."""
+        """Return whether the next attempt only tests if a failure is over. After `insist` it is a
+        normal attempt."""
         return self.failing and not self._insisted
 
     def check(self, not_yet: bool = False) -> None:
-        """Raise HalError with the last failure's text while the pause runs. `not_yet` raises HalError
-        even without a pause."""
+        """Raise HalError with the last failure's text while the pause runs. If `not_yet` is True, raise
+        it even without a pause."""
         if self._clock() < self._retry_at or not_yet:
             raise HalError(self._failure)
 

@@ -1,4 +1,4 @@
-"""TCP connections with one deadline for a whole call, even if the far side misbehaves.
+"""TCP connections with one deadline for a whole call, even if the server misbehaves.
 
 A timeout of requests or of a socket covers only a single wait. A server that sends a byte from time to
 time would keep the caller waiting for ever. In this file every wait of a call gets only the call's
@@ -73,8 +73,8 @@ class DeadlineSocket(socket.socket):
 def tls_socket(deadline: Deadline) -> "type[ssl.SSLSocket]":
     """Make a class of TLS sockets whose waits all end by the deadline.
 
-    A TLS socket takes only the timeout from the plain socket inside it. So this class checks the
-    deadline itself.
+    A TLS socket inherits only the timeout of the plain socket, not the methods of DeadlineSocket. So
+    this class checks the deadline itself.
     """
     import ssl
 
@@ -93,8 +93,8 @@ def tls_socket(deadline: Deadline) -> "type[ssl.SSLSocket]":
 
 
 class Dialler:
-    """The maker of all connections to one host. `dialled` counts the connections so far. `failure` is
-    the last error.
+    """The object that opens all connections to one host. `dialled` is the number of connections opened
+    so far. `failure` is the last error.
 
     Tests replace `resolve`, which is socket.getaddrinfo.
     """
@@ -143,7 +143,7 @@ class Dialler:
             sock.settimeout(timeout_s)
             sock.connect(where)
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            sock.settimeout(self.deadline.left())  # the timeout for a TLS handshake
+            sock.settimeout(self.deadline.left())  # so that a TLS handshake has a timeout
         except OSError:
             sock.close()
             raise
@@ -163,7 +163,7 @@ class Dialler:
             found = answer.get(timeout=self.deadline.left())
         except queue.Empty:
             raise TimeoutError("the name's lookup takes too long") from None
-        self._lookup = None  # the lookup has answered, though its thread may end a moment later
+        self._lookup = None  # forget the thread: it has answered, and will end
         if isinstance(found, OSError):
             raise found
         return found

@@ -17,7 +17,7 @@ def misspelt_address(host: str) -> str:
 
 
 def is_loopback(host: str) -> bool:
-    """Does this host name or address stay on this machine?"""
+    """Is this host name or address the machine itself (loopback)?"""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -29,7 +29,7 @@ def misspelt_host(host: str) -> str:
     text."""
     if re.fullmatch(r"[^:]*:[0-9]+", host):
         name, _, port = host.partition(":")
-        return f"is {host!r}: write host: {name}, port: {port}"
+        return f"{host!r} contains a port: write host: {name}, port: {port}"
     if not re.fullmatch(r"[A-Za-z0-9_.:-]+", host):
         return f"{host!r} is not a host: write its address, such as 192.168.1.50"
     return misspelt_address(host)

@@ -3,9 +3,9 @@
 Every call has one deadline from the lookup of the name to the last byte of the body
 (`drivers/hal/deadline.py`). The body has a maximum size. Proxies, redirects and compression are off.
 
-Each call has a connection of its own, because replies in HTTP/1.1 have no numbers. If a connection
-served several calls, a late or second reply could pass for the reply to the next request. A call is
-sent only once.
+Each call has a connection of its own, because a reply in HTTP/1.1 does not say which request it
+answers. If a connection served several calls, a late or second reply could pass for the reply to the
+next request. A call is sent only once.
 """
 
 import os
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 BODY_MAX = 64 * 1024
 WRONG_MAX = 256
-"""The greatest number of paths with a wrong answer that are remembered."""
+"""The maximum number of paths for which the bus remembers a wrong answer."""
 HEADERS = {
     "Accept": "application/json",
     "Accept-Encoding": "identity",
@@ -51,8 +51,7 @@ _HINTS = {
 
 
 class HttpBus(Bus):
-    """Calls to one controller. Every failure is a HalError, whose text tells the reader which parts to
-    check.
+    """Calls to one controller. Every failure is a HalError, whose text says what to check.
 
     Tests replace `clock` and `resolve`.
     """
@@ -91,7 +90,7 @@ class HttpBus(Bus):
         """Read `api_base` + `path`, and return the JSON object of the answer. The answer must have
         status 200.
 
-        `method` and `body` are for a controller that is not read by GET.
+        Some controllers are read by another method than GET. `method` and `body` are for these.
         """
         url = self._base.url(path)
         with self._attempt(self._backoff, path):
@@ -103,7 +102,7 @@ class HttpBus(Bus):
         """Send a command, with a JSON `body` if given. Any status 2xx is success.
 
         The command is sent at most once, even when the answer is lost. `safe` means that the command
-        switches an output off. So the command does not wait for the backoff of a failed reading.
+        switches an output off. Such a command does not wait for the backoff of a failed reading.
         """
         url = self._base.url(path)
         with self._attempt(self._safe_backoff if safe else self._backoff, path):
@@ -128,8 +127,9 @@ class HttpBus(Bus):
 
     @contextmanager
     def _attempt(self, backoff: Backoff, path: str) -> Iterator[None]:
-        """Run one attempt. During the backoff after a failure, raise the failure's text again instead.
-        A wrong answer delays only its own path, because the other paths may be other devices."""
+        """Run one attempt. During the backoff after a failure, do not run it, but raise the failure's
+        text again. A wrong answer delays only its own path, because the other paths may belong to
+        other devices."""
         backoff.check()
         wrong = self._wrong.get(path)
         if wrong is not None and backoff is self._backoff:
@@ -229,7 +229,7 @@ class HttpBus(Bus):
 
 
 def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":
-    """Make requests' HTTP adapter, on the dialler's connections.
+    """Make requests' HTTP adapter, which gets its connections from the dialler.
 
     This file uses no Session, for three reasons. A Session reads the whole body of a redirect, even
     when it must not follow the redirect. A Session keeps cookies. A Session takes proxies and passwords
@@ -259,9 +259,7 @@ def _adapter(dialler: Dialler, scheme: str) -> "HTTPAdapter":
     adapter = HTTPAdapter(pool_connections=1, pool_maxsize=1, max_retries=0)
     adapter.poolmanager.pool_classes_by_scheme = {"http": Pool, "https": TlsPool}
     if scheme == "https":
-        context = (
-            create_urllib3_context()
-        )  # trusts no authority yet, because each call's `verify` adds authorities
+        context = create_urllib3_context()  # no authorities here: `verify` of each call adds them
         context.sslsocket_class = tls_socket(dialler.deadline)
         adapter.poolmanager.connection_pool_kw["ssl_context"] = context
     return adapter
@@ -286,8 +284,8 @@ def _check_status(url: str, reads: bool, status: int) -> None:
 
 
 def _capped(raw: "BaseHTTPResponse") -> bytes:
-    """Read the whole body, up to one byte beyond the limit. Only the end of a body shows that the body
-    was cut."""
+    """Read the whole body, but at most one byte more than BODY_MAX. Read to the end, because an
+    incomplete body raises its error only there."""
     body = b""
     while len(body) <= BODY_MAX and (
         more := raw.read(BODY_MAX + 1 - len(body), decode_content=False)

@@ -47,7 +47,8 @@ def base(text: str) -> Base:
     """Split an `api_base` into its parts. Raises ValueError with the right form."""
     if "@" in text:
         raise ValueError(
-            "no user or password here: write login or token_file, with the secret in a file"
+            "must not contain a user or password: write login or token_file, which name a file"
+            " with the secret"
         )
     found = _BASE.fullmatch(text)
     if not found:

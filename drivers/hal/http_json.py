@@ -12,7 +12,8 @@ def excerpt(text: str) -> str:
 
 
 class WrongAnswer(HalError):
-    """The server has answered, but not as this call needs it. Its other calls may well be right."""
+    """The error of an answer that is not what this call needs. The server works, so other calls to the
+    same server may succeed."""
 
 
 def json_object(url: str, content_type: str, body: bytes) -> dict[str, object]:

@@ -1,8 +1,8 @@
 """A user and password for HTTP: basic (RFC 7617) or digest (RFC 7616), through the library requests.
 
-A digest login takes two requests. The controller refuses the first request with a challenge, and does
-nothing else. The later requests contain the challenge's nonce from the start, until the controller
-refuses this nonce.
+The first digest login takes two requests. The controller answers the first request with a challenge,
+and does nothing else. The second request is signed with the challenge's nonce. All later requests are
+signed with the same nonce, until the controller refuses it.
 """
 
 import base64
@@ -31,7 +31,7 @@ class Login(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     user: Annotated[User, tells("the user's name.")]
     password_file: Annotated[
-        AbsolutePath, tells("a file with the password, which only the daemon may read.")
+        AbsolutePath, tells("a file with the password. Only the daemon may have read access to it.")
     ]
     method: Annotated[
         Literal["digest", "basic"],
@@ -40,8 +40,8 @@ class Login(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class Signer:
-    """Signs requests for one user. Each call reads the password again, because somebody may have
-    renewed it."""
+    """Signs requests for one user. Each call reads the password file again, because somebody may have
+    changed the password."""
 
     def __init__(self, login: Login) -> None:
         from requests.auth import HTTPDigestAuth
@@ -70,8 +70,8 @@ class Signer:
         return digest and answer.status_code == 401
 
     def answered(self, answer: "Response", verify: bool | str) -> "Response":
-        """Sign the challenged request, send it again, and return its answer. A second challenge counts
-        as a refusal. Do not read the body of the challenge."""
+        """Sign the request that the controller has challenged, send the request again, and return its
+        answer. A second challenge counts as a refusal. Do not read the body of the challenge."""
         answer.raw.close()
         signed: Response = self._digest.handle_401(  # type: ignore[no-untyped-call]
             answer, stream=True, verify=verify

@@ -1,9 +1,10 @@
-"""A controller's WebSocket, through the library websockets. Each message causes a reading of the
+"""A controller's WebSocket, through the library websockets. After each message the daemon reads the
 controller at once.
 
-The content of a message is not used. A message has no age, and many makes push only the part that has
-changed. So a WebSocket that is silent, late, garbled or gone makes no reading wrong. Without messages
-the daemon reads the controller every `scan_s`, and once after each new connection.
+The daemon ignores the content of a message, because a message does not show its age, and many makes
+push only the part that has changed. So a WebSocket that is silent, late, garbled or gone cannot make a
+reading wrong. Without messages the daemon reads the controller every `scan_s`, and once after each new
+connection.
 """
 
 import logging
@@ -17,7 +18,7 @@ from drivers.hal.backoff import BACKOFF_FIRST_S, BACKOFF_MAX_S
 from drivers.hal.http_json import excerpt
 
 AT_MOST_EVERY_S: Final = 0.1
-"""The shortest time (s) between two readings that messages cause."""
+"""The shortest time (s) between two readings, if messages cause them."""
 MESSAGE_MAX: Final = 64 * 1024
 OPEN_S: Final = 3.0
 CLOSE_S: Final = 0.2
@@ -26,14 +27,14 @@ if TYPE_CHECKING:
     from websockets.sync.client import ClientConnection
 
 log = logging.getLogger(__name__)
-logging.getLogger("websockets.client").setLevel(logging.CRITICAL)  # `push_lost` says the same
+logging.getLogger("websockets.client").setLevel(logging.CRITICAL)  # `push_lost` reports it
 
 
 class Pushes:
     """A thread that listens to a WebSocket until `close`.
 
-    The thread calls `headers` for each connection, to get the headers of the handshake. The thread
-    calls `wake` after each connection and for messages. A connection without a message counts as
+    For each connection the thread calls `headers`, which returns the headers of the handshake. The
+    thread calls `wake` after each connection and for messages. A connection without a message counts as
     failed, because a server may accept each connection and close it at once.
     """
 

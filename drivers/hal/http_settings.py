@@ -21,15 +21,15 @@ Header = Annotated[
     ),
 ]
 Timeout = Annotated[float, msgspec.Meta(ge=0.1, le=5, extra={"unit": "s"})]
-"""The timeout of a call. It is at most 5 s, because systemd would take a longer call for a hang
-(`WatchdogSec=10` of the unit)."""
+"""The timeout of a call. It is at most 5 s, because systemd could restart a daemon whose call takes
+longer (`WatchdogSec=10` of the unit)."""
 
 
 class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="http"):
     """A controller's HTTP API."""
 
     api_base: Annotated[
-        Name, tells("host, port and path that every path begins with (`192.168.1.60:8080/api`).")
+        Name, tells("the beginning of every address: host, port, path (`192.168.1.60:8080/api`).")
     ]
     timeout_s: Annotated[
         Timeout, tells("how long a whole call may take, from the name lookup to the last byte.")
@@ -58,8 +58,9 @@ class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
     ] = None
     ca_file: Annotated[
         AbsolutePath | None,
-        tells("""with https, a PEM file with the certificate of the controller or of its authority.
-        Without this file the public authorities are trusted."""),
+        tells("""with https, a PEM file with the controller's certificate, or with the certificate
+        of the authority that signed it. Without this file the daemon trusts the public
+        authorities."""),
     ] = None
 
     def problems(self) -> Remarks:
@@ -72,16 +73,23 @@ class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
         if self.ca_file and not tls:
             yield ("ca_file",), "is for https: write api_base: https://…, or delete ca_file"
         if self.token_header and not self.token_file:
-            yield ("token_header",), "needs token_file: the file with the header's value"
+            yield (
+                ("token_header",),
+                "needs token_file, which names the file with the header's value",
+            )
         if self.login and self.token_file and not self.token_header:
-            yield ("login",), "token_file sends its own Authorization: delete one of the two"
+            yield (
+                ("login",),
+                "sends the header Authorization, as token_file does: delete login or token_file",
+            )
         if self.push_path and self.login and self.login.method == "digest":
             yield ("push_path",), "a WebSocket has no digest login: delete push_path"
         readable = _readable_secret(self)
         if readable == "login" and not self.accept_unencrypted:
             text = (
-                "with method: basic anybody on the network can read the password: write https://… or"
-                " method: digest where the controller has it, or accept_unencrypted: <why it is safe>"
+                "with method: basic anybody on the network can read the password. If the controller"
+                " has https or digest, write https://… or method: digest. Otherwise write"
+                " accept_unencrypted: <why it is safe>"
             )
             yield ("login",), text
         if self.accept_unencrypted and not readable:
@@ -123,5 +131,5 @@ def needs(settings: HttpSettings) -> Needs:
 
 
 def where(settings: HttpSettings) -> Where:
-    """Return the controller's address as the bus's place."""
+    """Return the controller's address, which is the hardware that the bus uses."""
     return Where(base(settings.api_base).url(""), local=False)

@@ -1,8 +1,9 @@
-"""Points: the named contacts of a device, on any bus that has contacts.
+"""Points: the named contacts and relays of a device, on any bus that has them.
 
-A driver works with signals that are asserted or not (`fire_alarm`, `call_L1`). This file knows the
-signals' addresses and polarity. The bus (`drivers/hal/`) knows only levels. Signals on GPIO pins are
-treated like signals on the coils and discrete inputs of a Modbus I/O module.
+A driver works with signals that are asserted or not (`fire_alarm`, `call_L1`). This file knows each
+signal's address, and whether high or low means asserted. The bus (`drivers/hal/`) knows only high and
+low levels. Signals on GPIO pins are treated like signals on the coils and discrete inputs of a Modbus
+I/O module.
 """
 
 import re
@@ -32,16 +33,16 @@ class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ]
     active: Annotated[Active, tells("the level of an asserted signal (`high` is 1 on Modbus).")]
     pull: Annotated[
-        Pull | None, tells("the resistor of an input; required on GPIO, refused on Modbus.")
+        Pull | None, tells("the pull resistor of an input; required on GPIO, refused on Modbus.")
     ] = None
     debounce_s: Annotated[
         DebounceSeconds | None,
-        tells("how long a change must last. Without this key the kind's default counts."),
+        tells("how long a change must last. Without this key the default of the signal counts."),
     ] = None
     bus: Annotated[
         OtherBus | None,
-        tells("""the bus that has this contact, if it is not the device's `bus`. While that bus is not
-        read, the device is not read either."""),
+        tells("""the bus that has this contact, if it is not the device's `bus`. While the daemon
+        cannot read that bus, the device counts as not read too."""),
     ] = None
 
     def wire(self, signal: str, path: tuple[str, ...], debounce_s: float | None) -> "Wire":
@@ -65,7 +66,8 @@ class Output(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     read_back: Annotated[
         bool,
         tells("""`false` for a coil that cannot be read back, or that the controller clears by
-        itself. Then every scan writes the coil, and nothing proves its level. Refused on GPIO."""),
+        itself. In this case every scan writes the coil, and nothing proves its level. On GPIO this
+        key is refused."""),
     ] = True
 
     def wire(
@@ -95,17 +97,19 @@ def input_wires(inputs: msgspec.Struct, debounce_s: float | None = None) -> list
 
 
 class Flash(msgspec.Struct, frozen=True):
-    """A pulse that the module times. `Flash` has the point for the request, and the duration (s)."""
+    """A pulse that a Modbus module ends by itself. `point` is the coil where the driver requests the
+    pulse, and `on_s` is the pulse's length (s)."""
 
     point: str
     on_s: float
 
 
 class Clearing(msgspec.Struct, frozen=True):
-    """The behaviour of a controller that takes commands from a place and clears them by itself. `bits`
-    are the bits of the place that hold the command.
+    """The behaviour of a controller that takes a command from a coil or register, and then clears it by
+    itself. `bits` are the bits that hold the command.
 
-    If `pulse` is true, the command is a pulse. The controller may end a pulse early without a warning.
+    If `pulse` is true, the command is a pulse. Then the controller may clear it before the pulse's end,
+    and no warning is given.
     """
 
     bits: int = 1
@@ -139,8 +143,8 @@ class Wire(msgspec.Struct, frozen=True):
         return level == (self.active == "high")
 
     def broken_reads(self) -> bool | None:
-        """Return the reading of a cut wire: True for asserted, False for not asserted, None if the wire
-        floats.
+        """Return how a cut wire reads. True means asserted, and False means not asserted. None means
+        that the wire floats, so that it may read either way.
 
         A cut wire at a GPIO input takes the level of the input's pull. At a Modbus module an open
         contact reads 0.
@@ -159,20 +163,22 @@ def is_number(wires: Iterable[Wire]) -> bool:
 
 
 class Lines(Protocol):
-    """The raw levels of one device's points on one bus. The values 1 and True mean high."""
+    """The contacts and relays of one device on one bus, as raw levels. The values 1 and True mean
+    high."""
 
     def claim(self) -> None:
-        """Claim every input, and claim every output at its safe level in one step. Raises HalError."""
+        """Claim every input and every output. An output must have its safe level from the first moment.
+        Raises HalError."""
 
     def read(self) -> Mapping[str, int]:
-        """Read every input now. Return the level of each input by its point in canonical spelling.
-        Raises HalError.
+        """Read every input now. Return the level of each input. The keys are the canonical spellings of
+        the points. Raises HalError.
 
         The result contains an output only if the output has lost its level and must be written again.
         """
 
     def write(self, levels: Mapping[str, bool]) -> None:
-        """Drive these outputs. Raises HalError. After an error nobody knows their levels.
+        """Drive these outputs. Raises HalError. After an error the levels of these outputs are unknown.
 
         The call tries every output that goes to its safe level, even after another output has failed.
         """
@@ -187,10 +193,11 @@ class Lines(Protocol):
 
 @runtime_checkable
 class FlashLines(Protocol):
-    """Lines of a bus whose modules can time a pulse."""
+    """Lines of a bus whose modules can end a pulse by themselves."""
 
     def flash(self, point: str, flash: Flash) -> None:
-        """Request once that the module switches this output on, and off again by itself.
+        """Request a pulse, only once. The module switches this output on, and switches it off again by
+        itself.
 
         Raises HalError. After an error the output may be on.
         """
@@ -201,7 +208,7 @@ class RenewedLines(Protocol):
     """Lines of a bus whose relays may have timers. A relay's own timer switches the relay off."""
 
     def renew(self, points: Iterable[str]) -> None:
-        """Restart the timers of these relays, which are on. Raises HalError."""
+        """Restart the timers of these relays, which must be on already. Raises HalError."""
 
 
 class PointsBus(Protocol):
@@ -217,7 +224,8 @@ class PointsBus(Protocol):
         unread: Collection[str] = (),
         clearing: Mapping[str, Clearing] = MappingProxyType({}),
     ) -> Lines:
-        """Return the lines of one device: canonical inputs, and outputs with their safe levels.
+        """Return the lines of one device: its inputs, and its outputs with their safe levels. All
+        points are in canonical spelling.
 
         `unread` are the outputs that are never read back. `clearing` are the outputs that the
         controller may clear.
@@ -234,7 +242,7 @@ raises DriverError while one of these inputs is unknown."""
 
 
 def _not_read() -> Mapping[str, bool]:
-    raise DriverError("nothing here reads the inputs on another bus")
+    raise DriverError("no function to read the inputs on the other bus is set")
 
 
 class Points:
@@ -264,7 +272,7 @@ class Points:
         self._written: dict[str, bool] | None = None
 
     def take_inputs(self, elsewhere: Readings) -> None:
-        """Call `elsewhere` for the inputs on other buses from now on."""
+        """From now on, call `elsewhere` to read the inputs that are on other buses."""
         self._elsewhere = elsewhere
 
     def open(self) -> None:
@@ -320,10 +328,11 @@ class Points:
         self._written = wanted
 
     def flash(self, signal: str) -> None:
-        """Let the module time a pulse of this output. From now on the output's level is unknown.
+        """Request a pulse of this output, which the module ends by itself. From now on the output's
+        level is unknown.
 
-        Raises HalError. After an error the module may give the pulse. A second request would prolong
-        the pulse.
+        Raises HalError. After an error the module may still give the pulse. A second request would
+        prolong the pulse.
         """
         wire, point = self._out[signal]
         assert wire.flash  # callers pass only outputs with `flash`

@@ -1,5 +1,5 @@
-"""Finds outputs that another master writes too. Without this, the two masters would switch a relay to
-and fro for ever."""
+"""Finds outputs that another master writes too. If nobody noticed this, the two masters would switch a
+relay to and fro for ever."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -8,17 +8,18 @@ from typing import Final
 from drivers.hal.points import HalError
 
 AGAIN_S: Final = 5.0
-"""The time (s) after a pause in which a contradiction counts as a repetition. A contradiction after
-this time counts as the first."""
+"""The time (s) after a pause during which a further contradiction begins the next pause. A later
+contradiction counts as the first one, which causes no pause. A contradiction is a reading that
+differs from the written value."""
 FIRST_S: Final = 1.0
 LONGEST_S: Final = 30.0
-"""The longest pause (s) before the next write to an output that another master writes too. FIRST_S is
-the first pause."""
+"""The shortest pause (FIRST_S) and the longest pause (LONGEST_S) in seconds. During a pause the daemon
+does not write an output that another master writes too."""
 
 
 class Rivals:
-    """The outputs, by name, that another master seems to write too. Such an output contradicts its
-    written value repeatedly.
+    """The outputs, by name, that another master seems to write too. The reading of such an output
+    contradicts the value that the daemon has written, again and again.
 
     After the first contradiction the daemon writes the output again at once, because the module may
     have restarted. If there is another master, repeated writes would switch the relay to and fro for
@@ -41,7 +42,7 @@ class Rivals:
         self._pause_s[name] = min(max(FIRST_S, 2 * before_s), LONGEST_S) if again else 0.0
 
     def check(self, names: Iterable[str]) -> None:
-        """Raise HalError if the pause of one of these outputs runs. The error is for the first such
+        """Raise HalError during the pause of one of these outputs. The error names the first such
         output."""
         for name in names:
             if self._now() - self._at.get(name, -math.inf) < self._pause_s.get(name, 0.0):

@@ -8,8 +8,9 @@ from drivers.hal import Needs
 USB: Final = ("ttyUSB", "ttyACM")
 BOARD: Final = ("ttyAMA", "ttyS")
 MODULES: Final = {"ttyUSB": "usbserial", "ttyACM": "cdc_acm"}
-"""The kernel module for each class of USB adapters. The module may load after the daemon's start, and
-adds the class at that moment."""
+"""The kernel module for each class of USB adapters. /proc/devices lists the class only while its module
+is loaded. The kernel may load the module after the daemon's start, when somebody plugs an adapter
+in."""
 
 
 def needs(port: str) -> Needs:

@@ -5,7 +5,7 @@ from typing import Any, Final
 from msgspec import Struct
 
 UNITS_MAX: Final = 64
-"""The maximum number of units that are counted apart. Calls to further units are counted together."""
+"""The maximum number of units that have counts of their own. Calls to further units share one count."""
 OTHERS: Final = "other units"
 
 
@@ -17,7 +17,8 @@ class _Calls(Struct):
 
 
 class UnitCalls:
-    """Counted by the thread of the bus, read by the thread that writes the status.
+    """The counts of calls to each unit. The bus's thread counts, and the thread that writes the status
+    reads the counts.
 
     A unit's name comes from the YAML, never from the network.
     """
@@ -26,7 +27,8 @@ class UnitCalls:
         self._units: dict[str, _Calls] = {}
 
     def ended(self, unit: str, took_s: float, *, failed: bool) -> None:
-        """Count a call of `took_s` (s). `failed`: without a reply, or refused."""
+        """Count a call that took `took_s` seconds. `failed` means that no reply came, or that the unit
+        refused the request."""
         if unit not in self._units and len(self._units) >= UNITS_MAX:
             unit = OTHERS
         one = self._units.setdefault(unit, _Calls())

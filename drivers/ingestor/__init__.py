@@ -1,1 +1,1 @@
-"""Drivers of ingestors. They are the drivers of dispensers."""
+"""Drivers of ingestors. These drivers are the same as the drivers of dispensers."""

@@ -1,8 +1,8 @@
-"""Finds misreadings of a lift's codes. A misreading happens when one of the code's lines is cut or
-shorted.
+"""Finds misreadings of a lift's codes. A code is a number that several lines show together. If one of
+the lines is cut or shorted, the daemon reads another number.
 
-The misreading of a service or motion code is unsafe if the read state is safer than the lift's real
-state. The misreading of a floor code gives a warning if another floor is read.
+A misreading of a service or motion code is unsafe if the state that the daemon reads is safer than the
+lift's real state. A misreading of a floor code causes a warning if the daemon reads another floor.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,14 +15,14 @@ from drivers.tables import Lines, breaks
 from drivers.unsafe import Unsafe
 
 SERVES = {"agv_mode": 0, "normal": 1, "overload": 1}
-"""A rank for each state that serves robots. A higher rank restricts robots more. Every state that is
-not listed takes the lift away from RMF."""
+"""A rank for each state in which robots may use the lift. A higher rank restricts robots more. In every
+state that is not listed, robots may not use the lift."""
 TAKEN_AWAY = 2
 
 
 class Misread(NamedTuple):
-    """One misreading. While `line` is broken (`how` is cut or shorted), the lift shows the state
-    `shown`, and the daemon reads the state `reads`."""
+    """One misreading. `line` is the broken line, and `how` is "cut" or "shorted". The lift shows the
+    state `shown`, but the daemon reads the state `reads`."""
 
     line: str
     how: str
@@ -35,8 +35,8 @@ def misread(
     read: Callable[[Lines], str | None],
     table: Mapping[str, Wire],
 ) -> Iterator[Misread]:
-    """Yield each misreading that one broken line causes. `shown` gives the codes of each meaning.
-    `read` returns the meaning of lines."""
+    """Yield each misreading that one broken line causes. `shown` gives the codes of each meaning, as
+    lines. `read` returns the meaning of a code."""
     for meaning, numbers in shown.items():
         for lines in numbers:
             for line, how, then in breaks(lines, table):
@@ -60,8 +60,8 @@ def unsafe_codes(wiring: LiftWiring, table: Mapping[str, Wire]) -> Iterator[Unsa
 
 
 def floor_warnings(code: FloorCode, table: Mapping[str, Wire]) -> str:
-    """Describe the floors that read as another floor when one line is broken. Return "" if no floor
-    does."""
+    """Describe the floors that read as another floor when one line is broken. Return "" if there are no
+    such floors."""
     shown: dict[str, list[Lines]] = {}
     for _, level, lines in code.shows():
         if level is not None:
@@ -78,14 +78,14 @@ def sentence(found: Iterator[Misread]) -> str:
 
 
 def _danger(state: str) -> int:
-    """Return a rank for a state. A higher rank restricts robots more. The rank of a moving car is the
-    highest."""
+    """Return a rank for a state. A higher rank restricts robots more. A state in which the car moves
+    has the highest rank."""
     return 0 if state == "stopped" else SERVES.get(state, TAKEN_AWAY)
 
 
 def _shown(name: str, code: ServiceCode | MotionCode) -> dict[str, list[Lines]]:
-    """Return the codes of each state, as lines. Leave out the codes of a fault, because the controller
-    never shows them."""
+    """Return the codes of each state, as lines. Leave out the codes that mean a fault, because a
+    working controller never shows them."""
     shown: dict[str, list[Lines]] = {}
     for number, state in code.codes.items():
         if state != "fault":

@@ -41,7 +41,7 @@ def problems(wiring: LiftWiring) -> Remarks:
 
 
 def warnings(wiring: LiftWiring) -> Remarks:
-    """Yield a warning for each valid choice of wiring that may be a mistake."""
+    """Yield a warning for each kind of wiring that is valid but may be a mistake."""
     table = {w.signal: w for w in wires(wiring)}
     told = wiring.inputs.agv_mode is not None or _in_service(wiring, "agv_mode")
     fire = sees(wiring, Hazard.FIRE)
@@ -62,7 +62,10 @@ def warnings(wiring: LiftWiring) -> Remarks:
         "" if _in_register(wiring.floor_code, table) else floor_warnings(wiring.floor_code, table)
     )
     if confused:
-        yield ("floor_code",), f"{confused}: ask for a parity line, or for codes two lines apart"
+        yield (
+            ("floor_code",),
+            f"{confused}: ask for a parity line, or for codes that differ in at least two lines",
+        )
     yield from needlessly_accepted(unsafe(wiring), wiring.accept_unsafe)
 
 
@@ -71,20 +74,21 @@ def missing(
 ) -> Remarks:
     """Yield a warning for each optional signal that is absent.
 
-    `told` means that the lift reports AGV mode. `asks` means that an output requests AGV mode. `fire`
-    means that the lift reports a fire. `holds` means that an output holds the door open. `path` is the
-    section of the YAML where the signal would be.
+    `told` is True if the lift reports AGV mode. `asks` is True if an output requests AGV mode. `fire`
+    is True if the lift reports a fire. `holds` is True if an output holds the door open. `path` is the
+    section of the YAML where the absent signal would be.
     """
     by_call = settings.agv_mode == "by_call"
     if not told:
         yield path, "no agv_mode: the lift cannot confirm that it serves the robot"
     elif not asks and not by_call:
         text = (
-            "no agv_mode_request, and AGV mode is awaited: the lift must enter AGV mode by itself"
+            "no agv_mode_request, although the daemon waits for AGV mode: the lift must enter AGV"
+            " mode by itself"
         )
         yield (*path[:-1], "outputs") if path == ("inputs",) else path, text
     if by_call and not holds:
-        text = "no door_open: with by_call nothing keeps AGV mode on while a robot goes through"
+        text = "no door_open: with by_call nothing keeps AGV mode on while a robot enters or leaves"
         yield path, text
     if not fire:
         yield path, "no fire_alarm: a fire recall would not be seen"
@@ -95,7 +99,8 @@ Sees = Callable[[str], bool]
 
 
 def notes(settings: LiftSettings, sees: Sees) -> Remarks:
-    """Yield a note for each intended choice with side effects that the site should know."""
+    """Yield a note for each setting that is no mistake, but has side effects that the site should
+    know."""
     if sees(Hazard.FIRE) and settings.alarm == "none":
         text = (
             "a fire stops this lift for robots, but no topic tells the fleets about it"
@@ -105,7 +110,7 @@ def notes(settings: LiftSettings, sees: Sees) -> Remarks:
     untold = [h for h in ALARMED if sees(h) and h not in settings.alarm_on]
     if untold and settings.alarm != "none":
         many = "stops" if len(untold) == 1 else "stop"
-        text = f"{' and '.join(untold)} {many} this lift for robots, but nobody tells the fleets"
+        text = f"{' and '.join(untold)} {many} this lift for robots, but no topic tells the fleets"
         yield ("alarm_on",), text
 
 
@@ -125,18 +130,24 @@ def unseen(settings: LiftSettings, sees: Sees) -> Remarks:
 
 
 def by_call(settings: LiftSettings, told: bool, asks: bool, request: tuple[str, ...]) -> Remarks:
-    """Yield problems with `by_call`. The lift must report AGV mode (`told`), and no output may request
-    AGV mode (`asks`). `request` is the path of such an output in the YAML."""
+    """Yield problems with `agv_mode: by_call`. It needs a lift that reports AGV mode (`told`). It
+    forbids an output that requests AGV mode (`asks`). `request` is the path that such an output has
+    in the YAML."""
     if settings.agv_mode == "by_call" and not told:
-        text = "by_call needs an agv_mode input: nothing else shows that the lift accepted a call"
+        text = (
+            "by_call needs an agv_mode input, which alone shows that the lift has accepted a call"
+        )
         yield ("agv_mode",), text
     if settings.agv_mode == "by_call" and asks:
-        yield request, "with agv_mode: by_call the calls request AGV mode: delete one of the two"
+        yield (
+            request,
+            "with agv_mode: by_call a call already requests AGV mode: delete this or by_call",
+        )
 
 
 def unsafe(wiring: LiftWiring) -> Iterator[Unsafe]:
-    """Yield the wiring that `accept_unsafe` must name. With such wiring a cut wire or a power-on could
-    cause harm."""
+    """Yield the wiring that `accept_unsafe` must name. With such wiring, a cut wire or the module's
+    power-on could cause harm."""
     table = {w.signal: w for w in wires(wiring)}
     yield from _cut(table, Hazard.FIRE, True, "a fire alarm reads clear")
     yield from _cut(table, "agv_mode", False, "AGV mode reads on")
@@ -157,8 +168,8 @@ def _cut(table: Mapping[str, Wire], signal: str, asserted: bool, meaning: str) -
 
 
 def floors(wiring: LiftSettings) -> Remarks:
-    """Yield a problem if there are no floors. Yield a problem for a floor that is named twice, and for
-    a landing that names one door twice."""
+    """Yield a problem if there are no floors. Yield a problem for a floor that is listed twice, and for
+    two floors that are the same door of one landing."""
     stops = wiring.stops()
     if not stops:
         yield ("floors",), "no floors: list this lift's floors by their names on RMF's map"
@@ -175,7 +186,7 @@ def floors(wiring: LiftSettings) -> Remarks:
 
 
 def counts_down(settings: LiftSettings, codes: Mapping[int, str], path: tuple[str, ...]) -> Remarks:
-    """Yield a warning if the floors' numbers fall from the lowest floor to the highest."""
+    """Yield a warning if the floors' code numbers decrease from the lowest floor to the highest."""
     levels = settings.levels()
     numbers = [min((n for n, at in codes.items() if at == level), default=0) for level in levels]
     if len(numbers) > 2 and all(above < below for below, above in pairwise(numbers)):
@@ -194,7 +205,7 @@ def named(
     what: str, section: tuple[str, ...], given: Collection[str], levels: Collection[str]
 ) -> Remarks:
     """Yield a problem for each landing that `given` lacks, and for each name in `given` that is not a
-    landing. `what` names an entry of `given`."""
+    landing. `what` is the word for an entry of `given` in the messages."""
     for level in given:
         if level not in levels:
             yield section, f"{level!r} is not a landing of this lift, which has {', '.join(levels)}"
@@ -210,7 +221,10 @@ def _floor_code(code: FloorCode, levels: list[str]) -> Remarks:
             yield ("floor_code",), "one_hot has lines, and no bits, codes or parity"
         return
     if code.lines:
-        yield ("floor_code", "lines"), f"{code.encoding} has bits and codes; lines are for one_hot"
+        yield (
+            ("floor_code", "lines"),
+            f"{code.encoding} needs bits and codes; only one_hot has lines",
+        )
     if not code.bits:
         yield ("floor_code",), "no bits: list the lines, least significant first"
     yield from named("code", ("floor_code", "codes"), set(code.codes.values()), levels)
@@ -224,7 +238,7 @@ def _floor_code(code: FloorCode, levels: list[str]) -> Remarks:
         if number in code.between_floors:
             yield (
                 ("floor_code", "codes", str(number)),
-                f"{number} is {code.codes[number]} here and means between floors as well: write"
+                f"{number} is {code.codes[number]} here, but is also in between_floors: write"
                 f" between_floors: {[n for n in code.between_floors if n not in code.codes]}",
             )
 
@@ -235,7 +249,7 @@ def _calls(wiring: LiftWiring) -> Remarks:
         yield from named("call", ("calls",), wiring.calls, wiring.levels())
         return
     if wiring.calls:
-        yield ("calls",), "calls and call_code are two ways of calling: delete one of the two"
+        yield ("calls",), "calls and call_code are alternatives: delete one of the two"
     yield from named("code", ("call_code", "codes"), set(code.codes.values()), wiring.levels())
     for number in code.codes:
         if number == 0 or number >> len(code.bits):
@@ -252,14 +266,20 @@ def _doors(wiring: LiftWiring) -> Remarks:
         if single and any(two):
             yield (
                 ("inputs", prefix),
-                f"{prefix} stands for one contact alone: delete {prefix}, or the other contacts",
+                f"{prefix} is for a door with only one contact: delete {prefix}, or the other contacts",
             )
         elif any(two) and not all(two):
             have = f"{prefix}_opened" if two[0] else f"{prefix}_closed"
             end = "open" if two[0] else "closed"
-            yield ("inputs", have), f"with one contact, write {prefix}: {{…, proves: {end}}}"
+            yield (
+                ("inputs", have),
+                f"is the only contact of this door: write {prefix}: {{…, proves: {end}}} instead",
+            )
         elif needed and not single and not any(two):
-            yield ("inputs",), f"no {prefix} contact: {prefix}, or {prefix}_opened and _closed"
+            yield (
+                ("inputs",),
+                f"no contact of this door: give {prefix}, or both {prefix}_opened and {prefix}_closed",
+            )
         elif not needed and (single or any(two)):
             yield ("inputs",), "a rear door is wired, but no floor has side: rear"
         travel_s = wiring.limits.door_travel_s
@@ -278,7 +298,8 @@ def _motion(wiring: LiftWiring) -> Remarks:
     if have not in ([], ["moving"], ["stopped"], ["up", "down"], ["motion"]):
         yield (
             ("inputs", have[0]),
-            f"give motion as moving, or stopped, or up with down, or motion; not {' with '.join(have)}",
+            "the motion needs either moving, or stopped, or motion, or both up and down; not"
+            f" {' with '.join(have)}",
         )
     motion = wiring.inputs.motion
     if motion is None:
@@ -287,7 +308,7 @@ def _motion(wiring: LiftWiring) -> Remarks:
     if "stopped" not in shown or not ("moving" in shown or {"up", "down"} <= shown):
         yield (
             ("inputs", "motion", "codes"),
-            "needs a code for stopped, and for moving or up and down",
+            "needs a code for stopped; it also needs either one for moving, or both up and down",
         )
     for number in motion.codes:
         if number >> len(motion.bits):
@@ -299,7 +320,10 @@ def _agv(wiring: LiftWiring) -> Remarks:
     told, asks = bool(by_line) or by_code, bool(wiring.outputs.agv_mode_request)
     yield from by_call(wiring, told, asks, ("outputs", "agv_mode_request"))
     if by_line and by_code:
-        yield ("inputs", "agv_mode"), "service shows agv_mode too: delete one of the two"
+        yield (
+            ("inputs", "agv_mode"),
+            "service has a code for agv_mode too: delete this input, or that code",
+        )
     for signal, path, line in input_rows(wiring):
         if not line.valid_when:
             continue
@@ -335,8 +359,8 @@ def _in_register(code: FloorCode, table: Mapping[str, Wire]) -> bool:
 
 
 def _dead_code(code: FloorCode, table: Mapping[str, Wire]) -> Iterator[Unsafe]:
-    """Yield the code if it reads as a floor when all its lines are cut at once. A cut cable or a lost
-    supply cuts all lines."""
+    """Yield the floor code if it is unsafe when all its lines are cut at once. It is unsafe if it then
+    reads as a floor. A cut cable or a lost supply cuts all lines."""
     if _in_register(code, table):
         return
     lines = [signal for signal, _, _ in code.inputs()]
@@ -345,5 +369,5 @@ def _dead_code(code: FloorCode, table: Mapping[str, Wire]) -> Iterator[Unsafe]:
         yield (
             lines[0],
             ("floor_code",),
-            f"with the floor code's cable cut, the car reads at {level}",
+            f"with the floor code's cable cut, the daemon reads the car at {level}",
         )

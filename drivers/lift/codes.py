@@ -1,5 +1,5 @@
-"""Converts between numbers and the lines that show them. The code is binary, Gray or BCD, and the least
-significant line comes first."""
+"""Converts between a number and the lines that show the number together. The encoding is binary, Gray
+or BCD. The least significant line always comes first."""
 
 from collections.abc import Mapping, Sequence
 from typing import Literal
@@ -33,8 +33,8 @@ def shown_number(prefix: str, shown: Mapping[str, bool], width: int) -> int:
 
 
 def lines(prefix: str, number: int, width: int) -> dict[str, bool]:
-    """Return for each of the binary lines `<prefix>_bit0`, `<prefix>_bit1`… whether the number asserts
-    the line."""
+    """Return the levels of the binary lines `<prefix>_bit0`, `<prefix>_bit1`… for this number. True
+    means that the line is asserted."""
     return {f"{prefix}_bit{i}": bool(number >> i & 1) for i in range(width)}
 
 

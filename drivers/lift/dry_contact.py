@@ -1,4 +1,4 @@
-"""A lift on dry contacts. The YAML gives a line to each signal, or gives several lines that form a
+"""A lift on dry contacts. In the YAML a signal has a line of its own, or several lines together show a
 number.
 
 The lines are GPIO pins, or coils and discrete inputs of a Modbus I/O module.
@@ -47,7 +47,8 @@ wires, debounce, warnings = lift_table.wires, lift_table.debounce, lift_checks.w
 
 
 def notes(settings: DryContactLiftSettings) -> Remarks:
-    """Yield a note, with its path below the device, for each intended choice with side effects."""
+    """Yield a note for each setting that is no mistake, but has side effects. The note has its path
+    below the device."""
     return lift_checks.notes(settings, partial(lift_checks.sees, settings))
 
 
@@ -77,14 +78,15 @@ class DryContactLift(OnPoints):
         return self._sample
 
     def write(self, outputs: LiftOutputs) -> None:
-        """Set every output to this level. Outputs that go off come first."""
+        """Set every output as `outputs` says. Outputs that go off come first."""
         if outputs != self._outputs:
             self._outputs, self._lines = outputs, encode(self._settings, outputs)
         self._points.write(self._lines)
 
 
 def encode(settings: DryContactLiftSettings, outputs: LiftOutputs) -> dict[str, bool]:
-    """Return for each signal whether it is asserted. `Points` leaves out signals without a wire."""
+    """Return whether each output signal must be asserted. Signals without a wire are included, and
+    `Points` ignores them."""
     calls = {f"call_{level}": level == outputs.call for level in settings.calls}
     if settings.call_code:
         calls = settings.call_code.lines(outputs.call)
@@ -99,8 +101,8 @@ def encode(settings: DryContactLiftSettings, outputs: LiftOutputs) -> dict[str, 
 def decode(
     settings: DryContactLiftSettings, shown: Mapping[str, bool], conditional: frozenset[str]
 ) -> LiftSample:
-    """Decode the lines. `shown` tells for each signal whether it is asserted. The groups in
-    `conditional` count only in AGV mode."""
+    """Decode the lines. `shown` has True for each asserted signal. `conditional` names groups of
+    signals, such as `floor`, that are valid only in AGV mode."""
     inputs = settings.inputs
     service = _service(inputs, shown)
     agv = _agv(inputs, shown, service)

@@ -1,9 +1,9 @@
 """A lift behind a gateway that speaks HTTP and JSON, such as RMF's lift template or a maker's gateway.
 
 If the network fails, only the gateway's own timers can end AGV mode and release the door. So the
-request `ask` of a held command starts the command's timer (`switches_off_after_s`). The driver sends
-`ask` in every scan while the command is on. A call of the car is one request, as when a person presses
-a button once.
+request `ask`, which switches such a command on, also starts the command's timer
+(`switches_off_after_s`). The driver repeats `ask` in every scan while the command is on. A call of the
+car is one request, as when a person presses a button once.
 """
 
 from collections.abc import Iterator, Mapping
@@ -36,12 +36,12 @@ class HttpLiftSettings(LiftSettings, frozen=True, kw_only=True, forbid_unknown_f
     api: Annotated[LiftApi | None, tells("the API, written here instead of a profile.")] = None
     lift_id: Annotated[
         Name | None,
-        tells('the lift\'s id at the gateway, for "{lift_id}" in the bodies of requests.'),
+        tells('the lift\'s id at the gateway. It replaces "{lift_id}" in the bodies of requests.'),
     ] = None
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
-        """Return the time (s) of the shortest timer, and its path in the YAML. Return None if there is
-        no timer."""
+        """Return the time (s) of the shortest timer, and the path of this time in the YAML. Return None
+        if there is no timer."""
         if any(PROFILE.problems(self.profile, self.api)):
             return None
         timers = (
@@ -101,24 +101,24 @@ def _lift_id(settings: HttpLiftSettings) -> Remarks:
     given = PROFILE.chosen(settings.profile, settings.api)
     used = any(LIFT_ID in (call.body or "") for call in given.requests().values())
     if used and settings.lift_id is None:
-        yield (), f"needs 'lift_id': the API's requests carry {LIFT_ID}"
+        yield (), f"needs 'lift_id', because requests of the API contain {LIFT_ID}"
     if settings.lift_id is not None and not used:
-        yield ("lift_id",), f"no request carries {LIFT_ID}: delete lift_id"
+        yield ("lift_id",), f"no request contains {LIFT_ID}: delete lift_id"
 
 
 def _unsafe(settings: HttpLiftSettings) -> Iterator[Unsafe]:
     for name, command in api_of(settings).commands.held().items():
         if command.switches_off_after_s is None:
             text = (
-                f"when the network dies nothing ends {name}: let ask set the gateway's own"
-                " timer, and write the timer's time as switches_off_after_s"
+                f"when the network dies nothing switches {name} off: let ask set the gateway's"
+                " own timer, and write the timer's time as switches_off_after_s"
             )
             yield name, _path(settings, "commands", name), text
 
 
 def claims(settings: HttpLiftSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield each command with its path in the YAML. If another device sent the command, it would
-    disturb this lift."""
+    """Yield each command with its path in the YAML. No other device may send these commands, because it
+    would disturb this lift."""
     if any(PROFILE.problems(settings.profile, settings.api)):
         return
     seen: set[str] = set()
@@ -144,24 +144,22 @@ def warnings(settings: HttpLiftSettings) -> Remarks:
     if not state.motion:
         yield (
             _path(settings, "state"),
-            "no motion, so the car counts as standing at every landing",
+            "no field motion, so the car counts as standing whenever it is at a landing",
         )
     if not state.online and not state.age:
         text = (
-            "neither online nor age: the daemon would believe a gateway that has lost the"
-            " lift and repeats its last state"
+            "neither a field online nor a field age: if the gateway loses the lift and repeats its"
+            " last state, the daemon believes this state"
         )
         yield _path(settings, "state"), text
     if not commands.cancel:
-        text = (
-            "no cancel: a call stays at the lift until the lift has served it, also after a fault"
-        )
+        text = "no command cancel: the lift keeps a call until it has served it, even after a fault"
         yield _path(settings, "commands"), text
     for name, command in commands.held().items():
         path = _path(settings, "commands", name)
         off_s = command.switches_off_after_s
         if off_s is not None:
-            text = f"pull the network plug while {name} is on: it must end within {off_s:g} s"
+            text = f"pull the network plug while {name} is on: it must go off within {off_s:g} s"
             yield path, text
             if command.release and (text := timer_unseen(command.ask, off_s)):
                 yield path, text
@@ -170,13 +168,14 @@ def warnings(settings: HttpLiftSettings) -> Remarks:
 
 
 def notes(settings: HttpLiftSettings) -> Remarks:
-    """Yield a note, with its path below the device, for each intended choice with side effects."""
+    """Yield a note for each setting that is no mistake, but has side effects. The note has its path
+    below the device."""
     return checks.notes(settings, api_of(settings).state.shows)
 
 
 def debounce(settings: HttpLiftSettings) -> Mapping[str, float]:
-    """Return the debounce times (s). They are those of contacts, because a gateway may show a
-    half-changed state."""
+    """Return the debounce times (s), which are the same as for contacts. A gateway needs them too,
+    because its answer may show a state that has only half changed."""
     return {**DEBOUNCE_S, **dict.fromkeys(Hazard, HAZARD_DEBOUNCE_S)}
 
 
@@ -195,7 +194,7 @@ def describe(settings: HttpLiftSettings, bus: http.HttpSettings) -> Iterator[tup
         yield " ".join(path), described(call, api)
     for name, command in found.commands.held().items():
         if off_s := command.switches_off_after_s:
-            yield f"{name} ends", f"by itself {off_s:g} s after its last request"
+            yield f"{name} ends", f"by itself, {off_s:g} s after the last request for it"
 
 
 def tables(settings: HttpLiftSettings) -> Iterator[Table]:
@@ -216,7 +215,7 @@ def tables(settings: HttpLiftSettings) -> Iterator[Table]:
 
 
 class GatewayCalls(InsistentCalls, Protocol):
-    """An HTTP bus that can read by any request."""
+    """An HTTP bus that can read JSON with any method and body, not only with GET."""
 
     def get_json(
         self, path: str, method: http.Method = "GET", body: str | None = None
@@ -232,9 +231,9 @@ def create(name: str, settings: HttpLiftSettings, bus: GatewayCalls) -> "HttpLif
 class HttpLift:
     """The driver of one lift (`drivers.Driver[LiftSample, LiftOutputs]`).
 
-    `_told` holds the state that the driver last commanded for each held command. A command whose state
-    is in doubt is missing. `_called` is the landing of the last call that was not withdrawn. `_sure` is
-    True if the gateway has answered this call.
+    `_told` holds for each held command whether the driver last switched it on or off. If this is
+    uncertain, the command is not in `_told`. `_called` is the landing of the last call that was not
+    withdrawn. `_sure` is True if the gateway has answered the request for this call.
     """
 
     def __init__(self, settings: HttpLiftSettings, bus: GatewayCalls) -> None:
@@ -249,10 +248,10 @@ class HttpLift:
         self._claimed = self._touched = False
 
     def open(self) -> None:
-        """Check that the gateway answers. At the first call, also switch off every command that is not
-        off.
+        """Check that the gateway answers. At the first call, also switch off every command that the
+        state does not show as off.
 
-        After a failure `open` only reads, because a lost answer must not end a ride.
+        After a failure `open` only reads. A lost answer must not end a robot's ride.
         """
         answer = self._answer()
         if not self._claimed:
@@ -275,7 +274,7 @@ class HttpLift:
         wanted = {name: _wants(outputs, name) for name in self._held}
         idle = [name for name in wanted if not wanted[name] and self._told.get(name) is not False]
         for name in sorted(idle, key=lambda name: name == self._failed):
-            self._failed = name  # the next attempt begins with another command
+            self._failed = name  # if this fails, the next attempt begins with another command
             self._switch(name, on=False)
         self._failed = None
         if self._called not in (None, outputs.call):
@@ -295,13 +294,13 @@ class HttpLift:
             raise DriverError(f"{' and '.join(still)} still on after being switched off")
 
     def close(self) -> None:
-        """Switch every command off if the driver ever sent one. Does not raise."""
+        """Switch every command off, if the driver ever sent a command. Does not raise."""
         if not self._touched:
             return
         try:
             self._off([*self._held])
         except DriverError:
-            return  # the daemon ends, and the gateway's timers end the commands
+            return  # do not raise: the gateway's timers will end the commands
 
     def _answer(self) -> Mapping[str, object]:
         """Return the state. If the state has several parts, the result has the answer for each part."""

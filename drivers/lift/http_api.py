@@ -30,7 +30,8 @@ Part = Annotated[
 ]
 Held = Literal["agv_mode_request", "door_open", "rear_door_open"]
 HELD: Final[tuple[Held, ...]] = ("agv_mode_request", "door_open", "rear_door_open")
-"""The commands that the driver holds on. The driver switches them on in this order."""
+"""The commands that stay on until the driver switches them off. The driver switches them on in this
+order."""
 
 
 class HeldCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -39,8 +40,8 @@ class HeldCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     ask: Annotated[Call, tells("the request that switches the command on.")]
     release: Annotated[
         Call | None,
-        tells("""the request that switches the command off. Without `release` the command lasts only
-        a moment at the gateway, and the driver repeats `ask` in each scan while the command
+        tells("""the request that switches the command off. Give no `release` if the gateway keeps
+        the command only for a moment. The driver then repeats `ask` in each scan while the command
         is on."""),
     ] = None
     shown: Annotated[
@@ -76,10 +77,11 @@ class LiftCommands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
         HeldCommand | None, tells("holds the rear door open at the landing where the car stands.")
     ] = None
     call: Annotated[
-        Call | None, tells('calls the car, with "{level}" in its body for the landing\'s value.')
+        Call | None, tells('calls the car. The landing\'s value replaces "{level}" in the body.')
     ] = None
     calls: Annotated[
-        dict[Name, Call], tells("landing -> its request. Give either `calls` or `call`.")
+        dict[Name, Call],
+        tells("landing -> the request that calls the car there. It replaces `call`."),
     ] = {}
     cancel: Annotated[
         Call | None,
@@ -87,7 +89,7 @@ class LiftCommands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     ] = None
 
     def held(self) -> dict[Held, HeldCommand]:
-        """Return each held command that the YAML gives, by its signal."""
+        """Return each held command that the YAML gives. The keys are the commands' names."""
         given = {name: getattr(self, name) for name in HELD}
         return {name: command for name, command in given.items() if command is not None}
 
@@ -108,12 +110,15 @@ class LiftCommands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
         yield from (((n,), c) for n, c in (("call", self.call), ("cancel", self.cancel)) if c)
 
     def problems(self) -> Remarks:
-        """Yield a problem for two ways of calling, for a call without a landing, and for a request that
-        occurs twice."""
+        """Yield a problem if the YAML gives both `call` and `calls`, and if the body of `call` lacks
+        the landing. Yield a problem for a request that occurs twice."""
         if self.call and self.calls:
-            yield ("calls",), "calls and call are two ways of calling: delete one of the two"
+            yield ("calls",), "calls and call are alternatives: delete one of the two"
         if self.call and LEVEL not in (self.call.body or ""):
-            yield ("call",), f"names no landing: write {LEVEL} into its body, or give calls"
+            yield (
+                ("call",),
+                f"does not contain the landing: write {LEVEL} into its body, or give calls",
+            )
         seen: list[tuple[str, Call]] = []
         for path, call in self.requests():
             same = [other for other, before in seen if before == call]
@@ -138,8 +143,8 @@ class LiftApi(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     commands: Annotated[LiftCommands, tells("the commands to the gateway.")]
 
     def requests(self) -> dict[tuple[str, ...], Call]:
-        """Return each request by its path. Leave out a GET of `state_path`. The path begins below this
-        section of the YAML."""
+        """Return all requests except a GET of `state_path`. The keys are their paths, which begin below
+        this section of the YAML."""
         parts = {("state_parts", name): call for name, call in self.state_parts.items()}
         return parts | {("commands", *path): call for path, call in self.commands.requests()}
 
@@ -161,8 +166,8 @@ class LiftApi(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
         return found
 
     def problems(self) -> Remarks:
-        """Yield a problem for a state without a request, and for a field that belongs to no part of the
-        state."""
+        """Yield a problem if no request, or two sorts of requests, would read the state. Yield a
+        problem for a field that belongs to no part of the state."""
         if bool(self.state_path) == bool(self.state_parts):
             yield ("state_path",), "give either state_path or state_parts"
         elif self.state_parts:
@@ -182,7 +187,8 @@ def _filled(call: Call, mark: str, value: Value) -> Call:
 
 
 def numbers(values: Mapping[str, Value]) -> dict[int, str]:
-    """Return the landing for each number. Leave out a landing whose value is not a whole number."""
+    """Return the landing for each value that is a whole number. Leave out landings with other
+    values."""
     return {
         value: level
         for level, value in values.items()

@@ -32,7 +32,8 @@ class JsonFloor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     field: Annotated[Field, tells("the field of the car's position. Null means between floors.")]
     values: Annotated[
         dict[Name, Value],
-        tells("landing -> its value. Without `values` a landing's name is its value."),
+        tells("""landing -> the field's value while the car is there. Without `values` the value is the
+        landing's name."""),
     ] = {}
     between_floors: Annotated[list[Value], tells("the values for a car between floors.")] = []
 
@@ -49,8 +50,8 @@ class JsonFloor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class ListedStates(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A field whose values stand for states. Each key except the field's own keys is a state, with a
-    list of its values."""
+    """A field whose value shows a state, such as `open`. Each state is a key of the YAML, with a list
+    of the values that show the state."""
 
     field: Annotated[Field, tells("the field of the value.")]
 
@@ -82,13 +83,14 @@ class JsonMotion(ListedStates, frozen=True, kw_only=True, forbid_unknown_fields=
     stopped: Annotated[Values, tells("the values for a standing car.")]
     up: Annotated[list[Value], tells("the values for a car that goes up.")] = []
     down: Annotated[list[Value], tells("the values for a car that goes down.")] = []
-    moving: Annotated[list[Value], tells("the values for a car that goes either way.")] = []
+    moving: Annotated[list[Value], tells("the values for a car that moves, up or down.")] = []
 
     def problems(self) -> Remarks:
-        """Yield a problem for missing values of a moving car, and for a value with two meanings."""
+        """Yield a problem if no value shows a moving car. Yield a problem for each value with two
+        meanings."""
         yield from super().problems()
         if not self.moving and not (self.up and self.down):
-            yield (), "needs values for moving, or for up and down"
+            yield (), "needs values for moving, or else values for both up and down"
 
 
 class JsonService(ListedStates, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -115,8 +117,8 @@ class JsonLiftState(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     ] = None
     age: Annotated[
         JsonNumber | None,
-        tells("""the age of the gateway's own reading (s). An answer older than `stale_after_s` is no
-        reading."""),
+        tells("""the age (s) of the gateway's own reading. A reading older than `stale_after_s` is
+        refused."""),
     ] = None
     floor: Annotated[JsonFloor, tells("the car's position.")]
     door: Annotated[JsonDoor, tells("the car's door.")]
@@ -126,19 +128,27 @@ class JsonLiftState(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         JsonService | None, tells("the lift's service state; it may include hazards and AGV mode.")
     ] = None
     agv_mode: Annotated[
-        JsonFlag | None, tells("the lift confirms AGV mode; not needed if `service` does.")
+        JsonFlag | None,
+        tells("the lift confirms AGV mode; not needed if `service` shows AGV mode."),
     ] = None
     fire_alarm: Annotated[
-        JsonFlag | None, tells("the fire alarm; MODE_FIRE, latched with `fire_reset: manual`.")
+        JsonFlag | None,
+        tells("the fire alarm; sets MODE_FIRE, which is latched with `fire_reset: manual`."),
     ] = None
-    code_blue: Annotated[JsonFlag | None, tells("the hospital's code blue; MODE_EMERGENCY.")] = None
-    earthquake: Annotated[JsonFlag | None, tells("an earthquake sensor; MODE_EMERGENCY.")] = None
-    emergency: Annotated[JsonFlag | None, tells("the car's emergency stop; MODE_EMERGENCY.")] = None
+    code_blue: Annotated[
+        JsonFlag | None, tells("the hospital's code blue; sets MODE_EMERGENCY.")
+    ] = None
+    earthquake: Annotated[JsonFlag | None, tells("an earthquake sensor; sets MODE_EMERGENCY.")] = (
+        None
+    )
+    emergency: Annotated[
+        JsonFlag | None, tells("the car's emergency stop; sets MODE_EMERGENCY.")
+    ] = None
     out_of_service: Annotated[
-        JsonFlag | None, tells("the lift is off or out of order; MODE_OFFLINE.")
+        JsonFlag | None, tells("the lift is off or out of order; sets MODE_OFFLINE.")
     ] = None
     manual_mode: Annotated[
-        JsonFlag | None, tells("inspection or manual drive (key switch); MODE_OFFLINE.")
+        JsonFlag | None, tells("inspection or manual drive (key switch); sets MODE_OFFLINE.")
     ] = None
     overload: Annotated[JsonFlag | None, tells("the car is too heavy; delays the ride.")] = None
 
@@ -172,8 +182,11 @@ def _doubles(given: Iterable[tuple[tuple[str, str], Value, str]]) -> Remarks:
 def decode(
     place: JsonLiftState, answer: Answer, levels: Sequence[str], stale_s: float
 ) -> LiftSample:
-    """Decode the answer of a lift with these landings. Raises a DriverError that names the field.
-    Raises DriverError too if the gateway's reading is older than `stale_s`."""
+    """Decode the answer of a lift with these landings.
+
+    Raises DriverError if a field is missing or invalid, and names the field. Also raises DriverError if
+    the gateway does not reach the lift, or if the gateway's reading is older than `stale_s`.
+    """
     _current(place, answer, stale_s)
     level, code_fault = _floor(place.floor, answer, levels)
     service = _service(place, answer)
@@ -213,7 +226,7 @@ def _value(answer: Answer, field: str) -> Value | None:
 
 
 def _state(place: ListedStates, answer: Answer) -> str | None:
-    """Return the state for this field's value. Return None for null and for a value that is not
+    """Return the state that the field's value shows. Return None if the value is null or is not
     listed."""
     value = _value(answer, place.field)
     return next((state for state, given in place.states().items() if _is_one(value, given)), None)
@@ -228,7 +241,7 @@ def _floor(place: JsonFloor, answer: Answer, levels: Sequence[str]) -> tuple[str
     if value is None or _is_one(value, place.between_floors):
         return None, ""
     level = next((level for level in levels if _is_one(value, [place.value(level)])), None)
-    return level, "" if level else f"{json_fields.value_text(value)} is not a floor's value"
+    return level, "" if level else f"{json_fields.value_text(value)} is no floor's value"
 
 
 def _door(place: JsonDoor, answer: Answer) -> DoorReading:

@@ -69,7 +69,7 @@ class RegisterLiftSettings(LiftSettings, frozen=True, kw_only=True, forbid_unkno
             if part.valid_when and not told:
                 yield (
                     ("map", name),
-                    "valid_when: agv_mode needs agv_mode, or a service state agv_mode",
+                    "valid_when: agv_mode needs the flag agv_mode, or the state agv_mode of service",
                 )
             elif part.valid_when and name in ("agv_mode", "service"):
                 yield ("map", name), f"{name} itself shows AGV mode: delete valid_when"
@@ -105,7 +105,7 @@ def warnings(settings: RegisterLiftSettings) -> Remarks:
         flag = found.flag(hazard)
         if flag and flag.is_in("discrete input") and flag.active == "high":
             text = (
-                f"if this input has a wire, its cut reads as no {hazard}: use a contact that opens"
+                f"if a wire leads here, a cut wire reads as no {hazard}: use a contact that opens"
             )
             yield ("map", hazard), f"{text} at the alarm, and active: low"
     if not commands.read_back:
@@ -123,14 +123,14 @@ def notes(settings: RegisterLiftSettings) -> Remarks:
 
 
 def debounce(settings: RegisterLiftSettings) -> Mapping[str, float]:
-    """Return the debounce times (s). They are those of contacts, because a gateway may show a
-    half-changed number."""
+    """Return the debounce times (s). A gateway may show a half-changed number. So its values have the
+    same debounce times as contacts."""
     return {**DEBOUNCE_S, **dict.fromkeys(Hazard, HAZARD_DEBOUNCE_S)}
 
 
 def claims(settings: RegisterLiftSettings) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield the place of each command with its path in the YAML. No other device may write to these
-    places."""
+    """Yield the register or coil of each command, with its path in the YAML. No other device may write
+    to these registers and coils."""
     seen: set[str] = set()
     for path, place, _ in settings.map.commands.places():
         if place not in seen and misplaced(apart(place)[1], WRITABLE) is None:
@@ -139,7 +139,8 @@ def claims(settings: RegisterLiftSettings) -> Iterator[tuple[str, tuple[str, ...
 
 
 def describe(settings: RegisterLiftSettings, bus: object) -> Iterator[tuple[str, str]]:
-    """Yield rows for `check` with the place of each part of the map, and of each command."""
+    """Yield rows for the command `check`. Each row names the register or coil of one value or
+    command."""
     for name, part in settings.map.parts().items():
         yield name, f"{point_at(settings.unit, place_of(part))}{_meaning(part)}"
     commands = settings.map.commands
@@ -153,8 +154,8 @@ def describe(settings: RegisterLiftSettings, bus: object) -> Iterator[tuple[str,
 
 
 def tables(settings: RegisterLiftSettings) -> Iterator[Table]:
-    """Yield tables of the floors (lowest first), of each part's numbers, and of each command's
-    values."""
+    """Yield a table of the floors (lowest first). Then yield a table for each value that is a number,
+    and a table of the commands."""
     yield floors(settings)
     for name, part in settings.map.parts().items():
         if isinstance(part, Number):
@@ -227,7 +228,8 @@ class RegisterLift:
         self._lines = lines
 
     def open(self) -> None:
-        """Check that the gateway answers. At the first call, also switch every command off."""
+        """Check that the gateway answers. When `open` is called for the first time, also switch every
+        command off."""
         self._lines.claim()
 
     def read(self) -> LiftSample:
@@ -235,7 +237,7 @@ class RegisterLift:
         return decode(self._map, self._lines.read())
 
     def write(self, outputs: LiftOutputs) -> None:
-        """Set every command to its level in `outputs`. Commands that go off come first."""
+        """Set every command to its level in `outputs`. First write the commands that go off."""
         self._lines.bring(encode(self._map, outputs))
 
     def make_safe(self) -> None:
@@ -248,7 +250,8 @@ class RegisterLift:
 
 
 def encode(found: LiftMap, outputs: LiftOutputs) -> dict[str, int]:
-    """Return the value of each place. If commands share a register, combine their values with OR."""
+    """Return the value to write to each register or coil. If commands share a register, combine their
+    values with OR."""
     asserted = {"agv_mode_request"} if outputs.agv_request else set()
     if outputs.hold_door:
         asserted.add(HOLD[outputs.hold_door])
@@ -293,7 +296,7 @@ def _floor(found: LiftMap, words: Mapping[str, int]) -> tuple[str | None, str]:
     number = found.floor.number(words["floor"])
     if number in found.floor.codes:
         return found.floor.codes[number], ""
-    return None, "" if number in found.floor.between_floors else f"code {number} is not a floor's"
+    return None, "" if number in found.floor.between_floors else f"code {number} is no floor's code"
 
 
 def _door(

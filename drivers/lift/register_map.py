@@ -1,5 +1,5 @@
-"""The register map of a lift's gateway in the YAML. The map gives the places of values and the meanings
-of numbers."""
+"""The register map of a lift's gateway in the YAML. The map gives the place of each value, which is a
+register or a coil. The map also gives the meaning of each number."""
 
 import functools
 import operator
@@ -24,7 +24,7 @@ from drivers.lift.register_parts import (
 )
 
 READ_BACK: Final = tells("""`read_back` for this command alone. Also write `false` if the gateway
-takes a call and then clears the call's place by itself.""")
+accepts a call and then clears the call's register or coil by itself.""")
 
 
 class LiftCommand(WrittenLevels, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -60,7 +60,7 @@ class CallCommand(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields
         number means "no call"."""
         yield from super().problems()
         if self.none in self.codes:
-            yield ("codes", str(self.none)), f"{self.none} is the number for no call (none)"
+            yield ("codes", str(self.none)), f"{self.none} means no call already (none)"
 
 
 class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -96,8 +96,8 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield f"call_{level}", ("calls", level), command
 
     def places(self) -> Iterator[tuple[tuple[str, ...], str, int]]:
-        """Yield (path, place, bits) for each command. `bits` are the bits of the place that the command
-        uses."""
+        """Yield (path, place, bits) for each command. `bits` are the bits that the command uses at its
+        place."""
         for _, path, command in self.singles():
             yield path, place_of(command), command.ask | command.release
         if self.call:
@@ -105,7 +105,7 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             yield ("call",), place_of(self.call), bits
 
     def calling(self) -> dict[str, int]:
-        """Return for each place the bits that calls use."""
+        """Return the bits that the lift's calls use at each place."""
         found: dict[str, int] = {}
         for path, place, bits in self.places():
             if path[0] in ("calls", "call"):
@@ -117,8 +117,8 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return {place for place, read_back in self._read_back().items() if False in read_back}
 
     def _read_back(self) -> dict[str, dict[bool, tuple[str, ...]]]:
-        """Return for each place the values of `read_back` that its commands give. Each value has the
-        path of the last command that gives it."""
+        """Return the values of `read_back` at each place. Commands that share a place may have
+        different values. Each value comes with the path of the last command that has this value."""
         found: dict[str, dict[bool, tuple[str, ...]]] = {}
         every: list[tuple[tuple[str, ...], LiftCommand | CallCommand]] = [
             (path, command) for _, path, command in self.singles()
@@ -131,8 +131,8 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return found
 
     def words(self, asserted: Collection[str], call: str | None) -> dict[str, int]:
-        """Return the value of each place, for these asserted signals and a call to this landing. A call
-        of None means no call."""
+        """Return the value to write to each place. `asserted` are the signals that are on. `call` is
+        the called landing, or None without a call."""
         found: dict[str, int] = {}
         for signal, _, command in self.singles():
             at = place_of(command)
@@ -151,8 +151,8 @@ class Commands(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         for at, told in self._read_back().items():
             if len(told) > 1:
                 text = (
-                    f"differs from the other commands at {at}, but the daemon can only read the"
-                    " whole place back"
+                    f"differs from read_back of other commands at {at}, but the daemon can only"
+                    " read the whole place back"
                 )
                 yield (*told[False], "read_back"), text
         taken: dict[str, int] = {}
@@ -182,7 +182,7 @@ class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 
     floor: Annotated[FloorField, tells("the car's position.")]
     door: Annotated[
-        DoorField | None, tells("the car's door as a number, if it has no `door_opened`.")
+        DoorField | None, tells("the car's door as a number, if the map has no `door_opened`.")
     ] = None
     door_opened: Annotated[
         LiftFlag | None, tells("the car's door is open; needs `door_closed` as well.")
@@ -212,19 +212,27 @@ class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
         ServiceField | None, tells("the lift's service state; it may include hazards and AGV mode.")
     ] = None
     agv_mode: Annotated[
-        LiftFlag | None, tells("the controller confirms AGV mode; not needed if `service` does.")
+        LiftFlag | None,
+        tells("the controller confirms AGV mode; not needed if `service` shows AGV mode."),
     ] = None
     fire_alarm: Annotated[
-        LiftFlag | None, tells("the fire alarm; MODE_FIRE, latched with `fire_reset: manual`.")
+        LiftFlag | None,
+        tells("the fire alarm; sets MODE_FIRE, which is latched with `fire_reset: manual`."),
     ] = None
-    code_blue: Annotated[LiftFlag | None, tells("the hospital's code blue; MODE_EMERGENCY.")] = None
-    earthquake: Annotated[LiftFlag | None, tells("an earthquake sensor; MODE_EMERGENCY.")] = None
-    emergency: Annotated[LiftFlag | None, tells("the car's emergency stop; MODE_EMERGENCY.")] = None
+    code_blue: Annotated[
+        LiftFlag | None, tells("the hospital's code blue; sets MODE_EMERGENCY.")
+    ] = None
+    earthquake: Annotated[LiftFlag | None, tells("an earthquake sensor; sets MODE_EMERGENCY.")] = (
+        None
+    )
+    emergency: Annotated[
+        LiftFlag | None, tells("the car's emergency stop; sets MODE_EMERGENCY.")
+    ] = None
     out_of_service: Annotated[
-        LiftFlag | None, tells("the lift is off or out of order; MODE_OFFLINE.")
+        LiftFlag | None, tells("the lift is off or out of order; sets MODE_OFFLINE.")
     ] = None
     manual_mode: Annotated[
-        LiftFlag | None, tells("inspection or manual drive (key switch); MODE_OFFLINE.")
+        LiftFlag | None, tells("inspection or manual drive (key switch); sets MODE_OFFLINE.")
     ] = None
     overload: Annotated[LiftFlag | None, tells("the car is too heavy; delays the ride.")] = None
     commands: Annotated[Commands, tells("the commands to the lift.")]
@@ -236,7 +244,10 @@ class LiftMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
             if len(ends) == 1:
                 yield (ends[0],), f"needs both {door}_opened and {door}_closed"
             elif ends and getattr(self, door):
-                yield (ends[0],), f"{door} and its contacts are two ways: delete one of the two"
+                yield (
+                    (ends[0],),
+                    f"{door} and its contacts both give the door: delete one of the two",
+                )
         if not (self.door or self.door_opened or self.door_closed):
             yield (), "needs the door: write door, or door_opened and door_closed"
         if bool(self.up) != bool(self.down):

@@ -1,5 +1,5 @@
-"""The parts of a lift's register map: numbers in registers, and flags. Each part is at a unit of the
-bus."""
+"""The parts of a lift's register map: numbers in registers, and flags. Each part belongs to one Modbus
+unit of the bus."""
 
 from collections.abc import Collection
 from typing import Annotated, Final, Literal, Protocol, TypeAlias
@@ -24,7 +24,7 @@ class AtUnit(Protocol):
 
     @property
     def at(self) -> str:
-        """Return the place."""
+        """Return the register, coil or discrete input, such as `coil 0`."""
 
     @property
     def unit(self) -> int | None:
@@ -44,8 +44,8 @@ def point_at(unit: int, where: str) -> Point:
 
 
 def apart(where: str) -> tuple[int | None, str]:
-    """Split a place that `place_of` has written into the part's own unit and the place at this unit.
-    The place may be invalid."""
+    """Split a text that `place_of` has written into the unit and the place, such as 2 and `coil 0`. The
+    unit is None if the text names no unit. The place may be invalid."""
     if not where.startswith("unit "):
         return None, where
     _, own, place = where.split(" ", 2)
@@ -79,8 +79,8 @@ class NumberField(InRegister, frozen=True, kw_only=True, forbid_unknown_fields=T
         return sum((number >> i & 1) << bit for i, bit in enumerate(self.bits))
 
     def fits(self, numbers: Collection[int], key: str) -> Remarks:
-        """Yield a problem for an invalid place, for a bit that is listed twice, and for numbers that do
-        not fit. `key` is the key of the numbers in the YAML."""
+        """Yield a problem for an invalid place, and for a bit that is listed twice. Yield a problem for
+        each number that needs more bits than the YAML lists. `key` is the YAML key of the numbers."""
         yield from InRegister.problems(self)
         if len(set(self.bits)) < len(self.bits):
             yield ("bits",), "a bit is listed twice"
@@ -114,7 +114,7 @@ class DoorField(NumberField, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ]
 
     def problems(self) -> Remarks:
-        """Yield the problems of `fits`, and a problem for a door without a code for open or for
+        """Yield the problems of `fits`. Yield a problem if no code means open, or if no code means
         closed."""
         yield from self.fits(self.codes, "codes")
         if not {"open", "closed"} <= set(self.codes.values()):
@@ -130,11 +130,15 @@ class MotionField(NumberField, frozen=True, kw_only=True, forbid_unknown_fields=
     ]
 
     def problems(self) -> Remarks:
-        """Yield the problems of `fits`, and a problem if standing or moving has no code."""
+        """Yield the problems of `fits`. Yield a problem if no code means a standing car, or if no code
+        means a moving car."""
         yield from self.fits(self.codes, "codes")
         shown = set(self.codes.values())
         if "stopped" not in shown or not ("moving" in shown or {"up", "down"} <= shown):
-            yield ("codes",), "needs a code for stopped, and for moving or up and down"
+            yield (
+                ("codes",),
+                "needs a code for stopped, and also for moving, or for both up and down",
+            )
 
 
 class ServiceField(NumberField, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -174,8 +178,7 @@ class LiftFlag(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return bool(word >> (self.bit or 0) & 1) == (self.active == "high")
 
     def word(self, asserted: bool) -> int:
-        """Return the value of the flag's register or bit for an asserted flag or a flag that is not
-        asserted."""
+        """Return the value of the flag's register or bit that shows whether the flag is asserted."""
         return (asserted == (self.active == "high")) << (self.bit or 0)
 
     def problems(self) -> Remarks:

@@ -1,4 +1,4 @@
-"""Tabulates a lift's wiring. Each line has a row with its signal, point and debounce."""
+"""Tabulates a lift's wiring. Each wire has a row with its signal, point and debounce."""
 
 from collections.abc import Iterator
 
@@ -7,11 +7,11 @@ from drivers.hal.points import Clearing, Output, Wire
 from drivers.lift.wiring import LiftInput, LiftWiring
 
 DEBOUNCE_S = {"floor": 0.08, "door": 0.1, "rear_door": 0.1, "motion": 0.05, "agv_mode": 0.05}
-"""The default debounce (s) of each group. HAZARD_DEBOUNCE_S is the default for hazards and service
-codes.
+"""The default debounce (s) of each group of signals. HAZARD_DEBOUNCE_S is the default for hazards and
+service codes.
 
-A door that reads open for 50 ms while the car passes a floor is a glitch. If there is no motion line,
-only the debounce filters this glitch out.
+While the car passes a floor, its door may read open for 50 ms, which is a glitch. If there is no motion
+line, only the debounce filters this glitch out.
 """
 
 HAZARD_DEBOUNCE_S = 0.05
@@ -54,7 +54,7 @@ def wires(wiring: LiftWiring) -> list[Wire]:
 
 
 def _call(wiring: LiftWiring, signal: str) -> Clearing | None:
-    """Return the way in which a controller may clear this line. Return None for a line that is not a
+    """Return how a controller may switch this output off by itself. Return None if the output is not a
     call."""
     pulse = wiring.limits.call_pulse_s is not None
     return Clearing(pulse=pulse) if signal.startswith("call_") else None
@@ -70,9 +70,10 @@ def group(signal: str) -> str:
 
 
 def debounce(wiring: LiftWiring) -> dict[str, float]:
-    """Return the debounce (s) of each group. A group's debounce is the longest of its lines.
+    """Return the debounce (s) of each group of signals. It is the longest debounce of the group's
+    lines.
 
-    A state of the service code has the debounce of the code's lines.
+    If the service code shows a state, the state has the longest debounce of the service code's lines.
     """
     longest: dict[str, float] = {}
     for signal, _, line in input_rows(wiring):
@@ -87,7 +88,7 @@ def debounce(wiring: LiftWiring) -> dict[str, float]:
 
 
 def conditional(wiring: LiftWiring) -> frozenset[str]:
-    """Return the groups that are valid only in AGV mode."""
+    """Return the groups of signals that are valid only in AGV mode."""
     return frozenset(group(s) for s, _, line in input_rows(wiring) if line.valid_when)
 
 

@@ -1,5 +1,5 @@
-"""Tabulates a lift's codes and outputs. A row shows a number, its lines, and the readings with one line
-cut."""
+"""Tabulates a lift's codes and outputs. A row of a code shows a number and the lines that are on. The
+row also shows how the code reads when one wire is cut."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -18,8 +18,8 @@ BETWEEN = "between floors"
 
 
 def tables(wiring: LiftWiring) -> Iterator[Table]:
-    """Yield tables of the floors (lowest first), of the other codes, and of how long each output is
-    on."""
+    """Yield a table of the floors (lowest first), and a table for each other code. Yield a table that
+    shows how long each output is on."""
     table = {wire.signal: wire for wire in wires(wiring)}
     yield floors(wiring)
     yield _floor_code(wiring, table)
@@ -30,7 +30,8 @@ def tables(wiring: LiftWiring) -> Iterator[Table]:
 
 
 def floors(wiring: LiftSettings) -> Table:
-    """Tabulate RMF's floors with the lowest first. The table reveals a list in the wrong order."""
+    """Tabulate RMF's floors with the lowest first. So a reader notices if the YAML lists the floors in
+    a wrong order."""
     stops = list(wiring.stops().items())
     rows = [
         (_place(i, len(stops)), name, stop.level, "rear door" if stop.side is Side.REAR else "door")
@@ -93,8 +94,8 @@ def _outputs(wiring: LiftWiring) -> Table:
 
 _DRIVEN = {
     "agv_mode_request": "on while a robot holds the lift, and {grace_s:g} s longer",
-    "door_open": "on while the car stands for a robot",
-    "rear_door_open": "on while the car stands for a robot, at a floor of the rear door",
+    "door_open": "on while the car waits for a robot",
+    "rear_door_open": "on while the car waits for a robot, at a floor with side: rear",
 }
 
 

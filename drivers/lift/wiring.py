@@ -22,8 +22,8 @@ class LiftInput(Input, frozen=True, kw_only=True, forbid_unknown_fields=True):
     valid_when: Annotated[
         Literal["agv_mode"] | None,
         tells("""`agv_mode` if the line is valid only while AGV mode is on. Outside AGV mode
-        the line's floor or motion is unknown, its door is neither open nor closed, and its
-        hazard is clear."""),
+        a floor or motion line reads as unknown, a door line as neither open nor closed, and a
+        hazard line as clear."""),
     ] = None
 
 
@@ -32,7 +32,8 @@ class DoorInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=True
 
     proves: Annotated[
         Literal["open", "closed"],
-        tells("the end that the asserted contact proves; `door_travel_s` estimates the other end."),
+        tells("""the end position that the asserted contact proves. `door_travel_s` estimates when the
+        door is at the other end position."""),
     ]
 
 
@@ -40,7 +41,9 @@ class ParityInput(LiftInput, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """A parity line. It reveals a broken line of the code."""
 
     total: Annotated[
-        Literal["even", "odd"], tells("the number of asserted lines, including the parity line.")
+        Literal["even", "odd"],
+        tells("""whether the number of asserted lines is even or odd. The parity line
+        counts too."""),
     ]
 
 
@@ -92,24 +95,28 @@ class LiftInputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
     """
 
     fire_alarm: Annotated[
-        LiftInput | None, tells("the fire alarm; MODE_FIRE, latched with `fire_reset: manual`.")
+        LiftInput | None,
+        tells("the fire alarm; sets MODE_FIRE, which is latched with `fire_reset: manual`."),
     ] = None
-    code_blue: Annotated[LiftInput | None, tells("the hospital's code blue; MODE_EMERGENCY.")] = (
+    code_blue: Annotated[
+        LiftInput | None, tells("the hospital's code blue; sets MODE_EMERGENCY.")
+    ] = None
+    earthquake: Annotated[LiftInput | None, tells("an earthquake sensor; sets MODE_EMERGENCY.")] = (
         None
     )
-    earthquake: Annotated[LiftInput | None, tells("an earthquake sensor; MODE_EMERGENCY.")] = None
-    emergency: Annotated[LiftInput | None, tells("the car's emergency stop; MODE_EMERGENCY.")] = (
-        None
-    )
+    emergency: Annotated[
+        LiftInput | None, tells("the car's emergency stop; sets MODE_EMERGENCY.")
+    ] = None
     out_of_service: Annotated[
-        LiftInput | None, tells("the lift is off or out of order; MODE_OFFLINE.")
+        LiftInput | None, tells("the lift is off or out of order; sets MODE_OFFLINE.")
     ] = None
     manual_mode: Annotated[
-        LiftInput | None, tells("inspection or manual drive (key switch); MODE_OFFLINE.")
+        LiftInput | None, tells("inspection or manual drive (key switch); sets MODE_OFFLINE.")
     ] = None
     overload: Annotated[LiftInput | None, tells("the car is too heavy; delays the ride.")] = None
     agv_mode: Annotated[
-        LiftInput | None, tells("the controller confirms AGV mode; not needed if `service` does.")
+        LiftInput | None,
+        tells("the controller confirms AGV mode; not needed if `service` shows AGV mode."),
     ] = None
     service: Annotated[ServiceCode | None, tells("the lift's service state as a code.")] = None
     door: Annotated[DoorInput | None, tells("the door's only contact.")] = None
@@ -183,11 +190,11 @@ class FloorCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
             return None, "a BCD digit above 9"
         if number in self.codes:
             return self.codes[number], ""
-        return None, "" if number in self.between_floors else f"code {number} is not a floor's"
+        return None, "" if number in self.between_floors else f"code {number} is no floor's code"
 
     def show(self, level: str | None) -> dict[str, bool]:
-        """Return for each signal whether it is asserted at this landing. A `level` of None means
-        between floors. Raises ValueError if the landing has no code."""
+        """Return the signals of the floor code while the car is at `level`. True means asserted. A
+        `level` of None means between floors. Raises ValueError if `level` has no code."""
         for _, shown_level, shown in self.shows():
             if shown_level == level:
                 return shown
@@ -224,14 +231,15 @@ class CallCode(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     codes: Annotated[dict[Number, Name], tells("number -> landing.")]
 
     def lines(self, level: str | None) -> dict[str, bool]:
-        """Return for each signal whether a call to this landing asserts it. A `level` of None means no
-        call."""
+        """Return the signals of the call code for a call to `level`. True means asserted. A `level` of
+        None means no call."""
         number = next((n for n, name in self.codes.items() if name == level), 0)
         return codes.lines("call", number, len(self.bits))
 
 
 class LiftOutputWiring(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The lines to the lift, except calls. Each line is a level whose safe state is off."""
+    """The lines to the lift, except calls. A line stays on as long as its command lasts. The safe state
+    of each line is off."""
 
     agv_mode_request: Annotated[
         Output | None, tells("requests AGV mode while a robot holds the lift.")

@@ -1,8 +1,8 @@
-"""Profiles are files for `profile: NAME`. The file drivers/profiles/NAME.yaml has a make's register map
-or frame map.
+"""A profile is a file with the register map or frame map of one make of device. The key `profile: NAME`
+of a device YAML selects the file drivers/profiles/NAME.yaml.
 
     for: door_register       the driver that reads the profile
-    hardware: untried        `tried` on the hardware, `untried`, or `none`: an example of no make
+    hardware: untried        `tried` or `untried` on the hardware; `none` for an invented example
     source: "..."            where the numbers come from
     map: {...}               the content, under the key that a device YAML uses for it
 
@@ -28,8 +28,8 @@ Content = TypeVar("Content", bound=msgspec.Struct, covariant=True)
 
 
 class Profile(Generic[Content]):
-    """One type of profile. `reader` is the profile's `for:`. `key` is the key of the profile's content,
-    and `content` is the content's struct."""
+    """One type of profile, such as the register maps of doors. `reader` is the driver that `for:`
+    names. `key` is the YAML key of the map, and `content` is the struct of the map."""
 
     def __init__(self, reader: str, key: str, content: type[Content]) -> None:
         self.reader = reader
@@ -49,8 +49,8 @@ class Profile(Generic[Content]):
         return found
 
     def chosen(self, name: str | None, inline: Content | None) -> Content:
-        """Return the YAML's content, or the profile's content if the YAML has none. Raises
-        SettingsError."""
+        """Return `inline`, the map that the device's YAML gives. If `inline` is None, return the map of
+        the profile `name`. Raises SettingsError."""
         return inline or self.load(name or "")
 
     def problems(self, name: str | None, inline: object) -> Remarks:

@@ -1,9 +1,9 @@
-"""Stores the texts of profiles and DBC files that this process has read, or that another process gave
-it.
+"""Stores the texts of profiles and DBC files. This process has read each text itself, or has got it
+from another process through `give`.
 
-A daemon records these texts together with its claims. `outputs-off` may run much later, even after an
-upgrade that changed the files. With the recorded texts, `outputs-off` reads the same maps as the
-daemon.
+A daemon records these texts together with the outputs that it claims. `outputs-off` may run much later,
+even after an upgrade that changed the files. With the recorded texts, `outputs-off` reads the same maps
+as the daemon.
 
 A file of drivers/profiles/ is stored under its name. Any other file is stored under its path.
 """

@@ -1,6 +1,6 @@
 """Xnergy's receiver as a CANopen node: `canopen.LocalNode`, with a plant behind its objects.
 
-These parts can fail, in addition to the parts of plant and bus:
+These parts of the receiver can fail. The parts of the plant and of the bus can fail as well.
 
 |           | off    | stuck          | slow         | garbage            | wrong                  |
 | node      | silent | answers no SDO | answers late | answers five bytes | answers another object |
@@ -30,7 +30,7 @@ NAMES: Final = {(found.index, found.subindex): name for name, found in OBJECTS.i
 
 
 class CanOpenRcu:
-    """A station (`hal_fakes.can.side.CanStation`)."""
+    """Xnergy's receiver as a station of a simulated CAN bus (`hal_fakes.can.side.CanStation`)."""
 
     def __init__(self, plant: Plant, node: int) -> None:
         self.plant = plant
@@ -46,7 +46,7 @@ class CanOpenRcu:
         self._send: Send | None = None
 
     def hear(self, message: can.Message, now: float, send: Send) -> None:
-        """Take a request, if the request is for this node."""
+        """Answer a request, if the request is for this node."""
         if self.plant.failures.get("node") in ("off", "stuck") or message.is_extended_id:
             return
         self._send = send
@@ -70,7 +70,8 @@ class CanOpenRcu:
         send(frame(0x700 + self._id, beat))
 
     def reply(self, can_id: int, answer: bytes) -> None:
-        """Send the library's answer. If the plant has an ordered failure, spoil the answer first."""
+        """Send the answer that the canopen library has made. If the node fails as `garbage` or `wrong`,
+        spoil the answer first. If it fails as `slow`, send the answer late."""
         mode = self.plant.failures.get("node")
         if mode == "garbage":
             answer = answer[:5]

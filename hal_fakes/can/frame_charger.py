@@ -1,13 +1,15 @@
-"""A charger with its maker's own CAN frames. A plant stands behind the driver's map.
+"""A simulated charger that sends and expects its maker's own CAN frames. It uses the frame map of the
+driver, and has a plant behind it.
 
 The charger charges while every frame of its map comes on time with the values of `on`. It stops when a
-frame has the values of `off`, or is missing for three periods. A busy machine delays this fake as well
-as the daemon. So a long gap between two checks of the frames counts as one short gap. If the map has
-wake frames, the charger sleeps until a wake frame comes, and sleeps again after it was off.
+frame has the values of `off`, or is missing for three periods. A busy machine may delay this fake as
+well as the daemon. Therefore a long time between two checks of the frames counts only as STATUS_S. If
+the map has wake frames, the charger sleeps until a wake frame comes, and sleeps again after it was off.
 
-The part `node` can fail in addition to the parts of plant and bus. In the mode `off` it is silent.
-`stuck` repeats the last status. `slow` sends a status every two seconds. `garbage` sends frames of six
-bytes. `wrong` sends a state that the map does not list.
+The part `node` can fail, and the parts of the plant and of the bus can fail as well. In the mode `off`
+the charger is silent. In the mode `stuck` it repeats the last status. In the mode `slow` it sends a
+status every two seconds. In the mode `garbage` it sends frames of six bytes. In the mode `wrong` it
+sends a state that the map does not list.
 """
 
 import time
@@ -45,7 +47,7 @@ ROBOTS_FAULTS: Final = frozenset(FLAGS) - {"transmitter_fault", "foreign_object"
 
 
 class FrameCharger:
-    """A station (`hal_fakes.can.side.CanStation`)."""
+    """A charger as a station of a simulated CAN bus (`hal_fakes.can.side.CanStation`)."""
 
     def __init__(self, plant: Plant, settings: FrameChargerSettings) -> None:
         self.plant = plant
@@ -64,7 +66,8 @@ class FrameCharger:
         self._status: list[can.Message] = []
 
     def hear(self, message: can.Message, now: float, send: Send) -> None:
-        """Take a frame that lets the charge go on, or that ends the charge."""
+        """Take a frame of the daemon. The frame may wake the charger, keep the charge going, or end the
+        charge."""
         self._look(now)
         extended = dbc.EXTENDED if message.is_extended_id else 0
         heard = message.arbitration_id | extended
@@ -82,7 +85,7 @@ class FrameCharger:
         self.plant.drive("power", self._fed(), now)
 
     def tick(self, now: float, send: Send) -> None:
-        """Stop the charge if its frames are missing. Send the status."""
+        """Stop the charge if the daemon's frames are missing. Send the status if it is due."""
         self._look(now)
         mode = self.plant.failures.get("node")
         self.plant.drive("power", self._fed() and mode != "off", now)
@@ -98,7 +101,8 @@ class FrameCharger:
             send(_short(message) if mode == "garbage" else message)
 
     def _look(self, now: float) -> None:
-        """Add up the time during which this fake has watched the bus."""
+        """Count the time for which this fake has watched the bus. The time since the last check counts,
+        but at most STATUS_S of it."""
         self._watched_s += min(now - self._looked_at, STATUS_S)
         self._looked_at = now
 
@@ -160,8 +164,8 @@ class FrameCharger:
     def _by_rules(
         self, reading: Reading, natural: Mapping[str, float], wrong: bool
     ) -> dict[str, float]:
-        """Return values for the signals of rules, error numbers and error bits. Leave out the error
-        flags."""
+        """Return a value for each signal that a rule, an error number or an error bit reads. Leave out
+        the signals of the error flags."""
         known = self._map
         flags = (*known.errors.station, *known.errors.robot)
         numbers = StationErrors(codes=known.errors.codes, bits=known.errors.bits)

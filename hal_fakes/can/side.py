@@ -1,4 +1,4 @@
-"""The far side of a CAN bus: a medium with stations, in a thread of their own.
+"""The far side of a CAN bus: a medium (the wire) with stations. They run in a thread of their own.
 
 Within one process the medium is python-can's `virtual` bus. Across processes the medium is an slcan
 adapter on a pseudo-terminal (`hal_fakes/can/slcan_port.py`). Each plant on the medium has a part `bus`,
@@ -7,8 +7,9 @@ which fails in the ways of a bus:
 - `off`: the adapter is unplugged; a virtual bus is silent
 - `stuck`: nothing passes in either direction
 - `slow`: every frame from the far side comes too late
-- `garbage`: noise comes: an adapter sends bytes that are not slcan, a virtual bus sends random frames
-- `wrong`: the controller reports bus-off; an adapter cannot report, so it passes only foreign frames
+- `garbage`: an adapter sends bytes that are not slcan; a virtual bus sends random frames
+- `wrong`: the controller reports bus-off; an adapter cannot report bus-off, so an adapter passes only
+  frames of other stations
 """
 
 import heapq
@@ -25,7 +26,8 @@ from drivers.hal.can import CanSettings
 from hal_fakes.plants.plant import FailureMode, Plant
 
 LOOK_S: Final = 0.02
-"""The maximum delay (s) of an ordered failure, a heartbeat or a status frame."""
+"""The longest time (s) between two checks of the far side. Ordered failures, heartbeats and status
+frames may be late by this time."""
 BUS_OFF: Final = 0x40
 SLOWNESS: Final = 1.5
 """The delay of a slow answer, as a multiple of the client's timeout."""
@@ -37,7 +39,8 @@ def slow_s(settings: CanSettings) -> float:
 
 
 class Medium(Protocol):
-    """The wire. `replace` holds the replacements for the bus's settings."""
+    """The wire of the simulated bus. `replace` has the settings with which the real bus finds this
+    wire."""
 
     replace: dict[str, object]
 
@@ -48,7 +51,7 @@ class Medium(Protocol):
         """Send a frame to the daemon. The frame is lost if no program has the bus open."""
 
     def fail(self, mode: FailureMode | None) -> None:
-        """Fail in this way from now on. None ends the failure. The far side calls `fail` often."""
+        """Fail in this mode from now on. None ends the failure. The far side calls `fail` often."""
 
     def close(self) -> None:
         """End the medium. The caller may call `close` twice."""
@@ -122,7 +125,8 @@ def any_frame(noise: random.Random) -> can.Message:
 
 
 class CanFarSide:
-    """A running far side. `replace` holds the replacements for the bus's settings.
+    """The running far side of a CAN bus. `replace` has the settings with which the real bus finds the
+    far side.
 
     `slow_s` is the delay (s) of a late frame, and of every frame on a slow bus.
     """

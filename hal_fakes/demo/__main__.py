@@ -1,7 +1,8 @@
 """Runs a demo: `python -m hal_fakes.demo [ride|charging|page]`.
 
-The exit code is 0 after a correct day. After an error the exit code is 1, and the demo prints the
-reason. After Ctrl-C the exit code is 130. The demo never leaves a process running.
+A demo plays one day of robots and devices. The exit code is 0 after a day without errors. After an
+error the exit code is 1, and the demo prints the reason. After Ctrl-C the exit code is 130. The demo
+never leaves a process running.
 """
 
 import argparse
@@ -24,7 +25,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         action="append",
         default=[],
         metavar=("DEVICE", "PART", "MODE"),
-        help="let a part fail first: off, stuck, slow, garbage or wrong; the demo then exits 1",
+        help="let a part fail before the demo begins (off, stuck, slow, garbage or wrong); the demo"
+        " then exits with 1",
     )
     parser.add_argument(
         "--patience",

@@ -37,8 +37,8 @@ FAULTS: Final = (
     (PAD_A, "fail", "server", "off", "ok"),
     (LIFT2, "fail", "unit", "off", "ok"),
 )
-"""The faults in their order. Each has a device, an order, a part or signal, a mode, and the mode that
-ends the fault."""
+"""The faults, in the order in which they happen. Each fault has a device, `fail` or `press`, and a part
+or signal. It also has the mode that begins the fault, and the mode that ends the fault."""
 FAULT_EVERY_S, FAULT_LASTS_S = 60.0, 15.0
 DRIVES_S: Final = 3.0
 CHARGES_S: Final = 20.0
@@ -79,8 +79,8 @@ class Rider:
 def errands(
     robot: RobotContext, lift: str, door: str, floors: tuple[str, str], levels: dict[str, str]
 ) -> Iterator[Step]:
-    """Yield the robot's steps endlessly: through a door, up or down in a lift, a rest. `levels` holds
-    each robot's level."""
+    """Yield the robot's steps endlessly. The robot goes through a door, rides up or down in a lift, and
+    rests. `levels` holds each robot's level."""
     there = cycle((floors, floors[::-1]))
     for start, goal in there:
         yield DoorOpen(door)
@@ -98,7 +98,8 @@ def errands(
 
 
 def charges(world: World, robot: str, charger: str) -> Iterator[Step]:
-    """Yield the robot's steps endlessly: onto the pad, a charge for some time, off the pad."""
+    """Yield the robot's steps endlessly. The robot drives onto the pad, charges for some time, and
+    leaves the pad."""
     numbers = count(1)
     request_at = [0.0]
 
@@ -124,7 +125,7 @@ def charges(world: World, robot: str, charger: str) -> Iterator[Step]:
 
 
 def live(world: World) -> None:
-    """Play the day endlessly."""
+    """Let the robots ride and charge endlessly. Let a fault begin and end every minute."""
     rides = (
         ("R1", LIFT1, WARD, ("L1", "L3")),
         ("R2", LIFT1, SIDE, ("L2", "L4")),

@@ -34,7 +34,7 @@ HERE = Path(__file__).parent
 COORDINATOR = HERE / "charging_coordinator.yaml"
 
 
-# --- the day -----------------------------------------------------------------------------------
+# --- the day: the scenarios in order -----------------------------------------------------------
 
 
 def dawns(world: World) -> bool:
@@ -46,7 +46,7 @@ def live(world: World) -> None:
     """Play all scenarios in order."""
     fleets = DemoFleets(world, load(COORDINATOR).section)
     world.join(fleets)
-    with world.leg("1 scheduled", f"all day {ONE} is to be charged to 96 %"):
+    with world.leg("1 scheduled", f"the schedule charges {ONE} to 96 % all day"):
         _scheduled(world, fleets)
     with world.leg(
         "2 ad-hoc",
@@ -202,7 +202,7 @@ def _robot_faulty(world: World, fleets: DemoFleets) -> None:
     _free(world)
 
 
-# --- the verdict, from the journal alone ---------------------------------------------------------
+# --- the check of the day, from the journal alone ------------------------------------------------
 
 CHARGED: Final = {A: [ONE, TWO, ONE, ONE, ONE, ONE], B: [PORTER, TWO, ONE]}
 """The only charges that are allowed. Each charger has its robots in the order of their charges."""
@@ -223,7 +223,7 @@ def _charged(states: list[d.ChargerState]) -> Iterable[str]:
 
 
 def _shared(states: list[d.ChargerState]) -> Iterable[str]:
-    """Yield an error for each robot that is on two chargers at once, according to the chargers'
+    """Yield an error if a robot is charged at two chargers at once, according to the chargers'
     states."""
     latest: dict[str, d.ChargerState] = {}
     for state in states:
@@ -235,7 +235,7 @@ def _shared(states: list[d.ChargerState]) -> Iterable[str]:
 
 
 def _unverified(states: list[d.ChargerState]) -> Iterable[str]:
-    """Yield an error for each charge that the coordinator did not request."""
+    """Yield an error for the first charge that the coordinator did not request."""
     for state in states:
         if _charging(state) and not state.request_id.startswith("charger_coordinator/"):
             yield f"{state.charger_name} charged for {state.request_id or 'no request'}"
@@ -248,17 +248,17 @@ def _charging(state: d.ChargerState) -> bool:
 
 DEMO: Final = Demo(
     files={A: HERE / "charging_a.yaml", B: HERE / "charging_b.yaml", "coordinator": COORDINATOR},
-    dawn=f"{A} and {B} idle, and a place for each robot",
+    dawn=f"{A} and {B} idle, and each robot has an assigned place",
     dawns=dawns,
     live=live,
     problems=problems,
     right="each scenario went as planned; never two robots at one charger.",
     outcomes={
-        "1 scheduled": f"{ONE} came home at 92 %, was called by the schedule and charged",
+        "1 scheduled": f"{ONE} came home at 92 %, and the schedule sent it to a charger",
         "2 ad-hoc": f"{TWO}'s fleet and an operator (for {PORTER}) requested a charge: both charged",
-        "3 stacked": f"{TWO} waited, a person was told who blocks {B}, and {TWO} was next there",
+        "3 stacked": f"{TWO} waited, a person was told who blocks {B}, and {TWO} was next at {B}",
         "4 wrong station": f"{B} gave {ONE} no power; {ONE} was sent to {A} and charged there",
-        "5a station faulty": f"{ONE} was charged twice at the other charger: it is not suspected",
-        "5b robot faulty": f"{TWO} was tried at two chargers only; {ONE} was charged meanwhile",
+        "5a station faulty": f"{ONE} was charged at the other charger each time, and counts as good",
+        "5b robot faulty": f"{TWO} failed at two chargers, and no third try came; {ONE} was charged",
     },
 )

@@ -1,5 +1,5 @@
-"""The demo's daemons, as real processes. Their control sockets lead to the plants behind the
-daemons."""
+"""The demo's daemons, as real processes. The demo acts on the plants behind a daemon through the
+daemon's control socket."""
 
 import os
 import signal

@@ -1,7 +1,8 @@
-"""Runs a demo: starts the daemons, plays the day, gives the verdict, and leaves no process running.
+"""Runs a demo: starts the daemons, plays the day of the demo, checks this day, and leaves no process
+running.
 
-The exit code is 0 after a correct day. After an error the exit code is 1, and the demo prints the
-reason. After Ctrl-C the exit code is 130.
+The exit code is 0 after a day without errors. After an error the exit code is 1, and the demo prints
+the reason. After Ctrl-C the exit code is 130.
 """
 
 import shutil
@@ -38,18 +39,19 @@ class Interrupted(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Demo:
-    """One demo.
+    """One demo, which plays one day of robots and devices.
 
     - `files` holds each daemon's YAML, by the device's name.
-    - `dawn` describes in words the state of everything in the morning. `dawns` checks this state.
-    - `live` plays the day itself. It raises DemoFailed when an awaited event is late.
-    - `problems` returns the errors of the day, from the journal alone.
-    - `right` is a sentence that sums up a correct day.
-    - `outcomes` returns the results of the parts of the day, if the summary lists them.
+    - `dawn` describes in words the state of all devices before the day begins. `dawns` checks this
+      state.
+    - `live` plays the day. It raises DemoFailed when an awaited event is late.
+    - `problems` returns the errors of the day. It reads only the journal of events.
+    - `right` is a sentence that sums up a day without errors.
+    - `outcomes` has the result of each part of the day, if the summary lists the parts.
     - `page_password` is the password of the page's user `demo`. Without a password the demo serves no
       page.
-    - `publishes` are the topics that RMF's side publishes. If real supervisors run, their topics are
-      left out.
+    - `publishes` are the topics that RMF's side publishes. If real supervisors run, it leaves out the
+      topics of these supervisors.
     """
 
     files: dict[str, Path]
@@ -64,7 +66,8 @@ class Demo:
 
 
 class DemoRun:
-    """One run of a demo. `failures` are set before the day begins.
+    """One run of a demo. The demo sets `failures` after all devices are ready, and before the first
+    step of the day.
 
     `patience` is a factor on the time limit of every step.
     """

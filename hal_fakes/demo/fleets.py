@@ -22,13 +22,15 @@ WARD: Final = "ward"
 DRIVE_S: Final = 1.0
 FILLS_PER_S: Final = 15.0
 CONFIGURED: Final = {"tiny": Path(__file__).parents[2] / "config" / "fleet_tiny.yaml"}
-"""Fleet -> its adapter's configuration. A fleet that is missing here has only FINISHING."""
+"""The configuration file of each fleet's adapter. A fleet without a file here has only its finishing
+request in FINISHING."""
 FINISHING: Final[dict[str, Finishing]] = {"porter": "nothing"}
 
 
 class DemoFleets(Party):
-    """Both fleets as one party on RMF's side, with the coordinator's diagnostics. `queue` is the
-    coordinator's queue. `shown` has all keys and values of the diagnostics."""
+    """Both fleets, as one participant on RMF's side. The participant also hears the coordinator's
+    diagnostics. `queue` is the coordinator's queue. `shown` has all keys and values of the
+    diagnostics."""
 
     subscribes: Sequence[AnyTopic] = (CHARGING_ASSIGNMENTS, DIAGNOSTICS)
 
@@ -46,7 +48,7 @@ class DemoFleets(Party):
         self._on_pad: dict[str, str] = {}
         self._filled_at = world.wall()
 
-    # ---- a party on RMF's side
+    # ---- methods that the world calls
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
         """Take charging assignments and the coordinator's diagnostics."""
@@ -67,7 +69,7 @@ class DemoFleets(Party):
         """Return 0, because the fleets are always due."""
         return 0.0
 
-    # ---- calls of the day
+    # ---- methods that the scenarios call
 
     def robot(self, who: str) -> FleetRobot:
         """Return this robot as its fleet adapter knows it."""
@@ -96,7 +98,7 @@ class DemoFleets(Party):
         self.world.note(f"drives to {place} by mistake", who)
         self.fleets[self._who[who].fleet].strays(who, place, self.world.wall())
 
-    # ---- inside
+    # ---- private methods
 
     def _diagnosed(self, message: d.DiagnosticArray) -> None:
         """Record the coordinator's queue when it changes."""
@@ -116,7 +118,8 @@ class DemoFleets(Party):
                 robot.battery_percent = min(100.0, percent)
 
     def _stands(self, who: RobotName) -> None:
-        """Put a robot onto the pad of its charger, and take a robot that has left off its pad."""
+        """Put a robot onto the pad of its charger. If the robot has left its pad, take it off this
+        pad."""
         before = self._on_pad.get(who.name)
         charger = self._stations.get((who.fleet, self.robot(who.name).place))
         if charger == before:

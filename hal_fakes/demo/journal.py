@@ -84,7 +84,7 @@ class Journal:
         self._once(JournalLine(at, "state", words.device(message), words.described(message)))
 
     def note(self, what: What, text: str, at: float, device: str = "") -> None:
-        """Record a robot's action or destination, a person's alert, or a step of the demo."""
+        """Record a robot's action or destination, an alert to a person, or a step of the demo."""
         self._add(JournalLine(at, what, device, text))
 
     def forget(self) -> None:

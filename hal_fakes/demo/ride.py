@@ -1,5 +1,5 @@
 """`make demo`: a robot's day. A fleet adapter drives the robot through a door, up in a lift and to a
-charger. The verdict uses the journal alone."""
+charger. The check of the day reads only the journal of events."""
 
 from collections.abc import Iterable
 from itertools import groupby
@@ -107,7 +107,7 @@ def _at_rest(world: World) -> bool:
     return world.door_is(DOOR, d.DoorModeValue.MODE_CLOSED) and not world.journal.relays_on()
 
 
-# --- the verdict, from the journal alone ---------------------------------------------------------
+# --- the check of the day, from the journal alone ------------------------------------------------
 
 RELAYS = {
     DOOR: [("hold_open", True), ("hold_open", False)],
@@ -184,7 +184,7 @@ def _charger(journal: Journal) -> Iterable[str]:
 
 
 def _in_order(values: Iterable[str]) -> list[str]:
-    """Return the items in their order, without repetitions."""
+    """Return the items in their order. Leave out an item that only repeats the item before it."""
     return [value for value, _ in groupby(values)]
 
 

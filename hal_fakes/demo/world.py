@@ -43,7 +43,9 @@ LOOK_EVERY_S: Final = 0.05
 
 
 class World:
-    """One inbox for messages and edges. The day waits in `until`, and RMF's side works during the wait.
+    """RMF's side of a demo, with one inbox for messages and edges. The demo's day waits in `until`.
+    During the wait this class takes messages from the inbox, and lets the supervisors and fleets
+    act.
 
     `places` holds the assigned place of each robot, where the robot charges or waits. `alerts` are
     texts for a person. `page` is the line with the page's address, if there is a page.
@@ -59,9 +61,13 @@ class World:
         *,
         publishes: Iterable[AnyTopic] = PUBLISHED,
     ) -> None:
-        """Join the graph. `until` calls `check` all the time, and `check` raises when the demo must
-        end. `patience` is a factor on the time limits of `until`. `publishes` are the topics that
-        this side publishes. A supervisor waits if it hears another publisher on its topics."""
+        """Join the graph.
+
+        `until` calls `check` again and again, and `check` raises an error when the demo must end.
+        `patience` is a factor on the time limits of `until`. `publishes` are the topics that this side
+        publishes. It must leave out the topics of real supervisors, because a supervisor stays passive
+        while it hears another publisher on its topics.
+        """
         self.daemons = daemons
         self.journal = journal
         self.places: dict[str, str] = {}
@@ -77,7 +83,7 @@ class World:
         }
         self._heard: set[str] = set()
         self._hear(*STATES, topics.CHARGING_ASSIGNMENTS, topics.ALERT)
-        for topic in TO_DAEMONS:  # messages of this side are recorded when they are sent
+        for topic in TO_DAEMONS:  # only other nodes: `say` records this side's own messages
             transport.subscribe(topic, self._to_inbox(topic), others_only=True)
 
     def edge(self, edge: Edge) -> None:
@@ -85,11 +91,11 @@ class World:
         self._inbox.put(lambda: self.journal.edge(edge))
 
     def join(self, *parties: Party) -> None:
-        """Add a party on RMF's side."""
+        """Add participants to RMF's side, such as a supervisor or a fleet."""
         self._parties += parties
         self._hear(*(topic for party in parties for topic in party.subscribes))
 
-    # ---- questions of the day
+    # ---- questions of the demo
 
     def wall(self) -> float:
         """Return the time of RMF's clock (s since the epoch)."""
@@ -116,10 +122,10 @@ class World:
         )
 
     def alerted(self, code: str) -> bool:
-        """Has RMF alerted a person with this text?"""
+        """Has RMF sent a person an alert with this code?"""
         return any(alert.subtitle == code for alert in self.alerts)
 
-    # ---- actions of the day
+    # ---- actions of the demo
 
     def say(self, said: Iterable[Said]) -> None:
         """Publish these messages. Record messages to a daemon in the journal."""
@@ -143,7 +149,8 @@ class World:
 
     @contextmanager
     def leg(self, name: str, text: str = "") -> Iterator[None]:
-        """Time a part of the day. If `text` is given, announce the part with this text."""
+        """Measure the time that a part of the day takes. If `text` is given, announce the part with
+        this text."""
         began_at = time.monotonic()
         if text:
             self.note(f"-- {name}: {text}")
@@ -156,7 +163,8 @@ class World:
     def until(
         self, ready: Callable[[], bool], within_s: float, what: str, repeat: Said | None = None
     ) -> None:
-        """Run until `ready()`. Publish the messages of `repeat` now, and then every second.
+        """Wait until `ready()` is true. If `repeat` is given, publish its message now, and then every
+        second.
 
         Raises DemoFailed with the text `what` after `within_s` times the patience.
         """
@@ -182,7 +190,7 @@ class World:
         while (left_s := over_at - time.monotonic()) > 0:
             self._turn(min(LOOK_EVERY_S, left_s))
 
-    # ---- inside
+    # ---- private methods
 
     def _turn(self, timeout_s: float) -> None:
         self._check()

@@ -33,7 +33,7 @@ from hal_fakes.modbus.units import FakeUnits, FarSide
 
 _aiohttp = sys.modules.get("aiohttp")
 sys.modules["aiohttp"] = None  # type: ignore[assignment]  # as if it were not installed
-try:  # without this, pymodbus imports aiohttp, which takes half of a start's time
+try:  # without this, pymodbus imports aiohttp, which takes half of the time of a start
     from pymodbus.server import ModbusTcpServer
 finally:
     del sys.modules["aiohttp"]
@@ -49,7 +49,7 @@ READY_S: Final = 10.0
 
 
 def serve(settings: ModbusSettings, stations: Sequence[FarSide]) -> "ModbusServer | RtuLine":
-    """Serve the devices of this bus on a free port of 127.0.0.1, or on a line of their own."""
+    """Serve the devices of this bus on a free port of 127.0.0.1, or on a simulated serial line."""
     dog = settings.module_watchdog
     devices = [*map(ModuleWatchdog, dog.units if dog else ()), *stations]
     if settings.serial:
@@ -58,14 +58,14 @@ def serve(settings: ModbusSettings, stations: Sequence[FarSide]) -> "ModbusServe
     return ModbusServer(devices, slow_s=1.5 * settings.timeout_s)
 
 
-logging.getLogger("pymodbus").setLevel(logging.WARNING)  # a daemon may log from this process too
+logging.getLogger("pymodbus").setLevel(logging.WARNING)  # keep pymodbus out of a daemon's log
 
 
 class ModbusServer:
     """A running server, whose asyncio loop has a thread of its own.
 
-    `replace` holds the replacements for the bus's settings. `devices` are the units. Another server may
-    serve the same units.
+    `replace` has the settings with which the real bus finds the server. `devices` are the units.
+    Another server may serve the same units.
     """
 
     def __init__(self, devices: Iterable[FarSide] | FakeUnits, slow_s: float) -> None:
@@ -115,7 +115,8 @@ class ModbusServer:
         await asyncio.sleep(0)  # the connections close in the next round of the loop
 
     async def _look(self) -> None:
-        """Stop or start the server as ordered. Let watchdogs trip."""
+        """Stop the server when its failure `off` begins, and start it when the failure ends. Let
+        watchdogs trip."""
         while True:
             self.units.tick()
             off = self.units.failure("server") == "off"

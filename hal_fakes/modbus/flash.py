@@ -1,5 +1,5 @@
-"""The far side of a pulse that the module times. pymodbus's own server would take any coil value as
-1."""
+"""The simulated module's side of a pulse whose length the module measures itself. pymodbus's own server
+cannot make such pulses, because it takes any coil value as 1."""
 
 import struct
 from typing import Final
@@ -14,8 +14,8 @@ COIL_VALUES: Final = (0xFF00, 0)
 
 
 class TimedCoilRequest(WriteSingleCoilRequest):
-    """Function 5 that keeps the sent value. A value other than on or off makes `FakeUnits` give a
-    pulse."""
+    """A request of function 5 (write a coil) that keeps the sent value. A value other than on or off
+    makes `FakeUnits` give a pulse."""
 
     def decode(self, data: bytes) -> None:
         """Decode the request, and keep its value."""

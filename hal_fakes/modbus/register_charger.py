@@ -13,7 +13,7 @@ from hal_fakes.plants.plant import Plant
 
 
 class FakeRegisterCharger:
-    """The cells of one station (`hal_fakes.modbus.units`)."""
+    """The cells of one station, which are its registers and coils (`hal_fakes.modbus.units`)."""
 
     def __init__(self, plant: Plant, settings: RegisterChargerSettings) -> None:
         self.plant = plant

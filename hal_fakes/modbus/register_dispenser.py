@@ -21,7 +21,8 @@ def contacts(settings: RegisterWorkcellSettings) -> list[Wire]:
 
 
 class FakeRegisterWorkcell:
-    """The cells of one PLC, at `unit`. `points` are all cells, including `outputs`."""
+    """The cells of one PLC, which are its registers and coils. `unit` is the PLC's Modbus unit.
+    `points` are all cells, including `outputs`."""
 
     def __init__(self, plant: Plant, settings: RegisterWorkcellSettings) -> None:
         self.plant = plant

@@ -26,7 +26,8 @@ def contacts(settings: RegisterDoorSettings) -> list[Wire]:
 
 
 class FakeRegisterDoor:
-    """The cells of one operator, at `unit`. `points` are all cells, including `outputs`."""
+    """The cells of one operator, which are its registers and coils. `unit` is the operator's Modbus
+    unit. `points` are all cells, including `outputs`."""
 
     def __init__(self, plant: Plant, settings: RegisterDoorSettings) -> None:
         self.plant = plant

@@ -1,5 +1,5 @@
-"""A lift's gateway. The numbers of its register map show the plant's contacts, and its commands act as
-relays.
+"""A lift's gateway. The numbers of its register map show the plant's contacts. Each of its commands
+switches a relay of the plant.
 
 Behind the gateway is a lift on contacts. It has one contact for each floor, two for a door, and one for
 each hazard. These contacts can be cut in the same way as the daemon's wires.
@@ -73,10 +73,11 @@ def contacts(settings: RegisterLiftSettings) -> dry_contact.DryContactLiftSettin
 
 
 class FakeRegisterLift:
-    """The cells of one gateway, at `unit`. `points` are all cells, including `outputs`.
+    """The cells of one gateway, which are its registers and coils. `unit` is the gateway's Modbus unit.
+    `points` are all cells, including `outputs`.
 
-    `clears_s` is the time (s) after which the gateway clears the place of a call that it has taken.
-    None means never.
+    `clears_s` is the time (s) after which the gateway clears the register or coil of a call that it has
+    accepted. None means never.
     """
 
     def __init__(
@@ -100,7 +101,7 @@ class FakeRegisterLift:
     def get(self, point: Point, now: float) -> int:
         """Return this point's value at `now` (monotonic s)."""
         self.plant.advance(now)
-        if now >= self._clear_at.get(point, math.inf):  # the lift keeps the call until its release
+        if now >= self._clear_at.get(point, math.inf):  # the register clears; the lift's call stays
             bits = self._calling[point]
             self._written[point] = self._written[point] & ~bits | self._none[point] & bits
         value = self._written.get(point, 0)
@@ -110,7 +111,8 @@ class FakeRegisterLift:
         return value
 
     def set(self, point: Point, value: int, now: float) -> bool:
-        """Write a value. Return False if the point cannot be written. Relays that go off come first."""
+        """Write a value. Return False if the point cannot be written. First switch the relays that go
+        off."""
         if point not in self._written:
             return False
         self._written[point] = value

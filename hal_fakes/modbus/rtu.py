@@ -3,15 +3,15 @@
 An absent unit is silent. A pseudo-terminal has no baud rate, so this file delays each byte by its time
 on the wire. A request ends with 3.5 characters of silence. Then the reply begins. If the settings have
 `ignore_echo`, the adapter echoes. `port` is a link that stays the same when the adapter is unplugged
-and plugged in, as in /dev/serial/by-id. The order `fail DEVICE unit|server MODE` lets one unit, or the
-server (the line with all units), fail:
+and plugged in, as in /dev/serial/by-id. The order `fail DEVICE unit|server MODE` lets one unit fail
+(`unit`), or the line with all units (`server`):
 
-- `off`: the unit is silent; the server's adapter is unplugged
+- `off`: the unit is silent; the line's adapter is unplugged
 - `stuck`: the unit's inputs stay unchanged; the line is cut, and silent
 - `slow`: the reply comes after the client has stopped waiting
 - `garbage`: the reply has a wrong CRC, or is half a frame
-- `wrong`: the reply has every bit set, comes in the name of another unit or of another function, or is
-  exception 4; on a line, our own request may come back before the reply, as from an adapter that echoes
+- `wrong`: the reply has every bit set, names another unit or another function, or is exception 4; if
+  the line fails, our own request may also come back before the reply, as from an adapter that echoes
   unannounced
 """
 
@@ -42,7 +42,7 @@ from hal_fakes.modbus.units import FakeUnits, FarSide
 from hal_fakes.plants.plant import FailureMode
 
 LOOK_S: Final = 0.02
-"""The maximum delay (s) before an adapter is unplugged."""
+"""The longest time (s) from the order `off` until the adapter is unplugged."""
 READY_S: Final = 10.0
 
 
@@ -74,7 +74,8 @@ class SerialAdapter:
 
 
 class RtuLine:
-    """A running line with a thread of its own. `replace` holds the replacements for the bus's settings.
+    """A running line with a thread of its own. `replace` has the settings with which the real bus finds
+    the line.
 
     `slow_s` is the delay (s) of a slow reply. `requests` holds every frame that the line has received.
     """
@@ -130,7 +131,8 @@ class RtuLine:
                 self._hear(frame)
 
     def _look(self) -> None:
-        """Unplug or plug the adapter as ordered. Let watchdogs trip."""
+        """Unplug the adapter when the server's failure `off` begins, and plug it in when the failure
+        ends. Let watchdogs trip."""
         self.units.tick()
         pulled = self.units.failure("server") == "off"
         if pulled != (self.adapter.wire is None):
@@ -138,7 +140,8 @@ class RtuLine:
             (self.adapter.pull if pulled else self.adapter.plug)()
 
     def _listen(self) -> None:
-        """Read until an event is due. Each character takes its time on the wire."""
+        """Read the bytes that arrive before the next event is due. Each character takes its time on the
+        wire."""
         wire = self.adapter.wire
         readable = select.select([wire] if wire is not None else [], [], [], self._idle_s())[0]
         sent = b""

@@ -100,13 +100,13 @@ class FakeUnits:
                 self._plants[unit].append(device.plant)
 
     def tick(self) -> None:
-        """Let due watchdogs trip, and end due pulses. The server calls this often."""
+        """Let watchdogs trip, and end pulses, when their time has come. The server calls this often."""
         now = time.monotonic()
         for coil in [coil for coil, at in self._off_at.items() if at <= now]:
             self._set(coil, False)
         for coil in [coil for coil, at in self._clear_at.items() if at <= now]:
             del self._clear_at[coil]
-            self._coils[coil] = False  # only the coil ends; the lift's controller keeps the call
+            self._coils[coil] = False  # only the coil goes off; the lift's call stays
         for dead_man in self._dead_men:
             if dead_man.trips(now):
                 for point, (wiring, name) in self._at.items():

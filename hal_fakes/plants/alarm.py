@@ -1,8 +1,10 @@
-"""An alarm panel. Its contacts change only when a person or the building presses them.
+"""A simulated alarm panel. Its contacts change only through the order `press`, which stands for a
+person or the building.
 
-The signals to press are each source (`fire_panel on`) and `drill`. A contact's loop can fail as every
-wire can (`contact.py`): cut (`fail fire_panel off`), jammed (`stuck`) or chattering (`garbage`). At a
-Modbus module `unit` and `server` can fail too. With `off` the panel goes silent.
+The signals to press are each source (`fire_panel on`) and `drill`. The wire of each contact can fail as
+every wire can (`contact.py`): cut (`fail fire_panel off`), jammed (`stuck`) or chattering (`garbage`).
+If the panel is at a Modbus module, the parts `unit` and `server` can fail too. In their mode `off` the
+panel goes silent.
 """
 
 from collections.abc import Iterable
@@ -21,7 +23,7 @@ class PanelPlant(WiredPlant):
         super().__init__(name, wired, parts, [wire.signal for wire in wired])
 
     def contact(self, signal: str) -> bool:
-        """Is this contact asserted, before any failure of its wire?"""
+        """Is this contact asserted at the panel? The contact's wire may show another value."""
         return self.pressed[signal]
 
     def run(self) -> None:

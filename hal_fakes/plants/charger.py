@@ -1,10 +1,10 @@
-"""A wireless charger on any wire: its pad, the robot on the pad, battery and heat.
+"""A simulated wireless charger on any bus: its pad, the robot on the pad, battery and heat.
 
-To press:
+The order `press` sets these signals, as a person or the building would:
 
 - `robot`: a robot stands on the pad. If the YAML has `receivers`, press a robot's name (`tiny/AMR02`)
-  instead, or `stranger` for an unknown robot. If several robots stand there, the station sees the
-  last that came.
+  instead, or `stranger` for an unknown robot. If several robots stand there, the station sees the robot
+  that came last.
 - `misparked`: the robot stands off centre.
 - `foreign_object`: an object lies on the pad.
 - `over_temperature`, `transmitter_fault`: errors of the station.
@@ -13,16 +13,18 @@ A robot comes with its battery 40 % full. The pad rises to the robot, and the st
 charges. When the battery is full, the station ramps down and waits. It is idle again until another
 robot comes. Current warms the coil, and a fan cools the coil.
 
-An error stays until its cause is gone and the error is cleared. If no command clears errors, switching
-the power off does. A robot's error (ROBOTS_FAULTS) stays until the robot leaves.
+An error stays until its cause is gone and the error is cleared. If the station has no command that
+clears errors, switching the power off clears an error. A robot's error (ROBOTS_FAULTS) stays until the
+robot leaves.
 
-To drive: `clear_error`. A commanded station also has `power`, which charging needs, and `range_check`,
-whose result comes a moment later. A station without range checks knows the range at once. A station on
-contacts has the relay `enable`. Its contacts are `charging` (current flows), `ready` (current could
-flow), `fault` (an error), and `at_height` and `range_ok` of the pad.
+The daemon drives the signal `clear_error`. A commanded station also has `power`, which must be on for a
+charge. It also has `range_check`, whose result comes a moment later. A station without range checks
+knows the range at once. A station on contacts has the relay `enable`. Its contacts are `charging`
+(current flows), `ready` (current could flow) and `fault` (an error). The pad adds the contacts
+`at_height` and `range_ok`.
 
-These parts can fail, with the effects of `off`, `stuck`, `slow`, `garbage` and `wrong`; `pad` is in
-`pad.py`:
+These parts can fail in the modes `off`, `stuck`, `slow`, `garbage` and `wrong`. `pad.py` describes the
+failures of `pad`.
 
 |          | off              | stuck            | slow         | garbage          | wrong         |
 | receiver | never answers    | in the handshake | 10 x as long | contact is lost  | wrong answer  |
@@ -113,7 +115,7 @@ class Reading:
 
     @property
     def robots(self) -> bool:
-        """Is at least one fault the robot's?"""
+        """Is at least one of the faults a fault of the robot?"""
         return bool(self.faults & ROBOTS_FAULTS)
 
     @property
@@ -123,10 +125,10 @@ class Reading:
 
 
 class ChargerPlant(WiredPlant):
-    """One charger. `battery` is the charge of the robot on the pad, 0 to 1. It is meaningless without a
-    robot.
+    """One charger. `battery` is the charge of the robot on the pad, 0 to 1. Without a robot `battery`
+    has no meaning.
 
-    - `receivers` gives the robot of each receiver's id.
+    - `receivers` maps the id of each receiver to its robot.
     - `commanded` means that the station charges only while `power` is on.
     - `asked` means that only a range check shows whether a robot is in range.
     - `cleared` means that an error stays until a command clears it.
@@ -193,7 +195,7 @@ class ChargerPlant(WiredPlant):
         )
 
     def contact(self, signal: str) -> bool:
-        """Is this contact asserted, before any failure of its wire?"""
+        """Is this contact asserted at the station? The contact's wire may show another value."""
         return {
             "charging": self.activity in CURRENT_FLOWS,
             "fault": self.activity is Activity.ERROR,
@@ -203,7 +205,7 @@ class ChargerPlant(WiredPlant):
         }[signal]
 
     def actuate(self, signal: str, energised: bool) -> None:
-        """Take a change of the enable relay."""
+        """React to a change of the relay `enable`."""
         self.power = energised
 
     def drive(self, signal: str, asserted: bool, now: float) -> None:
@@ -306,8 +308,9 @@ class ChargerPlant(WiredPlant):
             self.note("sensor", "state", str(activity))
 
     def _stop(self) -> None:
-        """End a handshake. If current flows and the robot is there, ramp the current down. The reason
-        is that the robot or the power is gone."""
+        """Stop the present activity, because the robot or the power is gone. End a handshake at once.
+        If the robot has left, the station releases it. If only the power is off, ramp the current
+        down."""
         if self.activity is Activity.HANDSHAKE:
             self._enter(Activity.IDLE)
         elif not self._here:

@@ -1,18 +1,20 @@
-"""A dispenser or ingestor: a conveyor that moves one item in each cycle, behind a small PLC.
+"""A simulated dispenser or ingestor: a conveyor that moves one item in each cycle, behind a small PLC.
 
-The contacts are `ready`, `busy`, `done` and `fault`. `done` is on until the start is off, and for at
-least DONE_S. The relays are `start`, and `select_…` for each sort. If the start must be steady, the
-conveyor stops when the start goes off. The edge `moved` counts the items that really left.
+The contacts are `ready`, `busy`, `done` and `fault`. `done` is on until the relay `start` is off, and
+for at least DONE_S. The relays are `start`, and `select_…` for each sort of item. If `start` must stay
+on during a cycle, the conveyor stops when `start` goes off. The edge `moved` counts the items that
+really left.
 
-To press:
+The order `press` sets these signals:
 
 - `hatch`: somebody has the hatch open. The workcell is not ready, and a running cycle stands still.
-- `restart`: the PLC restarts and forgets its cycle. If the start is on, the PLC takes it for a new
-  start.
+- `restart`: the PLC restarts and forgets its cycle. If the relay `start` is on, the PLC begins a new
+  cycle.
 - `fault`: the PLC reports a fault.
 
-The part `conveyor` can fail. `off` and `stuck` jam in the middle, `slow` takes five times as long,
-`wrong` reports a fault in the middle, and `garbage` ends without `done`.
+The part `conveyor` can fail. In the modes `off` and `stuck` it jams in the middle. In the mode `slow`
+it takes five times as long. In the mode `wrong` the PLC reports a fault in the middle. In the mode
+`garbage` the cycle ends without `done`.
 """
 
 from collections.abc import Iterable
@@ -58,7 +60,7 @@ class WorkcellPlant(WiredPlant):
         self._fault = False
 
     def contact(self, signal: str) -> bool:
-        """Is this contact asserted, before any failure of its wire?"""
+        """Is this contact asserted at the PLC? The contact's wire may show another value."""
         up = self.now >= self._boots_at and not self.pressed["restart"]
         done = self._on_since_done() or self.now < self._done_until
         return up and {
@@ -72,7 +74,7 @@ class WorkcellPlant(WiredPlant):
         return self._on and self._done_until > -NEVER
 
     def actuate(self, signal: str, energised: bool) -> None:
-        """Take a change of the start relay."""
+        """React to a change of the relay `start`."""
         if signal != "start":
             return
         self._on = energised

@@ -1,12 +1,14 @@
-"""A pedestrian door with an operator. The door opens while held or pushed, and closes by itself.
+"""A simulated pedestrian door with an operator. The door opens while it is held or pushed, and closes
+by itself.
 
 The contacts are `opened` and `closed` at its end positions, `obstruction` (light curtain) and `fire`
 (the building's alarm). The relay is `hold_open`. The signals to press are `push` (a person's button or
 hand), `obstruction` and `fire`.
 
-The part `operator` can fail. `off` and `stuck` stand still, `slow` takes five times as long, `wrong`
-inverts each command, and `garbage` stops halfway. At a Modbus module `unit` and `server` can fail as
-well (`hal_fakes/modbus/`).
+The part `operator` can fail. In the modes `off` and `stuck` the door stands still. In the mode `slow`
+it takes five times as long. In the mode `wrong` it does the opposite of each command. In the mode
+`garbage` it stops halfway. At a Modbus module `unit` and `server` can fail as well
+(`hal_fakes/modbus/`).
 """
 
 from collections.abc import Iterable
@@ -63,8 +65,8 @@ class DoorPlant(WiredPlant):
         self._arrives_at = float("inf")
 
     def contact(self, signal: str) -> bool:
-        """Is this contact asserted, before any failure of its wire? A limit contact opens as soon as
-        the door leaves its end position."""
+        """Is this contact asserted at the operator? The contact's wire may show another value. A limit
+        contact opens as soon as the door leaves its end position."""
         direction, _ = self._course
         if signal == "opened":
             return self.position == 1.0 and direction == 0
@@ -73,7 +75,7 @@ class DoorPlant(WiredPlant):
         return self.pressed[signal]
 
     def actuate(self, signal: str, energised: bool) -> None:
-        """Take a change of the hold relay."""
+        """React to a change of the relay `hold_open`."""
         self._held = energised
 
     def run(self) -> None:

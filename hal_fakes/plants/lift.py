@@ -1,9 +1,11 @@
-"""A lift with its controller: car, doors, AGV key logic, people, and the hazards that take it from RMF.
+"""A simulated lift with its controller: car, doors, AGV key logic, people, and the hazards that take
+the lift away from RMF.
 
 - AGV mode begins some time after its request, when people's calls are done, and never under a hazard.
   AGV mode ends when the request ends or a hazard comes.
-- With `agv_mode: by_call` a call requests AGV mode. The call counts until the door at its landing is
-  open and not held (as in open-rmf/mock-lift-io, firmware/Mock-Lift/src/main.cpp).
+- With `agv_mode: by_call` a call requests AGV mode. The request ends when a door has opened for the
+  call, and no relay holds a door or calls a landing (as in open-rmf/mock-lift-io,
+  firmware/Mock-Lift/src/main.cpp).
 - In AGV mode a call brings the car to its landing, and the door opens. The door stays open for its
   dwell time, and as long as its open relay is on. The car leaves only with its doors closed.
 - Fire: the car goes to the lowest landing and stays there with its door open. Emergency and earthquake:
@@ -17,10 +19,12 @@ The signals to press are each wired hazard, `hall_<landing>` (a person's call), 
 
 These parts can fail, with these effects. Wires fail as in `hal_fakes/plants/contact.py`.
 
-- `car`: `off` and `stuck` stand still, `slow` is slow, `wrong` goes a floor too far.
-- `door_operator` and `rear_door_operator`: `off` and `stuck` stand still, `slow` is slow, `wrong`
-  inverts.
-- `controller`: `off` never grants AGV mode, `stuck` leaves AGV mode unchanged, `slow` is slow.
+- `car`: in the modes `off` and `stuck` the car stands still. In `slow` it is slow, and in `wrong` it
+  goes a floor too far.
+- `door_operator` and `rear_door_operator`: in the modes `off` and `stuck` the door stands still. In
+  `slow` it is slow, and in `wrong` it does the opposite of each command.
+- `controller`: in the mode `off` it never grants AGV mode. In `stuck` it leaves AGV mode unchanged, and
+  in `slow` it is slow.
 """
 
 from collections.abc import Sequence
@@ -100,12 +104,12 @@ class LiftPlant(WiredPlant):
     # ---- WiredPlant's methods
 
     def contact(self, signal: str) -> bool:
-        """Is this contact asserted, before any failure of its wire?"""
+        """Is this contact asserted at the controller? The contact's wire may show another value."""
         return self._asserted.get(signal, False)
 
     def actuate(self, signal: str, energised: bool) -> None:
-        """Take a change of the daemon's relay. A call counts only after its relay has been stable for a
-        moment."""
+        """React to a change of the daemon's relay. A call counts only after its relay has been stable
+        for a moment."""
         (self._on.add if energised else self._on.discard)(signal)
         if signal.startswith("call_"):
             self._seen, self._seen_at = self._called(), self.now + CALL_SETTLES_S
@@ -129,7 +133,7 @@ class LiftPlant(WiredPlant):
         self._take_call()
         self.car.run(self.now, self._goal(), self._floor_s())
         self._arrive()
-        self._grant()  # AGV mode may be possible after an arrival, and may bring a call
+        self._grant()  # the arrival may allow AGV mode, and AGV mode may accept a waiting call
         self._arrive()
         for side, door in self.doors.items():
             turned = self.failures.get(f"{PREFIX[side]}door_operator") == "wrong"
@@ -163,7 +167,8 @@ class LiftPlant(WiredPlant):
     def _take_call(self) -> None:
         if self._seen_at <= self.now:
             self._seen_at = NEVER
-            if self._seen is not None:  # a call counts in AGV mode, and requests AGV mode again
+            # AGV mode serves the call, and the call also requests AGV mode.
+            if self._seen is not None:
                 self._call = self._seen
                 self._called_for_agv = True
 
@@ -221,7 +226,7 @@ class LiftPlant(WiredPlant):
             self._call = None if self.agv else self._call
             del self._people[:1]
         sides = self._sides[self._levels[self.car.floor]]
-        if len(sides) == 1 or not self.agv:  # if there are two doors, the open relays decide
+        if len(sides) == 1 or not self.agv:  # otherwise only the daemon's relays open a door
             for side in sides:
                 self.doors[side].dwell_until = self.now + self._pace.dwell_s
 

@@ -17,7 +17,7 @@ EDGES_KEPT = 100_000
 
 
 class WiredPlant(ABC):
-    """Every plant (`hal_fakes.plants.plant.Plant`) without its physics.
+    """The common base of all plants (`hal_fakes.plants.plant.Plant`). A derived class adds the physics.
 
     - `wires` is the driver's wiring table of this device. It is empty if the controller has no
       contacts.
@@ -54,14 +54,14 @@ class WiredPlant(ABC):
         self._driven = dict.fromkeys(self._relays, False)
         self._shown: dict[str, bool] = {}
 
-    # ---- added by a kind's plant
+    # ---- methods that a derived class overrides
 
     @abstractmethod
     def contact(self, signal: str) -> bool:
-        """Is this contact of the controller asserted, before any failure of its wire?"""
+        """Is this contact asserted at the controller? The contact's wire may show another value."""
 
     def actuate(self, signal: str, energised: bool) -> None:  # noqa: B027
-        """Take a change of the daemon's relay at `self.now`. Most plants do nothing here."""
+        """React to a change of the daemon's relay at `self.now`. By default do nothing."""
 
     @abstractmethod
     def run(self) -> None:
@@ -72,12 +72,13 @@ class WiredPlant(ABC):
         """Return the time (s) of the next event, or inf. After `run` at that time the event is over."""
 
     def act(self, signal: str, asserted: bool) -> None:  # noqa: B027
-        """Take a press or release. Most plants only read `pressed`."""
+        """React when a signal is pressed or released. By default do nothing, because a plant may read
+        `pressed`."""
 
     # ---- the Plant protocol
 
     def drive(self, signal: str, asserted: bool, now: float) -> None:
-        """Take a change of the daemon's relay."""
+        """Apply a change of the daemon's relay."""
         self.advance(now)
         if asserted != self._driven[signal]:
             self._driven[signal] = asserted

@@ -28,7 +28,8 @@ WARMS_IN_S: Final = 20.0
 
 
 class LiftingPad:
-    """The pad. `rises_until` is in monotonic seconds, or inf."""
+    """The pad. `rises_until` is the time (monotonic s) when the pad stops rising. It is inf while the
+    pad does not rise."""
 
     def __init__(self) -> None:
         self.rises_until = NEVER

@@ -35,11 +35,11 @@ class Plant(Protocol):
 
     @property
     def failures(self) -> Mapping[str, FailureMode]:
-        """Return the failure mode of each failing part. From this, the far side of a bus reads the
+        """Return the failure mode of each failing part. The far side of a bus looks here for the
         failures of its own parts."""
 
     def drive(self, signal: str, asserted: bool, now: float) -> None:
-        """Take a change of the daemon's relay."""
+        """Apply a change of the daemon's relay or command."""
 
     def advance(self, now: float) -> None:
         """Let the physics run until `now`."""

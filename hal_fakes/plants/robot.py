@@ -1,19 +1,25 @@
-"""A mobile robot: turns, drives straight to its goal, turns again; drains its battery and charges it.
+"""A simulated mobile robot. It turns, drives straight to its goal, and turns again. It drains its
+battery, and charges it at a charger.
 
-Its far side (a manager's HTTP interface, or VDA 5050) gives it orders as JSON through `drive`, and
-reads `RobotSeen`. To press: `fault` (the robot's own fault), `manual` (it takes no orders), `lost`
-(its manager goes on repeating its last report), `lies` (it calls a command completed at once).
-Failing parts:
+The robot's far side is a manager's HTTP interface or VDA 5050. The far side gives the robot orders as
+JSON through `drive`, and reads `RobotSeen`. The order `press` sets these signals:
+
+- `fault`: the robot has a fault of its own.
+- `manual`: the robot takes no orders.
+- `lost`: the manager only repeats the robot's last report.
+- `lies`: the robot reports each command as completed at once.
+
+These parts can fail:
 
 | part      | off, stuck      | slow              | wrong                | garbage              |
 | wheels    | does not move   | a fifth the speed | stops halfway        | stops halfway        |
-| localiser | keeps its place | keeps its place   | is on an unknown map | is far off the graph |
+| localiser | no effect       | no effect         | is on an unknown map | is far off the graph |
 | battery   | stays as it is  | stays as it is    | reports 250 %        | reports -3 %         |
 | pause     | is not obeyed, in each mode                                                         |
 
-With `missions` the robot's own manager sends it about, along a path, and gives a robot that stands
-paused for PATIENCE_S another path. A robot that stands in a lift rides: the car calls at its floors in
-turn, each for RIDE_S.
+With `missions` the robot's own manager sends the robot along paths. If the robot stands for PATIENCE_S,
+for example because it is paused, the manager chooses another path. A robot that stands in a lift's car
+rides with the car. The car stops at its floors one after the other, at each floor for RIDE_S.
 """
 
 import itertools
@@ -42,7 +48,8 @@ ACTS_S: Final = 5.0
 AT_CHARGER_M: Final = 0.3
 DRAINS: Final = 0.0005
 CHARGES: Final = 0.005
-"""Battery for each second, so fast that a person sees it."""
+"""The charge that the battery gains in each second. DRAINS is the charge that it loses. Both are so
+large that a person sees the change."""
 PARTS: Final = ("wheels", "localiser", "battery", "pause")
 BUTTONS: Final = ("fault", "manual", "lost", "lies")
 NEVER: Final = math.inf
@@ -50,12 +57,12 @@ RESTS_S: Final = 4.0
 """The pause between two missions."""
 PATIENCE_S: Final = 30.0
 Missions = Callable[[Pose], Sequence[Pose]]
-"""Returns the places of the next mission from this place."""
+"""A function that returns the places of the next mission. Its argument is the robot's present place."""
 
 
 class RobotOrder(msgspec.Struct, frozen=True):
-    """An order to the robot. `doing`: go, stop, act, localize, pause or resume. `at`: the goal, on the
-    robot's map."""
+    """An order to the robot. `doing` is go, stop, act, localize, pause or resume. `at` is the goal, on
+    the robot's map."""
 
     id: str
     doing: str
@@ -64,8 +71,9 @@ class RobotOrder(msgspec.Struct, frozen=True):
 
 
 class RobotSeen(msgspec.Struct, frozen=True):
-    """The robot's report. `completed`: the number of its last completed order; "" before the first.
-    `path`: the places left of its mission, whose number is `mission`."""
+    """The robot's report. `completed` is the id of the last completed order, and "" before the first.
+    `path` has the places of the mission that the robot has still to reach. `mission` is the
+    mission's number."""
 
     at: Pose
     battery: float
@@ -82,8 +90,8 @@ class RobotSeen(msgspec.Struct, frozen=True):
 
 
 class RobotPlant(WiredPlant):
-    """The robot. `start`: its first place. `chargers`, `cars`: places on the robot's map; `cars`:
-    lift -> the places of its car, floor by floor."""
+    """The robot. `start` is its first place. `chargers` are the chargers' places. `cars` has the places
+    of each lift's car, floor by floor. All places are on the robot's map."""
 
     def __init__(
         self,
@@ -116,7 +124,7 @@ class RobotPlant(WiredPlant):
     def drive(self, signal: str, asserted: bool, now: float) -> None:
         """Take an order, as JSON."""
         self.advance(now)
-        self.run()  # up to this moment by the last order
+        self.run()  # first obey the last order up to this moment
         order = msgspec.json.decode(signal, type=RobotOrder)
         if self.pressed["manual"]:
             return
@@ -139,7 +147,7 @@ class RobotPlant(WiredPlant):
         self._wait_in_car()
 
     def run(self) -> None:
-        """Move to the present moment."""
+        """Bring the robot's place and battery up to the present moment."""
         left_s = 0.0 if self._ran_at is None else max(0.0, self.now - self._ran_at)
         self._ran_at = self.now
         moved = self._legs()
@@ -174,7 +182,7 @@ class RobotPlant(WiredPlant):
         return min(arrives_at, self._act_until, self._floor_at, mission_at)
 
     def reading(self) -> RobotSeen:
-        """Return the robot's report, as its failures make it."""
+        """Return the robot's report. Failing parts and pressed signals change the report."""
         self.run()
         if self.pressed["lost"] and self._last is not None:
             return self._last
@@ -202,14 +210,15 @@ class RobotPlant(WiredPlant):
         return self._last
 
     def _legs(self) -> tuple[float, ...]:
-        """Return the seconds left to turn, drive and turn; empty for a robot that stands."""
+        """Return the seconds that the robot still needs to turn, to drive and to turn again. Return an
+        empty tuple for a robot that stands."""
         order = self._order
         wheels = self.failures.get("wheels")
         broken = wheels in ("off", "stuck") or any(self.pressed[b] for b in ("fault", "manual"))
         if order is None or order.doing != "go" or order.at is None or broken or self.paused:
             return ()
         if order.at.map != self.at.map:
-            return ()  # the car has carried it to another floor
+            return ()  # the car has carried the robot to another floor
         goal, share = order.at, 0.5 if wheels in ("wrong", "garbage") else 1.0
         length = math.hypot(goal.x - self.at.x, goal.y - self.at.y) * share
         pace = SLOWNESS if wheels == "slow" else 1.0
@@ -309,7 +318,7 @@ def build(config: Config, name: str, parts: Sequence[str] = ()) -> RobotPlant:
 
 
 def _mission(site: RobotSite, ways: Ways, turn: Iterator[int], at: Pose) -> Sequence[Pose]:
-    """Return the places to the next named waypoint of the robot's floor."""
+    """Return the places on the way to the next named waypoint of the robot's floor."""
     here = ways.nearest(site.on_rmfs_map(at))
     goals = ways.goals(at.map)
     way = ways.shortest(here, goals[next(turn) % len(goals)], set())

@@ -35,8 +35,8 @@ RANGES: Final = {"none": 0, "ongoing": 0, "in": IN_RANGE, "out": 2, "failed": 24
 
 
 def words(reading: Reading, latched: int = 0) -> dict[str, int]:
-    """Return the words under their names in `drivers.charger.xnergy`. `latched` holds earlier
-    errors."""
+    """Return the value of each of the receiver's words, by its name in `drivers.charger.xnergy`.
+    `latched` has the bits of earlier errors."""
     now = sum(ERRORS[fault] for fault in reading.faults)
     shadow = now | latched
     return {

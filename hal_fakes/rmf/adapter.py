@@ -1,4 +1,5 @@
-"""The module `rmf_adapter` as an object: the names that the daemon uses (hal_fakes/rmf/__init__.py)."""
+"""An object in place of the module `rmf_adapter`. The object has the names that the daemon uses
+(hal_fakes/rmf/__init__.py)."""
 
 import threading
 import time
@@ -27,7 +28,7 @@ OFF_GRAPH_M: Final = 1.0
 
 
 class RobotState(SimpleNamespace):
-    """`easy_full_control.RobotState`."""
+    """A stand-in for `easy_full_control.RobotState`."""
 
     def __init__(self, map: str, position: list[float], battery_soc: float) -> None:
         if len(position) != 3:
@@ -40,7 +41,7 @@ class RobotState(SimpleNamespace):
 
 
 class RobotCallbacks(SimpleNamespace):
-    """`easy_full_control.RobotCallbacks`."""
+    """A stand-in for `easy_full_control.RobotCallbacks`."""
 
     localize: Callable[[Any, Any], None] | None = None
 
@@ -49,7 +50,7 @@ class RobotCallbacks(SimpleNamespace):
 
 
 class FleetConfiguration:
-    """`easy_full_control.FleetConfiguration`."""
+    """A stand-in for `easy_full_control.FleetConfiguration`."""
 
     def __init__(self, config: str, graph: str) -> None:
         self.file = load_fleet(config)
@@ -61,7 +62,8 @@ class FleetConfiguration:
     def from_config_files(
         config_file: str, nav_graph_path: str, server_uri: str | None = None
     ) -> "FleetConfiguration | None":
-        """Return None for a configuration that RMF cannot read; raise RuntimeError for a graph."""
+        """Return the configuration. Return None if RMF cannot read the configuration file. Raise
+        RuntimeError if RMF cannot read the graph."""
         try:
             return FleetConfiguration(config_file, nav_graph_path)
         except SettingsError as error:
@@ -82,14 +84,15 @@ class FleetConfiguration:
 
 
 def transformation(rotation: float, scale: float, translation: list[float]) -> Similarity:
-    """Return `Transformation`."""
+    """Make the stand-in for a `Transformation`."""
     from cmath import rect
 
     return Similarity(rect(scale, rotation), complex(*translation), 0.0)
 
 
 class RobotHandle:
-    """`EasyRobotUpdateHandle` and, as `more()`, `RobotUpdateHandle`."""
+    """A stand-in for `EasyRobotUpdateHandle`. It is also the `RobotUpdateHandle` that `more()`
+    returns."""
 
     def __init__(self, robot: PatrolRobot, lock: threading.RLock) -> None:
         self.robot = robot
@@ -102,7 +105,7 @@ class RobotHandle:
             self.robot.update(state.pose(), state.battery_soc, activity)
 
     def more(self) -> "RobotHandle":
-        """Return the further handle."""
+        """Return the `RobotUpdateHandle`, which is this object as well."""
         return self
 
     def commission(self) -> SimpleNamespace:
@@ -124,7 +127,7 @@ class RobotHandle:
 
 
 class EasyFleet:
-    """`EasyFullControl`."""
+    """A stand-in for `EasyFullControl`."""
 
     def __init__(self, patrols: Patrols, lock: threading.RLock) -> None:
         self.handles: dict[str, RobotHandle] = {}
@@ -134,7 +137,7 @@ class EasyFleet:
     def add_robot(
         self, name: str, state: RobotState, configuration: Any, callbacks: RobotCallbacks
     ) -> RobotHandle | None:
-        """Add a robot; return None for a robot that RMF does not take."""
+        """Add a robot. Return None for a robot that RMF refuses."""
         if name in self.handles or configuration is None:
             return None
         site = RobotSite(
@@ -152,7 +155,7 @@ class EasyFleet:
 
 
 class StandInAdapter:
-    """`Adapter`, with a thread that runs the patrols."""
+    """A stand-in for `Adapter`, with a thread that runs the patrols."""
 
     def __init__(self, owner: "StandIn") -> None:
         self.fleet: EasyFleet | None = None
@@ -178,13 +181,14 @@ class StandInAdapter:
         pause_callback: Callable[[], None],
         resume_callback: Callable[[], None],
     ) -> None:
-        """Add a traffic light; its handle comes later, on RMF's thread."""
+        """Add a traffic light. `handle_callback` gets the light later, on the thread that stands for
+        RMF."""
         lights = self._owner.lights
         handle = lights.handles[robot_name] = TrafficLight(robot_name, pause_callback, lights)
         self._new.append(lambda: handle_callback(handle))
 
     def start(self) -> None:
-        """Begin to call back."""
+        """Start the thread that calls the callbacks."""
         self._thread.start()
 
     def stop(self) -> None:
@@ -210,8 +214,9 @@ class StandInAdapter:
 
 
 class StandIn:
-    """The module. `speak`: publishes the fleet's state, as RMF's adapter does by itself. `schedule`: is
-    there a schedule node? `patrols`: do the robots patrol, or wait for `EasyFleet.patrols.send`?"""
+    """A stand-in for the module `rmf_adapter`. `speak` publishes the fleet's state, as RMF's adapter
+    does by itself. `schedule` tells whether there is a schedule node. `patrols` tells whether the
+    robots patrol. If not, they wait for `EasyFleet.patrols.send`."""
 
     def __init__(self, schedule: bool = True, patrols: bool = True) -> None:
         self.schedule, self.patrols = schedule, patrols

@@ -1,8 +1,10 @@
-"""RMF's traffic lights: the answers of `EasyTrafficLight`, and a blockade that reserves checkpoints.
+"""Stand-ins for RMF's traffic lights. A light answers as `EasyTrafficLight` does. A blockade reserves
+checkpoints for robots.
 
-As in RMF a new path is taken later, on RMF's own thread, and a robot without a path is not on the
-schedule. The blockade is simpler: a robot gets its next checkpoint if its way there is RADIUS_M off
-everything that others hold. There is no planner: `negotiates` and `agrees` play a negotiation.
+As in RMF a new path is taken later, on RMF's own thread. As in RMF a robot without a path is not on the
+schedule. The blockade is simpler than RMF's. It gives a robot the next checkpoint if the way there
+keeps RADIUS_M from all points that other robots hold. There is no planner. Instead a test calls
+`negotiates` and `agrees`, which stand for a negotiation.
 
 Source: open-rmf/rmf_ros2, EasyTrafficLight.cpp; open-rmf/rmf_traffic, blockade/Moderator.cpp.
 """
@@ -20,7 +22,7 @@ STEP_M: Final = 0.4
 
 
 class MovingInstruction(Enum):
-    """`easy_traffic_light.MovingInstruction`."""
+    """A stand-in for `easy_traffic_light.MovingInstruction`."""
 
     MovingError = 0
     ContinueAtNextCheckpoint = 1
@@ -29,7 +31,7 @@ class MovingInstruction(Enum):
 
 
 class WaitingInstruction(Enum):
-    """`easy_traffic_light.WaitingInstruction`."""
+    """A stand-in for `easy_traffic_light.WaitingInstruction`."""
 
     WaitingError = 0
     Resume = 1
@@ -37,7 +39,7 @@ class WaitingInstruction(Enum):
 
 
 class Waypoint(Struct):
-    """`Waypoint`."""
+    """A stand-in for `Waypoint`."""
 
     map_name: str
     position: list[float]
@@ -46,8 +48,9 @@ class Waypoint(Struct):
 
 
 class TrafficLight:
-    """`EasyTrafficLight`. `begin`, `end`: the checkpoints that the robot holds; it may drive to `end`.
-    `planned`: RMF has a plan. `stops`: the plan lets the robot stand first."""
+    """A stand-in for `EasyTrafficLight`. The robot holds the checkpoints from `begin` to `end`, and may
+    drive to `end`. `planned` tells whether RMF has a plan. `stops` tells whether the plan first
+    makes the robot stand."""
 
     def __init__(self, name: str, pause: Callable[[], None], lights: "Lights") -> None:
         self.name, self.pause, self._lights = name, pause, lights
@@ -143,7 +146,8 @@ class Lights:
         self.handles: dict[str, TrafficLight] = {}
 
     def ready(self, light: TrafficLight, checkpoint: int) -> bool:
-        """May the robot pass this checkpoint? If it is free, reserve the way to the next one."""
+        """May the robot pass this checkpoint? If the way to the following checkpoint is free, reserve
+        this way. The answer is True only at a later call."""
         if checkpoint < light.end:
             return True
         after = min(checkpoint + 1, len(light.path) - 1)
@@ -152,7 +156,7 @@ class Lights:
         mine = [*light.held(after)]
         if not any(_near(a, b) for a in mine for b in taken):
             light.end = after
-        return False  # the blockade's word comes later
+        return False  # as in RMF, the robot learns of the reservation only at a later call
 
 
 def _near(one: tuple[str, Point], other: tuple[str, Point]) -> bool:

@@ -2,8 +2,8 @@
 
 A robot drives from vertex to vertex, along the graph's lanes, to one named waypoint after the other. A
 vertex belongs to one robot at a time. In a lift the robot rides to the floor of its next vertex, and is
-localized there. With a low battery it drives to its charger. It is pure but for its callbacks; `now` is
-monotonic seconds.
+localized there. With a low battery it drives to its charger. This module has no side effects except the
+robots' callbacks. `now` is monotonic seconds.
 """
 
 import math
@@ -29,7 +29,7 @@ Calls = list[Callable[[], None]]
 
 
 class Execution:
-    """`CommandExecution`. Its identifier is itself."""
+    """A stand-in for `CommandExecution`, which is its own identifier."""
 
     def __init__(self) -> None:
         self.is_finished = False
@@ -45,7 +45,7 @@ class Execution:
         return self is other
 
     def okay(self) -> bool:
-        """Does RMF still want this?"""
+        """Does RMF still want this command to be carried out?"""
         return not self.given_up
 
     def finished(self) -> None:
@@ -91,7 +91,8 @@ class PatrolRobot:
 
 
 class Patrols:
-    """The robots of one fleet. `alone`: they patrol; else they go only where `send` sends them."""
+    """The robots of one fleet. If `alone` is true, the robots patrol. Otherwise a robot goes only where
+    `send` sends it."""
 
     def __init__(
         self, fleet: str, graph: NavGraph, transforms: Mapping[str, Similarity], alone: bool
@@ -115,7 +116,7 @@ class Patrols:
         return [call for robot in self.robots for call in self._step(robot, now)]
 
     def state(self, wall: float) -> FleetState | None:
-        """Return the fleet's state each second."""
+        """Return the fleet's state once each second. Return None at other times."""
         if wall < self._tell_at:
             return None
         self._tell_at = wall + TELL_S
@@ -150,7 +151,8 @@ class Patrols:
             yield self._order(robot)
 
     def _choose(self, robot: PatrolRobot) -> None:
-        """Choose the next goal: the charger with a low battery, else the next waypoint in turn."""
+        """Choose the next goal. With a low battery the goal is a charger. Otherwise it is the next
+        waypoint in turn."""
         here, taken = self.graph.vertices[robot.vertex], self._taken(robot)
         if here.charger and robot.battery < FULL:
             return
@@ -165,7 +167,8 @@ class Patrols:
         return {i for other in self.robots if other is not robot for i in other.holds}
 
     def _is_free(self, robot: PatrolRobot, now: float) -> bool:
-        """Take the next vertex, if no other robot holds it; else wait, and at last choose anew."""
+        """Reserve the next vertex for the robot if no other robot holds it. Return whether it is
+        reserved. A patrolling robot that waits for PATIENCE_S gives up its path."""
         if robot.path[0] not in self._taken(robot):
             robot.holds.add(robot.path[0])
             robot.waits_since = None
@@ -201,6 +204,7 @@ class Patrols:
         return lambda: call(destination, execution)
 
     def _way(self, start: int, goal: int, avoided: set[int]) -> list[int]:
-        """Return the shortest way over free vertices, or else over all; [] if there is none."""
+        """Return the shortest way over free vertices. If there is none, return the shortest way over
+        all vertices. Return [] if there is no way."""
         found = self._ways.shortest(start, goal, avoided - {start, goal})
         return found or self._ways.shortest(start, goal, set())

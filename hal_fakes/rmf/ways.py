@@ -1,4 +1,4 @@
-"""Ways over a navigation graph, for robots in a simulation. Vertices go by their numbers."""
+"""Ways over a navigation graph, for robots in a simulation. Each vertex is known by its number."""
 
 import heapq
 import math

@@ -1,4 +1,5 @@
-"""The soak test's site, with a ring for each daemon. The replay tests use a day's recordings."""
+"""The soak test's site. Each of its daemons writes a ring, which is a file with its latest messages and
+decisions. The replay tests use the recordings of one day."""
 
 from collections.abc import Callable
 from functools import partial
@@ -36,7 +37,7 @@ def head(name: str, kind: str, content: dict[str, Any]) -> Head:
 
 
 def of_device(device: Device) -> Head:
-    """Return the head of a daemon that serves only this device."""
+    """Return the head of a recording for a daemon that serves only this device."""
     bus = {0.0: "gpio", 0.05: "modbus", 0.5: "http"}[device.poll_s]
     devices = {device.name: msgspec.to_builtins(device.settings)}
     content = {
@@ -48,7 +49,7 @@ def of_device(device: Device) -> Head:
 
 
 def of_graph(name: str, kind: AnyGraphKind, settings: Any) -> Head:
-    """Return the head of a supervisor or coordinator."""
+    """Return the head of a recording for a supervisor or coordinator."""
     return head(name, kind.name, {kind.devices_key: msgspec.to_builtins(settings)})
 
 

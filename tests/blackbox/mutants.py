@@ -71,8 +71,8 @@ TREES: Final[tuple[Any, ...]] = (
     [{"": "core.decision.Fault", "code": "X", "detail": 3}],
 )
 KEPT: Final = 70
-"""The number of entries, and the number of messages, that a recording keeps. So the mutants together
-change most entries."""
+"""The number of entries, and the number of messages, that a recording keeps. It is so small that the
+mutants together change most entries."""
 
 
 @dataclass(frozen=True)

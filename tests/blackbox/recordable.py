@@ -1,4 +1,5 @@
-"""All types that a daemon can record. The search starts at the arguments and results of the cores."""
+"""All types that a daemon can record. This file finds them from the arguments and results of the cores,
+which are the daemons' decision logic."""
 
 import enum
 import types

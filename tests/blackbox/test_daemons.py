@@ -1,4 +1,5 @@
-"""The rings of real daemons. Rings survive a kill, and a daemon needs no library to write a ring."""
+"""The rings of real daemons. A ring is a file with a daemon's latest messages and decisions. Rings
+survive a kill, and a daemon needs no library to write a ring."""
 
 import os
 import shutil
@@ -20,7 +21,7 @@ def lift(tmp_path: Path) -> Path:
 
 
 def spoken(ring: Path) -> list[str]:
-    """Return the topics of the messages in the ring that the daemon sent."""
+    """Return the topics of the messages that the daemon has sent, according to the ring."""
     try:
         return [
             one.topic for one in RingContent(ring).entries() if isinstance(one, Spoken) and one.sent

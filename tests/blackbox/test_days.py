@@ -1,5 +1,5 @@
-"""The counts for each day of this machine's devices, from the rings to the file, the table and the
-CSV."""
+"""The daily counts of this machine's devices. The counts are made from the rings, and stored in a file.
+They are shown as a table or as CSV."""
 
 from datetime import date
 from pathlib import Path

@@ -31,7 +31,7 @@ ENDED = {
     "lift.memory.Session.own_stamp",
     "lift.signals.FromAdapter.stamp",
 }
-"""Fields that no core has any more. A reader drops their values."""
+"""Fields that earlier cores had, and that no present core has. A reader drops their values."""
 
 
 def files(pattern: str) -> list[Path]:

@@ -39,7 +39,7 @@ def test_unchanged_every_one_of_them_is_read(tmp_path: Path) -> None:
         write_file(told, tmp_path / "a.mcap")
         for name in ("ring", "a.mcap"):
             assert ended(("replay", str(tmp_path / name))) == (0, "")
-            heard = told.subject != "site"  # a coordinator is not a device
+            heard = told.subject != "site"  # a coordinator is not a device, so `explain` finds none
             assert ended(("explain", str(tmp_path / name), told.subject)) == (int(not heard), "")
 
 

@@ -1,4 +1,4 @@
-"""The recorder and the commands beside a real daemon, as an operator runs them."""
+"""The recorder and the commands while a real daemon runs, as an operator runs them."""
 
 import io
 import json

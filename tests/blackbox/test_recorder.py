@@ -210,7 +210,7 @@ def test_a_killed_run_is_recorded_once_even_if_the_recorder_restarts(
     machine.live(5)
 
     assert reasons(machine.only()) == [
-        ("DIED", "", "it left no last entry: it was killed, or the machine stopped")
+        ("DIED", "", "the daemon left no last entry: it was killed, or the machine stopped")
     ]
     assert head_of(machine.only()).run == "00000001"
 
@@ -353,7 +353,7 @@ def test_a_file_from_the_future_counts_as_the_oldest_so_that_new_files_stay() ->
         ("REFUSED", "unknown floor: L9", "refused-unknown-floor"),
         ("REFUSED", "../" * 30 + "L9", "refused"),
         ("WAITING", "fleet/r1 has waited for L3 for 181 s", "waiting"),
-        ("DIED", "it left no last entry", "died"),
+        ("DIED", "the daemon left no last entry", "died"),
     ],
 )
 def test_a_files_name_has_the_reason_and_nothing_from_the_network(

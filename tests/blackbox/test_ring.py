@@ -1,4 +1,5 @@
-"""The ring. Entries survive a kill, and a reader ignores a torn last entry."""
+"""The ring, which is a file with a daemon's latest messages and decisions. Entries survive a kill, and
+a reader ignores a torn last entry."""
 
 from pathlib import Path
 

@@ -1,4 +1,5 @@
-"""The writer of rings. A failed ring disturbs no scan, and the ring holds only true entries."""
+"""The writer of rings, which are files with a daemon's latest messages and decisions. An error of the
+ring disturbs no scan. The ring holds only true entries."""
 
 import errno
 import os
@@ -193,7 +194,7 @@ def test_a_flood_takes_no_more_than_its_bound_and_each_decision_is_kept(tmp_path
     daemon.now += 1.0
     daemon.say(LiftState())
 
-    found = daemon.entries()  # the flood has filled the ring, so only the last seconds remain
+    found = daemon.entries()  # the many messages fill the ring, so only the last seconds remain
     kept = Counter(one.at for one in found if isinstance(one, Spoken))
     assert [kept[at] for at in (104.0, 105.0, 106.0)] == [200, 200, 1]
     assert {one.number for one in found if isinstance(one, EntriesLost)} == {9_800}

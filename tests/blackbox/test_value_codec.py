@@ -1,5 +1,5 @@
-"""Values of cores become trees, and the trees become the same values again. Decoding a tree runs no
-code."""
+"""Values of a daemon's decision logic become trees of plain values, and the trees become the same
+values again. Decoding a tree runs no code."""
 
 from typing import Any
 

@@ -21,8 +21,8 @@ WANTS = "etc/systemd/system/rmf-bridges.target.wants"
 
 @pytest.fixture
 def machine(tmp_path: Path) -> Path:
-    """Return the root of a machine with one enabled door, one disabled door, a secret, users and a
-    memory."""
+    """Return the root of a machine with one enabled door, one disabled door, a secret, users, and the
+    memory of a supervisor."""
     root = tmp_path / "old"
     config, state = root / "etc/rmf-bridges", root / "var/lib/rmf-bridge/door_supervisor"
     for folder in (config, state, root / WANTS):

@@ -136,7 +136,7 @@ def test_a_dry_run_prints_every_step_and_does_nothing(
     assert printed[:8] == [
         f"systemctl stop {UNIT}",
         f"systemctl disable {UNIT}",
-        f"{off}   # if a record is left in /var/lib/rmf-bridge/lift_dry_contact",
+        f"{off}   # if a dead daemon left a record in /var/lib/rmf-bridge/lift_dry_contact",
         f"rm /{DROP_IN}",
         "systemctl daemon-reload",
         f"install -m 644 {LIFT} {tmp_path / TARGET}",
@@ -228,7 +228,7 @@ def test_after_a_failed_step_the_stopped_service_starts_again(
 
 
 def with_token(file: Path) -> Path:
-    """Write a door that needs a token, with a name of its own."""
+    """Write the YAML of a door that needs a token. The door's name is the name of the file."""
     text = (CONFIG / "door_http.yaml").read_text().replace("side_door", file.stem)
     text = text.replace(
         "# token_file: /etc/rmf-bridges/relay.key", "token_file: /etc/rmf-bridges/relay.key"

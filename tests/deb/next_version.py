@@ -1,4 +1,4 @@
-"""Makes further versions of built packages, to upgrade to."""
+"""Makes newer versions of built packages, so that tests can upgrade to them."""
 
 import shutil
 import subprocess

@@ -103,7 +103,8 @@ def _replace(file: Path, text: str) -> None:
 
 
 class System:
-    """A root directory with services. Its `systemctl` only keeps files."""
+    """A root directory with services. Its `systemctl` starts nothing, and only keeps each service's
+    state in a file."""
 
     def __init__(self, folder: Path) -> None:
         self.root, self.fakes = folder / "root", folder / "fakes"

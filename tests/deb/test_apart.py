@@ -133,7 +133,7 @@ def test_daemons_whose_upgrade_was_refused_use_no_workbench_of_another_version(
     assert (refused.returncode, refused.stderr) == (
         os.EX_UNAVAILABLE,
         f"rmf-bridge watch: not installed: {BENCH} is {TWO}, and these daemons are {ONE}: both must be"
-        " the same version. After an upgrade that was refused: sudo dpkg --configure -a; else"
+        " the same version. If an upgrade was refused, run sudo dpkg --configure -a; otherwise run"
         f" {how(ONE)}",
     )
     assert [code(made, "check", LIFT), code(made, "outputs-off", NO_OUTPUTS)] == [0, 0]

@@ -67,7 +67,8 @@ class Prometheus:
 
 @contextmanager
 def prometheus(folder: Path, scrapes: int) -> Iterator[Prometheus]:
-    """Run a Prometheus with our rules, whose data is in `folder`/tsdb. It scrapes this port."""
+    """Run a Prometheus with our rules. It keeps its data in `folder`/tsdb, and scrapes the port
+    `scrapes`."""
     port, config = free_port(), folder / "prometheus.yaml"
     config.write_text(CONFIG.format(rules=RULES, port=scrapes))
     line = [

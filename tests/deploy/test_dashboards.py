@@ -1,6 +1,6 @@
 """Grafana's dashboards: their form, and the answer of a real Prometheus to each panel's query.
 
-Grafana itself is not in Debian, so nobody has looked at the picture here.
+Grafana itself is not in Debian, so no test draws a dashboard.
 """
 
 import json

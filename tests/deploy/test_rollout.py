@@ -38,7 +38,7 @@ YAML: sha256 {sha256(YAML).hexdigest()}
 | subject | | found by `doctor` |
 |---|---|---|
 | file | ok | lift.yaml is a valid file of a lift |
-| kill test | ok | Lift1 door_open was on, and the guard switched the output off, verified after 0.2 s |
+| kill test | ok | Lift1 door_open was on, and the guard switched the output off; this was verified after 0.2 s |
 """
 
 
@@ -48,7 +48,7 @@ def test_a_kill_test_that_went_well_is_accepted() -> None:
 
 def test_a_form_older_than_its_yaml_is_refused() -> None:
     why = rollout.rmf_untested(FORM, "machines/pi-lift1/lift.yaml", YAML + b"# a new wire\n")
-    assert why == "lift.yaml: the form is about an earlier content of this file"
+    assert why == "lift.yaml: the form was made for an earlier version of this file"
 
 
 def test_the_doctors_form_is_a_record_of_its_yaml(tmp_path: Path) -> None:

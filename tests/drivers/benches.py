@@ -31,8 +31,8 @@ Outputs = TypeVar("Outputs")
 
 
 class Bench(Generic[Sample, Outputs]):
-    """One driver on one bus, with a simulated device behind the bus. The bus measures its pauses with
-    `clock`."""
+    """One driver on one bus, with a simulated device behind the bus. After a failure the bus pauses.
+    `clock` measures these pauses."""
 
     def __init__(
         self, driver: Driver[Sample, Outputs], plant: Plant, clock: Time | None = None
@@ -58,11 +58,11 @@ class Bench(Generic[Sample, Outputs]):
         at_last(lambda: self.driver.write(outputs), "the outputs are written", self.a_moment)
 
     def a_moment(self) -> None:
-        """Let so much time pass that every pause of the bus ends."""
+        """Let so much time pass that the bus ends every pause after a failure."""
         self.clock.now += 60.0
 
     def patiently(self) -> Sample | str:
-        """Return a reading after all pauses, or the text of the error."""
+        """Return a reading after all pauses of the bus, or the text of the error."""
         self.a_moment()
         try:
             return self.driver.read()
@@ -178,7 +178,7 @@ def on_mqtt(
 
 @contextmanager
 def on_pins(world: RealTime, plant: Plant, wires: Sequence[Wire]) -> Iterator[gpio.GpioBus]:
-    """Yield a simulated header that is wired to this plant."""
+    """Yield a GPIO bus on a simulated header that is wired to this plant."""
     factory = WiredFactory([PlantWiring(plant, wires, gpio.canonical)], lock=world.lock)
     world.on_step.append(factory.show)
     bus = gpio.open_bus(gpio.GpioSettings(), factory)

@@ -125,10 +125,11 @@ class RegisterFar:
         """Do nothing, because this module has no watchdog that could trip."""
 
     def insist(self) -> None:
-        """Do nothing, because this bus makes no pauses."""
+        """Do nothing, because this bus never pauses after a failure."""
 
     def watchdog(self) -> None:
-        """Restore the first values if the bus is down. The caller has waited WATCHDOG_S."""
+        """Write the values that the controller had at the start, if the bus is down. The caller has
+        waited WATCHDOG_S."""
         if self.down:
             for point, value in self._first.items():
                 self._cells.set(point, value, self.now())

@@ -1,5 +1,7 @@
-"""Drivers, kinds and bus types in new files. `check` and `run` find the new files by name, so that no
-other file changes."""
+"""Drivers, kinds and bus types that are added as new files only.
+
+`check` and `run` must find the new files by their names, without changes in any other file.
+"""
 
 import json
 import shutil
@@ -61,7 +63,7 @@ ON_A_LINE = {"type": "line", "host": "192.0.2.1"}
 
 @pytest.fixture(scope="module")
 def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a copy of the project's folders, with the added files beside the existing files."""
+    """Return a copy of the project's folders, to which the files in `added/` have been added."""
     made = tmp_path_factory.mktemp("house")
     for room in ROOMS:
         shutil.copytree(ROOT / room, made / room)
@@ -71,7 +73,7 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Site:
-    """One YAML file in the copy, and the commands that run on the file."""
+    """One YAML file in the copied folders. The methods run commands with the file."""
 
     def __init__(self, here: Path, domain: int, text: str, bus: dict[str, Any]) -> None:
         self.here, self._text = here, text
@@ -81,8 +83,7 @@ class Site:
         self.point_at({})
 
     def point_at(self, replace: dict[str, Any]) -> None:
-        """Write the YAML file. `replace` has the address of the far side, and replaces settings of the
-        bus."""
+        """Write the YAML file. `replace` overrides settings of the bus, for example its address."""
         bus = json.dumps(self._bus | replace).replace(
             '"1":', "1:"
         )  # JSON cannot have numbers as keys
@@ -98,7 +99,8 @@ class Site:
 
     @contextmanager
     def far_side(self) -> Iterator[dict[str, Any]]:
-        """Run the far side of the bus in a separate process. Yield the settings for the bus."""
+        """Run the simulated device of the bus in its own process. Yield the bus settings that reach
+        it."""
         socket = ["--socket", str(self.here / "plant.sock")]
         child = [sys.executable, "-m", "hal_fakes", str(self.file), "b", *socket]
         pipe = subprocess.PIPE
@@ -109,8 +111,8 @@ class Site:
             running.stdin.close()
 
     def served(self, *options: str) -> dict[str, Any]:
-        """Serve the door until its state is known. End the daemon cleanly, and return the status
-        file."""
+        """Run the daemon until its status shows the closed door. Stop the daemon cleanly, and return
+        the last status file."""
         status = self.here / "run" / "status.json"
         with daemon(self.file, self.here / "run", *options) as running:
             running.wait_for("ready")
@@ -132,8 +134,8 @@ CHECKED = {
         "ward_door opened unit 1 discrete input 0 (10001) in high - 0.05 s - not asserted",
         "ward_door closed unit 1 discrete input 1 (10002) in high - 0.05 s - not asserted",
         "ward_door hold_open unit 1 coil 0 (00001) out high - - low not asserted",
-        "ward_door closing nothing is driven: a released door stays open unless its operator closes it"
-        " by itself",
+        "ward_door closing not commanded: a released door stays open unless its door operator closes"
+        " it by itself",
     ],
     "a bus type too": ["ward_door asks left wing at 192.0.2.1:4000"],
 }

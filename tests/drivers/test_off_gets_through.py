@@ -1,7 +1,8 @@
-"""Failing registers, units and replies. No output stays on, because the driver always writes off.
+"""Buses on which a read fails, once or for ever. The driver must still be able to switch its outputs
+off.
 
-In each story one output is on, and one read fails, once or for ever. The read concerns a part of the
-same device, or a neighbour on the bus.
+In each test one output is on. The failing read concerns another part of the same device, or another
+device on the bus.
 """
 
 import struct
@@ -31,14 +32,15 @@ __all__ = ["hang_up", "module"]
 
 HELD, RELEASED = DoorOutputs(hold_open=True), DoorOutputs(hold_open=False)
 STATUS, COMMAND = (3, 10), (3, 20)
-"""A door's holding registers, as (function that reads the register, address)."""
+"""Two holding registers of a door, as (function code for reading the register, address)."""
 SERVER_FAILURE, ILLEGAL_ADDRESS = 4, 2
 
 
 class Registers:
-    """A module with units of registers and coils. The test controls its answers.
+    """A Modbus module whose units have registers and coils. The test can let reads fail.
 
-    `refused` has the exception code for each (unit, reading function, address). Code 0 means silence.
+    `refused` has the exception code for each (unit, reading function, address). For code 0 the module
+    sends no answer.
     """
 
     def __init__(self, module: Module) -> None:
@@ -101,7 +103,7 @@ CONTACT_DOOR = msgspec.convert(
 
 
 def tried(step: Callable[[], object]) -> bool:
-    """Return whether the step succeeds."""
+    """Return whether the step succeeds without a DriverError."""
     try:
         step()
     except DriverError:
@@ -164,7 +166,7 @@ def test_a_relay_goes_off_while_the_inputs_of_its_unit_fail_for_ever(
     door.read()
     door.write(HELD)
     registers.refused[1, 2, 0] = code
-    for _ in range(20):  # the pause is long, and each reading begins a new pause
+    for _ in range(20):  # 20 failures make the bus's pause long, but `write` must not wait
         clock.now += 30.0
         assert not tried(door.read)
     door.write(RELEASED)
@@ -266,7 +268,8 @@ def test_a_charge_on_canopen_is_stopped_while_its_state_is_not_answered() -> Non
 
 
 class HttpStation:
-    """A station that accepts commands. The test controls its answers to /state."""
+    """An HTTP server of a device. It accepts every command, and the test controls its answers to
+    /state."""
 
     def __init__(self) -> None:
         station = self

@@ -1,5 +1,8 @@
-"""Drivers whose inputs are contacts on another bus. The driver gives the same sample as with one bus.
-Without the other bus it gives no sample."""
+"""Drivers whose inputs are contacts on a second bus.
+
+Such a driver reads the same sample as on a single bus. If the second bus fails, the driver reads no
+sample.
+"""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,7 +27,7 @@ DRIVEN: Final = ("outputs", "calls", "call_code")
 
 
 def on_contacts() -> Iterator[str]:
-    """Yield the shipped files whose inputs are contacts of one bus."""
+    """Yield the names of the example files whose only bus has the inputs as contacts."""
     for path in PATHS:
         content = yaml.safe_load(path.read_text())
         if content.get("driver") == "dry_contact" and len(content["buses"]) == 1:
@@ -36,7 +39,7 @@ class Now:
 
 
 def moved(part: Any) -> None:
-    """Put each input inside this part onto the bus `other`."""
+    """Put each input in this part of a YAML file onto the bus `other`."""
     if isinstance(part, dict):
         if "point" in part:
             part["bus"] = "other"
@@ -48,7 +51,7 @@ def moved(part: Any) -> None:
 
 
 def split(name: str, folder: Path) -> Config:
-    """Load this file, but put every input onto a second bus of the same type."""
+    """Load this example file with every input on a second bus of the same type."""
     content = yaml.safe_load((CONFIG / name).read_text())
     (own,) = content["buses"]
     settings = content["buses"][own]
@@ -74,7 +77,7 @@ def test_the_sample_is_the_same_whichever_bus_has_the_inputs(name: str, tmp_path
         here = PointsFar(Now(), plant, parts.wires_on(own, device))
         driver = parts.driver_type(device).create(device, settings, here)
         assert isinstance(driver, TakesInputs)
-        with pytest.raises(DriverError, match="nothing here reads"):
+        with pytest.raises(DriverError, match="no function to read"):
             driver.read()
         wires = parts.wires_on("other", device)
         there = PointsFar(Now(), plant, wires)

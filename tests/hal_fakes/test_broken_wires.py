@@ -1,7 +1,7 @@
-"""A lift with one broken wire. The driver reads it through plant, wires, mock pins and gpiozero.
+"""A simulated lift with one broken wire. The real driver reads it through gpiozero's mock pins.
 
-The car rides in AGV mode from L1 to L3, where the door opens and closes. Each reading must be true,
-unknown or a fault. No reading may show a closed door as open, or show a wrong floor.
+The car rides in AGV mode from L1 to L3, where the door opens and closes. Each reading must show the
+truth, show "unknown", or be a fault. No reading may show a closed door as open, or show a wrong floor.
 """
 
 from collections.abc import Iterator
@@ -37,7 +37,7 @@ def ride(lift: WiredLift, until: float = 14.0) -> Iterator[tuple[float, LiftSamp
 
 
 def changes(lift: WiredLift) -> list[tuple[float, LiftSample]]:
-    """Return the readings of a ride that differ from the reading before."""
+    """Return (s, reading) of each reading that differs from the previous reading of the ride."""
     seen: list[tuple[float, LiftSample]] = []
     for now, sample in ride(lift):
         if not seen or sample != seen[-1][1]:

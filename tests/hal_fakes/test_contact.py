@@ -1,4 +1,5 @@
-"""The five failures of a wire. Each test gives the history of the level at the wire's far end."""
+"""The five failures of a simulated wire. Tests compare the levels at the wire's far end, one for each
+second."""
 
 from typing import Any
 
@@ -14,8 +15,10 @@ def wire(active: Any = "high", pull: Any = "down", direction: Any = "in") -> Wir
 
 
 def shown(contact: Contact, fed: str, step: float = 1.0) -> str:
-    """Return the level at the far end for each second, as a text of 1 and 0. `fed` has the levels at
-    the near end. 1 means asserted."""
+    """Return the level at the wire's far end in each second. `fed` has the levels at its near end.
+
+    Both texts have 1 for asserted and 0 for not asserted.
+    """
     seen = ""
     for i, value in enumerate(fed):
         contact.feed(value == "1", i * step)

@@ -106,7 +106,7 @@ def test_a_caller_that_leaves_or_never_reads_does_not_stop_the_plants(world: Wor
     world.callers.remove(gone)
     plant = world.running.plants["Lift1"]
     told = 0
-    while told < 2000:  # a socket holds far fewer lines for a caller that does not read
+    while told < 2000:  # the socket of a caller that does not read is full much earlier
         for i in range(50):
             plant.drive("door_open", i % 2 == 0, time.monotonic())
         told += len(list(islice(well.edges(), 50)))

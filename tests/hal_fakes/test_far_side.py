@@ -1,4 +1,4 @@
-"""The far side of a bus runs in its own process, answers, and never outlives the daemon."""
+"""The simulated device of a bus (the far side) in its own process. It never outlives the daemon."""
 
 import json
 import signal

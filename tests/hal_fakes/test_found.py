@@ -1,4 +1,4 @@
-"""Each driver and each bus names an existing fake, so `--simulate` works for all of them."""
+"""Check that each driver and each bus type has a fake, because `--simulate` needs these fakes."""
 
 from importlib import import_module
 

@@ -17,7 +17,7 @@ FED_EVERY_S = 0.5
 
 
 class Bench:
-    """A charger and a driver that sends it frames, in virtual time."""
+    """A simulated charger on CAN, and the driver that sends frames to it, in virtual time."""
 
     def __init__(self) -> None:
         self.far = Reactive()
@@ -30,7 +30,7 @@ class Bench:
         self.driver.open()
 
     def passes(self, seconds: float, fed: bool) -> None:
-        """Let time pass, with regular looks of the charger at the bus. With `fed` the driver sends its
+        """Let time pass, while the charger checks its bus regularly. If `fed` is true, the driver sends
         frames."""
         until = self.far.now + seconds
         while self.far.now < until:

@@ -1,5 +1,5 @@
-"""`run config/door_register.yaml --simulate` without the daemon. The simulated doors on registers
-move."""
+"""The simulated doors of `config/door_register.yaml`, as `run --simulate` builds them, without the
+daemon."""
 
 from pathlib import Path
 

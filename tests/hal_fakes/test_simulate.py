@@ -1,5 +1,7 @@
-"""`run --simulate` without the daemon: real buses in real time, with simulated devices at the far
-side."""
+"""The simulation that `run --simulate` uses, without the daemon.
+
+Real buses run in real time, with simulated devices behind them.
+"""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -22,7 +24,7 @@ CONFIG = SHIPPED.parent
 
 
 class SimulatedLift:
-    """The shipped lift at a fast pace. The test opens it as the daemon does."""
+    """The lift of `config/lift_dry_contact.yaml`, opened as the daemon opens it."""
 
     def __init__(self, simulation: Simulation, config: Config) -> None:
         self.bus = simulation.open_bus("header")
@@ -33,7 +35,8 @@ class SimulatedLift:
         self.driver.open()
 
     def until(self, reached: Callable[[LiftSample], bool]) -> LiftSample:
-        """Read at each edge, as the loop does, until a reading fulfils the condition."""
+        """Read now, and again after each edge, until a reading fulfils the condition. The daemon's loop
+        also reads after each edge."""
         while not reached(sample := self.driver.read()):
             assert self._edge.wait(PATIENCE_S), f"no edge for long after {sample}"
             self._edge.clear()
@@ -122,8 +125,10 @@ def test_each_of_several_buses_has_its_own_socket(tmp_path: Path) -> None:
 
 
 def test_a_lift_on_two_buses_is_one_plant_behind_both(tmp_path: Path) -> None:
-    """The relays are at a real Modbus server, and the floor lines are on pins. Both are in one
-    process."""
+    """The lift's relays are on a real Modbus server, and its floor lines are on simulated pins.
+
+    One process simulates both, so that one lift is behind both buses.
+    """
     config = load(CONFIG / "lift_two_buses.yaml")
     simulation = Simulation(config, tmp_path)
     buses = {name: simulation.open_bus(name) for name in config.buses}

@@ -1,4 +1,5 @@
-"""A lift plant in virtual time, alone or behind the real driver on gpiozero's mock pins."""
+"""A simulated lift (the plant) in virtual time, alone or behind the real driver on gpiozero's mock
+pins."""
 
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ Event = tuple[float, str, object]
 
 
 def shipped() -> DryContactLiftSettings:
-    """Return the shipped lift of `config/`."""
+    """Return the settings of the lift in `config/lift_dry_contact.yaml`."""
     settings = load(SHIPPED).devices["Lift1"]
     assert isinstance(settings, DryContactLiftSettings)
     return settings
@@ -42,7 +43,10 @@ def history(plant: LiftPlant, *without: str) -> list[Event]:
 
 
 class WiredLift:
-    """The shipped lift: plant, wires, mock pins, gpiozero, our bus, points and driver."""
+    """The lift of `config/lift_dry_contact.yaml`, simulated down to its wires.
+
+    The real driver reads and writes the wires through the project's GPIO bus on gpiozero's mock pins.
+    """
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -56,7 +60,7 @@ class WiredLift:
         self.driver.open()
 
     def at(self, now: float) -> LiftSample:
-        """Let the lift run until `now`, and read every input."""
+        """Let the simulated lift run until the time `now`. Then read every input."""
         self.now = now
         self.factory.show(now)
         return self.driver.read()

@@ -95,7 +95,7 @@ def test_any_bytes_become_a_message_or_are_refused(kind: Any, body: bytes, littl
         message = decode(kind, bytes([0, little, 0, 0]) + body)
     except CdrError:
         return
-    again = encode(kind, message)  # a float may be NaN, which equals nothing, so compare bytes
+    again = encode(kind, message)  # compare bytes, because NaN is not equal to NaN
     assert encode(kind, decode(kind, again)) == again
 
 

@@ -1,4 +1,4 @@
-"""Our bytes and type hashes equal those of rosbags, an independent implementation."""
+"""Compare our bytes and type hashes with those of rosbags, an independent implementation."""
 
 from typing import Any
 
@@ -27,11 +27,11 @@ def name(kind: type) -> str:
 
 
 def theirs(value: Any) -> Any:
-    """Return our value in the form of rosbags, which has arrays for lists of numbers."""
+    """Return our value as a value of rosbags, which uses arrays for lists of numbers."""
     if isinstance(value, Struct):
         made = STORE.types[name(type(value))]
         members = {name: theirs(getattr(value, name)) for name in value.__struct_fields__}
-        if isinstance(value, d.DiagnosticStatus):  # rosbags reads the byte as signed
+        if isinstance(value, d.DiagnosticStatus):  # rosbags reads `level` as signed
             members["level"] = (value.level ^ 128) - 128
         return made(**members)
     if isinstance(value, tuple):

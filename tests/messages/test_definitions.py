@@ -205,8 +205,8 @@ def test_the_table_has_every_constant() -> None:
 
 
 def test_no_constant_that_jazzy_lacks_is_sent() -> None:
-    """Only Alert uses the tiers, and Jazzy lacks Alert too. Only RMF sends the modes that Jazzy
-    lacks."""
+    """We send none of the constants that Jazzy lacks. Only Alert uses AlertTier, and Jazzy lacks Alert
+    too. Only RMF sends the robot modes that Jazzy lacks."""
     assert NOT_IN_JAZZY[d.AlertTier] == CONSTANTS[d.AlertTier].keys()
     assert not releases.JAZZY.has(d.Alert)
     ours = set(CONSTANTS[d.RobotModeValue]) - NOT_IN_JAZZY[d.RobotModeValue]

@@ -30,7 +30,7 @@ Joining = Callable[[str, Release | None], Transport]
 
 @pytest.fixture(params=[DDS, "zenoh", "zenoh_ros2dds"])
 def join_of(request: pytest.FixtureRequest) -> Iterator[Joining]:
-    """Yield a function that joins a node of any release to one graph."""
+    """Yield a function that makes a node of any release. All its nodes are on one ROS graph."""
     nodes: list[Transport] = []
 
     def join(name: str, release: Release | None) -> Transport:
@@ -87,7 +87,7 @@ def test_a_publisher_of_another_release_is_named_and_counted_while_it_is_there(
 ) -> None:
     ours, received = join_of("ours", JAZZY), list[d.FleetState]()
     ours.subscribe(topics.FLEET_STATES, received.append)
-    fault = ("TYPE_MISFIT", "fleet_states: 1 of another definition than ours (jazzy)")
+    fault = ("TYPE_MISFIT", "fleet_states: 1 peer(s) with another definition than ours (jazzy)")
     with fleet(join_of("adapter", KILTED)) as say:
         wait_until(lambda: ours.faults() == [fault], "the misfit is counted")
         for _ in range(20):
@@ -125,7 +125,7 @@ def test_many_nodes_in_one_process_read_each_other(join_of: Joining) -> None:
         for n in range(1, 7):
             fleets.enter_context(fleet(join_of(f"new_{n}", KILTED)))
             fleets.enter_context(fleet(join_of(f"old_{n}", JAZZY)))
-            misfits = f"fleet_states: {n} of another definition than ours (jazzy)"
+            misfits = f"fleet_states: {n} peer(s) with another definition than ours (jazzy)"
             wait_until(told(watching, [both, ("TYPE_MISFIT", misfits)]), misfits)
 
 
@@ -143,7 +143,7 @@ def test_a_missing_or_unknown_hash_identifies_no_release() -> None:
     peers.seen(2, Announced("fleet_states", fleet_state, "RIHS01_" + "0" * 64, True))
     assert (peers.settle(), peers.release) == (False, JAZZY)
     assert peers.faults() == [
-        ("TYPE_MISFIT", "fleet_states: 1 of another definition than ours (jazzy)")
+        ("TYPE_MISFIT", "fleet_states: 1 peer(s) with another definition than ours (jazzy)")
     ]
 
 
@@ -159,7 +159,8 @@ def test_our_own_daemons_are_no_evidence_of_a_release() -> None:
 
 
 def site(release: Release) -> tuple[Outlet, MemoryTransport, list[object]]:
-    """Return a node of this release, and the list of its alarms that another node hears."""
+    """Return a node of this release, and a list that gets each alarm of the node. Another node fills
+    the list."""
     network, heard = MemoryNetwork(), list[object]()
     ears = MemoryTransport(network, "ears")
     for topic in (topics.EMERGENCY_SIGNAL, topics.FIRE_ALARM_TRIGGER, topics.ALERT):
@@ -173,7 +174,7 @@ def site(release: Release) -> tuple[Outlet, MemoryTransport, list[object]]:
 def test_without_emergency_signal_the_alarm_and_its_end_go_out_on_fire_alarm_trigger() -> None:
     outlet, node, heard = site(JAZZY)
     outlet.publish(topics.EMERGENCY_SIGNAL, d.EmergencySignal((), True))
-    node.release = KILTED  # the node learns its release only after the alarm
+    node.release = KILTED  # the alarm comes before the node knows its release
     outlet.publish(topics.EMERGENCY_SIGNAL, d.EmergencySignal((), False))
     assert heard == [d.Bool(True), d.Bool(False)]
     outlet, _, heard = site(KILTED)

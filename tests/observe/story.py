@@ -1,4 +1,4 @@
-"""Messages in virtual time. Each message may change the memory of a device."""
+"""RMF's messages in virtual time, and what our observers note about the devices in these messages."""
 
 from dataclasses import dataclass, field
 
@@ -23,7 +23,7 @@ OPEN, CLOSED = 2, 0
 
 @dataclass
 class Story:
-    """A series of messages. `news` has one line for each change that a message makes."""
+    """A series of messages. `news` has a line for each thing that the observer has noted as new."""
 
     graph: PlainGraph = field(default_factory=PlainGraph)
     tally: SiteTally = field(default_factory=SiteTally)
@@ -56,7 +56,8 @@ class Story:
         return self.graph.known[kind, name]
 
     def waits(self, kind: Kind, name: str) -> list[tuple[str, str, float]]:
-        """Return each waiting requester, with its request and the start of its wait."""
+        """Return (requester, request, time) for each requester that waits. The time (s) is the start of
+        its wait."""
         now = Moment(self.now, WALL + self.now)
         return [(one.who, one.wants, one.since.at) for one in self.device(kind, name).waits(now)]
 
@@ -70,13 +71,14 @@ class Story:
     def asks(
         self, who: str, floor: str = "L2", kind: int = AGV, *, passed: bool = False
     ) -> "Story":
-        """Let a LiftRequest arrive from a fleet adapter, or with `passed` from the supervisor."""
+        """Let a LiftRequest of a robot arrive. The fleet adapter sends it, or the supervisor if
+        `passed` is true."""
         topic = "lift_requests" if passed else "adapter_lift_requests"
         floor = "" if kind == END else floor
         return self.hear(topic, d.LiftRequest("Lift1", stamp(WALL + self.now), who, kind, floor))
 
     def ends(self, who: str, *, passed: bool = False) -> "Story":
-        """Let an END_SESSION arrive."""
+        """Let an END_SESSION of a robot arrive. `passed` is the same as for `asks`."""
         return self.asks(who, kind=END, passed=passed)
 
     def door(self, mode: int) -> "Story":

@@ -1,5 +1,5 @@
-"""The texts about alarms in `watch`, `explain` and the page. They come from our daemons'
-diagnostics."""
+"""The texts about alarms that `watch`, `explain` and the web page show. They are made from our daemons'
+messages on `/diagnostics`."""
 
 from datetime import UTC, datetime
 from typing import Any
@@ -29,7 +29,7 @@ BEGAN = "2023-11-14T22:10:00Z"
 def told(
     at: float, state: str, *fleets: str, panel: Any = None, since: str = BEGAN, **daemon: Any
 ) -> Heard:
-    """Return diagnostics in which a panel's daemon states its alarm."""
+    """Return a message on `/diagnostics` that has a panel's daemon with this state of its alarm."""
     report = FleetAlarmReport(state, CAUSE if state == "alarm" else ())
     statement = alarming.statement(report, frozenset(fleets))
     status = {**daemon, "alarm": {**statement, "since": since}}
@@ -56,18 +56,18 @@ def test_each_state_of_an_alarm_is_one_sentence() -> None:
         return found.because(utc)
 
     alarm = (
-        "Every robot is to stand because fire of Panel raised an alarm at 22:10 and nobody has reset"
-        " bridge"
+        "Every robot must stand still because fire of Panel raised an alarm at 22:10 and nobody has"
+        " reset bridge"
     )
     assert because(told(0.0, "alarm")) == f"{alarm}."
     silent = f"{alarm}, and has been silent since its last statement."
     assert because(told(0.0, "alarm"), now=60.0) == silent
     assert because(told(0.0, "drill", "y", "x")) == (
-        "Every robot of x, y is to stand for a drill of bridge, which began at 22:10 and ends by"
-        " itself."
+        "Every robot of x, y must stand still for a drill of bridge, which began at 22:10 and ends"
+        " by itself."
     )
     assert because(told(0.0, "alarm"), told(1.0, "reset")) == (
-        "Every robot is to stand until another alarm ends: bridge was reset at 22:10."
+        "Every robot must stand still until another alarm ends, although bridge was reset at 22:10."
     )
     for unknown in ("-", "soon"):
         assert "raised an alarm at an unknown time and" in because(
@@ -76,7 +76,10 @@ def test_each_state_of_an_alarm_is_one_sentence() -> None:
 
 
 def published(at: float, on: bool, node: str = "", *fleets: str) -> Heard:
-    """Return a message about an alarm from a node; "" if the wire hides the node."""
+    """Return a message that begins (`on`) or ends an alarm.
+
+    If `node` is "", the transport does not tell the sender.
+    """
     sender = Sender(f"/{node}") if node else None
     if fleets:
         message = d.EmergencySignal(fleets, on)
@@ -85,19 +88,22 @@ def published(at: float, on: bool, node: str = "", *fleets: str) -> Heard:
 
 
 def test_an_alarm_of_another_node_stands_until_any_node_ends_it_for_its_fleets() -> None:
-    """RMF's fleet adapters obey the last word of any node."""
+    """RMF's fleet adapters obey the last message, from whichever node it comes."""
 
     def told_of(*heard: Heard) -> list[str]:
         began = told(-9.0, "quiet")
         return [one.because(utc) for one in observed(began, *heard) if one.stands]
 
-    desk = "Every robot is to stand because desk published an alarm on fire_alarm_trigger at 22:13."
+    desk = (
+        "Every robot must stand still because desk published an alarm on fire_alarm_trigger at"
+        " 22:13."
+    )
     assert told_of(published(0.0, True, "desk")) == [desk]
     assert told_of(published(0.0, True, "desk"), published(9.0, False, "nurse")) == []
     of_x = published(0.0, True, "desk", "x")
     [two] = told_of(of_x, published(1.0, False, "desk", "y"))
     assert two.startswith(
-        "Every robot of x is to stand because desk published an alarm on emergency"
+        "Every robot of x must stand still because desk published an alarm on emergency"
     )
     assert told_of(of_x, published(1.0, False)) == []
 
@@ -113,7 +119,7 @@ def test_in_the_beginning_an_old_end_ends_only_its_senders_alarm() -> None:
     assert (one.node, one.since, one.condition) == (
         "desk",
         None,
-        "ALARM on fire_alarm_trigger; every fleet is to stand",
+        "ALARM on fire_alarm_trigger; every fleet must stand still",
     )
     assert observed(*heard, published(0.2, False, "desk")) == []
     [hidden] = observed(published(0.0, True))
@@ -131,7 +137,7 @@ def test_watch_has_a_row_for_the_alarm_and_for_each_panel() -> None:
     panel = {"state": "alarm", "active": "fire", "faults": [fault], "input_age_s": 0.1}
     board = Board()
     board.take(told(0.0, "alarm", panel=panel, simulated=True))
-    stands = "ALARM: fire of Panel; every fleet is to stand"
+    stands = "ALARM: fire of Panel; every fleet must stand still"
     faults = "ALARM_SOURCE_ACTIVE (fire)"
     assert board.rows(1.0, WALL + 1) == [
         BoardRow("alarm", "bridge", stands, simulated=True),
@@ -141,7 +147,7 @@ def test_watch_has_a_row_for_the_alarm_and_for_each_panel() -> None:
     board.take(told(61.0, "drill"))
     [row, _] = [*board.rows(61.0, WALL + 61), None]
     assert row is not None
-    assert row.state == "DRILL; every fleet is to stand"
+    assert row.state == "DRILL; every fleet must stand still"
     board.take(told(62.0, "quiet"))
     assert board.rows(62.0, WALL + 62) == [BoardRow("alarm", "bridge", "no alarm")]
     assert board.rows(99.0, WALL + 99) == []
@@ -155,12 +161,12 @@ def test_explain_begins_with_the_alarm_for_which_the_robots_stand() -> None:
     before = site.explain("lift", "Lift1", None).now
     site.take(told(1.0, "alarm"))
     alarm = (
-        "Every robot is to stand because fire of Panel raised an alarm at 22:10:00 and nobody has"
-        " reset bridge."
+        "Every robot must stand still because fire of Panel raised an alarm at 22:10:00 and nobody"
+        " has reset bridge."
     )
     explained = site.explain("lift", "Lift1", UTC)
     assert explained.now[0] == alarm
-    how = "when the cause is over and it is safe: `rmf-bridge reset FILE` of bridge"
+    how = "when the cause is over and it is safe: `rmf-bridge reset FILE` for bridge"
     assert explained.next == (NextStep("a person", how),)
     site.take(told(2.0, "drill"))
     drill = (NextStep("nobody", "the drill ends by itself"),)

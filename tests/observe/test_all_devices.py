@@ -1,5 +1,5 @@
-"""The memory of all devices: its bounds, its clock, the age of messages, and two nodes with one
-name."""
+"""The memory of our observers about all devices. The tests cover the bounds of this memory, stepped
+clocks, the age of messages, and two nodes with one name."""
 
 import pytest
 from msgspec.structs import replace

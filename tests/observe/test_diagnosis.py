@@ -1,4 +1,5 @@
-"""The memory of our nodes' messages on `/diagnostics` stays within its bounds."""
+"""The memory of our observers about our nodes' messages on `/diagnostics`. The memory must stay
+bounded."""
 
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard

@@ -1,4 +1,4 @@
-"""The memory of a door and a charger: requesters, holders and waits."""
+"""The memory of our observers about a door and a charger: requesters, holders and waits."""
 
 from msgspec.structs import replace
 

@@ -1,5 +1,5 @@
-"""The memory of a lift: requesters, holder, waits, and the conditions for which RequestLift still
-waits."""
+"""The memory of our observers about a lift: requesters, holder and waits. It also has the conditions
+for which RMF's phase RequestLift still waits."""
 
 import pytest
 
@@ -115,7 +115,7 @@ def test_a_robot_counts_as_ending_until_its_last_end_is_old() -> None:
 
 
 def not_passed_on(story: Story) -> str:
-    """Return the requester whose requests the supervisor withholds from the lift."""
+    """Return the requester whose request the supervisor has not passed on to the lift, or ""."""
     lift = story.device("lift", "Lift1")
     assert isinstance(lift, ObservedLift)
     one = lift.not_passed_on(story.graph.now)

@@ -12,8 +12,8 @@ A, B, C = (Sender(f"/{name}") for name in "abc")
 def publishers(
     *told: Sender | None, step_s: float = 0.5, after_s: float = 0.0
 ) -> tuple[Sender, ...]:
-    """Let these senders publish the same state in turn. Return the publishers that count `after_s`
-    later."""
+    """Let these senders publish the same state, one after the other. Return the publishers that the
+    observer counts `after_s` seconds later."""
     graph, at = PlainGraph(), 0.0
     for at, sender in enumerate(told):
         graph.hear(Heard(at * step_s, WALL, "lift_states", LIFT, sender))
@@ -32,7 +32,7 @@ def test_a_restarted_node_or_a_rejoined_listener_is_no_second_publisher() -> Non
     assert publishers(A, A, A) == (A,)
     assert publishers(A, A, B) == (B,)
     assert publishers(A, B, C) == (C,)
-    assert publishers(A, B, A, step_s=SLOWEST_S) == (A,)  # A has come back, and B has gone
+    assert publishers(A, B, A, step_s=SLOWEST_S) == (A,)  # B has gone before A comes back
 
 
 def test_two_publishers_become_one_after_the_other_has_gone() -> None:

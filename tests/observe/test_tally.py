@@ -31,8 +31,8 @@ FREE, HELD = ("", "L2"), (RED, "L1")
 
 
 def ride(story: Story) -> Story:
-    """Let a robot ask at L1, board after 20 s, and ask for L2. Another 8 s later it may leave the
-    car."""
+    """Let a robot request the lift at L1, get it after 20 s, and request L2. The lift is open at L2
+    another 8 s later."""
     asks_for(story.lift(*FREE), "L1", 20, FREE).lift(RED, "L1", OPEN)
     asks_for(story, "L2", 8, HELD).lift(RED, "L2", OPEN)
     return story.ends(RED).ends(RED, passed=True).lift()

@@ -1,4 +1,4 @@
-"""The maker of the alert rules in deploy/prometheus/, from the faults and their remedies."""
+"""Functions that make the alert rules in deploy/prometheus/ from the faults and their remedies."""
 
 from collections.abc import Iterator
 from typing import Any, Final
@@ -20,7 +20,7 @@ LONG_WAIT: Final = (
 
 
 def page() -> str:
-    """Return the rules file."""
+    """Return the content of the file with the alert rules."""
     groups = {
         "groups": [
             {"name": "rmf-bridges", "rules": [*_fixed()]},
@@ -36,7 +36,7 @@ def _fixed() -> Iterator[dict[str, Any]]:
         "rmf_bridge_lift_session_still_seconds > 180",
         "0s",
         "critical",
-        "Nothing about lift {{ $labels.device }} has changed for 3 minutes, and a robot has it.",
+        "A robot has lift {{ $labels.device }}, and the lift's state has not changed for 3 minutes.",
         "Look into the car. `rmf-bridge explain --live {{ $labels.device }}` says who must act.",
     )
     yield _rule(
@@ -54,8 +54,8 @@ def _fixed() -> Iterator[dict[str, Any]]:
         "30s",
         "warning",
         "The last reading of {{ $labels.kind }} {{ $labels.device }} is old.",
-        "The device's own fault names the wire or bus. Without a fault compare the clocks of the"
-        " machines (`timedatectl`).",
+        "If the device has a fault, the fault names the wire or bus. Otherwise compare the clocks of"
+        " the machines (`timedatectl`).",
     )
     yield _rule(
         "TwoNodesForOneDevice",
@@ -79,7 +79,7 @@ def _fixed() -> Iterator[dict[str, Any]]:
         "0s",
         "warning",
         "A robot has waited more than 5 minutes for {{ $labels.kind }} {{ $labels.device }}.",
-        "`rmf-bridge explain --live {{ $labels.device }}` says for whom the robot waits.",
+        "`rmf-bridge explain --live {{ $labels.device }}` says what the robot waits for.",
     )
     yield _rule(
         "OutputsUnverified",
@@ -87,7 +87,7 @@ def _fixed() -> Iterator[dict[str, Any]]:
         "0s",
         "critical",
         "Daemon {{ $labels.daemon }} has died, and its outputs may be on.",
-        "Run `rmf-bridge status` there: it prints the command that switches them off.",
+        "Run `rmf-bridge status` on its machine: it prints the command that switches the outputs off.",
     )
     yield _rule(
         "DaemonDown",
@@ -107,7 +107,10 @@ def _fixed() -> Iterator[dict[str, Any]]:
     )
     left = "rmf_bridge_certificate_end_timestamp_seconds - time()"
     file = "{{ $labels.file }} ({{ $labels.daemon }}, {{ $labels.key }}) on {{ $labels.instance }}"
-    renew = "Renew it (docs/how-to/harden.md), and restart the daemon. After the end TLS fails."
+    renew = (
+        "Renew the certificate (docs/how-to/harden.md), and restart the daemon."
+        " TLS fails when a certificate has ended."
+    )
     soon, urgent = SOON_S // DAY_S, URGENT_S // DAY_S
     yield _rule(
         "CertificateEndsSoon",

@@ -1,7 +1,8 @@
-"""The unsafe control actions of `hazards.toml`.
+"""The rows of `hazards.toml`. Each row has an unsafe control action, and the guard in the code against
+it.
 
-`python -m tests.reference.hazards [ID …]` removes each guard in a copy of the tree. Then it runs the
-test of that row, which must fail.
+`python -m tests.reference.hazards [ID …]` removes the guard of each row in a copy of the repository.
+Then it runs the row's test, which must fail.
 """
 
 import re
@@ -30,10 +31,10 @@ class Cut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class UnsafeAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One row: an unsafe action with its guard and its test. A row without guard and test has a reason
+    """One row: an unsafe control action with its guard and its test. A row without a guard has a reason
     in `gap`.
 
-    `also` lists further guards. Each guard alone would suffice, so a cut removes all of them together.
+    `also` lists further guards. Each guard alone would suffice, so all of them are removed together.
     """
 
     id: str
@@ -54,7 +55,7 @@ class UnsafeAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def file(self) -> Path:
-        """Return the guard's file, relative to the tree."""
+        """Return the path of the guard's file, relative to the repository."""
         return Path(self.guard.partition("::")[0])
 
 
@@ -79,7 +80,9 @@ def _row(row: UnsafeAction) -> str:
     function = row.guard.partition("::")[2]
     file, _, test = row.test.partition("::")
     told = re.sub(r"_", " ", test.removeprefix("test_"))
-    more = "".join(f", and alone enough too: `{one.file}`" for one in row.also)
+    more = "".join(
+        f", and another guard that would suffice alone in `{one.file}`" for one in row.also
+    )
     return f"{first} {row.rule}: `{function}` in `{row.file}`{more} | {told} (`{file}`) |\n"
 
 

@@ -97,8 +97,9 @@ def exit_codes() -> str:
         for code, text in EXIT_CODES[name].items()
     )
     return (
-        "# Exit codes\n\nFor scripts and monitoring. From 64 on they are those of `sysexits.h`. Each"
-        f" command may also end with:\n\n| code | meaning |\n|---|---|\n{always}\n\n"
+        "# Exit codes\n\nFor scripts and monitoring. The codes from 64 on are those of `sysexits.h`."
+        " Each command may also end with one of these codes:\n\n"
+        f"| code | meaning |\n|---|---|\n{always}\n\n"
         "| command | code | meaning |\n|---|---|---|\n" + "\n".join(rows) + "\n"
     )
 
@@ -120,10 +121,10 @@ OF: Final = {
 LAWS_HEAD: Final = """\
 # Laws
 
-What RMF's supervisors and fleet adapters need of any node for a lift, door, charger, dispenser or
-ingestor, and what lifts and doors need of a fleet's adapter. `rmf-bridge judge` holds a node against
-them ([how](../how-to/judge.md)); `rmf-bridge judge KIND --laws` prints them. A stuck or noisy wire
-below a right node can break a law marked with \\* too.
+Laws are what RMF's supervisors and fleet adapters need from any node for a lift, door, charger,
+dispenser or ingestor, and what lifts and doors need from a fleet's adapter. `rmf-bridge judge` checks
+whether a node keeps them ([how](../how-to/judge.md)). `rmf-bridge judge KIND --laws` prints them. Even
+a correct node can break a law marked with \\* if one of its wires is stuck or noisy.
 
 No part of RMF sends ChargerRequest, and RMF has no names for its topics: `charger_states`,
 `charger_requests` and `charger_cancels` are ours (`topics:` in a YAML given by `--config` renames
@@ -201,9 +202,9 @@ def decisions() -> str:
 DECISIONS_HEAD: Final = """\
 # Decisions
 
-What costs something to reverse, with its date and reason. A new one takes the next number; its second
-line is its date and its status: proposed, accepted, or replaced by another. Texts are left as they
-were: a file that they name may have moved since ([0116](0116-two-houses.md)).
+Decisions that cost something to reverse, with date and reason. A new decision gets the next number. Its
+second line has its date and its status: proposed, accepted, or replaced by another. The texts of old
+decisions are not changed, so a file that they name may have moved since ([0116](0116-two-houses.md)).
 
 | | decision | date | status |
 |---|---|---|---|

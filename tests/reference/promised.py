@@ -29,8 +29,8 @@ JSON: Final = {
     "status": DaemonStatus,
     "watch": BoardRow,
 }
-"""The struct that each command prints with `--json`. The list leaves out `judge`, `replay` and
-`log`."""
+"""The struct that each command prints with `--json`. `judge`, `replay` and `log` have no struct
+here."""
 FILE: Final = Path(__file__).with_suffix(".txt")
 
 
@@ -53,7 +53,8 @@ def present() -> set[str]:
 def _fields(shape: type) -> Iterator[str]:
     schema = msgspec.json.schema(shape)
     found = _keys(schema, schema, ())
-    return (path for path in found if not path.endswith(".headings"))  # leads to the keys of a row
+    # leave out `headings`, which only leads to the keys of a row
+    return (path for path in found if not path.endswith(".headings"))
 
 
 def _keys(node: Any, root: Any, path: tuple[str, ...]) -> Iterator[str]:

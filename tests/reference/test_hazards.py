@@ -1,4 +1,5 @@
-"""Every output has its rows in `hazards.toml`. Each row names a guard and a test that exist."""
+"""Check that `hazards.toml` has rows for every output. Check that each row names an existing guard and
+test."""
 
 import re
 
@@ -13,8 +14,8 @@ from tests.reference.hazards import PAGE, ROOT, UnsafeAction, actions, page
 ROWS = actions()
 WAYS = ("given", "not_given", "timing", "duration")
 NO_COMMANDS = {"door.between_pulses", "dispenser.guid", "dispenser.item"}
-"""Fields of outputs that drive nothing. They tell the driver why a hold ended, or what a start
-dispenses."""
+"""Fields of the outputs that switch nothing. They only tell the driver why a hold ended, or what a
+start dispenses."""
 
 
 def test_the_page_has_the_table() -> None:
@@ -27,7 +28,7 @@ def test_every_output_of_every_kind_has_its_four_rows() -> None:
         "lift": LiftOutputs,
         "door": DoorOutputs,
         "charger": ChargerOutputs,
-        "dispenser": WorkcellOutputs,  # also the outputs of an ingestor
+        "dispenser": WorkcellOutputs,  # an ingestor has the same outputs
     }
     outputs = {f"{kind}.{field}" for kind, of in kinds.items() for field in of.__struct_fields__}
     wanted = {f"{output}.{way}" for output in outputs - NO_COMMANDS for way in WAYS}

@@ -1,4 +1,4 @@
-"""The files that the documentation names exist."""
+"""Check that the files which the documentation names exist."""
 
 import re
 from pathlib import Path, PurePath
@@ -26,8 +26,8 @@ THERE = [
     if "__pycache__" not in path.parts
 ]
 PATH = re.compile(r"`([\w.-]+(?:/[\w.-]+)*(?:/|\.(?:py|md|yaml|dbc)))`")
-"""A file or a folder in a text. The tests skip a path with `<kind>` or `*`, which stands for many
-files."""
+"""A pattern for the path of a file or folder in a text. It does not match a path with `<kind>` or `*`,
+because such a path means many files."""
 WAYS = ("a request", "an edge", "a register", "a frame", "a YAML")
 
 
@@ -43,7 +43,8 @@ def test_every_file_that_is_named_exists(page: str) -> None:
 
 
 def test_each_program_that_a_page_names_by_its_folder_exists() -> None:
-    """The test covers decisions too. An old decision must name a moved file by its present place."""
+    """The test also checks old decisions. If a file has moved, a decision must name the file's present
+    path."""
     programs = [path for path in THERE if path.suffix == ".py"]
     lost = [
         f"{page.name}: {found}"

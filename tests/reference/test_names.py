@@ -1,4 +1,5 @@
-"""A class name has one meaning. At most 5 % of the product's classes may share a name."""
+"""Check that few classes have the same name. At most 5 % of the product's classes may share their names
+with other classes."""
 
 import ast
 from collections import Counter

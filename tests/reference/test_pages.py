@@ -1,4 +1,4 @@
-"""The generated pages of docs/ are up to date."""
+"""Check that the generated pages of docs/ are up to date."""
 
 import os
 import re
@@ -33,7 +33,7 @@ def test_each_exit_code_of_a_command_is_documented(command: str) -> None:
 
 
 def tracked(pattern: str) -> Iterator[Path]:
-    """Yield the files in git except generated files."""
+    """Yield the repository's files, except files in the folders of virtual environments and builds."""
     for path in sorted(ROOT.rglob(pattern)):
         if not {".venv", ".venv-ros", "build", "dist"} & set(path.relative_to(ROOT).parts):
             yield path
@@ -44,7 +44,7 @@ PAGE = re.compile(r"\bdocs/[\w./-]+\.(?:md|svg|png)\b")
 
 @pytest.mark.parametrize("pattern", ["*.py", "*.md", "*.yaml", "*.service", "*.toml", "*.xml"])
 def test_each_page_of_docs_that_a_text_names_exists(pattern: str) -> None:
-    """`make docs` checks only the links within docs/."""
+    """This test is needed because `make docs` checks only the links within docs/."""
     wrong = {
         f"{path.relative_to(ROOT)}: {page}"
         for path in tracked(pattern)

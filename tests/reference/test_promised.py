@@ -1,5 +1,5 @@
-"""A promised name stays for a whole major version. After a change of name the old name can still be
-read."""
+"""Check that promised names stay for a whole major version. If a YAML key gets a new name, files with
+the old name must stay readable."""
 
 import re
 from fnmatch import fnmatch

@@ -1,4 +1,4 @@
-"""Each line of the threat model names an existing test, or states that there is a gap."""
+"""Check that each line of the threat model names an existing test, or has the word **gap:**."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,5 @@
-"""`make test-rollout` rolls versions out to two booted machines, and prints a line for each check.
+"""`make test-rollout` installs versions of our packages on two booted machines, and prints a line for
+each check.
 
 The command must run as root. The exit code is 1 if a check failed, and 69 if no check ran.
 """
@@ -24,7 +25,8 @@ ROOT: Final = Path(__file__).parents[2]
 WORK: Final = ROOT / "build/rollout"
 BIN: Final = ROOT / ".venv/bin"
 INSIDE: Final = "RMF_ROLLOUT_INSIDE"
-"""A variable that is set in the process with its own network. That network has only loopback."""
+"""The environment variable that marks the inner process. This process has a network with only
+loopback."""
 ENV: Final = os.environ | {
     "PATH": f"{BIN}:{os.environ['PATH']}",
     "GNUPGHOME": str(WORK / "gpg"),
@@ -39,7 +41,8 @@ FIRST, SECOND = PORTS
 
 
 def main() -> int:
-    """Build everything that needs the network. Then run the checks in a network of their own."""
+    """Download and build the machines. Then run the checks in another process, whose network has only
+    loopback."""
     if os.geteuid() != 0:
         print("containers need root: sudo make test-rollout", file=sys.stderr)
         return os.EX_UNAVAILABLE
@@ -52,7 +55,8 @@ def main() -> int:
             debian(WORK, release)
         words = ["unshare", "--net", "--mount", sys.executable, "-m", "tests.rollout"]
         return subprocess.run(words, env=os.environ | {INSIDE: "1"}).returncode
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # this exit shuts the containers down too
+    # exit by an exception, so that the containers are shut down too
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     sh("ip", "link", "set", "lo", "up")
     try:
         return Rollouts().run()
@@ -69,12 +73,15 @@ def sh(*words: object, check: bool = True) -> subprocess.CompletedProcess[str]:
 
 
 VERSIONS: Final = {".1": None, ".2": broken, ".3": cut_off}
-"""The versions after the built version. One version serves, and two versions fail."""
+"""The suffixes of the versions after the built version, with the function that breaks each version.
+
+The first version works, and the two others fail.
+"""
 
 
 def repository() -> str:
-    """Make the package repository. Return the version of the built packages, without the system's
-    name."""
+    """Make the package repository. Return the version of the built packages without the suffix for the
+    system."""
     packages = [
         deb
         for _, name in SYSTEMS.values()
@@ -108,7 +115,11 @@ def door(name: str, api_base: str) -> str:
 
 @contextmanager
 def relays() -> Iterator[dict[str, str]]:
-    """Serve a simulated relay with a door for each machine. Also write the folder of the inventory."""
+    """Write the inventory's folder, with the YAML file of a door for each machine. Run a simulated
+    relay for each door.
+
+    Yield the API address of each machine's relay.
+    """
     sh("rm", "-rf", WORK / "site")
     bases = {}
     with ExitStack() as stack:
@@ -145,13 +156,16 @@ def relays() -> Iterator[dict[str, str]]:
 
 
 def renew(yaml: Path) -> None:
-    """Write the checksum of the present YAML into its form, as a new kill test does."""
+    """Write the checksum of the present YAML file into its form.
+
+    The form is the record of a kill test. A new kill test would write the checksum, too.
+    """
     form, new = yaml.with_suffix(".md"), sha256(yaml.read_bytes()).hexdigest()
     form.write_text(re.sub("sha256 [0-9a-f]{64}", f"sha256 {new}", form.read_text()))
 
 
 class Rollouts:
-    """All rollouts with their checks, in order."""
+    """All rollouts with their checks, in the order in which they run."""
 
     def __init__(self) -> None:
         self.failed = 0
@@ -188,7 +202,9 @@ class Rollouts:
         yaml.write_text(kept.replace("door2:", "door1:"))
         done = self._roll("same-name", self.old)
         self._expect(
-            "one name on two machines stops it", done != 0, "'door1' is used in" in self.said
+            "one name on two machines stops the rollout",
+            done != 0,
+            "'door1' is used in" in self.said,
         )
         yaml.write_text(kept)
 
@@ -222,7 +238,7 @@ class Rollouts:
         left = self._on(FIRST, f"ls {state}/door1")
         made = self._on(FIRST, f"stat -c %U /run/rmf-bridge/door1 {state}/door1").split()
         self._expect(
-            "at boot the outputs of a lost daemon go off, by its own user",
+            "at boot the outputs of a lost daemon are switched off, by the daemon's own user",
             "claimed-" not in left,
             len(set(made)) == 1,
             made != ["root"] * 2,
@@ -233,12 +249,14 @@ class Rollouts:
     def _in_use(self, bases: dict[str, str]) -> None:
         self._send("open")
         done = self._roll("in-use", self.good)
-        self._expect("a held door stops it", done != 0, "door1 is in use" in self.said)
+        self._expect("a held door stops the rollout", done != 0, "door1 is in use" in self.said)
         self._expect("no machine was changed", self._versions() == [self.old] * 2)
         self._send("close")
         self._on(FIRST, "systemctl stop rmf-bridge@door1")
         done = self._roll("stopped", self.good)
-        self._expect("a stopped service stops it", done != 0, "machine: door1" in self.said)
+        self._expect(
+            "a stopped service stops the rollout", done != 0, "machine: door1" in self.said
+        )
         self._on(FIRST, "systemctl start rmf-bridge@door1")
 
     def _broken(self, bases: dict[str, str]) -> None:
@@ -246,12 +264,14 @@ class Rollouts:
         kept = yaml.read_text()
         yaml.write_text(kept.replace("scan_s: 1", "scan_s: 0.9"))
         done = self._roll("old-form", self.bad)
-        old = "door1.yaml: the form is about an earlier content" in self.said
-        self._expect("a form older than its YAML stops it", done != 0, old)
+        old = "door1.yaml: the form was made for an earlier version" in self.said
+        self._expect("a form older than its YAML stops the rollout", done != 0, old)
         renew(yaml)
         done = self._roll("broken", self.bad)
         self._expect(
-            "a version that cannot start stops it", done != 0, "did not come back" in self.said
+            "a version that cannot start stops the rollout",
+            done != 0,
+            "did not come back" in self.said,
         )
         self._expect("the old version is back", self._versions() == [self.old] * 2)
         self._expect(
@@ -263,27 +283,35 @@ class Rollouts:
         renew(yaml)
 
     def _cut_off(self) -> None:
-        """Cut the first machine off in the middle of its change, once for a while and once for too
-        long."""
+        """Cut the first machine off while it gets a new version, first for a short time, and then for
+        too long."""
         self._on(FIRST, "echo 90 > /run/cut-off-for")
         done = self._roll("cut-off", self.lost, "-e", "rmf_bridges_reached_again_s=300")
         lost = "did not come back" in self.said and "could not be reached any more" in self.said
-        self._expect("a machine that cannot be reached stops it", done != 0, lost)
-        self._expect("it is put back when it answers again", self._versions() == [self.old] * 2)
+        self._expect("a machine that cannot be reached stops the rollout", done != 0, lost)
+        self._expect(
+            "the machine is put back when it answers again", self._versions() == [self.old] * 2
+        )
         self._expect("every daemon serves again", *self._serving())
         done = self._roll("unknown", self.lost, "-e", "rmf_bridges_reached_again_s=5")
-        self._expect("else its state is unknown", done != 0, f"state unknown: {FIRST}" in self.said)
+        self._expect(
+            "a machine that stays away has an unknown state",
+            done != 0,
+            f"state unknown: {FIRST}" in self.said,
+        )
         self._expect("the second machine was never asked", f"[{SECOND}]" not in self._changed())
         self._reachable()
         done = self._play("put-back", "put_back", "--limit", FIRST)
         self._expect(
-            "the named command puts it back", done == 0, self._versions() == [self.old] * 2
+            "the command that the message names puts the machine back",
+            done == 0,
+            self._versions() == [self.old] * 2,
         )
         self._expect("every daemon serves again", *self._serving())
 
     def _new_file_refused(self, bases: dict[str, str]) -> None:
-        """Roll out a good version with a file that no daemon can serve. Version and file must both go
-        back."""
+        """Roll out a good version, and a file that no daemon can serve. The old version and the old
+        files must come back."""
         folder = WORK / f"site/machines/{FIRST}"
         new = door("door3", "http://127.0.0.1:1")
         (folder / "door3.yaml").write_text(new)
@@ -291,7 +319,9 @@ class Rollouts:
         (folder / "door3.md").write_text(form)
         renew(folder / "door3.yaml")
         done = self._roll("dead-device", self.good)
-        self._expect("a dead device stops it", done != 0, "door3: a fault that" in self.said)
+        self._expect(
+            "a dead device stops the rollout", done != 0, "door3: a fault that" in self.said
+        )
         self._expect("its outputs are named", "door3: NOT VERIFIED OFF" in self.said)
         self._on(FIRST, "rm -r /var/lib/rmf-bridge/door3 /run/rmf-bridge/door3")  # cut off
         self._on(FIRST, "rm /etc/rmf-bridges/door3.yaml; systemctl reset-failed")
@@ -309,9 +339,12 @@ class Rollouts:
         taken = f"rmf_bridges_exporter_options='--no-graph --listen 127.0.0.1:{PORTS[FIRST]}'"
         done = self._roll("exporter", self.good, "-e", taken)
         died = "rmf-bridge-exporter.service: activating" in self.said
-        self._expect("an exporter that does not stay up stops it", done != 0, died)
+        self._expect("an exporter that does not stay up stops the rollout", done != 0, died)
         versions = [self.good, self.old]
-        self._expect("its machine is put back, the first serves", self._versions() == versions)
+        self._expect(
+            "its machine is put back, and the first machine keeps the new version",
+            self._versions() == versions,
+        )
         self._expect("the old exporter runs again", self._runs(SECOND, "exporter"))
         done = self._roll("upgrade", self.good)
         self._expect("an upgrade", done == 0, self._versions() == [self.good] * 2)

@@ -21,7 +21,8 @@ PROGRAMS: Final = {
 }
 PORTS: Final = {"pi-door1": 2201, "pi-door2": 2202}
 SYSTEMS: Final = {"pi-door1": ("bookworm", "deb12"), "pi-door2": ("trixie", "deb13")}
-"""For each machine: the release of Debian, and the name of this release in the packages' versions."""
+"""For each machine: the release of Debian, and the suffix of this release in the versions of our
+packages."""
 CGROUPS: Final = Path("/sys/fs/cgroup")
 
 

@@ -1,5 +1,5 @@
-"""Makers of versions that fail. In one version no daemon starts. Another version cuts the machine
-off."""
+"""Functions that make versions of our package with a defect. In one version no daemon starts. During
+the installation of another version the machine becomes unreachable."""
 
 from pathlib import Path
 from typing import Final
@@ -7,13 +7,15 @@ from typing import Final
 from tests.deb.next_version import bridges_in
 
 BROKEN: Final = 'raise SystemExit("this version cannot start")\n'
-"""The text of the command `run` in the broken version. Its `check` works, so the package installs."""
+"""The statement with which the command `run` begins in the broken version. The version's command
+`check` still works, so the package installs."""
 CUT_OFF: Final = """
 systemctl stop ssh.service
 systemd-run --on-active=$(cat /run/cut-off-for) systemctl start ssh.service
 pkill sshd
 """
-"""The end of a postinst. After this script nobody reaches the machine for a while."""
+"""The last lines of a package's postinst script. They end every ssh connection and stop the ssh server.
+A timer starts the server again."""
 
 
 def broken(tree: Path) -> None:

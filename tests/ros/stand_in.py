@@ -1,8 +1,9 @@
-"""A stand-in for rclpy in a separate folder. On the stand-in a daemon can start, and then refuse to
-run.
+"""A stand-in for rclpy. `write` puts it into a separate folder. With this stand-in a daemon starts, and
+then refuses to run because messages are missing.
 
-When the interpreter ends, the stand-in prints whether its executor's thread still runs. In that case
-the real rclpy aborts the process (SIGABRT), because the thread still uses deleted C++ objects.
+A real rclpy executor has a thread. If this thread still runs when the interpreter ends, rclpy aborts
+the process (SIGABRT). The reason is that the thread still uses deleted C++ objects. Instead of
+aborting, the stand-in prints whether the thread still runs.
 """
 
 from pathlib import Path

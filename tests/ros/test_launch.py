@@ -1,4 +1,5 @@
-"""The launch files. Stand-ins replace ROS's `launch`, and Python has only ROS's packages."""
+"""Tests of the launch files. A stand-in replaces ROS's package `launch`. As on a machine with only
+ROS's packages, Python cannot import the libraries that our daemons need."""
 
 import subprocess
 import sys

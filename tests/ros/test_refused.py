@@ -1,6 +1,7 @@
-"""A refused start on `ros2`, with a stand-in for rclpy. The exit code is 69, and the thread has ended.
+"""A daemon on `ros2` refuses to start. A stand-in replaces rclpy. The exit code is 69, and the
+executor's thread has ended.
 
-With the real ROS 2 of 4 such starts ended in SIGABRT. The stand-in cannot abort.
+With the real ROS, 2 of 4 such starts ended in SIGABRT. The stand-in cannot abort.
 """
 
 import os

@@ -25,8 +25,8 @@ def graph(module: Module) -> Iterator[Graph]:
 
 @pytest.fixture
 def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return a machine with services and users. On this machine systemd gives a daemon no
-    directories."""
+    """Return a temporary folder that stands in for the directories of services and users. The
+    environment is that of a daemon to which systemd gives no directories."""
     for name in ("RUNTIME_DIRECTORY", "STATE_DIRECTORY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(directories, "SERVICE_RUN", tmp_path / "run")

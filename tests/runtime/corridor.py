@@ -1,4 +1,4 @@
-"""Doors on one bus in virtual time. The tests run each scan round."""
+"""Doors on one bus in virtual time. Each scan round runs only when a test calls `round`."""
 
 from collections.abc import Callable, Sequence
 
@@ -18,8 +18,8 @@ SCAN_S = 0.25
 
 
 class Door:
-    """A stand-in for a door's driver. Each reading calls `during`. With `lost` the door cannot be
-    switched off."""
+    """A stand-in for a door's driver. Each reading calls `during`. If `lost` is set, switching the door
+    off fails."""
 
     def __init__(self, name: str, log: Callable[[str], None]) -> None:
         self.during: Callable[[], None] = lambda: None
@@ -67,8 +67,8 @@ class Wires(Bus):
 
 
 class Corridor:
-    """A loop for the named doors on one bus, by default two doors. `story` has (time in s, event) for
-    each event."""
+    """A scan loop for the named doors on one bus, by default two doors. `story` lists all events, each
+    as (time in s, text)."""
 
     def __init__(
         self, debounce: dict[str, float] | None = None, doors: Sequence[str] = ("ward", "lab")

@@ -65,6 +65,7 @@ def with_a_dead_bus_first(yaml: str, port: int, timeout_s: float = 1.5) -> str:
 
 
 def live_before_dead(log: str) -> bool:
-    """Return whether the log reports the live bus off before the wait for the dead bus ends."""
+    """Return whether the log reports the live bus (`module`) as switched off before it reports the dead
+    bus."""
     before, _, live = log.partition("outputs_off bus=module verified=yes")
     return bool(live) and "outputs_off bus=dead" not in before

@@ -1,7 +1,9 @@
-"""One device with inputs on two buses. The daemon's own service runs in virtual time.
+"""One device whose inputs are on two buses, such as a door. The daemon's own service runs in virtual
+time.
 
-The device is on the bus `gateway`, and its other inputs are on `header`. A bus that is down fails each
-call at once, as in a backoff. A hanging bus runs no round, because its thread waits for an answer.
+The device itself is on the bus `gateway`. Some of its inputs, such as a fire contact, are on the bus
+`header`. On a bus that is down every call fails at once. A hanging bus runs no round, because its
+thread waits for an answer.
 """
 
 from collections.abc import Callable, Mapping
@@ -47,8 +49,8 @@ doors:
 
 
 class FarBus(PointsFar, Bus):
-    """The far side of one bus. `read_at` is the time of the last successful reading (s). `shown` has
-    the levels of that reading."""
+    """A stand-in for one bus with the equipment behind it. `read_at` is the time of the last successful
+    reading (s). `shown` has the levels of that reading."""
 
     def __init__(self, clock: Any, plant: Any, wires: Any) -> None:
         super().__init__(clock, plant, wires)
@@ -67,12 +69,12 @@ class FarBus(PointsFar, Bus):
 
 
 class OnTwoBuses:
-    """The service of one device. `states` has (time in s, message). After each round of a bus the
-    service calls `after_round(bus)`."""
+    """The daemon's service for one device. `states` lists the published states as (time in s, message).
+    After each round of a bus the service calls `after_round(bus)`."""
 
     def __init__(self, file: Path, ring: Path | None = None) -> None:
-        """Start the service. The service records a ring in the folder `ring`. With None it records
-        nothing."""
+        """Start the service. The service records into the ring buffer in the folder `ring`. If `ring`
+        is None, the service records nothing."""
         self.now = 0.0
         self.config = load(file)
         (self.device,) = self.config.devices

@@ -20,9 +20,10 @@ from tests.waiting import PATIENCE_S, wait_until
 
 ROOT = Path(__file__).parents[2]
 SERVICE = {"RMF_BRIDGE_SERVICE": "1"}
-"""The environment of a service. In a service the daemon starts no guard process.
+"""The environment variable that tells a daemon that systemd runs it as a service. Such a daemon starts
+no guard process.
 
-A guard would run for minutes after the test's module has gone.
+A guard process would run for minutes after the test's module has gone.
 """
 PATIENT = "stale_after_s: 30"
 """A limit so long that the door does not become stale, even if a busy machine delays the scans.
@@ -115,8 +116,8 @@ BRIDGE = ("bridges.cli",)
 
 
 def command(*arguments: str | Path, program: Sequence[str] = BRIDGE) -> list[str]:
-    """Return the command line of `rmf-bridge …`. `program` is another Python module with its first
-    arguments."""
+    """Return the command line of `rmf-bridge …`. `program` can replace `rmf-bridge` by another Python
+    module and this module's first arguments."""
     return [sys.executable, "-m", *program, *map(str, arguments)]
 
 
@@ -183,7 +184,7 @@ def daemon(
 
 
 def hold_open(module: Module, graph: "Graph", running: Daemon) -> None:
-    """Request OPEN again and again, until the relay holds the door."""
+    """Request OPEN again and again, until the relay is on and so holds the door open."""
     running.wait_for("ready")
 
     def held() -> bool:

@@ -90,8 +90,8 @@ class Place:
         wait_until(lambda: self.state() == state, f"{self._name} is {state}: {self.file}")
 
     def reset(self) -> None:
-        """Type `rmf-bridge reset` until the alarm is reset. The alarm's cause may end only during the
-        first tries."""
+        """Run `rmf-bridge reset` again and again, until the alarm is reset. The daemon refuses each
+        reset while the alarm's cause lasts."""
 
         def is_reset() -> bool:
             code, _, said = self.told("reset")
@@ -180,7 +180,7 @@ def test_a_drill_is_no_alarm_and_ends_though_its_daemon_is_killed(
     def begins(place: Place, for_s: str) -> None:
         begun = "the drill has begun, and ends by itself in"
 
-        def is_begun() -> bool:  # not before the quiet start is over
+        def is_begun() -> bool:  # a daemon accepts no drill in the first seconds after its start
             code, out, said = place.told("drill", "--for", for_s)
             assert (code, said) == (0, "") or "no drill yet" in said, said
             return out.startswith(begun)

@@ -1,5 +1,5 @@
-"""Daemons that are suspended, deaf or hung. RMF gets the right states, and systemd the right
-messages."""
+"""Daemons that are suspended, that no longer hear the graph, or that hang. RMF must get no outdated
+states. systemd must not be told that a hanging daemon is alive."""
 
 import argparse
 import os
@@ -119,7 +119,7 @@ def test_a_transport_that_cannot_be_restarted_ends_the_daemon_with_the_relay_off
 
         def ended() -> bool:
             heard.extend(manager.heard())
-            graph.request(DoorModeValue.MODE_OPEN)  # the request wakes the reader
+            graph.request(DoorModeValue.MODE_OPEN)  # wakes the reader, which then fails
             return running.process.poll() is not None
 
         wait_until(ended, "the daemon has ended")
@@ -162,7 +162,8 @@ def test_the_watchdog_is_not_fed_while_a_call_of_the_bus_hangs(
 def _status_written(run: Path, times: int) -> None:
     """Wait until the daemon's main thread has written the status `times` times.
 
-    The main thread also sends the watchdog messages.
+    The main thread also sends the watchdog messages. So each new status shows that a watchdog message
+    was possible.
     """
     for _ in range(times):
         before = (run / "status.json").stat().st_ino
@@ -191,7 +192,7 @@ def test_a_reset_during_the_start_does_no_harm(
             return "ready " in running.log.read_text()
 
         wait_until(ready, "the daemon is in service")
-        assert (False, 0) in codes, "a reset came before the daemon served, and was obeyed after"
+        assert (False, 0) in codes, "no reset from before the daemon served was obeyed"
         assert {code for _, code in codes} <= {0, 1}
         hold_open(module, graph, running)
         assert running.end(signal.SIGTERM) == 0

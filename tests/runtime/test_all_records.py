@@ -24,7 +24,8 @@ COIL_ON = bytes.fromhex("0001 0000 0006 01 05 0000 ff00")
 def died(state: Path, file: Path, later: bytes = b"") -> Path:
     """Write the record that a daemon leaves behind when the power fails. Return the record's path.
 
-    `later` is text that a later version has added to the YAML file.
+    `later` is appended to the YAML text in the record, as if a later version of the daemon had written
+    it.
     """
     left = record.of(load(file))
     if later:
@@ -61,8 +62,8 @@ def port(file: Path) -> int:
 
 
 def booted(state: Path) -> subprocess.CompletedProcess[str]:
-    """Run the command that a unit runs at boot. The state directories and YAMLs are in this
-    folder."""
+    """Run the command that a unit runs at boot. The folder `state` holds the state directories and the
+    YAML files."""
     code = (
         "import pathlib, sys; from bridges.runtime.all_records import switch_off_all;"
         f"here = pathlib.Path({str(state)!r});"

@@ -1,4 +1,4 @@
-"""Impossible requests to a lift's daemon on each wire. The daemon is a real process."""
+"""Impossible requests to a lift's daemon, sent over each transport. The daemon is a real process."""
 
 import json
 from collections.abc import Iterator
@@ -97,8 +97,7 @@ def test_a_flood_ends_with_the_last_valid_request_and_states_go_on(lift: Lift) -
     edges = [
         line for line in lift.running.log.read_text().splitlines() if " outputs device" in line
     ]
-    # The daemon's own time gives the limits for the number of states and for the number of relay
-    # changes.
+    # The time that passed in the daemon limits the number of states and the number of relay changes.
     read_at = [stamps.in_seconds(state.lift_time) for state in lift.states if state.lift_time.sec]
     took_s = read_at[-1] - read_at[0]
     assert len(read_at) <= 2 + (took_s + 1) / TELL_GAP_S

@@ -1,4 +1,5 @@
-"""A process that switches off takes its settings from the record.
+"""A process that switches outputs off after a daemon's death. It takes its settings from the daemon's
+record of claimed outputs.
 
 If the process cannot decode these settings, the process reads the YAML text in the record.
 """
@@ -59,7 +60,8 @@ def of_file(file: Path) -> tuple[Config, ClaimRecord, ClaimedSettings]:
 @pytest.mark.parametrize("file", DEVICES, ids=lambda file: file.stem)
 def test_the_settings_in_a_record_are_those_of_its_yaml(file: Path) -> None:
     config, written, _ = of_file(file)
-    # The second record has a spoiled YAML text. So only its decoded settings can give the result.
+    # The second record has a spoiled YAML text. So a correct result can come only from its decoded
+    # settings.
     assert claimed(msgspec.structs.replace(written, yaml=config.text).config()) == claimed(config)
     spoiled = msgspec.structs.replace(written, yaml=b"kind: [").config()
     assert claimed(spoiled)[1:] == claimed(config)[1:]

@@ -1,11 +1,10 @@
-"""A controller may take a call and then clear the call's register or coil. Such a controller is no
-rival.
+"""A lift controller may take a call and then reset the call's register or coil to zero. The daemon must
+not report such a controller as a second master.
 
-A second master that writes the same register or coil is a rival. The daemon's log must name the second
-master.
+A real second master may write the same register or coil. Then the daemon's log must name it.
 
-Only the lift is simulated. The daemon's service with its clock, the Modbus line, and the rival's
-connection are real. On RS-485 the rival uses the module's network port.
+Only the lift is simulated. The daemon's service with its clock, the Modbus line, and the second
+master's connection are real. On RS-485 the second master uses the module's network port.
 """
 
 import logging
@@ -160,7 +159,7 @@ def is_told(point: Point, caplog: pytest.LogCaptureFixture) -> bool:
 
 
 SPOILED: Final = re.compile(r"is not a frame|no reply within")
-"""Texts in the log after a busy machine has torn a frame of the line or delayed a reply."""
+"""Texts in the log after a busy machine has split a frame on the serial line or delayed a reply."""
 
 
 def ridden(
@@ -257,7 +256,8 @@ def test_another_master_that_switches_our_command_off_is_told(
     held: ExitStack,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    """The second master writes 0 twice a second. The controller keeps its calls or clears them."""
+    """The second master writes 0 twice a second. The test runs with a controller that keeps its calls,
+    and with one that clears them."""
     point = SERVED[what][example]
     site = Site(configured(example, tmp_path), clears_s, rtu, held)
     site.plant.fail("car", "slow")

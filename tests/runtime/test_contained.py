@@ -1,5 +1,5 @@
-"""A defect in a driver. The defect takes only one device offline and off. The other devices stay in
-service."""
+"""A defect in one device's driver. The daemon switches this device off and shows it as offline. The
+other devices stay in service."""
 
 import pytest
 

@@ -406,7 +406,8 @@ def test_where_a_live_daemon_cannot_be_ruled_out_only_execstoppost_switches_off(
 
 
 def _runs_for_others() -> bool:
-    """Return whether another user may run this Python. Below root's home no other user may."""
+    """Return whether another user may run this Python. If Python lies below root's home directory, no
+    other user may."""
     try:
         return subprocess.run([sys.executable, "-c", ""], user=65534).returncode == 0
     except PermissionError:
@@ -478,7 +479,7 @@ def test_a_user_who_may_not_open_the_adapter_is_told_what_to_do(name: str) -> No
             user=65534 if os.geteuid() == 0 else None,
         )
     assert (done.returncode, "Traceback" in done.stderr) == (1, False), done.stderr
-    assert "add the daemon's user to the group dialout" in done.stderr
+    assert "the daemon's user must be in the group dialout" in done.stderr
 
 
 def test_missing_lgpio_or_permission_is_reported_in_one_line(tmp_path: Path) -> None:
@@ -492,8 +493,8 @@ def test_missing_lgpio_or_permission_is_reported_in_one_line(tmp_path: Path) -> 
 def test_a_bus_that_cannot_be_opened_leaves_nothing_to_switch_off(
     domain: int, tmp_path: Path
 ) -> None:
-    """The daemon claimed no output, so no record may remain. Without the hardware nobody could clear a
-    record."""
+    """The daemon has taken over no output, so it must leave no record of claimed outputs. Such a record
+    could never be removed without the hardware."""
     file = shipped("lift_dry_contact.yaml", tmp_path, wire())
     text = file.read_text()
     text = text.replace("domain_id: 0", f"domain_id: {domain}\n  network: localhost")

@@ -1,4 +1,5 @@
-"""The file with the memories of a daemon's devices, and a person's order."""
+"""The file in which a daemon keeps the memories of its devices. Also a person's order about a
+device."""
 
 import os
 from pathlib import Path

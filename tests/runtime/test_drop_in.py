@@ -1,5 +1,5 @@
-"""The permissions in a service's drop-in. The permissions depend on the way to the devices and to RMF's
-graph."""
+"""The permissions in the systemd drop-in of a service. They depend on the buses to the devices and on
+the transport to RMF's graph."""
 
 from pathlib import Path
 
@@ -69,7 +69,8 @@ SHIPPED = {
 
 
 def permits(config: Config, groups: tuple[str, ...] = GROUPS) -> list[str]:
-    """Return only the lines with permissions, without comments, section names and the fingerprint."""
+    """Return only the lines with permissions. Comments, section names and the drop-in's fingerprint are
+    left out."""
     lines = text(config, groups).splitlines()
     return [line for line in lines if line[:1] not in ("#", "[") and FITS not in line]
 
@@ -89,7 +90,7 @@ def test_each_shipped_file_is_permitted_what_it_needs_and_no_more() -> None:
 def test_the_whole_text_names_its_file_and_the_needs_that_it_meets() -> None:
     config = load(CONFIG / "lift_dry_contact.yaml")
     assert text(config, ["gpio"]).splitlines() == [
-        "# Written by `rmf-bridge enable` for lift_dry_contact.yaml. After a change enable it again.",
+        "# Written by `rmf-bridge enable` for lift_dry_contact.yaml. If it changes, enable it again.",
         "[Service]",
         f"Environment=RMF_BRIDGE_FITS={fits(config)}",
         *GPIO,
@@ -178,7 +179,7 @@ def test_the_watchdogs_time_follows_from_the_slowest_call(
     )
     assert watchdog_s(config) == expected_s
     assert too_slow(config, watchdog_s(config)) == ""
-    fed_every_s = watchdog_s(config) / 6 + 1 + timeout_s  # period of `_watch`, a scan, a call
+    fed_every_s = watchdog_s(config) / 6 + 1 + timeout_s  # `_watch` + a scan + a call
     assert fed_every_s < watchdog_s(config)
 
 

@@ -34,8 +34,8 @@ def _forgotten() -> Iterator[None]:
 
 
 def left(folder: Path, **later: object) -> tuple[Path, Records, str]:
-    """Write a record with fields of a later version. Return its path, the records, and the path of the
-    YAML."""
+    """Write a record with fields of a later version. Return the record's path, the daemon's `Records`,
+    and the path of the YAML."""
     (source,) = EARLIER[-1].glob(PATTERN)
     content = msgspec.json.decode(source.read_bytes()) | later
     path = folder / source.name

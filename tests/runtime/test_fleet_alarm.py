@@ -1,4 +1,5 @@
-"""The node of a daemon's alarm, on the memory transport: disks, late fleet adapters, releases."""
+"""The node that tells a daemon's alarm to the fleets, on the memory transport. The tests cover full
+disks, late fleet adapters and RMF's releases."""
 
 import pytest
 
@@ -83,7 +84,7 @@ class Site:
             node.round()
 
     def until(self, at: float) -> None:
-        """Let time pass in steps of 0.25 s. Each second every node looks, and publishes its
+        """Let time pass in steps of 0.25 s. Each second every node runs `look`, and publishes its
         diagnostics."""
         while self.now < at:
             self.now += 0.25
@@ -193,7 +194,7 @@ def test_an_unnamed_sender_is_named_when_discovery_knows_it() -> None:
     publisher.sender.node = "/desk"
     site.until(6.0)
     [fault] = site.nodes["a"].status()["faults"]
-    assert fault["detail"] == "reset here, but the alarm of desk stands"
+    assert fault["detail"] == "reset here, but the alarm of desk is not over"
 
 
 @pytest.mark.parametrize(("nobody", "heard"), [(False, [d.Bool(True)]), (True, [])])

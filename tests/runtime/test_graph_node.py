@@ -1,4 +1,5 @@
-"""The service of a kind without hardware: the node around the core, on real transports."""
+"""The service of a supervisor, a kind of daemon without hardware. The tests run its node, which feeds
+messages to the decision code."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -339,7 +340,7 @@ def test_a_lost_transport_is_logged_and_does_not_end_the_daemon(
     assert site.node.devices()["Lift1"]["holder"] == "fleet/a (1 s)"
 
 
-# --- in its thread, and on the wire --------------------------------------------------------------
+# --- the node in its own thread, on the memory transport and on a real wire ----------------------
 
 
 @pytest.fixture(params=["memory", "wire"])
@@ -361,8 +362,8 @@ def join(request: pytest.FixtureRequest) -> Iterator[Callable[[str], Transport]]
 def test_a_served_graph_kind_runs_in_its_thread_until_it_is_stopped(
     join: Callable[[str], Transport],
 ) -> None:
-    """A passive node publishes only after its rival has gone. Then the other nodes see one
-    publisher."""
+    """The passive node publishes nothing while its rival is there. After the rival has gone, the other
+    nodes see only this node's publisher."""
     others, ours, rival = join("others"), join("supervisor"), join("rival")
     rival.publisher(LIFT_REQUESTS)
     heard: list[LiftRequest] = []

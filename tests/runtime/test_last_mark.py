@@ -1,7 +1,7 @@
-"""The mark that a daemon's last run leaves. The mark says that all outputs are off. So `outputs-off`
+"""The file (mark) that a daemon leaves at its end to say that all outputs are off. Then `outputs-off`
 need not switch any output.
 
-The mark counts only if the same run stopped cleanly.
+`outputs-off` believes the mark only if the same run of the daemon stopped cleanly.
 """
 
 import signal

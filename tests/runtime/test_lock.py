@@ -1,4 +1,5 @@
-"""Processes that read the lock file or wait for the lock. Such processes keep no relay on.
+"""Foreign processes that read the lock file or wait for the lock. They must not prevent that a dead
+daemon's relays are switched off.
 
 No run of a daemon switches the outputs of another run off.
 """

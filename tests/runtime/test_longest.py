@@ -1,4 +1,4 @@
-"""Messages with a string of ten megabytes. No kind keeps such a string."""
+"""Messages with a string of ten megabytes. No kind of daemon may keep so long a string in an event."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -20,7 +20,7 @@ from bridges.settings.load import load
 CONFIG = Path(__file__).parents[2] / "config"
 HUGE = "x" * 10_000_000
 KEPT_MOST = 20_000
-"""The greatest number of characters that a kind may keep of one message."""
+"""The limit on the length of an event (in characters) that a kind of daemon makes from one message."""
 
 ROBOT = d.RobotState(
     name="AMR01", task_id="t", mode=d.RobotMode(int(d.RobotModeValue.MODE_CHARGING))

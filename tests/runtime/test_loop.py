@@ -60,8 +60,8 @@ def test_one_device_that_cannot_be_switched_off_keeps_no_other_on_and_is_reporte
 
 
 def test_after_a_suspension_nothing_is_shown_that_was_only_true_before_it() -> None:
-    """The daemon is suspended by SIGSTOP or by a laptop's sleep. The suspension is shorter than a
-    reading may be old."""
+    """The daemon is suspended by SIGSTOP or by a laptop's sleep. The suspension is short, so the last
+    reading has not yet exceeded its permitted age."""
     corridor = Corridor(debounce={"opened": 0.1, "closed": 0.1})
     for i in range(7):
         corridor.round(SCAN_S * i)

@@ -23,11 +23,13 @@ from workbench.replay.replayed import Replay, ReplayedCores, of_head
 LIFT: Final = Path(__file__).parents[2] / "config" / "lift_two_buses.yaml"
 STALE_S: Final = 1.0
 LATEST_S: Final = STALE_S + 0.15 + 0.1
-"""The greatest age (s) of the inputs that a device uses. Three times add up: stale_after_s, the
-validity of a header's reading (0.05 s + 0.1 s), and a scan of the gateway."""
+"""The greatest age (s) of the inputs that a device uses. It is the sum of three times:
+- `stale_after_s`
+- the time for which a reading of the bus `header` is valid (0.05 s + 0.1 s)
+- a scan of the bus `gateway`"""
 SEEN_S: Final = 0.05 + 0.15 + 0.1 + 0.05
-"""The longest time (s) until the device sees an alarm. Three times add up: the debounce of a fire
-contact, the age of a reading, and a scan of each bus."""
+"""The longest time (s) until the device sees an alarm. It is the sum of a fire contact's debounce time,
+a reading's age, and a scan of each bus."""
 
 
 @pytest.fixture
@@ -117,11 +119,12 @@ def test_an_alarm_that_begins_while_the_other_bus_is_dead_is_never_taken_for_non
     held: list[str] = []
     door.after_round = lambda bus: held.extend(door.relays())
     door.run(3.0)
-    assert (held, modes(door)[-1]) == ([], "UNKNOWN"), "the alarm is seen before the hold is back"
+    assert (held, modes(door)[-1]) == ([], "UNKNOWN"), "the relay was on before the alarm was seen"
 
 
 def test_one_reading_of_the_other_bus_is_no_debounced_change(door: OnTwoBuses) -> None:
-    """The gateway's thread takes one reading of the other bus several times."""
+    """Between two readings of `header`, the thread of `gateway` uses the last reading several times.
+    That must not count as several equal readings."""
     door.run(1.0)
     hold(door)
     door.run(3.0)
@@ -180,7 +183,8 @@ def test_a_reading_counts_from_before_it_was_asked_for_and_not_longer_than_its_t
 
 
 def test_what_was_decided_on_two_buses_is_decided_again_from_its_recording(tmp_path: Path) -> None:
-    """The recorded sample has the values of both buses. The debounce times come from the YAML."""
+    """The recorded sample has the values of both buses, and the debounce times come from the YAML. So a
+    replay can repeat every decision."""
     file = tmp_path / "door.yaml"
     file.write_text(DOOR)
     on = OnTwoBuses(file, ring=tmp_path)
@@ -203,7 +207,7 @@ def test_what_was_decided_on_two_buses_is_decided_again_from_its_recording(tmp_p
     assert replay.course.decisions > 20
 
 
-# ---- walks through every order of some events
+# ---- every order of some losses and returns of the two buses
 
 
 Step = tuple[str, Callable[[OnTwoBuses], None]]

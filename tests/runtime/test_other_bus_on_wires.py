@@ -1,5 +1,5 @@
-"""Inputs on another bus, with real buses and threads. The device's bus is Modbus TCP. The other bus is
-Modbus TCP too, or a header's pins.
+"""Doors of which one has an input on another bus than the door itself. Buses and threads are real. The
+doors' bus is Modbus TCP. The other bus is Modbus TCP too, or the pins of a GPIO header.
 
 The fire contact is in a separate panel, so the panel's module can fail alone. A second door on the same
 gateway has no input at the panel.

@@ -1,5 +1,5 @@
-"""Directories that another user makes or replaces where a daemon expects its own. A daemon neither
-reads nor writes in such a directory."""
+"""Directories that another user makes or replaces at the place of a daemon's own directory. The daemon
+neither reads nor writes in such a directory."""
 
 import json
 import os
@@ -99,7 +99,8 @@ def files(folder: Path) -> dict[str, str]:
 def test_what_anybody_plants_below_tmp_is_neither_read_nor_written(
     victim: Path, machine: Path, plant: Callable[[Path, Path], None], where: str
 ) -> None:
-    """If root starts a daemon by hand, its runtime directory or its state directory is at `where`."""
+    """The other user plants a directory at `where`. There a daemon that root starts by hand would have
+    its runtime directory or its state directory."""
     before = files(victim)
     plant(victim.parents[1], machine / "tmp" / where)
     with pytest.raises(Distrusted):

@@ -1,4 +1,5 @@
-"""A reading that repeats the last one: the daemon does what it would do if the core decided on it."""
+"""Readings that repeat the last reading. On such a reading the daemon skips the core (its decision
+code). It must behave as if the core had decided."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -28,7 +29,8 @@ SCAN_S = 0.05
 
 
 def counted(kind: AnyDeviceKind, readings: list[object]) -> AnyDeviceKind:
-    """Return the kind, with a core that notes each reading on which it decides."""
+    """Return the kind with a changed core. The new core adds each reading on which it decides to
+    `readings`."""
 
     def decide(memory: Any, event: Any, now: float, limits: Any) -> Any:
         if isinstance(event, Sampled):
@@ -157,7 +159,8 @@ def test_the_core_decides_on_few_readings_of_a_standing_lift_and_on_each_change_
     story.run(10.0)
     readings.clear()
     story.run(20.0)
-    assert len(readings) < 35  # of 200: when a state is due, and when a reading would be stale
+    # Of 200 readings, the core decides only if a state is due or a reading would be stale.
+    assert len(readings) < 35
     story.building.set(level=None)
     story.run(20.05)
     assert readings[-1] == Sampled(
@@ -182,7 +185,7 @@ def test_an_equal_reading_that_still_changes_the_memory_is_decided() -> None:
     story.building.unwritable = "timeout"
     story.run(5.37)
     story.building.unwritable = ""
-    story.run(5.42)  # written again: the next reading shows it to the core
+    story.run(5.42)  # the write succeeds again, and only the next reading tells the core
     assert story.node.subject.memory.unwritten_since is not None
     story.run(5.47)
     assert story.node.subject.memory.unwritten_since is None

@@ -102,5 +102,5 @@ def test_a_thread_that_has_a_defect_serves_no_more_though_it_still_switches_off(
 def test_where_one_thread_cannot_be_started_the_others_are_stopped() -> None:
     threads = [Serving(Rounds(), CLOCK), Serving(Rounds(), CLOCK)]
     threads[0].start()
-    assert not stop(threads, PATIENCE_S), "the thread that never started verified its outputs"
+    assert not stop(threads, PATIENCE_S), "the thread that never started counts as switched off"
     assert not threads[0].alive

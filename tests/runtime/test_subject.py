@@ -14,7 +14,7 @@ from bridges.runtime.subject import Subject, SubjectCore
 
 
 class Seen(msgspec.Struct, frozen=True):
-    """A report of a number. The report is news if the number has become even or odd."""
+    """A report of a number. It counts as news only if the number has become even or odd."""
 
     number: int
     faults: tuple[Fault, ...] = ()

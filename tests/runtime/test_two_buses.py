@@ -1,6 +1,6 @@
 """A dead bus that comes first in the YAML file. The dead bus must not keep a relay of another bus on.
 
-The daemon ends in several ways.
+The daemon ends by a signal, by a part that dies, or by SIGKILL.
 """
 
 import os
@@ -60,7 +60,7 @@ def test_a_part_that_dies_switches_the_live_bus_off_while_the_dead_one_is_still_
         hurt.touch()
 
         def ended() -> bool:
-            graph.request(DoorModeValue.MODE_OPEN)  # the request wakes the reader
+            graph.request(DoorModeValue.MODE_OPEN)  # wakes the transport's reader
             return running.process.poll() is not None
 
         wait_until(ended, "the daemon has ended")
@@ -89,8 +89,8 @@ def test_after_a_kill_the_live_bus_is_switched_off_while_the_dead_one_is_still_t
 def test_what_several_dead_daemons_left_on_shares_the_time_of_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """After TimeoutStopSec systemd kills ExecStopPost. Before that time even the last record must get
-    its turn."""
+    """After TimeoutStopSec systemd kills ExecStopPost. So `outputs-off` must divide its time among the
+    records, and must reach the last record in time."""
     file, given = tmp_path / "lift.yaml", list[float]()
     claims = Records(Directories(tmp_path, tmp_path), file)
     for name in ("lift_dry_contact", "lift_relay_board", "lift_one_hot"):

@@ -1,4 +1,5 @@
-"""A dispenser's daemon as a process. SIGKILL ends the daemon at each stage, and the PLC continues."""
+"""A dispenser's daemon as a process. SIGKILL ends the daemon in the middle of a delivery, and the PLC
+continues."""
 
 import signal
 from collections.abc import Callable, Iterator

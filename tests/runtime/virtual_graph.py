@@ -1,7 +1,9 @@
-"""RMF's graph in virtual time: its parties, the network between them, and our kinds without hardware.
+"""RMF's graph in virtual time: its participants (parties), the network between them, and our
+supervisors.
 
-The network may lose, delay, repeat and reorder each message. A kind without hardware runs on the
-product's own runtime (`GraphNode`). No thread runs: `World.run` calls each round at its due time.
+The network may lose, delay, repeat and reorder each message. Our supervisors and coordinators, the
+kinds without hardware, run on the product's own runtime (`GraphNode`). No thread runs: `World.run`
+calls each round at its due time.
 """
 
 import heapq
@@ -22,7 +24,8 @@ from workbench.rmf_model import Party as RmfParty
 from workbench.rmf_model import Said
 
 EPOCH = 2.0**30
-"""The wall time (s) at 0 s on the world's clock. A power of two keeps sums of times exact."""
+"""The wall time (s) at 0 s on the world's clock. It is a power of two, so that floating-point sums of
+times stay exact."""
 NEVER = float("inf")
 
 Route = Callable[[str, str], Sequence[float]]
@@ -78,7 +81,8 @@ class World:
         self._numbers = 0
 
     def add(self, party: Party, *topics: Topic[Any]) -> None:
-        """Let a party join and hear these topics. It replaces a party with the same name."""
+        """Let a party join and hear these topics. The new party replaces an earlier party with the same
+        name."""
         self.parties[party.name] = party
         for topic in topics:
             self.hearers[topic.name].add(party.name)
@@ -179,7 +183,7 @@ class WorldTransport:
     lives = True
 
     def sender(self) -> None:
-        """Return None, because no daemon in the world asks for a sender."""
+        """Return None, because no daemon in the world asks who sent a message."""
 
     def faults(self) -> list[tuple[str, str]]:
         return []
@@ -235,7 +239,8 @@ class Disk:
 
 
 class Served:
-    """A kind without hardware. It runs as in its daemon."""
+    """A supervisor or coordinator, a kind without hardware. It runs with the same node as in its real
+    daemon."""
 
     def __init__(
         self,
@@ -322,7 +327,8 @@ class Ticking:
 
 
 class StandIn:
-    """A stand-in for one of RMF's parties. It follows RMF's rules. `new` makes the party."""
+    """A stand-in for one of RMF's parties. The function `new` makes the party, which follows RMF's
+    rules."""
 
     def __init__(
         self, world: World, new: Callable[[], RmfParty], name: str, publishes: Topic[Any]

@@ -1,2 +1,2 @@
-"""Tests of the YAML loader. They use the real kinds, drivers and buses, and those of the folder
-`site/`."""
+"""Tests of the YAML loader. They use the real kinds, drivers and buses, and also the kind, drivers and
+buses in the folder `site/`."""

@@ -1,4 +1,5 @@
-"""`python -m tests.settings` prints each mistake of `mistakes.toml` with the outcome of `check`."""
+"""`python -m tests.settings` runs `check` on each example in `mistakes.toml`. It prints whether `check`
+does what the example's author expects."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -11,4 +12,4 @@ with TemporaryDirectory() as folder:
         found = unlike(mistake, Path(folder))
         wrong += found != ""
         print(f"{'-' if found else 'ok':3} {mistake['name']}: {found or mistake['what']}")
-print(f"{len(MISTAKES) - wrong} of {len(MISTAKES)} as their author expects")
+print(f"check treats {len(MISTAKES) - wrong} of {len(MISTAKES)} mistakes as their author expects")

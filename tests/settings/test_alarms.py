@@ -29,7 +29,7 @@ def problems(directory: Path, text: str) -> list[str]:
 @pytest.mark.parametrize(
     ("was", "now", "says"),
     [
-        ("alarm: fire_alarm_trigger", "alarm: none", "a panel is here to tell the fleets"),
+        ("alarm: fire_alarm_trigger", "alarm: none", "a panel must tell the fleets"),
         ("alarm: fire_alarm_trigger  ", "fleets: [x]\n    alarm: fire_alarm_trigger  ",
          "only emergency"),
         ("alarm: fire_alarm_trigger  ", "without_fleets: tell_all\n    alarm: fire_alarm_trigger  ",
@@ -57,7 +57,7 @@ def test_named_fleets_need_a_setting_for_releases_without_names_of_fleets(tmp_pa
 
 def test_the_panels_of_one_file_raise_one_alarm(tmp_path: Path) -> None:
     [found] = problems(tmp_path, PANEL + SECOND.format(alarm="emergency_signal"))
-    assert "the devices of a file raise one alarm, but 'Main panel' tells other fleets" in found
+    assert "all devices of a file share one alarm, but 'Main panel' has another alarm" in found
     file = tmp_path / "a.yaml"
     file.write_text(PANEL + SECOND.format(alarm="fire_alarm_trigger"))
     assert list(load(file).devices) == ["Main panel", "Second panel"]

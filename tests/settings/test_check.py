@@ -179,7 +179,8 @@ def test_a_certificate_that_has_ended_or_ends_soon_is_a_warning(
 def test_an_unknown_or_late_end_of_a_certificate_is_no_warning(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """`check` may run on another machine than the daemon, or on a machine without openssl."""
+    """A missing certificate is no warning, because `check` may run on another machine than the daemon.
+    A missing openssl is no warning either."""
     late, missing = certificate(tmp_path / "ca.pem", 31), str(tmp_path / "missing.pem")
     Path("gate.yaml").write_text(with_tls(late, missing))
     assert check("gate.yaml") == 0

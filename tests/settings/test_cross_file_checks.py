@@ -38,7 +38,7 @@ GPIO = (
     .replace("unit 1 coil 0", "BCM18")
 )
 GATEWAY = (
-    "b.yaml:5:3: warning: 192.168.1.50:502 is asked in a.yaml too for unit 1: many gateways take"
+    "b.yaml:5:3: warning: 192.168.1.50:502 is also polled in a.yaml for unit 1: many gateways take"
     " only one client: use one file for each gateway"
 )
 

@@ -54,8 +54,7 @@ levels:
 
 
 class Site:
-    """The coordinator's file and RMF's fleet config. RMF's navigation graph is added if a test gives
-    one."""
+    """The coordinator's file and RMF's fleet config. A test may add RMF's navigation graph."""
 
     def __init__(self, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         self._folder, self._capsys = folder, capsys
@@ -92,7 +91,7 @@ def test_files_that_agree_give_no_problem_and_the_error_of_the_transform_is_repo
     assert site.check() == (0, [])
     assert (
         "config.yaml: transformation error estimate for L1: 0"
-        " (turned by 1.5708 rad, scaled by 1, 0.00 m off on RMF's map)" in site.out
+        " (turned by 1.5708 rad, scaled by 1, error 0.00 m on RMF's map)" in site.out
     )
 
 
@@ -143,8 +142,8 @@ def test_files_that_agree_give_no_problem_and_the_error_of_the_transform_is_repo
         (
             "robot: [[7, -5], [4, -5], [7, -11], [3, -11]]",
             "robot: [[7, -5], [4, -5], [7, -11], [30, -11]]",
-            "config.yaml:10:3: the pairs do not fit: 5.46 m off on RMF's map, and near_m is 1 m:"
-            " a robot would not be seen at its waypoint",
+            "config.yaml:10:3: the pairs do not fit: they differ by 5.46 m on RMF's map, but near_m is"
+            " 1 m: a robot would not be seen at its waypoint",
         ),
         (
             "robot: [[7, -5], [4, -5], [7, -11], [3, -11]]",
@@ -176,7 +175,7 @@ def test_contradictory_settings_are_named_at_their_place(
         ),
         (
             "account_for_battery_drain: False",
-            "config.yaml:3:3: without this key RMF never sends a robot to charge: write true",
+            "config.yaml:3:3: with false, RMF never sends a robot to charge: write true",
         ),
     ],
 )
@@ -236,14 +235,14 @@ def test_a_station_that_releases_a_robot_before_rmfs_recharge_soc_is_a_mismatch(
         (
             "  finishing_request: park",
             "  finishing_request: nothing",
-            "config.yaml:5:3: warning: finishing_request: nothing leaves a charged robot on its pad"
-            " until it gets a task, and the next robot waits: write charge",
+            "config.yaml:5:3: warning: with finishing_request: nothing, a charged robot stays on its"
+            " pad until it gets a task, and the next robot waits: write charge",
         ),
         (
             "  finishing_request: park\n",
             "",
-            "config.yaml:1:1: warning: finishing_request: nothing leaves a charged robot on its pad"
-            " until it gets a task, and the next robot waits: write charge",
+            "config.yaml:1:1: warning: with finishing_request: nothing, a charged robot stays on its"
+            " pad until it gets a task, and the next robot waits: write charge",
         ),
         (
             "    AMR02: {charger: dock_b}\n",
@@ -254,7 +253,7 @@ def test_a_station_that_releases_a_robot_before_rmfs_recharge_soc_is_a_mismatch(
             "AMR02: {charger: dock_b}",
             "AMR02: {charger: wait_1}",
             "config.yaml:8:13: warning: 'AMR02' charges or waits at dock_b, charger_a, wait_2, but"
-            " RMF drives it elsewhere at first",
+            " RMF first drives it to 'wait_1'",
         ),
         (
             "  L1:\n",
@@ -363,7 +362,8 @@ def test_the_transform_of_the_adapter_template_example_has_the_expected_error() 
 
 
 def _nudged(x: list[tuple[float, float]], y: list[tuple[float, float]]) -> tuple[float, ...]:
-    """Return scale and rotation (s, r) and the translation, computed by least squares."""
+    """Return (s, r, x, y), computed by least squares. s and r are scale times cosine and scale times
+    sine of the rotation. x and y are the translation."""
     n = len(x)
     a1, b1 = sum(p[0] for p in x), sum(p[1] for p in x)
     c1, d1 = sum(p[0] for p in y), sum(p[1] for p in y)

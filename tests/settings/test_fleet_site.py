@@ -66,8 +66,7 @@ def test_the_shipped_files_are_one_site(write: Write) -> None:
         (
             (OURS, "  AMR03:", "  AMR04:"),
             [
-                "fleet_tiny.yaml:29:5: robots_http.yaml does not say how 'AMR03' is reached: write it"
-                " below robots:",
+                "fleet_tiny.yaml:29:5: robots_http.yaml has no robot 'AMR03': add it below robots:",
                 "robots_http.yaml:25:3: fleet_tiny.yaml has an unknown robot 'AMR04': did you mean"
                 " 'AMR03'? known here: AMR01, AMR02, AMR03",
             ],
@@ -108,7 +107,7 @@ def test_the_shipped_files_are_one_site(write: Write) -> None:
         ),
         (
             (CONFIG, "[6.98, -11.0]", "[16.98, -11.0]"),
-            ["fleet_tiny.yaml:33:3: the pairs do not fit: 2.38 m off on RMF's map"],
+            ["fleet_tiny.yaml:33:3: the pairs do not fit: they differ by 2.38 m on RMF's map"],
         ),
         (
             (CONFIG, "  L2:\n    rmf", "  L3:\n    rmf"),
@@ -120,13 +119,13 @@ def test_the_shipped_files_are_one_site(write: Write) -> None:
         *(
             (
                 (CONFIG, "linear: [0.5, 0.75]", f"linear: [0.5, {number}]"),
-                ["fleet_tiny.yaml:9:5: is no size of a robot: RMF's planner would fail"],
+                ["fleet_tiny.yaml:9:5: is not possible for a robot: RMF's planner would fail"],
             )
             for number in (".nan", ".inf", "0", "-0.75")
         ),
         (
             (CONFIG, "tool_system: {power: 0.0}", "tool_system: {power: -1}"),
-            ["fleet_tiny.yaml:16:17: is no size of a robot: RMF's planner would fail"],
+            ["fleet_tiny.yaml:16:17: is not possible for a robot: RMF's planner would fail"],
         ),
         (
             (OURS, "AMR02: {profile: rmf-demos}", "AMR02: {profile: rmf-demos, maps: {L9: a}}"),
@@ -139,8 +138,8 @@ def test_the_shipped_files_are_one_site(write: Write) -> None:
                 "actions: [clean, sweep]\n  finishing_request: park",
             ),
             [
-                f"robots_http.yaml:{line}:3: fleet_tiny.yaml has the action 'sweep': write how it"
-                " begins below actions:"
+                f"robots_http.yaml:{line}:3: fleet_tiny.yaml has the action 'sweep': write below"
+                " actions: how it is started"
                 for line in (23, 24, 25)
             ],
         ),
@@ -155,21 +154,24 @@ def test_the_shipped_files_are_one_site(write: Write) -> None:
         (
             (GRAPH, "name: wait_2", "name: wait_1"),
             [
-                "fleet_tiny_graph.yaml:10:9: a second waypoint 'wait_1': RMF's adapter ends at this"
-                " graph"
+                "fleet_tiny_graph.yaml:10:9: a second waypoint 'wait_1': RMF's adapter would end with"
+                " an error"
             ],
         ),
         (
             (GRAPH, "- [11, 10, {}]", "- [12, 10, {}]"),
-            ["fleet_tiny_graph.yaml:41:9: joins vertices 12 and 10, but 'L1' has 12 (from 0)"],
+            [
+                "fleet_tiny_graph.yaml:41:9: joins vertices 12 and 10, but 'L1' has 12 vertices,"
+                " numbered from 0"
+            ],
         ),
         (
             (GRAPH, "lifts:\n  Lift1:", "lifts:\n  LiftA:"),
             [
-                "fleet_tiny_graph.yaml:18:9: the lift 'Lift1' is not below 'lifts': RMF's adapter ends"
-                " there",
-                "fleet_tiny_graph.yaml:44:9: the lift 'Lift1' is not below 'lifts': RMF's adapter ends"
-                " there",
+                "fleet_tiny_graph.yaml:18:9: the lift 'Lift1' is not below 'lifts': RMF's adapter would"
+                " end with an error",
+                "fleet_tiny_graph.yaml:44:9: the lift 'Lift1' is not below 'lifts': RMF's adapter would"
+                " end with an error",
             ],
         ),
         (
@@ -242,7 +244,7 @@ def test_check_reads_the_files_and_prints_the_transforms(
 ) -> None:
     assert main(["check", str(write())]) == 0
     said = capsys.readouterr().out
-    assert "fleet_tiny.yaml: the robots' map for L1 is RMF's, turned by 1.5683 rad" in said
+    assert "fleet_tiny.yaml: the robots' map for L1 is RMF's map, turned by 1.5683 rad" in said
     texts._texts.clear()
     spoilt = write((CONFIG, "charger: wait_1", "charger: wait_9"))
     assert main(["check", str(spoilt)]) == os.EX_CONFIG

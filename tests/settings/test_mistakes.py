@@ -14,14 +14,14 @@ HERE: Final = Path(__file__).parent
 CONFIG: Final = HERE.parents[1] / "config"
 MISTAKES: Final = tomllib.loads((HERE / "mistakes.toml").read_text())["mistake"]
 OTHERWISE: Final = {
-    "makers addresses": "refused: the text gives both spellings, and 0x2711 is accepted",
+    "makers addresses": "refused: the message gives both spellings, and check accepts 0x2711",
     "timeout too long for line": "refused: no call may take more than 5 s",
     "right yes": "refused with its spelling: YAML 1.2 reads yes as a text",
-    "pin twice in and out": "wrong: the pin's level at boot is named before its second use",
-    "host name": "accepted: a module may have a name, and doctor resolves it",
+    "pin twice in and out": "other message: the first message is about the pin's level at boot",
+    "host name": "accepted: a module may have a host name, and `doctor` resolves this name",
 }
-"""Mistakes for which `check` differs from the expectation of the mistake's author. Each has a
-reason."""
+"""Mistakes for which `check` differs from the expectation of the mistake's author. For each mistake:
+what `check` does instead, and why."""
 
 
 def file_of(mistake: dict[str, Any], folder: Path) -> Path:

@@ -109,8 +109,8 @@ def test_the_text_for_a_map_tells_that_the_map_uses_one_bus(
     file: Path, old: str, new: str, place: str
 ) -> None:
     assert problems(file, old, new, MAPPED) == [
-        f"{place}: a map is read from its device's own bus: only contacts (driver: dry_contact) can be"
-        " on another bus"
+        f"{place}: all places of a map are on the device's own bus: only contacts (driver: dry_contact)"
+        " can be on another bus"
     ]
 
 
@@ -137,7 +137,8 @@ def test_a_bus_that_no_device_names_is_still_refused(file: Path) -> None:
 
 
 def test_a_mistyped_point_does_not_make_its_bus_unused(file: Path) -> None:
-    """The mistyped contact is the only contact on its bus."""
+    """The mistyped contact is the only contact on the bus `header`. Still `check` must not report this
+    bus as unused."""
     text = TWO
     for i in range(1, 5):
         start = text.index(f"        L{i}: {{bus: header")
@@ -179,4 +180,6 @@ def test_a_warning_tells_that_a_charge_goes_on_without_the_other_bus(
     text = text.replace("charger_e:", "charger_e:\n    bus: module")
     old = 'fault: {point: "unit 1 discrete input 2", active: low}'
     file.write_text(text.replace(old, "fault: {bus: header, point: BCM4, active: low, pull: down}"))
-    assert "'fault' cannot end the charge" in " ".join(map(str, load(file).warnings))
+    assert "a charge continues even if the contact 'fault' changes" in " ".join(
+        map(str, load(file).warnings)
+    )

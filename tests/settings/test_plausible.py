@@ -87,7 +87,8 @@ REFUSED = {
     ),
     "a unit that is everybody": (
         door(LINE).replace("unit 1 coil", "unit 0 coil"),
-        "12:26: unit 0 addresses all units, and no unit answers: units on a serial line are 1 to 247",
+        "12:26: unit 0 addresses all units at once, so no unit answers: units on a serial line"
+        " are 1 to 247",
     ),
     "a unit that only TCP has": (
         door(LINE).replace("unit 1 coil", "unit 255 coil"),
@@ -134,7 +135,7 @@ doors:
     outputs:
       hold_open: {point: BCM18, active: high}
 """
-OFF = "see that it is switched off in config.txt, or use another pin"
+OFF = "make sure that config.txt switches this use off, or use another pin"
 PINS = {
     "BCM2": "BCM2 is for I2C (dtparam=i2c_arm=on), and has a fixed 1.8 kΩ pull-up",
     "J8:5": "BCM3 is for I2C (dtparam=i2c_arm=on), and has a fixed 1.8 kΩ pull-up",
@@ -168,5 +169,5 @@ def test_an_alarm_with_a_long_debounce_gives_a_warning(file: Path) -> None:
     )
     text = door().replace(fire[0], f"{fire[1]}\n{fire[0]}") + "    on_fire: open\n"
     assert warnings_of(file, text) == [
-        "11:71: warning: 'ward': fire counts only after 10 s: contacts bounce for 0.05 s"
+        "11:71: warning: 'ward': fire is noticed only after 10 s, but contacts bounce for only 0.05 s"
     ]

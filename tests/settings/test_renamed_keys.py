@@ -70,7 +70,7 @@ def test_a_service_that_starts_logs_its_old_keys(
 ) -> None:
     monkeypatch.setenv(
         "RMF_BRIDGE_FITS", "nothing"
-    )  # the unit has no drop-in, so its daemon ends at once
+    )  # as in a unit without a drop-in: then `run` ends at once
     assert cli.main(["run", str(old)]) == os.EX_CONFIG
     told = capsys.readouterr().err
     assert told.count("has a new name") == 1

@@ -1,5 +1,5 @@
-"""`check --json` serves programs, and `check --sheet` serves signatures. Both agree with the printed
-text."""
+"""`check --json` prints its findings for programs. `check --sheet` writes a page for people to sign.
+Both must say the same as the printed text."""
 
 import json
 import os

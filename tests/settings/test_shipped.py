@@ -1,5 +1,5 @@
-"""Every shipped YAML is correct. After a change that spoils it, the loader names the place of the
-change."""
+"""Every shipped YAML is correct. If a test makes a mistake in a shipped YAML, the loader names the
+place of the mistake."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -43,9 +43,10 @@ T = TypeVar("T")
 
 CONFIG = Path(__file__).parents[2] / "config"
 FILES = device_yamls()
-NAMES = ['"17"', "x", ""]  # each may be a valid name, or be wrong in another place
+NAMES = ['"17"', "x", ""]  # each may be valid as a name; or the loader reports another place
 SORTS = {"accept_unsafe": "signal", "setpoints": "setpoint", "values": "value", "when": "value"}
-"""The loader's word for an unknown key in these sections. In all other sections the word is `key`."""
+"""For these sections: the word by which the loader calls an unknown key in its messages. In all other
+sections the word is `key`."""
 TRAPS = ["017", "1:30", "no", "1e3", "~", "1.0", "17", "[]", *NAMES]
 
 
@@ -60,7 +61,8 @@ class Place:
 
     @property
     def end(self) -> int:
-        """Return the end of the entry's text. The end that YAML gives for a block value is too late."""
+        """Return where the entry's text ends. PyYAML's own end mark of a block value also covers the
+        blank lines and comments that follow."""
         node = self.value
         while isinstance(node, CollectionNode) and not node.flow_style and node.value:
             last = node.value[-1]
@@ -69,7 +71,7 @@ class Place:
 
 
 def composed(text: str) -> MappingNode:
-    """Return the top mapping of a file, with its marks."""
+    """Return the top mapping of a file as YAML nodes. Each node knows its line and column."""
     root = yaml.compose(text)
     assert isinstance(root, MappingNode)
     return root
@@ -133,13 +135,14 @@ def names_in(value: object) -> set[str]:
 
 
 def some(of: Sequence[T], config: Path, turn: int) -> Sequence[T]:
-    """Return every twelfth item. The first item differs for each file and each turn."""
+    """Return every twelfth item. The first item depends on the file and on `turn`, so that different
+    tests take different items."""
     return part(of, 12, (FILES.index(config) + 4 * turn) % 12)
 
 
 def is_own(name: str, names: set[str]) -> bool:
-    """Return whether the site chose this key. Names of floors (`L1`) and codes (`1`) count as
-    chosen."""
+    """Return whether the author of the YAML chose this key freely. Names of floors (`L1`) and codes
+    (`1`) count as chosen freely."""
     return name in names or name[0].isupper() or name[0].isdigit()
 
 
@@ -288,7 +291,7 @@ def test_every_tricky_value_is_found_at_its_place(config: Path, file: Path) -> N
             accepted += not found
             if (
                 found and trap == "[]"
-            ):  # at the key, or at the key of the mapping that lacks an item
+            ):  # reported at the key, or at the key of the mapping that lacks an item
                 assert at(node).partition(":")[0] in {s.partition(":")[0] for s in spots(found)}
             elif found and trap not in NAMES:
                 assert is_blamed(leaf, trap, found), (trap, found)

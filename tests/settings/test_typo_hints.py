@@ -1,5 +1,5 @@
-"""`check` describes typing mistakes in plain words. It names a subject, and shows no parser's words or
-patterns."""
+"""`check` describes typing mistakes in plain words. Each message names the key that it is about. No
+message shows words of the YAML parser or a regular expression."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -159,8 +159,8 @@ doors:
 """
     assert problems_of(file, text) == [
         "4:3: 'module' needs a connection: write tcp: {host: …} or serial: {port: …}",
-        "7:19: 'on_s' must be shorter than every_s; delete pulse for a steady hold",
-        "8:5: 'inputs' needs 'closed'; without that contact write feedback: estimated",
+        "7:19: 'on_s' must be shorter than every_s; delete pulse if the relay must stay on",
+        "8:5: 'inputs' needs 'closed'; if the door has no such contact, write feedback: estimated",
     ]
 
 

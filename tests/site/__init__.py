@@ -1,15 +1,15 @@
 """A whole site for a day: 2 lifts, 5 doors, 3 chargers and 5 robots, with many faults.
 
-The day runs in virtual time. Drivers, cores, nodes and supervisors are those of the daemons, on the
-`memory` transport. The plants of `hal_fakes` stand behind the drivers, and stand-ins play RMF. One seed
-makes one day. `make soak SEED=7 HOURS=24` plays that day. A failed day prints the command that plays it
-again.
+The day runs in virtual time. It uses the daemons' own drivers, decision code (cores), nodes and
+supervisors, on the `memory` transport. Behind the drivers are simulated devices (the plants of
+`hal_fakes`). Stand-ins replace RMF. The same seed always gives the same day. `make soak SEED=7
+HOURS=24` runs that day. If a day fails, it prints the command that runs it again.
 
     timeline.py  virtual time
     network.py   the graph: delay, loss, repeats and cuts, within the limits of DDS
     building.py  the devices: settings, plants, drivers
     daemons.py   the daemons of the devices, and the supervisors: a test can kill and start each
-    robots.py    fleet adapters and their robots, each with an endless day
+    robots.py    fleet adapters and their robots, which move until the end of the day
     trouble.py   faults and their repair
     laws.py      rules for messages, relays, and the true positions of cars, doors and robots
     storeroom.py a dispenser, with a delivery each hour

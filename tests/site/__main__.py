@@ -1,7 +1,7 @@
-"""`python -m tests.site --seed 7 --hours 24` plays one day.
+"""`python -m tests.site --seed 7 --hours 24` runs one simulated day.
 
-If a law is broken or a resource grows, the exit code is 1. Then the command prints how to play the same
-day again.
+If a rule of `laws.py` is broken or a resource grows, the exit code is 1. Then the command prints how to
+run the same day again.
 """
 
 import argparse
@@ -17,20 +17,20 @@ from tests.site.laws import Broken
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Play one day. Return the exit code."""
+    """Run one simulated day. Return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m tests.site", description=__doc__)
     parser.add_argument("--seed", type=int, help="seed of the day; by default random")
     parser.add_argument("--hours", type=float, default=24.0, help="simulated hours, at least 0.3")
     parser.add_argument(
         "--rmf",
         choices=SUPERVISORS,
-        help="supervisors: ours, or RMF's of a release; by default the seed decides",
+        help="supervisors: ours, or RMF's of kilted or jazzy; by default the seed decides",
     )
     parser.add_argument(
         "--kill-every",
         type=float,
         metavar="S",
-        help="the only trouble: RMF's lift supervisor dies each S seconds",
+        help="kill RMF's lift supervisor every S seconds, and cause no other trouble",
     )
     parser.add_argument(
         "--size",

@@ -1,4 +1,4 @@
-"""The site's devices, each with its wiring, driver and plant.
+"""The site's devices, each with its wiring, its driver and its simulated device (plant).
 
 Lift1 is on the GPIO header. It has one door contact, no motion line, and a binary floor code with
 parity. Lift2 is on a Modbus module. It has two door contacts, a motion line, a one-hot floor code, and
@@ -60,7 +60,8 @@ SITE = Size()
 
 
 def hospital(lifts: int, doors: int, chargers: int, robots: int) -> Size:
-    """Return a site with so many of each. Wirings and drivers repeat as the names do."""
+    """Return a site with these numbers of devices and robots. After five doors, names, wirings and
+    drivers repeat in the same order."""
     return Size(
         tuple(f"Lift{number}" for number in range(1, lifts + 1)),
         _numbered(DOORS, doors),
@@ -75,7 +76,7 @@ def _numbered(names: tuple[str, ...], many: int) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Device:
-    """One device from settings to plant.
+    """One device: its settings, its driver, and the simulated device (plant) behind the driver.
 
     Each new daemon makes a new driver by `driver()`. `driver_name` is the driver's name in a YAML.
     """

@@ -1,9 +1,11 @@
 """The daemons of the site: a node for each device, and the supervisors. Each can die and start again.
 
 A daemon scans its device at each request, at its core's `wake_at`, and every SCAN_S. A change of a
-contact also causes a scan, on a polled bus one poll later. Between these times no input changes and no
-time limit passes, so a scan would repeat the last decision. Therefore the day does without the 20 scans
-per second of the real loop. The tests of the cores prove that no decision changes before `wake_at`.
+contact also causes a scan. On a bus with polling this scan comes one poll period later.
+
+Between these times no input changes and no time limit passes, so a scan would repeat the last decision.
+Therefore a daemon here need not scan 20 times per second, as the real loop does. The tests of the cores
+prove that no decision changes before `wake_at`.
 """
 
 from collections import Counter
@@ -33,8 +35,8 @@ from tests.site.timeline import EPOCH, NEVER, Alarm, Timeline
 from workbench.rmf_model.supervisors import DoorSupervisor, LiftSupervisor
 
 SCAN_S = 0.9
-"""The time between scans (s). It is less than the permitted age of a state (1 s). `wake_at` causes one
-state per second."""
+"""The time between scans (s). It is less than the permitted age of a state (1 s). The core's `wake_at`
+also makes the daemon publish one state per second."""
 LEAST_GAP_S = 0.001
 
 
@@ -43,7 +45,7 @@ class DeviceDaemon:
     the graph, by default the device's name.
 
     Tests set these callbacks:
-    - `looks` gets each time at which the plant is about to change or to be scanned.
+    - `looks` runs before each change of the plant and before each scan. It gets the time.
     - `scanned` runs after each scan.
     - `relayed` gets each edge of a relay.
     - `started` runs at the start.
@@ -106,7 +108,8 @@ class DeviceDaemon:
         self.scan()
 
     def kill(self) -> None:
-        """Kill the daemon. The daemon itself or `rmf-bridge outputs-off` switches the outputs off."""
+        """Kill the daemon, and switch the outputs off. In reality a dying daemon or `rmf-bridge
+        outputs-off` does that."""
         self.alive = False
         self._alarm.set(NEVER)
         self._node.make_safe()
@@ -134,7 +137,7 @@ class DeviceDaemon:
         self._alarm.set(max(due, now + LEAST_GAP_S))
 
     def advance(self) -> None:
-        """Let the plant run up to now, from event to event."""
+        """Let the plant run until now. Stop at each event of the plant to call `looks`."""
         plant, now = self.device.plant, self._timeline.now
         while (at := plant.next_at()) < now:
             self.looks(self, at)
@@ -160,8 +163,8 @@ class DeviceDaemon:
         return [fault["code"] for fault in self.status()["faults"]] if self.alive else []
 
     def _edge(self, edge: Edge) -> None:
-        """Handle an edge of the plant. Remove the plant's own record of this edge, which nobody
-        needs."""
+        """Pass an edge of the plant on. Clear the plant's own list of edges, because nobody reads
+        it."""
         self.device.plant.edges.clear()
         if edge.what == "relay":
             self.relayed(edge)
@@ -246,7 +249,8 @@ def rmfs_door_supervisor(timeline: Timeline, air: Air) -> RmfsSupervisor:
 
 
 class GraphDaemon:
-    """The daemon of a kind without hardware. Its clock is `wall_skew` seconds ahead."""
+    """The daemon of a supervisor or coordinator, a kind without hardware. Its wall clock is `wall_skew`
+    seconds ahead."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""A day at the site, with all parties, all troubles and the laws."""
+"""A day at the site, with all daemons and robots, all troubles, and the rules of `laws.py`."""
 
 import logging
 import random as the_random
@@ -36,24 +36,26 @@ WIND_DOWN_S = BOUND_S + 90.0
 """The length of the wind-down (s). In this time no new trouble begins, and every robot ends its
 tour."""
 ADOPTS_S = 5.0
-"""The time (s) in which RMF's restarted supervisor ends the shown session and takes the next requester.
+"""The time (s) that a restarted supervisor of RMF needs to end the session that it sees. Then it
+accepts the next requester.
 
-Another robot may ask before the robot in the car. Then RMF lets the other robot in too. Only RMF can
-mend that defect.
+The robot in the car may not be the first requester. Then RMF lets another robot into the same car. Only
+RMF can mend that defect.
 """
 SWEEP_S = 45.0
-"""The time (s) before the end of the day at which RMF's supervisors restart. Every robot is at home
-then."""
+"""The time (s) before the end of the day at which RMF's supervisors restart. By then every robot has
+ended its tour."""
 LOOK_EVERY_S = 5.0
 HOUR_S = 3600.0
 
 
 SUPERVISORS = ("ours", "kilted", "jazzy")
-"""The possible supervisors of a day: ours, or RMF's own by the rules of this release."""
+"""The possible supervisors of a day: ours, or RMF's own with the rules of its release Kilted or
+Jazzy."""
 
 
 class Site:
-    """The day of one seed. `run` raises `laws.Broken` when a law is broken.
+    """A day at the site, which the seed determines. `run` raises `laws.Broken` when a law is broken.
 
     `rmf` is one of SUPERVISORS. Without `rmf` the seed decides. With our supervisors the seed also
     decides the release of the fleet adapters. With `kill_every_s` the only trouble is the death of
@@ -114,7 +116,8 @@ class Site:
     def run(self, hours: float, told: Callable[[Look], None] = lambda look: None) -> None:
         """Run the whole day. After each hour `told` gets the resources in use."""
         end = hours * HOUR_S
-        the_random.seed(self.seed)  # a supervisor that meets a rival waits for a random time
+        # Fix also the random time for which a supervisor waits when it meets a rival.
+        the_random.seed(self.seed)
         self._open()
         if self.kill_every_s is None:
             self.trouble.begin(until=end - WIND_DOWN_S)
@@ -197,7 +200,8 @@ class Site:
             robot.homing = True
 
     def _sweep(self) -> None:
-        """Restart RMF's supervisors. They still hold lifts and doors for robots whose adapters died."""
+        """Restart RMF's supervisors, because they still hold lifts and doors for robots whose adapters
+        died."""
         for supervisor in self.supervisors:
             if isinstance(supervisor, RmfsSupervisor):
                 supervisor.kill()
@@ -214,8 +218,8 @@ class Site:
                 self.laws.require(empty, f"{supervisor.name}: {name} {waiting} at the end")
 
     def _speakers(self, topic: str) -> int:
-        """Return the number of supervisors that publish. Our supervisor and a new rival count as
-        one."""
+        """Return the number of supervisors that publish on the topic. If RMF's rival runs beside our
+        supervisor, return 1, because that trouble is intended."""
         speaking = [end.node.name for end in self.air.memory.publishers[topic]]
         if RIVAL in speaking and self.rmf == "ours":
             return 1
@@ -329,8 +333,8 @@ class Site:
         return Ill("rival", rival.name, "rival", begin, end, most_s=40.0)
 
     def _restart_rmfs(self, random: Random) -> Ill:
-        """Return a trouble: RMF's supervisor forgets everything, and then may speak for other
-        robots."""
+        """Return a trouble: RMF's supervisor forgets everything. After its restart it may publish
+        requests of other robots."""
         supervisor = random.choice([s for s in self.supervisors if isinstance(s, RmfsSupervisor)])
         devices = self.size.lifts if supervisor.name == RIVAL else self.size.doors
 
@@ -365,7 +369,8 @@ class Site:
         self.timeline.after(self.kill_every_s or NEVER, self._kill)
 
     def _distrust(self, devices: Sequence[str], why: str) -> None:
-        """Note that from now on a request in a robot's name may not be the robot's own wish."""
+        """Note that from now on a supervisor may send requests in a robot's name that the robot did not
+        send."""
         for name in devices:
             self.ills.begin(name, why)
         for robot in self.robots:
@@ -437,11 +442,11 @@ class Site:
         self.daemons[device.name].look()
 
     def _restart(self, random: Random) -> Ill:
-        """Return a trouble: a party dies, and comes back with a changed clock.
+        """Return a trouble: a daemon or a robot's adapter dies, and starts again with a changed clock.
 
-        If RMF's own door supervisor runs, no adapter's clock goes back. That supervisor would ignore
-        the adapter's CLOSE as too old, and would send a heartbeat. The adapter would answer each
-        heartbeat with another CLOSE, as fast as the network allows.
+        If RMF's own door supervisor runs, no adapter's clock is set back. Otherwise that supervisor
+        would ignore the adapter's CLOSE as too old, and would send a heartbeat. The adapter would
+        answer each heartbeat with another CLOSE, as fast as the network allows.
         """
         ours = [node for node in self.nodes if isinstance(node, GraphDaemon)]
         sorts: list[list[Mortal]] = [[*self.daemons.values()], [*self.robots], [*ours]]
@@ -475,7 +480,8 @@ class Site:
 
 
 class _Defects(logging.Handler):
-    """Ends the day at a defect that a daemon has contained, because the daemon would serve on."""
+    """A log handler that ends the day when a daemon logs a defect. Without this handler the daemon
+    would contain the defect and go on serving."""
 
     def emit(self, record: logging.LogRecord) -> None:
         if "defect" in (text := record.getMessage()):
@@ -484,8 +490,10 @@ class _Defects(logging.Handler):
 
 @contextmanager
 def _defects_end_the_day() -> Iterator[None]:
-    """Log nothing below an error, because a whole day's log would fill the memory of a test's
-    process."""
+    """End the day if a daemon logs a defect.
+
+    Log nothing below an error, because a whole day's log would fill the memory of a test's process.
+    """
     before, defects = logging.root.manager.disable, _Defects(logging.ERROR)
     logging.disable(logging.WARNING)
     logging.root.addHandler(defects)

@@ -1,7 +1,8 @@
-"""`python -m tests.site.days --seeds 20`: play a day of each seed under each party's rules.
+"""`python -m tests.site.days --seeds 20` runs a day for each seed and each kind of supervisors.
 
-Each day is a process of its own, which prints its memory by the hour. Its output stays in `build/soak`,
-and a day whose output is there is not played again. The table of all days comes last.
+Each day runs in its own process, which prints its memory use every hour. The output stays in
+`build/soak`. A day whose output is already there is not run again. At the end the command prints a
+table of all days.
 """
 
 import argparse
@@ -22,7 +23,7 @@ MEMORY = re.compile(r"^ +([\d.]+) h .* ([\d.]+) MB$", re.MULTILINE)
 
 class PlayedDay(msgspec.Struct, frozen=True):
     """One day. `memory_mb`: the memory after the first hour and at the end (MB). `why`: the broken law,
-    or "" for a day that held."""
+    or "" if no law was broken."""
 
     rmf: str
     seed: int
@@ -34,7 +35,8 @@ class PlayedDay(msgspec.Struct, frozen=True):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Play the missing days, and print the table. Return 1 if a day broke a law or grew."""
+    """Run the missing days, and print the table. Return 1 if a day broke a law, if a resource grew, or
+    if a day has no result."""
     parser = argparse.ArgumentParser(prog="python -m tests.site.days", description=__doc__)
     parser.add_argument("--seeds", type=int, default=20, help="the seeds 1 to this number")
     parser.add_argument("--hours", type=float, default=24.0)
@@ -60,13 +62,13 @@ def _play(kept: Path, seed: int, rmf: str, hours: float) -> None:
         return
     day = ["tests.site", "--seed", str(seed), "--hours", str(hours), "--rmf", rmf]
     played = subprocess.run([sys.executable, "-m", *day], stdout=subprocess.PIPE, text=True)
-    if played.returncode in (0, 1):  # others are no verdict: the process was ended
+    if played.returncode in (0, 1):  # else the process was ended
         kept.write_text(played.stdout)
         sys.stderr.write(f"{kept.name}: {played.stdout.strip().splitlines()[-1]}\n")
 
 
 def _days(kept: Path, hours: float) -> Iterator[PlayedDay]:
-    """Yield the days of this length that are kept."""
+    """Yield the days of this length whose output is in the folder."""
     for path in sorted(kept.glob(f"*-{hours:g}h.txt")):
         rmf, seed, _ = path.stem.split("-")
         text = path.read_text()
@@ -80,9 +82,10 @@ def _days(kept: Path, hours: float) -> Iterator[PlayedDay]:
 
 
 def _table(days: Sequence[PlayedDay], parties: Sequence[str]) -> Iterator[str]:
-    """Yield the lines of the table, and a line for each day that did not hold."""
+    """Yield the lines of the table. Then yield a line for each day that broke a law or has no
+    result."""
     columns = (
-        "supervisors, seeds that held, rides, doors, deliveries, faults, of them restarts, memory"
+        "supervisors, seeds that broke no law, rides, doors, deliveries, faults, restarts, memory"
     )
     yield f"| {columns.replace(',', ' |')} |"
     yield "|---|---|---|---|---|---|---|---|"

@@ -1,15 +1,19 @@
-"""The site's two fire panels and three fleet adapters: once a day drills and alarms, with troubles.
+"""The site's two fire panels and three fleet adapters. Once a day they run drills and alarms, with
+troubles.
 
-The panels have their own part of the network. Each panel has a daemon of its own, which dies and comes
-back. A fleet adapter obeys the last word on `fire_alarm_trigger`. It restarts, and is out of reach, as
-well. Between the exercises the daemons are away, so they cost no time.
+The panels have their own part of the network. Each panel has its own daemon, which may die and start
+again. A fleet adapter stops or releases its robots as the last message on `fire_alarm_trigger` says. An
+adapter may also restart or lose its network. Between the exercises no daemon runs, so they cost no
+time.
 
 Laws:
-- Every fleet that can be reached is told of an alarm within TOLD_S of a cause that its daemon can see.
-- A daemon publishes `false` only after all of its causes have ended and a person has reset the
-  daemon, and only if no other panel's alarm stands.
-- A drill is stated as a drill. It ends at its time, without a reset.
-- After each exercise every robot drives. `rmf-bridge judge alarm` finds no broken law of any panel.
+- Every reachable fleet hears of an alarm within TOLD_S, once the panel's daemon can see the alarm's
+  cause.
+- A daemon publishes `false` only after all of its causes have ended and a person has reset it. At that
+  time no other panel may have an alarm.
+- A daemon calls a drill a drill in its state. The drill ends at its time, without a reset.
+- After each exercise every robot may drive again. `rmf-bridge judge alarm` finds no broken law of any
+  panel.
 """
 
 from collections.abc import Callable
@@ -48,9 +52,11 @@ FIRST_S, EVERY_S = 40.0, 86400.0
 CASE_S = 150.0
 """The length of one exercise (s)."""
 TOLD_S = 3.0
-"""The debounce, a late message of the network, and a scan (s)."""
+"""The longest time (s) until a reachable fleet hears of an alarm. It is the sum of the debounce time,
+the delay of a late message, and a scan."""
 KNOWN_S = 4.0
-"""The time (s) after which every panel knows another panel's alarm: a late statement and its period."""
+"""The time (s) after which every panel knows another panel's alarm. It is the delay of a late message
+plus the period of the states."""
 DRILL_S = 40.0
 PANELS, FLEETS = ("north", "south"), ("tiny", "deliver", "clean")
 SOURCES = ("fire_panel", "code_blue")
@@ -59,10 +65,10 @@ Require = Callable[[bool, str], None]
 
 
 class Panel:
-    """A panel, and its daemon with the alarm for the fleets.
+    """A panel, and its daemon, which tells the panel's alarm to the fleets.
 
-    `cause_at`: the time since which a cause could be seen, until a person resets the daemon; NEVER
-    without a cause. `drills_until`: the end of a drill, if nothing else happens.
+    `cause_at`: the time from which the daemon could see an alarm's cause. It is NEVER without a cause,
+    and again after a person's reset. `drills_until`: the planned end of a drill.
     """
 
     def __init__(self, timeline: Timeline, air: Air, name: str) -> None:
@@ -97,7 +103,7 @@ class Panel:
         self.node: FleetAlarmNode
 
     def start(self) -> None:
-        """Start a new daemon, which has only its memory on disk."""
+        """Start a new daemon, which remembers only what is on its disk."""
         self._place = Place(self._air, self.name, self._round)
         limits = FleetAlarmLimits(topics.FIRE_ALARM_TRIGGER, devices=frozenset({self.name}))
         self.node = FleetAlarmNode(
@@ -115,7 +121,7 @@ class Panel:
         self.daemon.kill()
 
     def press(self, signal: str, on: bool) -> None:
-        """Let the building or a person act."""
+        """Set or release a contact of the panel, as an alarm or a person does."""
         self.plant.press(signal, on, self._timeline.now)
         self.daemon.look()
 
@@ -132,7 +138,7 @@ class Panel:
         return self.node.subjects[ALARM].ordered[1]
 
     def state(self) -> str:
-        """Return the daemon's present statement."""
+        """Return the alarm's state as the daemon reports it."""
         return str(self.status()["alarm"]["state"])
 
     def status(self) -> Any:
@@ -152,7 +158,7 @@ class Panel:
             self._alarm.set(max(self.node.wake_at, self._timeline.now + LEAST_GAP_S))
 
     def _tell(self) -> None:
-        """State the alarm on `/diagnostics`, each second."""
+        """Publish the alarm's state on `/diagnostics`, each second."""
         if self.daemon.alive:
             self.node.look()
             told = diagnosis(self.name, "alarm", self.status(), {}, stamp(self._clock.wall()))
@@ -161,8 +167,8 @@ class Panel:
 
 
 class FleetAdapter:
-    """A fleet adapter. `stands`: the last word that it has heard. `since`: the time since which it can
-    be reached."""
+    """A fleet adapter. `stands`: whether the last message told its robots to stand still. `since`: the
+    time from which the adapter can be reached."""
 
     def __init__(self, timeline: Timeline, air: Air, name: str) -> None:
         self.name = name
@@ -200,7 +206,7 @@ class FirePanels:
 
     def __post_init__(self) -> None:
         self.air = Air(self.timeline, self.random)
-        self.air.weather = Weather(lost=0.0, states_lost=0.0)  # reliable, as the topic's QoS is
+        self.air.weather = Weather(lost=0.0, states_lost=0.0)  # RELIABLE loses nothing
         self.air.watch = self._said
         self._judges = {name: Judge("alarm", name) for name in PANELS}
         ear = Place(self.air, "judge", lambda: None)
@@ -272,7 +278,8 @@ class FirePanels:
     # ---- the laws
 
     def _watch(self) -> None:
-        """Check that every fleet stands that must stand, and that a drill is called a drill."""
+        """Check that each reachable fleet stands still during an alarm or drill. Check also that each
+        daemon reports a drill as a drill."""
         if not self._open:
             return
         now = self.timeline.now
@@ -292,7 +299,7 @@ class FirePanels:
         return self.timeline.now < panel.drills_until - DRILL_S + TOLD_S
 
     def _said(self, speaker: str, topic: topics.Topic[Any], message: Any) -> None:
-        """Check each `false` when it is published."""
+        """Check that a panel does not publish `false` while the alarm of any panel lasts."""
         if topic != topics.FIRE_ALARM_TRIGGER or message.data:
             return
         for panel in self.panels.values():
@@ -306,7 +313,7 @@ class FirePanels:
         self.timeline.after(seconds + self.random.uniform(0.0, 2.0), what)
 
     def _burns(self, panel: Panel, signal: str = "") -> Callable[[], None]:
-        """Let a source come on. Return the function that ends it."""
+        """Activate one of the panel's contacts. Return the function that releases the contact."""
         signal = signal or self.random.choice(SOURCES)
         panel.press(signal, True)
         self._sees(panel)
@@ -328,7 +335,7 @@ class FirePanels:
 
     def _restart(self, panel: Panel, after_s: float) -> None:
         panel.kill()
-        for fleet in self.fleets:  # whose next `true` comes with the daemon
+        for fleet in self.fleets:  # a fleet hears `true` again only from the new daemon
             fleet.since = max(fleet.since, self.timeline.now + after_s)
         self.timeline.after(after_s, panel.start)
 
@@ -336,7 +343,7 @@ class FirePanels:
         panel.orders(DRILL_S)
         panel.drills_until = self.timeline.now + DRILL_S
 
-    # ---- the exercises: one panel, and the other panel
+    # ---- the exercises: each gets the two panels in random order
 
     def _key(self, one: Panel, other: Panel) -> None:
         one.press("drill", True)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 PAGE = os.sysconf("SC_PAGE_SIZE")
 WARM_UP = 2
-"""The number of hourly looks to skip. In that time caches, queues and the laws' logs reach their full
-size."""
+"""The number of hourly measurements to skip. In these hours caches, queues and the laws' logs grow to
+their full size."""
 MOST_OBJECTS = 1.05
 MOST_MB = 4.0
 

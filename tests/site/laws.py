@@ -1,11 +1,12 @@
-"""Laws that hold at every moment of the day. No law here uses a core's memory or a report.
+"""Laws that hold at every moment of the day. They use neither a core's memory nor a daemon's reports.
 
 The laws of `rmf-bridge judge` (`workbench/judge/`) judge all messages that reach the node. The laws
 here also use the driven relays at the terminal block, and the true state of cars, doors, robots and
 current.
 
-A node cannot know that a sensor lies, because its wire is stuck or noisy. States that depend on a lying
-sensor are judged again only shortly after its repair. A cut wire is no excuse.
+A sensor lies if its wire is stuck or noisy. A node cannot know that. So no law judges the states that
+depend on a lying sensor, until a short time after its repair. A cut wire is no excuse, because a node
+must notice it.
 """
 
 from collections import deque
@@ -45,25 +46,25 @@ LATE_S = 5.0
 longer."""
 
 ARRIVED_S = 3.5
-"""The longest time (s) for which a door may be released after RMF has let a robot through.
+"""The longest time (s) for which the daemon may release a door after RMF has told a robot to enter.
 
-The state that lets the robot through may be older than the robot's request. The request may arrive only
-after an earlier CLOSE has taken effect. The limit is the delay of a late message, plus the time until
-our supervisor repeats the request.
+RMF may use a door state that is older than the robot's request. So the request may arrive only after an
+earlier CLOSE has taken effect. The limit is the delay of a late message, plus the time until our
+supervisor repeats the request.
 """
 
 STATED = (d.LiftState, d.DoorState, d.ChargerState)
 NO_DWELL = "D2.people"
 """A law that this test does not judge, because the plants' doors close at once after each push."""
 SHOWN = ("floor", "door", "motion")
-"""The groups of lines on which the shown door of a lift depends."""
+"""The groups of a lift's input lines from which the daemon derives the door state."""
 
 
 class Broken(BaseException):
     """A broken law. The text names the law and the time.
 
-    Broken is no Exception, because a relay's edge comes in the middle of a driver's call. A daemon
-    contains every Exception of a driver (`bridges/runtime/contained.py`).
+    Broken is a BaseException, because a relay's edge may raise it inside a driver's call. A daemon
+    catches every ordinary Exception of a driver (`bridges/runtime/contained.py`).
     """
 
 
@@ -71,10 +72,12 @@ class Broken(BaseException):
 class LiftTruth:
     """The true state of one lift. `open_at` has the last time at which the door was open at each floor.
 
-    `session` is the session in the last published state. `last` is the session before, which resumes
-    unchanged within the grace. `offered` means that the lift has shown OPEN at the session's
-    destination. `crossing` has the robots on the threshold, and `inside` the robots in the car, each
-    with its time of arrival. `ended` has the time of each session's last END.
+    `session` is the session in the last published state. `last` is the session before it. If `last`
+    returns within GRACE_S, it counts as resumed, and `offered` stays. `offered` means that the lift has
+    shown OPEN at the session's destination.
+
+    `crossing` has the robots on the threshold, and `inside` the robots in the car, each with its time
+    of arrival. `ended` has the time of each session's last END.
     """
 
     open_at: dict[str, float] = field(default_factory=dict)
@@ -88,7 +91,8 @@ class LiftTruth:
 
 
 class Judges:
-    """The judges of one daemon. While the device has an ill, they do not apply laws about sensors."""
+    """The judges of one daemon. They do not apply laws about sensors while the device has a trouble
+    (ill), and for LATE_S afterwards."""
 
     def __init__(self, daemon: DeviceDaemon) -> None:
         kind = cast(JudgedKind, daemon.device.kind.name)
@@ -250,8 +254,8 @@ class Laws:
         )
 
     def _sensed_s(self, name: str) -> float:
-        """Return the greatest permitted age of a shown state (s). A reading counts until it is
-        stale."""
+        """Return the greatest permitted age of a shown state (s). While the bus is down, the daemon may
+        show the last reading until that reading is stale."""
         return STALE_S if self._ills.since(name, "bus") <= self._timeline.now else SENSED_S
 
     def _door_state(self, name: str, state: d.DoorState) -> None:
@@ -305,7 +309,8 @@ class Laws:
             self._currents[name] = at
 
     def _relay(self, edge: Edge) -> None:
-        """Check an edge of a relay. The pulse by which a charger clears errors is not a relay here."""
+        """Check an edge of a relay. Ignore a charger's edges, because they are only the pulses that
+        clear errors."""
         name, now = edge.device, self._timeline.now
         plant = self._daemons[name].device.plant
         if isinstance(plant, ChargerPlant):
@@ -373,7 +378,8 @@ class Laws:
         sighted = not self._ills.has(name, "bus")
         sick = self._hazard_since(name) + AT_ONCE_S < now
         self.require(not (sighted and sick), f"{name} drives {sorted(on)} under a hazard")
-        # A session may end before a state shows it, and its END may arrive late.
+        # A session may end before a state shows its end, and its END may arrive late. So the grace
+        # period begins at the latest of these times.
         ends = [truth.since, *(at + LATEST_S for at in truth.ended.values())]
         since = max(*ends, self._ills.since_over(name, "bus", "cut off"))
         over = max(since + GRACE_S, self._on_since[name] + AT_ONCE_S) < now
@@ -384,7 +390,8 @@ class Laws:
         self.require(on == {"agv_mode_request"} or "agv_mode_request" in on, f"{name}: {on}")
 
     def _door_outputs(self, name: str) -> None:
-        """Require that a fire that releases the door also ends the hold, even against a request."""
+        """Require that a fire ends the hold of a door with `on_fire: release`, even if RMF requests
+        OPEN."""
         releases = self._daemons[name].device.settings.on_fire == "release"
         sick = self._hazard_since(name) + AT_ONCE_S < self._timeline.now
         held = releases and sick and self._relays[name] and not self._ills.has(name, "bus")
@@ -423,7 +430,8 @@ class Laws:
         self._lifts[lift].inside.pop(robot, None)
 
     def abandoned(self, robot: str) -> None:
-        """Forget the robot, because a request in its name may not be its own wish from now on."""
+        """Forget the robot's crossing and ride. From now on a supervisor may send requests in the
+        robot's name that the robot did not send."""
         self.crossed(robot)
         for truth in self._lifts.values():
             truth.inside.pop(robot, None)

@@ -1,9 +1,11 @@
-"""The site's graph: the `memory` transport, with a network between its nodes.
+"""The site's graph: the `memory` transport, with a simulated network between its nodes.
 
-The network keeps the promises of RELIABLE and KEEP_LAST. A reader gets the samples of one writer in
-order. A sample that the network had to repeat arrives late. RMF's own readers of states are best effort
-on Fast DDS in the field, so here they lose some samples. The network is harsher than DDS. All other
-readers lose a few samples too, and a few samples come twice.
+The network keeps the guarantees of the QoS RELIABLE and KEEP_LAST. A reader gets the samples of one
+writer in order. If the network must send a sample twice, the sample arrives late.
+
+On real sites RMF's own readers of states are best effort (Fast DDS). So here these readers lose some
+samples. The network is harsher than DDS, because all other readers lose a few samples too. A few
+samples also come twice.
 
 A node that is cut off for less than a lease gets all samples afterwards in one burst. A node that is
 cut off for longer loses all samples of that time. Afterwards it gets the messages that other nodes
@@ -26,15 +28,15 @@ from tests.transports.memory import MemoryNetwork, MemoryTransport
 LEASE_S = 10.0
 STATES = (LIFT_STATES.name, DOOR_STATES.name)
 RETAINED = "retained"
-"""The speaker's name during the delivery of retained messages to a late joiner."""
+"""The name that stands in for the sender's name when a late joiner gets retained messages."""
 
 Watch = Callable[[str, Topic[Any], Message], None]
 
 
 @dataclass(frozen=True)
 class Weather:
-    """The probabilities for each sample: the sample is lost, is lost on its way to RMF, is late, or is
-    doubled."""
+    """The probabilities of disturbances. `lost`: a sample is lost. `states_lost`: a state to a node of
+    RMF is also lost. `late`: a sample is up to `latest_s` late. `twice`: a sample arrives twice."""
 
     lost: float = 0.005
     states_lost: float = 0.02
@@ -47,8 +49,8 @@ CLEAR = Weather(0.0, 0.0, 0.0, 0.0)
 
 
 class Air:
-    """The network between the nodes. Nodes in `best_effort` hear states as RMF does. `watch` gets all
-    samples."""
+    """The network between the nodes. Nodes in `best_effort` lose more states than other nodes do, as
+    RMF's nodes do. `watch` gets all samples."""
 
     def __init__(self, timeline: Timeline, random: Random) -> None:
         self.timeline = timeline

@@ -1,7 +1,8 @@
 """The same robots in real time, on DDS. Each fleet adapter and each daemon is a node of its own.
 
-Each daemon is a process that a test can kill. The test reads the plants' edges from their control
-sockets. The edges must keep RMF's promises to the robots.
+Each daemon is a process that a test can kill. The test reads the edges of relays and doors from the
+plants' control sockets. It checks that the lift and the door stay open for each robot that RMF has told
+to enter.
 """
 
 import signal
@@ -34,7 +35,7 @@ LIFT, DOOR = "Lift1", "ward_door"
 PLACES = Places(["L1", "L2"], [LIFT], [DOOR])
 PACE = 0.05
 PATIENCE_S = 240.0
-"""The longest permitted wait (s), even after the death of a party on a busy machine."""
+"""The longest permitted wait (s), even on a busy machine after the death of a daemon."""
 
 
 class RealTime(Timeline):
@@ -50,7 +51,7 @@ class RealTime(Timeline):
         self._posted.put(what)
 
     def until(self, done: Callable[[], bool], check: Callable[[], None]) -> None:
-        """Let time pass until `done` is true. `check` raises an error if it is useless to wait on."""
+        """Let time pass until `done` is true. `check` raises an error if further waiting is useless."""
         while not done():
             self.run(time.monotonic() - self._began)
             check()
@@ -88,7 +89,8 @@ class DdsPlace:
         return self._inner.subscribe(topic, post, others_only=others_only)
 
     def sender(self) -> None:
-        """Return None. The publisher of a late message is known before the message arrives here."""
+        """Return None. When the timeline delivers a message, the transport no longer knows who sent
+        it."""
 
     @property
     def lives(self) -> bool:
@@ -110,8 +112,8 @@ class DdsPlace:
 
 
 class RealSite:
-    """A lift, a door, both supervisors, and robots that compete for lift and door (as
-    `robots.Ground`)."""
+    """A lift, a door, both supervisors, and robots that compete for lift and door. The class has the
+    methods of `robots.Ground`."""
 
     def __init__(self, directory: Path, domain: int, names: tuple[str, ...]) -> None:
         self.timeline = RealTime()

@@ -1,8 +1,9 @@
-"""Robots with an endless day. Each has its own fleet adapter by RMF's rules (`workbench.rmf_model`).
+"""Robots that move all day. Each has its own fleet adapter by RMF's rules (`workbench.rmf_model`).
 
 A robot passes a door, rides a lift to another floor, and passes another door, again and again.
-Sometimes it goes to a charger or rests. Sometimes RMF cancels its task during a wait. An adapter that
-restarts knows only the place of its robot, so the robot first leaves that place.
+Sometimes it goes to a charger or rests. Sometimes RMF cancels its task during a wait. A restarted
+adapter has forgotten the task, and knows only the place of its robot. So the robot first leaves that
+place.
 """
 
 from collections.abc import Callable, Generator
@@ -28,7 +29,7 @@ CHARGER_PATIENCE_S = 8.0
 
 @dataclass(frozen=True)
 class Places:
-    """The destinations of the robots, by RMF's names."""
+    """The floors, lifts, doors and chargers that the robots visit, with RMF's names."""
 
     floors: list[str]
     lifts: list[str]
@@ -46,8 +47,8 @@ class Within:
 
 Want = Within | float
 Day = Generator[Want, bool, None]
-"""A generator of a robot's waits. It yields a phase or a number of seconds. The answer tells whether
-the phase succeeded."""
+"""A generator that yields what a robot waits for next: a phase, or a number of seconds. The value sent
+back tells whether the phase succeeded."""
 
 
 class Ground(Protocol):
@@ -87,9 +88,9 @@ class Ground(Protocol):
 class Resident:
     """One robot. Since the time `since` it waits for `waits_for`.
 
-    `join(name)` gives its adapter a place on the graph. `pace` is the length of its pauses relative to
-    a real robot. `disturbed_at` is the time at which its adapter last died. After that time a request
-    in its name may not be its own wish.
+    `join(name)` gives the robot's adapter a place on the graph. `pace` is the length of the robot's
+    pauses relative to a real robot. `disturbed_at` is the time at which the adapter last died. After
+    that time a request in the robot's name may come from a supervisor, and not from the robot.
     """
 
     def __init__(
@@ -270,7 +271,8 @@ class Resident:
             self._task.ends()
         if self.in_car:
             lift, _, target = self.in_car
-            if self._random.random() < 0.5:  # RMF may see our session meanwhile and end it
+            # Half of the time wait, so that RMF may see and end our session.
+            if self._random.random() < 0.5:
                 yield self._pause(1.0, 4.0)
             yield from self._ride_on(lift, target)
         yield self._pause(0.1, 3.0)
@@ -294,7 +296,7 @@ class Resident:
         target = self._random.choice([f for f in self._places.floors if f != self.floor])
         came = yield Within(RequestLift(lift, self.floor, inside=False), self._patience())
         if not came:
-            return  # a new task: the context ends the session after 30 s of silence
+            return  # begin a new task; the adapter ends the lift's session later
         while not self._ground.may_enter_lift(self, lift, self.floor):
             yield 0.5
         self.in_car = (lift, self.floor, target)
@@ -346,7 +348,8 @@ class Resident:
         return assigned and state is not None and f"fleet/{state.robot_name}" == self.name
 
     def _charge_on(self, charger: str) -> Generator[Want, bool, bool]:
-        """Charge until the battery is full or the time is over. Return True if current has flowed."""
+        """Charge until the battery is full, or until a random time limit has passed. Return True if
+        current has flowed."""
         assert self._task is not None
         yield PAD_S
         if not self._is_kept(charger):

@@ -1,8 +1,9 @@
 """The site's dispenser. It makes a delivery each hour, and has its own troubles and its own network.
 
-RMF's phase (`workbench/rmf_model/workcells.py`) must go on only when its item has left. The daemon dies
-during a delivery, the conveyor jams, the PLC restarts, and messages are lost or late. Later a person
-comes, looks, and decides each delivery that is in doubt.
+RMF's task may continue only when the item has left the dispenser (`workbench/rmf_model/workcells.py`).
+The daemon dies during a delivery, the conveyor jams, the PLC restarts, and messages are lost or late.
+Later a person comes and looks. For each delivery whose outcome is unknown, this person decides whether
+the item has left.
 """
 
 from collections.abc import Callable
@@ -119,7 +120,8 @@ class Storeroom:
         self._timeline.after(5.0, self.daemon.reset)
 
     def _end(self) -> None:
-        """Require that the delivery has ended, and that RMF has gone on only with its item."""
+        """Require that the delivery has ended. RMF's task may have continued only if the item has left
+        the dispenser."""
         phase, moved = self._phase, self._plant.moved - self._before
         assert phase is not None
         said = f"{phase.outcome} ({phase.why}), {moved} moved"

@@ -1,4 +1,5 @@
-"""The fire panels alone, for whole exercises: every fleet is told, and only resets end an alarm."""
+"""The fire panels without the rest of the site, through all their exercises. Every fleet hears of each
+alarm, and only resets end an alarm."""
 
 import logging
 from random import Random

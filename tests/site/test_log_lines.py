@@ -1,8 +1,8 @@
 """No fault makes a daemon log the same line for ever. Each fault lasts ten minutes of virtual time, and
 robots wait meanwhile.
 
-Lifts, doors, chargers, supervisors and the coordinator are those of the daemons. Two lines count as
-equal if only their numbers differ.
+Lifts, doors, chargers, supervisors and the coordinator run the same code as in the daemons. Two lines
+count as equal if only their numbers differ.
 """
 
 import re
@@ -21,7 +21,7 @@ from tests.workbench.explain.story import Scene
 
 SERVED = ("Lift1", "Lift2", "ward", "gate", "bay1")
 MOST = 3
-"""The most equal lines in the last five minutes. It is less than one line a minute."""
+"""How often an equal line may be logged in the last five minutes. That is less than once a minute."""
 
 
 class Hospital(Scene):

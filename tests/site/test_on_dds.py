@@ -14,7 +14,8 @@ from tests.site.on_dds import RealSite
 def site(
     domain: int, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[RealSite]:
-    directory: Path = tmp_path_factory.mktemp("s")  # a socket's path has at most 107 characters
+    # The name is short, because a socket's path has at most 107 characters.
+    directory: Path = tmp_path_factory.mktemp("s")
     monkeypatch.setenv("XDG_STATE_HOME", str(directory))
     monkeypatch.setenv("TRANSPORT", runs_here())
     site = RealSite(directory, domain, ("red", "green", "blue"))

@@ -9,8 +9,8 @@ from tests.site.growth import Look, growth
 from tests.site.laws import Broken, Laws
 
 SEEDS = depth([2], [1, 2, 3])
-"""The seeds of the days. Each seed has other supervisors. tests/workbench/replay/test_replay.py also
-plays seeds 1 and 3."""
+"""The seeds of the days. They differ in the kind of supervisors. tests/workbench/replay/test_replay.py
+also runs seeds 1 and 3."""
 MINUTES = depth(8, 20)
 """The length of a day (min). It exceeds WIND_DOWN_S, the time in which the robots go home."""
 
@@ -18,10 +18,10 @@ MINUTES = depth(8, 20)
 @pytest.mark.long(5)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_site_survives_its_troubles(seed: int) -> None:
-    """After a failure, `make soak SEED=… HOURS=0.3333` plays the day again and prints the events before
-    it.
+    """After a failure, `make soak SEED=… HOURS=0.3333` runs the day again and prints the last events
+    before the failure.
 
-    The seed chooses our supervisors, or RMF's supervisors of either release.
+    The seed chooses our supervisors, or RMF's supervisors of the release Kilted or Jazzy.
     """
     site = Site(seed)
     site.run(MINUTES / 60)
@@ -50,7 +50,8 @@ def test_without_our_remedy_a_forgotten_robot_blocks_a_lift_for_ever(
 def test_no_other_robot_gets_an_occupied_car_if_the_supervisor_dies_every_27_s(
     rmf: str,
 ) -> None:
-    """`make soak RMF=jazzy KILL_EVERY=27 HOURS=1.65 SEED=3` plays two hundred kills."""
+    """To run the same day with two hundred kills: `make soak RMF=jazzy KILL_EVERY=27 HOURS=1.65
+    SEED=3`."""
     site = Site(3, rmf, kill_every_s=27.0)
     site.run(depth(12, 60) / 60)
     assert site.kills["of them with a robot in a car"] > depth(4, 60)
@@ -79,7 +80,8 @@ def test_growth_from_hour_to_hour_is_reported() -> None:
 def test_a_law_that_is_broken_in_the_middle_of_a_drivers_call_ends_the_day(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A daemon contains what its driver raises; a relay's edge comes in the driver's `write`."""
+    """A daemon catches each Exception of its driver. A broken law of a relay is raised inside the
+    driver's `write`, but must still end the day."""
     monkeypatch.setattr(
         Laws, "_lift_relay", lambda laws, name, edge: laws.require(False, f"{edge.signal} moves")
     )

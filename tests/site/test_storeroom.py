@@ -1,4 +1,5 @@
-"""The storeroom alone, for whole days. In spite of all troubles RMF goes on only with its item."""
+"""The storeroom without the rest of the site, for whole days. In spite of all troubles, RMF's task
+continues only if the item has left the dispenser."""
 
 import logging
 from random import Random

@@ -1,9 +1,12 @@
 """Troubles and their repair. Both depend on the seed alone.
 
 Troubles come in groups. In each group a few parts break within a minute, and each part is repaired some
-time later. Then comes a calm, sometimes so long that no robot may still wait at its end. After the
-repair of a wire, a part or a fire latch the technician resets the device (`rmf-bridge reset`). Nobody
-resets a device after restarts, cuts, lost buses, or hazards that end alone.
+time later. Then comes a time without troubles. Sometimes it is so long that every robot's wait must end
+within it.
+
+After the repair of a wire or a part the technician resets the device (`rmf-bridge reset`). The same
+holds after an alarm that stays latched. After a restart, a network cut, a lost bus, or a hazard that
+ends by itself, nobody resets the device.
 """
 
 from collections.abc import Callable, Iterator
@@ -29,9 +32,10 @@ LIFT_HAZARDS = ("fire_alarm", "code_blue", "manual_mode", "earthquake")
 
 
 class Ills:
-    """The ills of each party: the start of each present ill, and the end of each past ill.
+    """The troubles (ills) of devices, supervisors and robots: the start of each present ill, and the
+    end of each past ill.
 
-    The argument `device` may name any party.
+    The argument `device` may also be the name of a supervisor or a robot.
     """
 
     def __init__(self, timeline: Timeline) -> None:
@@ -78,7 +82,8 @@ class Ills:
         return max(self._over.get(device, {}).values(), default=-NEVER)
 
     def lying(self, device: str, settles_s: float) -> Iterator[str]:
-        """Yield the wires and parts that lie, or that have lied in the last `settles_s` seconds."""
+        """Yield the wires and parts that give wrong values now, or did so in the last `settles_s`
+        seconds."""
         for (name, what), mode in self._modes.items():
             if name != device or mode not in LIES:
                 continue
@@ -87,7 +92,8 @@ class Ills:
                 yield what
 
     def hazard_since(self, device: str) -> float:
-        """Return the time at which a hazard began on a sound wire. Without a hazard return inf."""
+        """Return the time from which the daemon could see a hazard, because the hazard's wire works.
+        Without such a hazard return inf."""
         now, over = self._now.get(device, {}), self._over.get(device, {})
         return min(
             (
@@ -130,12 +136,11 @@ class Mortal(Protocol):
 
 @dataclass(frozen=True)
 class Ill:
-    """One possible trouble of a party. The functions `begin` and `end` start and end it. It lasts from
-    `least_s` to `most_s` (s).
+    """One possible trouble of a device, supervisor or robot. The functions `begin` and `end` start and
+    end it. It lasts from `least_s` to `most_s` (s).
 
-    `sort` is the heading under which it is counted. `reset` is the technician's action after the
-    repair. If the ill lasted at most `heals_s` (s), the device recovers alone and the technician does
-    nothing.
+    `sort` is the name under which the day counts this trouble. `reset` is the technician's action after
+    the repair. If the trouble lasted at most `heals_s` (s), the device recovers without a reset.
     """
 
     sort: str
@@ -151,7 +156,7 @@ class Ill:
 
 
 class Trouble:
-    """Groups of trouble. `draw` returns a trouble that may begin now."""
+    """The troubles of a day, in groups. `draw` returns a trouble that may begin now."""
 
     def __init__(
         self,
@@ -170,7 +175,8 @@ class Trouble:
         self._note = note
 
     def begin(self, until: float) -> None:
-        """Begin the first group. More groups follow. All trouble ends by `until`."""
+        """Begin the first group. More groups follow. No trouble lasts longer than until the time
+        `until`."""
         self.over_at = until
         self._timeline.after(self._random.uniform(20.0, 60.0), self._bout)
 

@@ -1,4 +1,4 @@
-"""The ends of real certificates, read by the real openssl."""
+"""The expiry times of real certificates, which the real openssl reads."""
 
 import os
 import time
@@ -14,7 +14,8 @@ NOW = time.time()
 
 
 def certificate(file: Path, *days: float) -> str:
-    """Write certificates that end in so many days; return the file's path."""
+    """Write a file of certificates, one for each number of days until its expiry. Return the file's
+    path."""
     file.unlink(missing_ok=True)
     for each in days:
         end = datetime.fromtimestamp(NOW, UTC) + timedelta(days=each)

@@ -1,4 +1,5 @@
-"""Commands without the workbench. The daemons' commands work. Other commands name the missing package.
+"""Commands of an installation without the package `workbench`. The daemons' commands work. Other
+commands name the missing package.
 
 `tests/deb/test_apart.py` checks the texts from our Debian packages.
 """

@@ -1,4 +1,4 @@
-"""Log lines that use the field's terms and show nothing of Python."""
+"""Log lines that use the words of technicians, and show no Python names such as class names."""
 
 import json
 import logging

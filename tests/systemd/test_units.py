@@ -25,9 +25,9 @@ OTHERS = (RECORDER, PAGE, EXPORTER, NOTIFY, EARLY)
 CONFIG = device_yamls()
 VERIFY = ("systemd-analyze", "verify", "--man=no")
 MOST = 2.0
-"""The highest permitted exposure. On systemd 252 a service on the network has 1.5. A service with GPIO
-or a serial port has 1.7. A service with CAN sockets has 1.7 too, because AF_CAN counts as exotic
-(0.2)."""
+"""The highest permitted exposure score of a service. On systemd 252 a service on the network scores
+1.5. A service with GPIO or a serial port scores 1.7. A service with CAN sockets scores 1.7 too,
+because AF_CAN counts as exotic (0.2)."""
 
 needs_systemd = pytest.mark.skipif(
     shutil.which("systemd-analyze") is None, reason="systemd-analyze is not installed"
@@ -71,7 +71,7 @@ def test_the_service_of_each_shipped_file_stays_within_the_limit_of_exposure(
 @needs_systemd
 @pytest.mark.parametrize(
     ("service", "most"),
-    # EARLY begins as root, because each of its children becomes the user of another service.
+    # EARLY starts as root, because each of its child processes changes to the user of one service.
     [(RECORDER, 1.0), (PAGE, 1.5), (EXPORTER, 1.5), (NOTIFY, 1.5), (EARLY, 3.0)],
 )
 def test_the_other_units_are_no_more_exposed_than_this(

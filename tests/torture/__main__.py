@@ -33,7 +33,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--recordings", type=int, default=300, help="number of wrong recordings")
     parser.add_argument("--forged-s", type=float, default=20.0, help="seconds on each wire")
     options = parser.parse_args(argv)
-    # After nohup a daemon would inherit from this process that it ignores SIGHUP.
+    # Under nohup this process ignores SIGHUP. Without this line the daemons would inherit that and
+    # ignore SIGHUP too.
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
     seed = secrets.randbelow(10**6) if options.seed is None else options.seed
     began, table, failed = time.monotonic(), Table(), list[str]()

@@ -1,4 +1,4 @@
-"""Disturbances of DDS. Names have ten megabytes, or the network fails."""
+"""Disturbances of DDS: messages with names of up to ten megabytes, and a network that fails."""
 
 import re
 import shutil

@@ -1,5 +1,5 @@
-"""Deaths and shortages of a door's daemon on a real Modbus server. The tests watch a relay of that
-server."""
+"""Deaths of a door's daemon, and lack of resources such as disk space. The Modbus server is real, and
+the tests watch one of its relays."""
 
 import os
 import random
@@ -84,8 +84,8 @@ def door(directory: Path) -> Iterator[Door]:
 
 
 def kills(directory: Path, rng: random.Random, times: int, table: Table) -> None:
-    """Kill a daemon with -9 at random moments. Half of the daemons run as services. The others have a
-    guard."""
+    """Kill a daemon with -9 at random moments. Half of the daemons run as services. The others are
+    started by hand, and have a guard process that switches their relay off."""
     pause = threading.Event()
     with door(directory) as here:
         for n in range(times):
@@ -121,8 +121,8 @@ def signals(directory: Path, table: Table) -> None:
 
 
 def shortages(directory: Path, rng: random.Random, times: int, table: Table) -> None:
-    """Let a daemon that holds a door meet each shortage. The daemon must survive and then shut down
-    cleanly."""
+    """Let a daemon that holds a door suffer each shortage, such as a full disk. The daemon must survive
+    and then shut down cleanly."""
     with door(directory) as here:
         running = here.held()
         hurts: dict[str, Callable[[Door, int], None]] = {

@@ -108,8 +108,8 @@ class LineLiar(Liar):
 
 
 class DatagramLiar(Liar):
-    """A sender of forged DDS messages that begin like RTPS. It sends to every port of the domain's
-    first processes."""
+    """A sender of forged DDS messages that begin like RTPS. It sends to the first four ports that
+    processes in the domain use."""
 
     def __init__(self, rng: random.Random, domain: int) -> None:
         self._domain = domain

@@ -1,5 +1,5 @@
-"""Causes outside a daemon that could keep a relay on: a dead bus, processes that wait for locks,
-repeated looks at a lock, planted links."""
+"""Causes outside a daemon that could keep a relay on: a dead bus, and processes that wait for locks.
+Also two other attacks: frequent reading of the lock, and links that another user plants."""
 
 import os
 import shutil
@@ -29,7 +29,8 @@ PLANTED = 100
 
 
 def dead_bus_first(directory: Path, table: Table) -> None:
-    """Send each signal that would end or suspend a process. The first bus in the YAML never answers."""
+    """Send each signal that would end or suspend a process. Meanwhile the first bus in the YAML never
+    answers, and must not delay the other bus."""
     with door(directory) as here, socket.create_server(("127.0.0.1", 0)) as hole:
         module = here.module
         module.file.write_text(with_a_dead_bus_first(module.yaml, hole.getsockname()[1], 0.5))
@@ -38,14 +39,15 @@ def dead_bus_first(directory: Path, table: Table) -> None:
             code = running.end(number)
             wait_until(lambda: not here.is_on(), "the relay is off", PATIENCE_S)
             assert live_before_dead(running.log.read_text())
-            shutil.rmtree(here.run)  # so no later start has to verify the dead bus
-            then = f"exit code {code}, the live bus off before the dead one was waited for"
+            # Remove the record, so that the next start need not switch the dead bus off.
+            shutil.rmtree(here.run)
+            then = f"exit code {code}, the live bus off before the wait for the dead bus"
             table.count("such a signal, a dead bus listed first", then)
 
 
 def readers(directory: Path, times: int, table: Table) -> None:
-    """Kill a daemon with -9. A process of the same group waits for the lock of every file that it can
-    open."""
+    """Kill a daemon with -9 while a user of the same group waits for locks. This user waits for the
+    lock of every file that the user can open."""
     if os.geteuid() != 0:
         table.count("a group's member waits for every lock", "not tried: needs root", 0)
         return
@@ -68,8 +70,8 @@ def readers(directory: Path, times: int, table: Table) -> None:
 
 
 def looks(directory: Path, table: Table) -> None:
-    """Take the lock again and again, with one try each time. Another thread looks at the lock without
-    pause."""
+    """Take the lock again and again, each time with a single try. Meanwhile another thread reads in a
+    loop who holds the lock, which must not block the lock."""
     places, end = Directories(directory, directory), threading.Event()
 
     def look() -> None:
@@ -84,7 +86,7 @@ def looks(directory: Path, table: Table) -> None:
     finally:
         end.set()
         looking.join()
-    table.count("a take of the lock beside a loop of looks", "granted", TAKES)
+    table.count("a take of the lock while a loop reads its holder", "granted", TAKES)
 
 
 def planted(directory: Path, table: Table) -> None:

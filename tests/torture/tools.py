@@ -26,7 +26,8 @@ MOST_LINES: Final = 20
 
 
 def pages(directory: Path, rng: random.Random, table: Table) -> None:
-    """Attack the page with half requests, with strange frames, and with names of 1 MB on its graph."""
+    """Attack the page with half requests, with strange frames, and with graph messages that contain
+    names of 1 MB."""
     directory.mkdir()
     access.add_user(directory / "passwords", USER, PASSWORD)
     log = directory / "log"

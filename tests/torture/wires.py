@@ -1,4 +1,5 @@
-"""Disturbances of a daemon's wires: spoiled replies, silence, routers, tokens, clocks."""
+"""Disturbances of a daemon's wires: spoiled replies, silent devices, zenoh routers, floods of
+liveliness tokens, and wrong clocks."""
 
 import json
 import random
@@ -79,7 +80,9 @@ def _replies(directory: Path, rng: random.Random, each_s: float, table: Table) -
         liar.close()
         graph.transport.close()
     assert "Traceback" not in said, said
-    what = "replies of an open door with number 0, of before, of another unit, or exception 0"
+    what = (
+        "replies of an open door with number 0 or the previous one, of another unit, or exception 0"
+    )
     table.count(what, f"never OPEN, {said.count(chr(10))} log lines", liar.count)
 
 
@@ -89,12 +92,13 @@ def _silences(rng: random.Random, times: int, table: Table) -> None:
         charger.awake = True
         assert {frame for _, frame in charger.scans(rng.uniform(1, 4), power=True)} == {CHARGE}
         charger.awake = False
-        charger.scans(1.5, power=True)  # the last status of the charger stays fresh for 1 s
+        # Wait for 1.5 s, because the charger's last status stays fresh for 1 s.
+        charger.scans(1.5, power=True)
         silent = {frame for _, frame in charger.scans(rng.uniform(2, 10), power=True)}
         assert silent == {START, STOP}
         charger.bus.close()
     what = "a charger on CAN that falls silent in a charge (driver, virtual time)"
-    table.count(what, "told to stop and woken in each period, nothing else", times)
+    table.count(what, "told to wake up and to stop in each period, nothing else", times)
 
 
 @contextmanager
@@ -154,11 +158,12 @@ def _tokens(directory: Path, table: Table) -> None:
         rss = Path(f"/proc/{written}/status").read_text().partition("VmRSS:")[2].split()[0]
         said = running.log.read_text()
         assert said.count("crowded") == 1
-        table.count("liveliness tokens", f"served on, {int(rss) // 1000} MB, one line", TOKENS)
+        table.count("liveliness tokens", f"served on, {int(rss) // 1000} MB, one log line", TOKENS)
 
 
 def _past(directory: Path, table: Table) -> None:
-    """Set a clock before 1970 for the daemon's process alone, because Linux refuses such a time."""
+    """Start a daemon whose process sees a time before 1970. Linux itself refuses such a time, so a
+    preloaded library changes the clock."""
     source, library = Path(__file__).with_name("past.c"), directory / "past.so"
     subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source, "-ldl"], check=True)
     past = directory / "past"

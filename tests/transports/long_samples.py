@@ -1,4 +1,5 @@
-"""A DDS node with Cyclone's own settings, like RMF's nodes. So its samples have no size limit.
+"""A DDS node with Cyclone's own settings, like RMF's nodes. Unlike our nodes, it may send samples of
+any size.
 
 `python -m tests.transports.long_samples DOMAIN BYTES SECONDS` sends on every topic that a daemon hears.
 Each message has a text of that many bytes. In the end the program prints the number of sent samples.
@@ -53,7 +54,7 @@ def main(domain: int, length: int, seconds: float) -> None:
     while time.monotonic() < until:
         for writer, message in pairs:
             if writer.get_matched_subscriptions():
-                with suppress(DDSException):  # with a full history a write fails after 1 s
+                with suppress(DDSException):  # a write fails after 1 s if the reader is too slow
                     writer.write(message)
                     sent += 1
         time.sleep(0.001)

@@ -1,7 +1,7 @@
 """The `memory` transport between nodes of one process, for tests in virtual time.
 
-The transport has no thread, and reads no clock but the wall clock. `publish` delivers a message before
-`publish` returns. The oldest subscription gets the message first.
+The transport has no thread. The only clock that it reads is the wall clock. `publish` delivers a
+message before `publish` returns. The oldest subscription gets the message first.
 
 Publisher and subscription match as in DDS, if name and type are equal. A subscription that wants
 retained messages hears only publishers that retain messages.
@@ -136,8 +136,8 @@ class _Subscription:
         self._others_only = others_only
 
     def hears(self, publisher: _Publisher) -> bool:
-        """Return whether DDS would match this publisher with this subscription. Their topic names are
-        equal."""
+        """Return whether DDS would match this publisher with this subscription. The caller has already
+        checked that their topic names are equal."""
         theirs, ours = publisher.topic, self.topic
         return (
             theirs.type == ours.type

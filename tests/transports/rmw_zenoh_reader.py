@@ -90,7 +90,8 @@ def tell_sample(sample: zenoh.Sample) -> None:
 
 
 def gid(token: str) -> bytes:
-    """Return the token's XXH3 hash, with both halves in memory order, as liveliness_utils.cpp does."""
+    """Return the token's 128-bit XXH3 hash as bytes: first the low half, then the high half, both
+    little-endian. liveliness_utils.cpp does the same."""
     both = xxhash.xxh3_128_intdigest(token.encode())
     return struct.pack("<QQ", both & (1 << 64) - 1, both >> 64)
 

@@ -1,7 +1,7 @@
-"""Duties of every transport with a wire, in one process.
+"""Requirements on every transport with a real wire, tested in one process.
 
-The tests check threads, and publishers and subscriptions that do not fit. After closing, nothing may
-remain.
+The tests check threads, and publishers and subscriptions whose QoS does not match. After a node closes,
+no thread and no file may remain.
 """
 
 import os

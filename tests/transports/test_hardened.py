@@ -40,8 +40,8 @@ def papers(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def flat(config: dict[str, Any], path: tuple[str, ...] = ()) -> Iterator[tuple[str, Any]]:
-    """Yield (`a__b`, value) for each setting of a nested configuration. Access control stays one
-    value."""
+    """Yield (`a__b`, value) for each setting of a nested configuration. `access_control` is not split
+    into its settings."""
     for key, value in config.items():
         if isinstance(value, dict) and key != "access_control":
             yield from flat(value, (*path, key))

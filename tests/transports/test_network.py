@@ -90,7 +90,7 @@ class Machine:
         self.addresses = frozenset()
 
     def comes_back(self) -> None:
-        """Bring the network back. The network is loopback."""
+        """Bring the network back. In these tests the network is the loopback interface."""
         self._monkeypatch.delenv("ROS_STATIC_PEERS", raising=False)
         self._monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
 

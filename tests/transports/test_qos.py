@@ -39,7 +39,8 @@ def test_a_lifts_node_hears_adapters_without_what_they_retain() -> None:
 def test_on_the_memory_transport_a_late_subscriber_hears_what_the_golden_depths_retain(
     name: str,
 ) -> None:
-    """Publisher and subscription match for each topic, as in the golden table."""
+    """Publisher and subscription match for each topic. The late subscriber gets as many retained
+    messages as the depths in the golden table permit."""
     topic: Topic[Any] = TOPICS[name]
     _, publish, subscribe = GOLDEN[name]
     network = MemoryNetwork()

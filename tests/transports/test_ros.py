@@ -222,8 +222,8 @@ def test_ros_args_that_ros_does_not_understand_are_refused(ros_args: list[str]) 
 def test_on_fast_dds_a_node_shares_no_memory_unless_its_environment_says_so(
     monkeypatch: pytest.MonkeyPatch, given: str | None, wanted: str
 ) -> None:
-    """RMF runs as another user. With shared memory the two nodes found each other, but no sample
-    arrived."""
+    """RMF may run as another user. With shared memory, nodes of two users find each other, but no
+    sample arrives."""
     from bridges.transports.ros2.stay import FAST_DDS_SPEAKS, Stay
 
     joined: list[str | None] = []

@@ -85,6 +85,6 @@ def test_a_peer_whose_type_does_not_fit_is_counted_on_ros_too(
     ours: list[tuple[AnyTopic, bool]] = [(topics.FLEET_STATES, False), (topics.LIFT_STATES, True)]
     for _ in range(3):
         ros_peers.look(Graph(hashed), peers, ours)
-    fault = ("TYPE_MISFIT", "fleet_states: 1 of another definition than ours (jazzy)")
+    fault = ("TYPE_MISFIT", "fleet_states: 1 peer(s) with another definition than ours (jazzy)")
     assert peers.faults() == ([] if fits else [fault])
     assert caplog.text.count("misfit topic=fleet_states") == (not fits)

@@ -1,4 +1,5 @@
-"""Duties of a transport between two processes of one machine. The tests run on every wire in turn.
+"""Requirements on a transport between two processes of one machine. The tests run on every wire in
+turn.
 
 `ros2` runs where ROS is installed (make test-ros). `zenoh` runs without a router and with both key
 formats.

@@ -1,4 +1,4 @@
-"""Duties of every transport, on any wire."""
+"""Requirements on every transport, including the `memory` transport."""
 
 from typing import Any
 

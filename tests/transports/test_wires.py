@@ -1,4 +1,4 @@
-"""Duties of transports whose wire is DDS. `ros2` needs an installed ROS (make test-ros)."""
+"""Requirements on transports whose wire is DDS. `ros2` needs an installed ROS (make test-ros)."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -56,8 +56,8 @@ def test_forged_samples_are_dropped_and_counted_and_the_good_ones_after_them_arr
 
 
 def test_nothing_forged_is_taken_for_a_message(domain: int) -> None:
-    """Our node reads only its own keys. A key with a wrong hash or with a wildcard is not among
-    them."""
+    """Our node takes no forged sample for a message. It does not hear a key with a wrong hash. It
+    counts a key with a wildcard as dropped."""
     received: list[d.LiftRequest] = []
     node = ZenohTransport("listener", domain, loopback=True)
     liar = ZenohTransport("liar", domain, loopback=True)

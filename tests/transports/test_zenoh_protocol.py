@@ -54,7 +54,8 @@ def bridged() -> Iterator[ZenohTransport]:
 
 
 def session_of(tokens: list[str], at: int) -> str:
-    """Return the session's id from the position `at` of the tokens. All tokens have the same id."""
+    """Return the session's id, which is the part with the number `at` in each token. All tokens must
+    have the same id."""
     (session,) = {token.split("/")[at] for token in tokens}
     assert int(session, 16) > 0
     return session

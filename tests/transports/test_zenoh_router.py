@@ -169,7 +169,8 @@ def test_a_node_on_zenoh_joins_another_address_and_what_was_retained_goes_out_ag
     machine = Machine()
     monkeypatch.setattr(addresses, "addresses", lambda: machine.addresses)
     router = site.router()
-    # The kernel sends packets for 0.0.0.0 to this machine. Our code does not count 0.0.0.0 as loopback.
+    # Our code does not count 0.0.0.0 as loopback, so the node follows the machine's addresses. The
+    # kernel sends packets for 0.0.0.0 to this machine.
     anywhere = router.endpoint.replace("127.0.0.1", "0.0.0.0")
     lift = site.node("lift", anywhere)
     rmf = site.node("rmf", router.endpoint, mode="client")
@@ -267,7 +268,7 @@ def test_with_its_certificate_a_node_comes_in_and_without_it_does_not(
     )
     wait_until(lambda: talk.arrives("encrypted"), "RMF hears the lift")
     site.node("stranger", router.endpoint, tls=ZenohTls(ca=papers.ca))
-    wait_until(lambda: linked(caplog, "stranger"), "the log tells the stranger of the missing link")
+    wait_until(lambda: linked(caplog, "stranger"), "the log says that the stranger has no link")
     assert linked(caplog, "stranger") == ["not_linked"]
 
 
@@ -295,7 +296,7 @@ def test_with_its_password_a_node_comes_in_and_with_another_does_not(
     site.node("stranger", router.endpoint, mode="client")
     for name in ("liar", "stranger"):
         logged = partial(linked, caplog, name)
-        wait_until(logged, f"the log tells the {name} of the missing link")
+        wait_until(logged, f"the log says that the {name} has no link")
         assert linked(caplog, name) == ["not_linked"]
 
 

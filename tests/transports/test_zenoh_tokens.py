@@ -231,8 +231,8 @@ def test_samples_bear_no_time_of_zenohs_clock_which_panics_before_1970(
 
 
 class BusyThread(RmwZenoh):
-    """Keys that stop zenoh's thread at the first token. The test sets `go_on` to let the thread
-    continue."""
+    """A reader of tokens that blocks zenoh's thread at the first token. The test sets `go_on` to let
+    the thread continue."""
 
     def __init__(self, domain: int) -> None:
         super().__init__(domain, "", "lift")

@@ -28,13 +28,13 @@ RESTARTS: dict[str, Callable[[Machine], None]] = {
 ROOT = Path(__file__).parents[2]
 CACHE = ROOT / "build/vm"
 NEXT = "next"
-"""The folder of the next version's packages. It lies in the folder of packages
-(`guest/upgrades.py`)."""
+"""The subfolder for the packages of the next version. It lies in the folder that `_packages`
+returns."""
 
 
 def main() -> int:
-    """Build all missing files, then run the checks. A whole run uses one machine for each part, all at
-    the same time."""
+    """Build all missing files, then run the checks. A run without `--only` has several parts. Each part
+    runs on its own machine, and all parts run at the same time."""
     args = _arguments()
     folder = CACHE / f"last-{args.arch}"
     folder.mkdir(parents=True, exist_ok=True)
@@ -91,7 +91,8 @@ def _packages(arch: str, folder: Path) -> Path:
 
 
 def _with_a_new_module(tree: Path) -> None:
-    """Let `outputs-off` need a new module, which only the new version has."""
+    """Change the new version so that `outputs-off` imports a module that the old version does not
+    have."""
     with bridges_in(tree) as package:
         (package / "added.py").touch()
         command = package / "commands/outputs_off.py"

@@ -1,13 +1,13 @@
-"""A bootable Debian. An ordinary user can build it. Kernel and package list identify the image in the
-cache.
+"""Builds a bootable Debian image. An ordinary user can build the image. In the cache, the image's name
+contains the kernel and a hash of the image's packages, kernel modules and files.
 
 `mmdebstrap` makes an archive of Debian, and `mke2fs -d` makes a file system from the archive. Both run
-under fakeroot, so nothing is mounted. The first RAM disk is our own (`ram_disk.py`). To make Debian's
-RAM disk, the build would have to run a program of the target system.
+under fakeroot, so nothing is mounted. The image uses our own initial RAM disk (`ram_disk.py`),
+because the build could make Debian's RAM disk only with a program of the target system.
 
-The build does not emulate installers of another architecture. Installers leave the same text in /etc
-and /var on each architecture. So the build unpacks the other architecture's packages over a tree that
-this machine's installers have made.
+For another architecture, the build does not emulate the packages' install scripts. These scripts leave
+the same text in /etc and /var on each architecture. So the build first installs the packages of this
+machine's architecture. Then the build unpacks the other architecture's packages over them.
 """
 
 import hashlib
@@ -22,8 +22,8 @@ from typing import Final
 from tests.vm.ram_disk import ram_disk
 
 KERNEL: Final = "7.3.4+deb13"
-"""A kernel of trixie-backports, which keeps old kernels. The kernel of Debian 13 itself lacks
-gpio-sim."""
+"""The kernel's version. The kernel is from trixie-backports, because the kernel of Debian 13 itself
+lacks gpio-sim. trixie-backports keeps old versions."""
 MIRROR: Final = "http://deb.debian.org/debian"
 SUITES: Final = ("trixie", "trixie-backports")
 SIZE: Final = "1500M"
@@ -58,8 +58,8 @@ MODULES: Final = (
 """The kernel modules in the image. All modules together would take 400 MB."""
 DPKG: Final = "var/lib/dpkg"
 KEPT: Final = ("--exclude=./dev", "--exclude=./etc", "--exclude=./var")
-"""Options that keep these folders as this machine's installers left them, when the other architecture's
-files are unpacked."""
+"""Options of tar for unpacking the other architecture's packages. With these options, tar does not
+overwrite the folders that this machine's install scripts have filled."""
 LEFT_OUT: Final = ("usr/share/doc", "usr/share/locale", "usr/share/man")
 TOOLS: Final = {
     "depmod": "kmod",
@@ -70,7 +70,7 @@ TOOLS: Final = {
 }
 """The Debian package of each program."""
 FILES: Final = Path(__file__).parent / "root"
-"""Files that are copied over the tree, so that this Debian runs the checks."""
+"""Files that are copied into the image. With these files, the machine runs the checks."""
 
 
 class Unusable(Exception):
@@ -137,7 +137,8 @@ def _build(arch: str, folder: Path) -> None:
 
 
 def _filled(arch: str, folder: Path, log: int) -> list[str]:
-    """Make archives. Return the shell's lines that make the tree from these archives."""
+    """Make archives of Debian. Return the shell commands that unpack these archives into the folder
+    `tree`."""
     here = subprocess.check_output(["dpkg", "--print-architecture"], text=True).strip()
     kernel = [f"linux-{part}-{KERNEL}-{arch}" for part in ("binary", "modules")]
     tree, ours, other = folder / "tree", folder / "ours.tar", folder / "other.tar"
@@ -168,8 +169,8 @@ def _run(words: Iterable[str], log: int) -> None:
 
 
 def _mmdebstrap(arch: str, variant: str, packages: Iterable[str], archive: Path) -> list[str]:
-    """Return the command of mmdebstrap. An ordinary user needs a user namespace and the programs of
-    uidmap."""
+    """Return the command of mmdebstrap. For a user other than root, the command needs a user namespace
+    and the programs of the package uidmap."""
     if os.geteuid() != 0:
         needed({"newuidmap": "uidmap"})
     return [

@@ -18,7 +18,8 @@ from tests.vm.image import Image, Unusable, needed
 PROBE_S: Final = 10.0
 BOOT_S: Final = 1800.0
 ANSWER_S: Final = 3600.0
-"""Limits (s) by the host's clock. They are far above need, because the host may be busy."""
+"""Limits (s) by the host's clock. The limits are much longer than normal, because the host may be
+busy."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,10 +35,11 @@ class Arch:
 
 
 FAST: Final = "mitigations=off"
-"""A kernel option for speed. It switches off the protection against leaks of real processors.
+"""A kernel option for speed. The option switches off the kernel's protection against flaws of real
+processors, such as Spectre.
 
-Five levels of page tables cost time on TCG too. SMAP, the kernel's protection from a program's pages,
-costs time as well. So the processor for amd64 has neither.
+Two features of the processor also cost time under TCG: page tables with five levels, and SMAP. SMAP
+keeps the kernel from reading a program's memory. So QEMU's amd64 processor has neither feature.
 """
 COUNTED: Final = ("-accel", "tcg", "-icount", "shift=0")
 ARCHS: Final = {
@@ -57,8 +59,8 @@ ARCHS: Final = {
     ),
 }
 ENDS_WITH_US: Final = ("setpriv", "--pdeathsig", "KILL")
-"""Words before a program's name. The kernel then kills the program when the thread that started it
-ends."""
+"""The first words of a command. Because of these words, the kernel kills the command's process when the
+thread that started the process ends."""
 KVM: Final = ("-accel", "kvm", "-cpu", "host")
 
 
@@ -82,9 +84,10 @@ def _kernel(image: Image, words: str) -> list[str]:
 
 
 class Machine:
-    """A running machine. Its disk survives a power cut, but not the end of the machine.
+    """A running machine. Its disk keeps its content after `cut_power`, but not after `close`.
 
-    `shared` gives folders by their 9p tags. `folder` holds the console's log and QEMU's sockets.
+    `shared` maps 9p tags to folders of the host, which the machine can mount. `folder` holds the
+    console's log and QEMU's sockets.
     """
 
     def __init__(
@@ -123,10 +126,10 @@ class Machine:
         self.booted()
 
     def booted(self) -> None:
-        """Wait until the machine reports that it is up. Raises Unusable."""
+        """Wait until the machine reports that it has booted. Raises Unusable."""
         self._port.settimeout(BOOT_S)
         while "booted" not in (heard := self._heard()):
-            if not heard["passed"]:  # this is the result of a check that ends with a restart
+            if not heard["passed"]:  # a check that restarts the machine has failed
                 raise Unusable(f"{heard['found']}\n{heard['log']}")
 
     def check(self, name: str) -> dict[str, Any]:

@@ -1,4 +1,5 @@
-"""The order of the checks, which are functions in `guest/`. Between the checks the host acts too."""
+"""The order of the checks. A check is a function in `guest/`. Between two checks, the host may cut the
+machine's power or restart the machine."""
 
 import os
 from typing import Final
@@ -71,11 +72,13 @@ PARTS: Final = {
         "upgrades.purged",
     ),
 }
-"""The checks of each part. A part runs on one machine from its first boot. A check may depend on
-earlier checks."""
+"""The name of each part of the tests, with its checks. All checks of a part run on one machine, in this
+order. A check may need the result of an earlier check."""
 WHOLE: Final = ("lift", "site", "upgrade")
 """The parts that together have every check. They run at the same time."""
 ALSO: Final = {("arm64", "lift"): ("inside.demo", "inside.transport")}
-"""More checks on arm64, because arm64 differs from CI's own amd64 machine."""
+"""Additional checks for arm64. CI's own machine is an amd64 machine, so arm64 needs these checks
+here."""
 NOT_ON: Final = {"arm64": ("network.late",)}
-"""Checks that do not run on arm64. There zenoh would need a router to find another machine."""
+"""Checks that do not run on arm64. In this check on arm64, zenoh would need a router to find another
+machine."""

@@ -1,4 +1,4 @@
-"""The first RAM disk: busybox, modules to reach the root file system, and a script of ten lines.
+"""The initial RAM disk: busybox, modules to reach the root file system, and a script of ten lines.
 
 The archive's format is "newc" in the kernel's
 Documentation/driver-api/early-userspace/buffer-format.rst.
@@ -40,7 +40,7 @@ def _modules(folder: Path) -> Iterator[Path]:
     told: set[str] = set()
     for wanted in WANTED:
         found = [name for name in needs if name.rpartition("/")[2].split(".")[0] == wanted]
-        for name in found:  # modules.dep lists the deepest need last
+        for name in found:  # in modules.dep, each module comes before the modules that it needs
             for each in (*reversed(needs[name]), name):
                 if each not in told:
                     told.add(each)

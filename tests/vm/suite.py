@@ -1,5 +1,5 @@
-"""Makes the folder of tests for the machine. The tests run with the libraries of the installed
-package."""
+"""Makes the folder of tests that run inside the virtual machine. The tests use the libraries of the
+installed package."""
 
 import shutil
 import subprocess
@@ -31,8 +31,9 @@ def suite(arch: str, root: Path, folder: Path) -> Path:
 
 
 def _fetch(arch: str, root: Path, site: Path) -> None:
-    """Fetch the libraries with deb/wheels.py, as for the package. pip alone would judge requirements by
-    this machine."""
+    """Fetch the libraries that only the tests need, with the script that fetches the package's
+    libraries (deb/wheels.py). pip itself would choose libraries for the architecture of this
+    machine."""
     fresh = site.with_name("site.new")
     shutil.rmtree(fresh, ignore_errors=True)
     words = ["--arch", arch, "--python", PYTHON, "--target", str(fresh)]

@@ -94,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
     - 64: nobody confirmed the kill test.
     - 78: the YAML has an error.
     """
-    log.start("CRITICAL")  # the findings report the same errors
+    log.start("CRITICAL")  # no log of errors, because the findings report them
     try:
         config = load(args.file)
         config = replace(config, rmf=overridden(config.rmf, args))

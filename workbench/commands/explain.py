@@ -102,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _recorded(args: argparse.Namespace) -> int:
-    wanted = "" if "/" in (args.device or "/") else args.device  # a robot waits for other devices
+    wanted = "" if "/" in (args.device or "/") else args.device  # a robot: take every device
     site = HeardDevices(wanted, args.session)
     span = RecordingSpan(args.from_, args.to)
     for heard in told_between(args.file, span, "explain", wanted):
@@ -172,7 +172,8 @@ def _live(args: argparse.Namespace) -> int:
 
 
 def _listen(ear: Ear, past: Ear, site: HeardDevices, for_s: float) -> None:
-    """Listen for `for_s` (s). `past` hears also the requests that fleet adapters sent before."""
+    """Listen for `for_s` (s). `past` also receives the retained requests, which fleet adapters sent
+    before this program began."""
     until = time.monotonic() + for_s
     site.pass_time(time.monotonic(), time.time())
     while (left_s := until - time.monotonic()) > 0:

@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE",
-        help="another certificate whose end to export, such as that of the web page's proxy",
+        help="another certificate whose end date is exported, such as that of the web page's proxy",
     )
     add_graph_arguments(parser)
 
@@ -154,7 +154,8 @@ class Site:
         yield from machine.of_recordings(RECORDER)
 
     def _end(self, file: str) -> CertificateEnd:
-        """Return the end of a certificate. Log once why the end is unknown: no metric says so."""
+        """Return the end of a certificate. If the end is unknown, log the reason once, because a metric
+        cannot give a reason."""
         end = self._reader.end(file)
         if end.reason and end.reason != self._unreadable.get(file):
             logger.warning(pairs("certificate_unreadable", file=file, reason=end.reason))

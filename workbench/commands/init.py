@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--wiring",
         choices=get_args(Wiring),
-        help="modbus is contacts on Modbus TCP; gateway is registers",
+        help="modbus: contacts at a Modbus TCP module; gateway: registers of the device's controller",
     )
     parser.add_argument("--address", help="host, serial port or CAN interface")
     parser.add_argument("--unit", help="unit id of a Modbus module")
@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--contacts", choices=get_args(Level), help="level of a closed contact")
     parser.add_argument("--relays", choices=get_args(Level), help="level that switches a relay on")
     for name, (part, offered) in gateway.PLACES.items():
-        text = f"the place of {part} on a gateway, such as {offered}"
+        text = f"the register address of {part} on a gateway, such as {offered}"
         parser.add_argument(f"--{name.replace('_', '-')}", metavar="PLACE", help=text)
     for name, meanings in gateway.NUMBERS.items():
         text = f"a gateway's numbers for {meanings}, such as 0,1,2"
@@ -109,11 +109,13 @@ def _written(file: Path, given: Given) -> int:
         text = draft(answers(given))
         config = understood(file, text.encode())
         if config.kind == "fleet":
-            read_site(config)  # RMF's own files
+            read_site(config)  # reads RMF's files of the fleet, and may raise SettingsError
         write(file, f"{_schema_line()}{text}")
     except SettingsError as error:
         told = "\n".join(problem.text for problem in error.problems)
-        print(f"rmf-bridge init: with these answers check would say:\n{told}", file=sys.stderr)
+        print(
+            f"rmf-bridge init: with these answers, `check` would report:\n{told}", file=sys.stderr
+        )
         return EX_USAGE
     except Impossible as error:
         print(f"rmf-bridge init: {error}", file=sys.stderr)
@@ -206,7 +208,7 @@ def answers(given: Given) -> DraftAnswers:
             told[name] = tuple(part.strip() for part in told[name].split(",") if part.strip())
     if unknown := [signal for signal in told.get("signals", ()) if signal not in LIFT_INPUTS]:
         raise Impossible(
-            f"a lift has no input {', '.join(unknown)}; there are {', '.join(LIFT_INPUTS)}"
+            f"a lift has no input {', '.join(unknown)}; its inputs are {', '.join(LIFT_INPUTS)}"
         )
     places = {name: told.pop(name) for name in TABLE if name in told}
     return DraftAnswers(**told, places=places)

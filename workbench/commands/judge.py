@@ -1,7 +1,7 @@
 """`rmf-bridge judge`: check a device's node, a fleet adapter or a node's alarm against RMF's contract.
 
-`workbench/judge/` has the laws and the plays. This file has the options, the graph, the clock and the
-verdict.
+`workbench/judge/` has the laws and the plays. A law is a rule of the contract. In a play, the judge
+moves the device, as RMF would. This file has the options, the graph, the clock and the verdict.
 
 Exit codes:
 
@@ -67,7 +67,8 @@ BESIDE: dict[str, tuple[str, ...]] = {
     "fleet": (topics.ADAPTER_LIFT_REQUESTS.name, topics.ADAPTER_DOOR_REQUESTS.name),
     "coordinator": (topics.CHARGER_REQUESTS.name, topics.CHARGER_CANCELS.name),
 }
-"""Topics that a play may share with another node. The user names that node with `--beside`."""
+"""Option of `--beside` -> topics. If the user gives the option, the judge plays although another node
+publishes on these topics."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -130,19 +131,19 @@ def _add_plays(parser: argparse.ArgumentParser) -> None:
         "--robot",
         default=f"{FLEET}/robot1",
         metavar="FLEET/ROBOT",
-        help="the robot to request the charger for; the charger must know it",
+        help="the robot to request the charger for; the charger must know this robot",
     )
     parser.add_argument(
         "--restarts",
         action="store_true",
-        help="restart RMF's supervisor in between; in a simulation only (--localhost)",
+        help="restart RMF's supervisor during the play; in a simulation only (--localhost)",
     )
     parser.add_argument(
         "--beside",
         action="append",
         choices=tuple(BESIDE),
         default=[],
-        help="play although this node is on the graph; rides and passages go through a supervisor",
+        help="play although this node is on the graph; rides and passages then use the supervisor",
     )
     parser.add_argument(
         "--patience",
@@ -154,7 +155,8 @@ def _add_plays(parser: argparse.ArgumentParser) -> None:
 
 
 def performance_of(args: argparse.Namespace) -> Scenario | None:
-    """Return the play, or None to listen only. Exit with code 2 if options contradict each other."""
+    """Return the play. If the judge only listens, return None. Exit with code 2 if options contradict
+    each other."""
     kinds: dict[JudgedKind, bool] = {
         "lift": args.ride is not None,
         "door": args.passages is not None,
@@ -165,11 +167,11 @@ def performance_of(args: argparse.Namespace) -> Scenario | None:
         return None
     if wanted != [args.kind]:
         args.usage(
-            "a lift is played by --ride A B, a door by --passages N, a charger by --charge; "
-            " the others are only listened to"
+            "--active moves a lift with --ride A B, a door with --passages N, a charger with --charge;"
+            " to other nodes, judge only listens"
         )
     if not args.active:
-        args.usage(f"the play moves {words_of(args)}: add --active")
+        args.usage(f"this would move {words_of(args)}: to permit it, add --active")
     if args.restarts and not args.localhost:
         args.usage("--restarts needs --localhost: never restart a supervisor with a real device")
     through = "supervisor" in args.beside
@@ -202,7 +204,7 @@ def run(args: argparse.Namespace) -> int:
     if args.recording is None:
         return _live(args, performance)
     if performance is not None:
-        args.usage("a recording is only judged: delete --active")
+        args.usage("with --recording, judge moves no device: delete --active")
     try:
         return _recorded(args)
     except BagError as error:
@@ -244,7 +246,9 @@ def _live(args: argparse.Namespace, performance: Scenario | None) -> int:
 def _begins(args: argparse.Namespace, performance: Scenario | None) -> str:
     """Return the first line of output, which tells the waiting user what the program is doing."""
     if performance is not None:
-        return f"plays with {words_of(args)}; Ctrl-C releases the device, and judges"
+        return (
+            f"moves {words_of(args)}; after Ctrl-C, judge releases the device and gives the verdict"
+        )
     until = "until Ctrl-C" if args.for_s == NEVER else f"for {args.for_s:g} s"
     return f"listens to {words_of(args)} {until}"
 
@@ -293,7 +297,7 @@ class Live:
             return ""
         who = [name for name, topics in BESIDE.items() if set(topics) & set(found)]
         beside = " ".join(f"--beside {name}" for name in who)
-        return f"other nodes publish on {', '.join(found)}: to play nevertheless, add {beside}"
+        return f"other nodes publish on {', '.join(found)}; to play nevertheless, add {beside}"
 
     def judge(self, judging: JudgeRun) -> None:
         """Run until there is a verdict. A play always releases the device before the play ends."""

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 TURN_S: Final = 0.5
 KEEPALIVE_S: Final = 10
 WAITING: Final = 5000
-"""Maximum number of messages that wait for a slow broker. The next turn publishes the rest."""
+"""Maximum number of messages that wait for a slow broker. The rest is published TURN_S later."""
 LEAVES_S: Final = 2.0
 PORTS: Final = {False: 1883, True: 8883}
 
@@ -217,7 +217,7 @@ class Broker:
     def close(self) -> None:
         """Publish the message that `mqtt-out` has stopped, and disconnect. Never raises."""
         if self._client.is_connected():
-            with suppress(RuntimeError, ValueError):  # else the will does it
+            with suppress(RuntimeError, ValueError):  # on failure, the broker publishes the will
                 self._client.publish(self._status, "offline", 1, True).wait_for_publish(LEAVES_S)
         self._client.disconnect()
         self._client.loop_stop()
@@ -236,8 +236,8 @@ class Broker:
             self._tell(f"is gone: {reason}")
 
     def _tell(self, trouble: str) -> None:
-        """Print a trouble, but not twice in a row. A new connection makes `Broker` forget the last
-        trouble."""
+        """Print a trouble, but not twice in a row. After a new connection, print the same trouble
+        again."""
         if trouble != self._trouble:
             self._trouble = trouble
             complain("mqtt-out", f"broker {self._where} {trouble}")

@@ -53,7 +53,8 @@ MOST_WAITING: Final = 200
 notices, and logs that."""
 CERTIFICATES_EVERY_S: Final = 60.0
 NOTIFY: Final = "notify"
-"""The owner of certificates that only the file of `notify` names."""
+"""Name that notices give in place of a daemon's name. The name stands for certificates that only the
+file of `notify` lists."""
 SERVICE_STATE: Final = Path("/var/lib/rmf-bridge-notify")
 """Folder in which `rmf-bridge-notify.service` stores the troubles already reported."""
 
@@ -124,7 +125,7 @@ def _acknowledge(state: Path, key: str) -> int:
     except OSError as error:
         complain("notify", f"{state} cannot be written: {error.strerror}")
         return os.EX_CANTCREAT
-    print(f"{key}: if this is a present trouble, its repeats stop, and the log of notify says so")
+    print(f"{key}: if notify reports this trouble now, its repeats stop, and notify logs that")
     return 0
 
 
@@ -220,8 +221,8 @@ class Certificates:
 
 
 class Desk:
-    """A finder of new notices. Each turn, `Desk` gives the new notices to the couriers, and stores on
-    disk which notices people were sent."""
+    """A finder of new notices. At each call of `turn`, `Desk` gives the new notices to the couriers. It
+    also stores on disk which notices it has given to them."""
 
     def __init__(self, settings: NotifySettings, state: Path, couriers: list[Courier]) -> None:
         self._settings = settings

@@ -30,7 +30,7 @@ NARROWEST, WIDEST = 480, 8000
 
 
 class PlotError(Exception):
-    """No picture can be made. The error's text gives the remedy."""
+    """An error if no picture can be made. The error's text gives the remedy."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--theme",
         choices=("light", "dark"),
-        help="default: the style of the reader's screen; a PNG is light",
+        help="default: light or dark, as the reader's screen is set; a PNG is light",
     )
     add_span_arguments(parser)
 

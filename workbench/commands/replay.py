@@ -1,4 +1,5 @@
-"""`rmf-bridge replay FILE`: repeat a recording's decisions with the present program."""
+"""`rmf-bridge replay FILE`: compute a recording's decisions again with the installed version of the
+program."""
 
 import argparse
 import json
@@ -27,7 +28,10 @@ MOST: Final = 200
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `replay`."""
     parser.add_argument(
-        "file", type=Path, metavar="FILE", help="a recording of a daemon, or its ring"
+        "file",
+        type=Path,
+        metavar="FILE",
+        help="a recording of a daemon, or the daemon's ring (the file of its latest events)",
     )
     parser.add_argument(
         "--config", type=Path, metavar="YAML", help="show what this YAML would have changed"
@@ -117,7 +121,10 @@ def _lines(
         f" recorded by version {head.version}"
     )
     if course.unusable:
-        yield f"{course.unusable} entries are left out: their memory is not in the recording"
+        yield (
+            f"{course.unusable} entries are left out, because the recording lacks the daemon's"
+            " memory for them"
+        )
     if args.config:
         yield from _changes(differences)
     else:
@@ -144,7 +151,7 @@ def _changes(differences: list[Difference]) -> Iterator[str]:
             before[-1] += f" to {_time(one.wall)}"
         if one.today is not None:
             today, recorded = _plain(one.today), _plain(one.recorded)
-            text = f"{one.subject}: {_part(one)}: {today}, where {recorded} was recorded"
+            text = f"{one.subject}: {_part(one)}: {today} (recorded: {recorded})"
             came = times.setdefault(text, [])
             came.append(_time(one.wall))
             if one.what != "refused":

@@ -153,7 +153,9 @@ def _workcell_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quantity", type=int, default=1, metavar="N", help="default: 1")
     parser.add_argument("--compartment", default="", metavar="NAME", help="default: none")
     parser.add_argument(
-        "--request-id", metavar="GUID", help="the request's guid, to repeat it (default: a new one)"
+        "--request-id",
+        metavar="GUID",
+        help="the request's guid; an earlier guid repeats that request (default: a new guid)",
     )
     add_shared_arguments(parser, direct=False)
 
@@ -342,7 +344,8 @@ class _Exchange:
         self._publisher(topic).publish(message)
 
     def _finish(self, outcome: Fulfilled | Failed) -> int | None:
-        """Print the outcome. Return an exit code, or None to watch the lift a little longer."""
+        """Print the outcome. Return the exit code, or None if the program watches the lift a little
+        longer."""
         if isinstance(outcome, Failed):
             complain(self.command, outcome.text)
             return 1
@@ -355,7 +358,8 @@ class _Exchange:
         return None
 
     def _watch(self, now: float) -> int | None:
-        """Print the lift's movements at the end of the watch. The outcome stays the same."""
+        """Print the lift's movements when the watching time is over. Return the exit code then, and
+        None before."""
         if self.watches_until is None or now < self.watches_until:
             return None
         self._line(now, "after", aftermath(self.seen.states_of(d.LiftState)[self._last_before :]))

@@ -54,8 +54,8 @@ WRITTEN: dict[str, object] = {
     "maps": {"L1": "ground floor"},
     "paths": {"battery": "/robots/$robot/battery"},
 }
-"""Examples for keys that shipped files lack. Each of these keys has the same meaning in every
-section."""
+"""Examples for keys that shipped files lack. One example is enough for each key, because the key has
+the same meaning in every section."""
 
 Found = dict[tuple[type, str], str]
 

@@ -24,9 +24,9 @@ Schema = dict[str, object]
 FILE: dict[str, str] = {
     "kind": "the kind of devices in the file: lifts, doors, chargers, or a node without hardware.",
     "driver": "the driver of the devices; a device may name another driver.",
-    "rmf": "the way to Open-RMF.",
-    "recording": "the recording of the daemon's work.",
-    "buses": "name -> a bus, by its `type`.",
+    "rmf": "the connection to Open-RMF.",
+    "recording": "how the daemon records its work.",
+    "buses": "name -> the settings of a bus, which depend on the bus's `type`.",
     "type": "the type of a bus, which decides the other keys of the bus.",
 }
 """Meanings of the keys that no struct has."""

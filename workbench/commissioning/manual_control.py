@@ -22,9 +22,10 @@ def guarded(
 ) -> tuple[dict[str, Bus], Callable[[], None]]:
     """Return the device's buses by name, and a function `all_off`. Raises HalError.
 
-    The caller calls `all_off` after every output is verified off. Once the buses are open, but before
-    an output is claimed, the record is written and the guard starts. If this process dies, the guard
-    runs `outputs_off`. If a bus cannot be opened, there is nothing to switch off.
+    This function first opens the buses. If a bus cannot be opened, no output can be on. Then it writes
+    the record and starts the guard, before any output is claimed. If this process dies, the guard runs
+    `outputs_off`. When every output is verified off, the caller must call `all_off`, which ends the
+    record and the guard.
     """
     directories.work_somewhere(held.places)
     buses = {name: config.open_bus(name) for name in buses_of(config, device)}
@@ -72,9 +73,9 @@ class _OtherInputs:
 
 
 def not_off(driver: Driver[Any, Any], insist: Callable[[], None]) -> str:
-    """Switch every output off. Return "" if all is verified off, or the reason why an output is not.
+    """Switch every output off. Return "" if all outputs are verified off. Otherwise return the reason.
 
-    `insist` is a function that ends the bus's pauses.
+    `insist` ends the bus's pauses, so that the bus tries to reach the device at once.
     """
     insist()
     try:

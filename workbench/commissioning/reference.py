@@ -64,7 +64,8 @@ def _keys_of(same: list[Shape]) -> str:
 
 
 def _tops() -> Headings:
-    """Return a file's sections with their headings. Structs that several sections share come first."""
+    """Return a file's sections with their headings. A base struct that several sections share comes
+    before these sections."""
     found: Headings = {Rmf: "## `rmf`", RecordingSettings: "## `recording`"}
     for name in named.bus_types():
         found[named.bus_called(name).settings] = f"## Bus of `type: {name}`"
@@ -101,7 +102,7 @@ def _headings(tops: Headings) -> Headings:
     everywhere = [struct for top in tops for struct, _ in _inside(top, ())]
     heirs = Counter(base for struct in {*tops, *everywhere} for base in _bases(struct))
     shared = (base for base, many in heirs.items() if many > 1 and len(_fields(base)) > 1)
-    printed = {*tops, *everywhere, *shared}  # heirs print the key of a base with one key
+    printed = {*tops, *everywhere, *shared}  # a struct also prints its base's only key
     inside = {top: list(_inside(top, printed)) for top in tops}
     tops_of = Counter(struct for found in inside.values() for struct in {s for s, _ in found})
     ordered: Headings = {}

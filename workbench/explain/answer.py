@@ -141,8 +141,8 @@ def _others(around: OthersHeard) -> str:
 
 
 def stopped(device: Device, around: OthersHeard, clock: TimePhrases) -> Answer | None:
-    """Answer for a device whose states have stopped, or whose daemon has died. The reason to keep the
-    file may tell of the death. Return None for any other device."""
+    """Answer for a device whose states have stopped, or whose daemon has died. The daemon's death may
+    be the reason for which the recorder kept the file. Return None for any other device."""
     last = device.last_state
     if last is not None and around.reason is not None and around.reason.code == DIED:
         return Answer(since=last.at - 60.0, because=()).say(
@@ -217,8 +217,8 @@ def clock_of(claim: DeviceRequester) -> tuple[str, ...]:
     off = lasted(abs(claim.stamp_age_s))
     return (
         f"The requests of {claim.who} are stamped {off} {side} this clock. RMF's own supervisors do not"
-        " compare stamps. Ours take a request with such a stamp for a replay until it has been repeated"
-        " for a while.",
+        " compare stamps. Our supervisors take a request with such a stamp for a copy of an old"
+        " request, until the request has been repeated for a while.",
     )
 
 
@@ -236,10 +236,14 @@ def faults(
 def relays(device: Device, clock: TimePhrases) -> str:
     """Return a clause that lists the relays that are on. Return "" if the relays' state is unknown.
 
-    An example is `; its daemon has these on: agv_request, call L3`.
+    An example is `; its daemon has these relays on: agv_request, call L3`.
     """
     told = device.told("outputs", clock.now)
     shown = [part.removesuffix(" yes") for part in told.split(", ") if not part.endswith(" 0")]
     if not told:
         return ""
-    return f"; its daemon has these on: {listed(shown)}" if shown != ["-"] and shown else RELAYS_OFF
+    return (
+        f"; its daemon has these relays on: {listed(shown)}"
+        if shown != ["-"] and shown
+        else RELAYS_OFF
+    )

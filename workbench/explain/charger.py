@@ -21,18 +21,19 @@ from workbench.explain.phrases import TimePhrases, lasted
 from workbench.explain.rows import label
 
 LONG_S: Final = 120.0
-"""Time (s) after which a person should look why a robot has not come to its charger."""
+"""Time (s) that a robot normally needs to come to its charger. After this time, a person should look
+for the cause."""
 REFUSED_LATELY_S: Final = 60.0
 
 Coordinator = Mapping[str, str]
-"""Diagnostics of the coordinator. The keys are the chargers' names, `queue`, `schedule` and
+"""Diagnostics of the coordinator. The keys are the chargers' names, and also `queue`, `schedule` and
 `assigns`."""
 
 
 def answer(
     charger: ChargerFacts, clock: TimePhrases, around: common.OthersHeard, coordinator: Coordinator
 ) -> Answer:
-    """Explain the charger at the last message.
+    """Explain the charger's state at the time of the last message.
 
     `coordinator` holds the coordinator's present diagnostics, or {} if there is no coordinator.
     """
@@ -115,10 +116,10 @@ def _idle(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
         return
     first = asking[0]
     found.say(
-        f"Request {first.who} to charge {first.wants} has waited"
+        f"A request to charge {first.wants} (request {first.who}) has waited"
         f" {clock.since(first.first)}. {charger.name} has not taken the request.",
         "the device's node",
-        "take the request; a refusal is explained below, or in its log",
+        "take the request; if the node refuses the request, the reason is below or in the node's log",
     )
 
 
@@ -130,7 +131,9 @@ def _error(found: Answer, charger: ChargerFacts) -> None:
         who = label(str(misplaced.robot))
         wanted = misplaced.expected
         instead = (
-            f"; it is meant for {label(str(wanted))}" if wanted else ", which nobody requested"
+            f"; the station expects {label(str(wanted))}"
+            if wanted
+            else "; nobody has requested the station"
         )
         found.say(
             f"Wrong station: {who} stands at {charger.name}{instead}.",
@@ -142,7 +145,7 @@ def _error(found: Answer, charger: ChargerFacts) -> None:
         FaultCause.ROBOT: ("The robot is at fault", "check the robot's receiver"),
         FaultCause.STATION: ("The station is at fault", "repair it, then `rmf-bridge reset FILE`"),
         FaultCause.PAD: (
-            "What stands on the pad should not be there",
+            "Something stands on the pad that should not be there",
             "clear the pad; add a new receiver to `receivers:`",
         ),
         FaultCause.LOST: (
@@ -168,7 +171,7 @@ def _refusal(found: Answer, charger: ChargerFacts, clock: TimePhrases) -> None:
 
 
 def _coordinated(found: Answer, charger: ChargerFacts, coordinator: Coordinator) -> None:
-    """Add the coordinator's texts about this charger, the queue and the schedule."""
+    """Add the coordinator's texts about this charger, about the queue, and about the schedule."""
     of_it = coordinator.get(charger.id, "")
     if of_it:
         found.say(f"The coordinator lists {charger.name} as {label(of_it)}.")

@@ -1,4 +1,7 @@
-"""Facts about one charger, from its messages. The charger's story tells requests and refusals."""
+"""Facts about one charger, from its messages.
+
+The charger's story (a list of its events) also tells the requests and the refusals.
+"""
 
 from dataclasses import dataclass
 

@@ -1,5 +1,5 @@
 """Facts that all kinds of device share: states and their age, faults that daemons report, and the
-story."""
+device's story (one text line for each event)."""
 
 import sys
 from abc import abstractmethod
@@ -20,21 +20,25 @@ from workbench.explain.rows import label
 
 MOST_LINES: Final = 600
 LONGEST_DETAIL: Final = 300
-"""Maximum length (characters) of a fault's detail. The details of HTTP drivers have an address and a
+"""Maximum length (characters) of a fault's detail. The details of HTTP drivers contain an address and a
 reason."""
 BACK_S: Final = 0.2
 BACK_TIMES: Final = 3
 BACK_WITHIN_S: Final = 15.0
-"""BACK_S, BACK_TIMES and BACK_WITHIN_S are limits that show two publishers. With two publishers, stamps
-step back by at least BACK_S (s). This happens at least BACK_TIMES times within BACK_WITHIN_S (s)."""
+"""BACK_S, BACK_TIMES and BACK_WITHIN_S tell when stamps prove that two nodes publish the same device.
+
+With two publishers, stamps jump back again and again. The proof is BACK_TIMES jumps of at least BACK_S
+(s) within BACK_WITHIN_S (s).
+"""
 
 
 class Device(ObservedDevice[Any]):
     """One device, built from its messages, and its story.
 
     - `name`: the device's name in a printable form.
-    - `focus`: a session whose last ride stays complete in the story, even if other sessions ride later.
-    - `bus_error`: the last bus error in the notes of the device's daemon.
+    - `focus`: the session that the user asked about. The story keeps every line of this session's last
+      ride, even if other sessions ride later.
+    - `bus_error`: the last bus error that the device's daemon wrote into the recording.
     """
 
     def __init__(self, name: str, began: Moment) -> None:
@@ -84,7 +88,7 @@ class Device(ObservedDevice[Any]):
             case "states again":
                 return f"states of {self.name} come again, after {lasted(one.gap_s)} without one"
             case "read" if one.text:
-                return f"the reading behind the states {one.text}"
+                return f"the reading in the device's states {one.text}"
             case "read":
                 return "the readings are fresh again"
             case "refused":
@@ -104,8 +108,8 @@ class Device(ObservedDevice[Any]):
         return tuple(line for line in self.lines if line.at >= at)
 
     def two_nodes(self, now: Moment) -> bool:
-        """Return whether two nodes publish this device's states. Then publishers take turns, or stamps
-        jump back and forth."""
+        """Return whether two nodes publish this device's states. The signs are states from two
+        publishers, or stamps that jump back and forth."""
         return (
             len(self.publishers(now)) > 1
             or self.steps_back(now.at, BACK_S, BACK_WITHIN_S) >= BACK_TIMES
@@ -119,8 +123,8 @@ class Device(ObservedDevice[Any]):
         return sorted({one.name.partition(": ")[0] for one in every if one.kind == self.kind})
 
     def note(self, moment: Moment, note: Noted) -> None:
-        """Take a note of the device's own daemon. A daemon notes only changes, so a value holds until
-        the next note."""
+        """Take an entry that the device's own daemon wrote into the recording. The daemon writes only
+        changes, so a value holds until the next entry."""
         if self.noted is None:
             near = moment.at - self.began.at <= SILENT_S
             self.noted = Diagnosis(self.kind, Moment(moment.at, moment.wall, seen=not near))
@@ -138,14 +142,15 @@ class Device(ObservedDevice[Any]):
             self._tell_all(known.refuses(moment, label(note.refused.partition(": ")[0])))
 
     def _daemons(self) -> Iterator[Diagnosis]:
-        """Yield the notes of the device's own daemon first, and then the diagnostics of all our
-        daemons."""
+        """Yield first what the device's own daemon wrote into the recording. Then yield the diagnostics
+        of all our daemons."""
         if self.noted is not None:
             yield self.noted
         yield from self.diagnoses.values()
 
     def heard_from(self, now: Moment) -> Iterator[Diagnosis]:
-        """Yield the present diagnostics of our daemons, and the notes of the device's own daemon."""
+        """Yield the present diagnostics of our daemons, and what the device's own daemon wrote into the
+        recording."""
         return (o for o in self._daemons() if o is self.noted or o.is_current(now.at))
 
     def own(self, now: Moment) -> Diagnosis | None:
@@ -160,8 +165,8 @@ class Device(ObservedDevice[Any]):
         return next((one.values[key] for one in own if key in one.values), "")
 
     def faults(self, now: Moment) -> dict[str, tuple[str, Moment]]:
-        """Return fault code -> detail and beginning. The faults from the device's own daemon come
-        first."""
+        """Return fault code -> the fault's detail and beginning. The faults from the device's own
+        daemon come first."""
         found: dict[str, tuple[str, Moment]] = {}
         for one in sorted(self.heard_from(now), key=lambda one: one.kind != self.kind):
             for code, fault in one.faults.items():
@@ -169,7 +174,8 @@ class Device(ObservedDevice[Any]):
         return found
 
     def waits_said(self, now: Moment) -> dict[str, str]:
-        """Return kind of daemon -> why requesters wait, as our daemon of that kind says."""
+        """Return kind of daemon -> the reason why requesters wait. The reason is the text of our daemon
+        of that kind."""
         said = ((one.kind, one.values.get("waits")) for one in self.heard_from(now))
         return {kind: label(text, 200) for kind, text in said if text}
 

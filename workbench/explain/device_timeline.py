@@ -149,7 +149,7 @@ class Drawing:
     # ---- our daemon's notes
 
     def _note(self, level: Level) -> None:
-        if level.lane not in self._noted:  # notes tell times more exactly than diagnostics
+        if level.lane not in self._noted:  # clear the less exact values from diagnostics
             self._noted.add(level.lane)
             self._rows[level.lane].clear()
         looks: Tone = "wrong" if level.lane == "faults" else "works"
@@ -192,7 +192,8 @@ class Drawing:
                 self._say("mode", text, tone(d.ChargerStateValue, state.state))
 
     def _age(self, stamped_at: float, wall: float) -> None:
-        """Show an old reading, or a reading stamped by another clock, as a separate fault."""
+        """Show a problem of the reading as a fault of its own: old, never read, or a stamp from the
+        future."""
         text = AGES[reading_age(stamped_at, wall)]
         if text or STAMP in self._rows["faults"]:
             self._row("faults", STAMP).say(self._now, text, "wrong")
@@ -282,7 +283,8 @@ class Drawing:
 
 
 def _floor(floor: str, runs: Tone) -> Tone:
-    """Return a floor's tone. If a lift has no motion lines, a known floor means that the car stands."""
+    """Return the tone (the meaning of the colour) of a floor. `runs` is the tone of the car's motion.
+    If a lift does not report motion, a known floor means that the car stands."""
     if not floor:
         return "unknown"
     return "works" if runs == "works" else "calm"

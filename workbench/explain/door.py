@@ -23,15 +23,16 @@ SETTLES_S: Final = 2.0
 LONG_S: Final = 60.0
 """Maximum normal time (s) of a robot's drive through a doorway."""
 OPENS_S, MOVES_S = 5.0, 15.0
-"""Normal times (s) of a door that nobody holds: OPENS_S in state OPEN, and MOVES_S in motion."""
+"""Normal times (s) of a door that nobody holds. OPENS_S is the time for which the door stays OPEN.
+MOVES_S is the time for which the door moves."""
 AWAY: Final = ("offline", "unknown")
 
 
 def answer(
     door: DoorFacts, clock: TimePhrases, around: common.OthersHeard, focus: str = ""
 ) -> Answer:
-    """Explain the door at the last message. `focus` is the requester to explain. With "", explain the
-    requester who waits."""
+    """Explain the door's state at the time of the last message. `focus` is the requester to explain.
+    With "", explain the requester who waits."""
     if door.last_state is None:
         return _with_askers(common.unheard(door, around), door, clock)
     stopped = common.stopped(door, around, clock)
@@ -43,7 +44,7 @@ def answer(
     if claim is not None:
         wants = "open" if claim.wants == OPEN else "released"
         found.say(
-            f"{claim.who} has waited for {door.name} to be {wants} {clock.since(claim.since)}."
+            f"{claim.who} has waited {clock.since(claim.since)} for {door.name} to be {wants}."
         )
         found.asks, found.fields = claim.who, _fields(door, claim, clock)
         found.notes += common.clock_of(claim)
@@ -88,7 +89,7 @@ def _begins(door: DoorFacts, claim: DeviceRequester | None) -> float:
 
 def _with_askers(found: Answer, door: DoorFacts, clock: TimePhrases) -> Answer:
     for claim in [one for one in door.requesters if one.wants == OPEN and one.asks(clock.now)][:3]:
-        found.say(f"{claim.who} has waited for the door to be open {clock.since(claim.since)}.")
+        found.say(f"{claim.who} has waited {clock.since(claim.since)} for the door to be open.")
         found.since = min(found.since, claim.since.at)
     return found
 
@@ -96,8 +97,8 @@ def _with_askers(found: Answer, door: DoorFacts, clock: TimePhrases) -> Answer:
 def _fields(
     door: DoorFacts, claim: DeviceRequester, clock: TimePhrases
 ) -> tuple[CheckedField, ...]:
-    """Return the fields that DoorOpen or DoorClose checks, as this requester's fleet adapter sees the
-    fields."""
+    """Return the fields that DoorOpen or DoorClose checks, with the values that this requester's fleet
+    adapter sees."""
     told = {
         "door": door.mode.since,
         "heartbeat": door.holders.get(claim.who) or claim.since,
@@ -130,7 +131,7 @@ def _opens(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePh
     if not passed:
         what = "asks for CLOSE" if asked is not None else "has not asked the door to open"
         found.say(
-            f"The supervisor lists {claim.who}, and {what}.",
+            f"The supervisor's heartbeat lists {claim.who}, but the supervisor {what}.",
             "the supervisor",
             f"send OPEN for {door.name}",
         )
@@ -140,7 +141,7 @@ def _opens(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: TimePh
         f"The supervisor asks for OPEN, and the door has been {door.mode.value}"
         f" {clock.since(door.mode.since)}{on}.",
         "the controller",
-        f"open {door.name} fully, and show it by its contact",
+        f"open {door.name} fully, so that its contact shows OPEN",
     )
     if clock.now.at - door.mode.since.at > LONG_S:
         found.say(
@@ -166,7 +167,7 @@ def _not_listed(found: Answer, door: DoorFacts, claim: DeviceRequester, clock: T
         )
     else:
         found.say(
-            f"The door supervisor does not list {claim.who}. It takes these requests for replays, or"
+            f"The door supervisor does not list {claim.who}. It regards these requests as replays, or"
             " has too many requesters.",
             "the supervisor",
             f"take the request of {claim.who}; the supervisor's log says why it does not",
@@ -218,8 +219,8 @@ def _nobody_tells(
 ) -> None:
     """Explain an open door that no requester is known to hold.
 
-    RMF's supervisor sends a heartbeat only after requests. If nobody holds an open door, the supervisor
-    sends CLOSE at each state of the door (door_supervisor/Node.cpp).
+    RMF's supervisor sends a heartbeat only after requests. Whenever a state shows an open door that
+    nobody holds, the supervisor sends CLOSE (door_supervisor/Node.cpp).
     """
     if clock.now.at - door.began.at < REQUESTER_SILENT_S:
         found.say(
@@ -230,17 +231,17 @@ def _nobody_tells(
     if around.nobody_publishes("door_requests"):
         found.say(
             "No node publishes `door_requests`, so the door supervisor is not running. It is not known"
-            " whether a robot holds the door. A robot in the doorway says nothing.",
+            " whether a robot holds the door. A robot in the doorway sends nothing.",
             "a person",
             f"{doorway}; when no robot stands in it, start the door supervisor, which lets go of every"
             " door whose holder is silent",
         )
         return
-    holds = "a robot holds the door, and most likely stands in the doorway, where it says nothing"
+    holds = "a robot holds the door, and most likely stands silent in the doorway"
     if nodes := around.publishers("door_requests"):
         found.say(
-            f"RMF's supervisor sends CLOSE at each state of an open door that nobody holds. {nodes}"
-            f" publishes `door_requests` and sends no CLOSE, so {holds}.",
+            "RMF's supervisor sends CLOSE whenever a state shows an open door that nobody holds."
+            f" {nodes} publishes `door_requests` and sends no CLOSE, so {holds}.",
             "the robot",
             f"drive through and send CLOSE; if {door.name} stays open for more than a minute, a person"
             " has to look into the doorway",
@@ -254,14 +255,14 @@ def _nobody_tells(
 
 
 def _asked_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
-    """Explain requests heard only on the daemon's own topic. The sender is the supervisor, or a person
-    with `send --direct`."""
+    """Explain a request that was heard only on `door_requests`, the topic of the door's daemon. The
+    sender is the supervisor, or a person with `send --direct`."""
     assert door.asked is not None
     found.say(
         f"On door_requests {door.asked_by} has asked for OPEN {clock.since(door.asked.since)}."
     )
     opened = NextStep("the robot", "drive through; then its fleet adapter sends CLOSE")
-    opens = NextStep("the controller", f"open {door.name} fully, and show it by its contact")
+    opens = NextStep("the controller", f"open {door.name} fully, so that its contact shows OPEN")
     found.next.append(opened if door.mode.value == OPEN else opens)
 
 
@@ -278,7 +279,7 @@ def _held_open(found: Answer, door: DoorFacts, clock: TimePhrases) -> None:
     )
     if clock.now.at - since.at <= LONG_S:
         found.say(
-            f"{said} A robot in the doorway says nothing until it is through.",
+            f"{said} A robot in the doorway sends nothing until it has driven through.",
             "the robot",
             f"{who} has to drive through; then its fleet adapter sends CLOSE. If {door.name} stays open"
             " for more than a minute, a person has to look into the doorway",

@@ -1,4 +1,4 @@
-"""Facts about one door, from its messages, and the door's story."""
+"""Facts about one door, from its messages, and the door's story (a list of its events)."""
 
 from bridges.observe.device import Check
 from bridges.observe.door import OPEN, SUPERVISOR, ObservedDoor
@@ -10,7 +10,8 @@ from workbench.explain.phrases import lasted
 
 
 class DoorFacts(Device, ObservedDoor):
-    """A door with its story. `passages` counts the holds that have ended."""
+    """A door with its story. `passages` is the number of times that a requester has stopped holding the
+    door."""
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
@@ -23,13 +24,13 @@ class DoorFacts(Device, ObservedDoor):
 
     @property
     def hears_lists(self) -> bool:
-        """Return whether this listener would hear the supervisor's heartbeat. The recording of a door's
-        daemon has no heartbeat."""
+        """Return whether the listener can hear the supervisor's heartbeat. A recording by a door's
+        daemon has no heartbeat, so its listener does not know the holders."""
         return self.last_heartbeat is not None or self.noted is None
 
     def checks(self, one: DeviceRequester) -> tuple[Check, ...]:
-        """Return this requester's conditions of DoorOpen or DoorClose. Leave out conditions that cannot
-        be known."""
+        """Return the conditions for which this requester's DoorOpen or DoorClose waits. If the
+        heartbeat cannot be heard, leave out the condition on the heartbeat."""
         found = super().checks(one)
         return tuple(check for check in found if check.name == "door" or self.hears_lists)
 
@@ -42,16 +43,16 @@ class DoorFacts(Device, ObservedDoor):
             case "asks" if by and (by.wants == OPEN or who in self.holders):
                 return f"{who} asks for the door to be {by.wants}"
             case "lost":
-                return f"the supervisor no longer lists {who}, after {lasted(one.gap_s)}"
+                return f"the supervisor no longer lists {who}, after a hold of {lasted(one.gap_s)}"
             case "has":
                 return f"the supervisor lists {who} as holding the door"
             case "changed":
                 return f"the door {moves(self.changed['mode'], self.mode.value)}"
             case "met":
-                hold = ", and its hold" if self.hears_lists else ""
-                return f"RMF sees what {who} waits for: the door open{hold}"
+                hold = f", and the supervisor lists {who}" if self.hears_lists else ""
+                return f"RMF sees what {who} waits for: the door is open{hold}"
         return ""
 
     def notice(self, one: News) -> None:
-        """Count the holds that end."""
+        """Count how often a requester stops holding the door."""
         self.passages += one.what == "lost"

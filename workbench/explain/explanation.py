@@ -21,8 +21,8 @@ Who = Literal[
 ]
 """The party that has to act next.
 
-`the device's node` is the device's daemon, which may be ours or another maker's. `the controller` is
-the maker's controller of the lift, door or charger.
+`the device's node` is the daemon of the device. This daemon may be ours or another program. `the
+controller` is the controller that the manufacturer built into the lift, door or charger.
 """
 
 
@@ -73,7 +73,7 @@ class FaultTold:
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """The explanation of one device or robot, at the last message.
+    """The explanation of one device or robot, at the time of the last message.
 
     - `now`: sentences, the most important first.
     - `asks`: the requester who waits for `fields`.

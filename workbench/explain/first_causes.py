@@ -1,7 +1,7 @@
-"""Causes that an answer names before any other cause, for every kind of device.
+"""Causes that an explanation names before any other cause, for every kind of device.
 
 There are three such causes: two nodes that publish under one name, readings that come and go, and a
-fault of the device itself. As long as such a cause lasts, an answer blames nothing else.
+fault of the device itself. As long as such a cause lasts, the explanation blames nothing else.
 """
 
 from collections.abc import Mapping
@@ -15,36 +15,36 @@ from workbench.explain.phrases import TimePhrases, lasted, listed
 
 TWO_NODES: Final = "TWO_NODES_FOR_ONE_DEVICE"
 BUS: Final = (
-    "check the bus or network: the module at its end, its supply, cable and address, and on Modbus a"
-    " second master on the line; `rmf-bridge log` shows each lost reply"
+    "check the bus or network, and the supply, cable and address of the module; on Modbus, look for"
+    " a second master on the line; `rmf-bridge log` shows each lost reply"
 )
 FLICKERS: Final = (
     "find what kept changing: an input that flickers (check its wire and contact), or a relay module"
-    " that restarts; `rmf-bridge log` shows which"
+    " that restarts; `rmf-bridge log` shows which of the two"
 )
 CONTACT: Final = (
-    "The leaf has not moved all the way, or the {contact} contact or its wire is bad: both look the"
-    " same from here.",
-    "look whether the door really stands {end}; if it does, check the {contact} contact and its wire;"
-    " if it does not, check what stops the leaf, and the relay that drives it",
+    "The leaf has not moved all the way, or the {contact} contact or its wire is bad. The daemon"
+    " cannot tell which.",
+    "look whether the door really stands {end}; if so, check the {contact} contact and its wire;"
+    " if not, check what stops the leaf, and the relay that drives the leaf",
 )
 OWN: Final[Mapping[str, tuple[str, str]]] = {
     "INPUTS_NOT_FRESH": ("", BUS),
     "COMMUNICATION_LOST": ("", BUS),
     "OUTPUTS_NOT_WRITTEN": (
         "What the daemon asks for does not reach the controller, so the controller is not to blame.",
-        "check the relays that the fault names: their supply, their line, and on Modbus whether a"
-        " second master writes to them",
+        "check the supply and the bus line of the relays that the fault names; on Modbus, check whether"
+        " a second master writes to these relays",
     ),
     "RELAY_RESTS": (
-        "While the relay rests, the daemon asks the controller for nothing, so the controller is not to"
-        " blame.",
+        "The daemon keeps this relay off for a while, because the relay was switched too often."
+        " Meanwhile the daemon asks the controller for nothing, so the controller is not to blame.",
         FLICKERS,
     ),
     "DOOR_OPENING_FAULT": CONTACT,
     "DOOR_TRAVEL_TIMEOUT": CONTACT,
     "RUNTIME_LIMIT_EXCEEDED": (
-        "The car does not come, or the floor code does not show it there.",
+        "The car does not come, or the floor code does not show that the car has come.",
         "",
     ),
     **dict.fromkeys(
@@ -61,29 +61,31 @@ OWN: Final[Mapping[str, tuple[str, str]]] = {
         ("", ""),
     ),
 }
-"""Faults of the device itself, the most telling first.
+"""Faults of the device itself. The fault that explains most comes first.
 
-Each code has an explanation, and the place where a person should look. "" stands for the text in
+Each code has two texts: an explanation, and what a person should check. "" stands for the text in
 `bridges/runtime/faults.yaml`.
 """
 READINGS: Final = ("INPUTS_NOT_FRESH", "COMMUNICATION_LOST")
 OFFLINE: Final = (*READINGS, "OUTPUTS_NOT_WRITTEN", "MANUAL", "OUT_OF_SERVICE")
-"""Faults that make a device OFFLINE."""
+"""Faults because of which a daemon publishes its device as OFFLINE."""
 UNSTEADY: Final = "not steady:"
 STALLS_S: Final = 0.5
-"""Limit (s) for the ages that readings have when the device changes. Ages that differ by this limit or
-more show that new readings did not come."""
+"""Limit (s) for the difference between the ages of readings. Each age is the reading's age when the
+device went OFFLINE or came back. A greater difference shows that no new readings came."""
 
 
 def two_nodes(
     found: Answer, device: Device, clock: TimePhrases, around: OthersHeard, topic: str
 ) -> bool:
-    """Explain that two nodes publish one device's states on this topic. Return whether this is the
-    cause."""
+    """Check whether two nodes publish this device's states on this topic. If so, explain this and
+    return True."""
     if TWO_NODES not in device.faults(clock.now) and not device.two_nodes(clock.now):
         return False
     names, nodes = device.nodes(clock.now), around.publishers(topic)
-    named = f"these nodes publish {topic}: {nodes}" if nodes else "the messages do not name them"
+    named = (
+        f"these nodes publish {topic}: {nodes}" if nodes else "the messages do not name the nodes"
+    )
     if len(names) > 1:
         named = listed(names)
     found.because = (TWO_NODES,)
@@ -91,18 +93,18 @@ def two_nodes(
         f"Two nodes publish states of {device.name} ({named}). Until one of the two is stopped, trust"
         " none of these states.",
         "a person",
-        "find out by the wires which of the two has the device, and stop the other or give it another"
-        f" name (`ros2 topic info -v /{topic}` lists the publishers)",
+        "follow the wires to find out which of the two nodes has the device; stop the other node, or"
+        f" give its device another name (`ros2 topic info -v /{topic}` lists the publishers)",
     )
     return True
 
 
 def comes_and_goes(found: Answer, device: Device, clock: TimePhrases) -> bool:
-    """Explain a device that goes OFFLINE and comes back. Return whether the device does.
+    """Check whether the device goes OFFLINE and comes back. If so, explain this and return True.
 
-    A listener of a few seconds may hear few changes. Therefore present faults from the daemon count
-    too, such as lost readings or unsteady inputs. Old readings, or several unsteady inputs, show that
-    no new readings came. Otherwise an input flickers.
+    A listener of a few seconds may hear few changes. Therefore fewer changes are enough if the daemon
+    reports lost readings or unsteady inputs. The cause is lost readings if readings were old, or if
+    several inputs were unsteady. Otherwise the cause is one input that flickers.
     """
     ages = device.flaps(clock.now)
     _, unsteady, inputs = device.waits_said(clock.now).get(device.kind, "").partition(UNSTEADY)
@@ -116,10 +118,10 @@ def comes_and_goes(found: Answer, device: Device, clock: TimePhrases) -> bool:
     flickers = "," not in inputs and max(ages) - min(ages) < STALLS_S
     found.because = () if flickers else READINGS
     why = (
-        "though its readings are fresh: an input flickers, as a contact for manual mode may"
+        "though its readings are fresh: an input flickers, for example a contact for manual mode"
         if flickers
-        else "because its bus or module answers late, or at times not at all; the states in between"
-        " prove nothing"
+        else "because its bus or module answers late, or sometimes not at all; do not rely on its"
+        " states meanwhile"
     )
     bus = f" The last error on its bus: {device.bus_error}." if device.bus_error else ""
     again = " again and again" if len(ages) > 1 else ""
@@ -139,10 +141,11 @@ def own_fault(
     shown: str = "",
     end: str = "open",
 ) -> bool:
-    """Explain the most telling fault of the device itself. Return whether the device has such a fault.
+    """Explain the fault of the device itself that explains most. Return whether the device has such a
+    fault.
 
-    `shown` is the door's published state. `end` is the state that the door should have. A door that is
-    shown closed has not moved, so no contact is to blame.
+    `shown` is the door's published state. `end` is the state that the door should have. If the door is
+    shown closed, the leaf has not moved. Therefore the text does not blame the end contact.
     """
     present = {code: detail for code, (detail, _) in device.faults(clock.now).items()}
     if around.reason is not None and around.reason.fault:

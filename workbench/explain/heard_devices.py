@@ -37,16 +37,17 @@ from workbench.explain.workcell_facts import DispenserFacts, IngestorFacts, Work
 
 STORY_LINES: Final = 40
 SHOWS_S: Final = 1.5
-"""Time (s) after the recorder's reason to keep a file. After this time, the device's states show the
-reason's effect. States come at 1 Hz."""
+"""Time (s) from the moment for which the recorder kept a file until the device's states show the
+effect. States come at 1 Hz."""
 
 
 class HeardDevices(ObservedGraph[Device]):
     """All devices heard, or only the devices with one name.
 
-    - `session`: the session whose last ride stays in the story, even if other sessions ride later.
-    - `senders`: the nodes that publish each topic on a live graph. `senders` is None if the nodes are
-      unknown. On a graph with `senders`, FLEET_STATES is heard too.
+    - `session`: the session that the user asked about. The story keeps this session's last ride, even
+      if other sessions ride later.
+    - `senders`: topic -> the nodes that publish the topic on a live graph. `senders` is None if the
+      nodes are unknown. If `senders` is known, the listener also hears FLEET_STATES.
     """
 
     makes: ClassVar = {
@@ -68,7 +69,8 @@ class HeardDevices(ObservedGraph[Device]):
 
         - `name`: the name of the devices to explain; "" for all devices.
         - `most_lines`: maximum number of story lines for each device.
-        - `graph`: options that name this graph. The commands in sentences get these options.
+        - `graph`: command-line options that name this graph. Commands that a sentence proposes get
+          these options.
         """
         super().__init__()
         self._most_lines = most_lines
@@ -99,8 +101,8 @@ class HeardDevices(ObservedGraph[Device]):
     def retained(self, heard: Heard) -> None:
         """Take a request that a fleet adapter sent before we listened.
 
-        The request matters for a lift without states, because no adapter repeats the request to such a
-        lift.
+        The request matters only for a lift that publishes no states. The adapter sends nothing more to
+        such a lift, because an adapter repeats a request only at a state.
         """
         if isinstance(heard.message, d.LiftRequest):
             found = self.device("lift", heard.message.lift_name, self.now)
@@ -109,7 +111,8 @@ class HeardDevices(ObservedGraph[Device]):
                 found.retain(heard.message, self.now)
 
     def at_its_end(self) -> None:
-        """Explain the end of the recording. Ignore the moment for which our recorder kept the file."""
+        """Explain the devices at the end of the recording. Without this call, `explain` explains the
+        moment for which our recorder kept the file."""
         self._reason.clear()
         self._then.clear()
 
@@ -118,21 +121,21 @@ class HeardDevices(ObservedGraph[Device]):
         self._story_from = at
 
     def devices(self) -> list[tuple[Explained, str]]:
-        """Return the devices that have published a state, in the order of kinds and names, and the
-        robots of our daemons."""
+        """Return the devices that have published a state, by kind and name. After the devices come the
+        robots that our daemons report."""
         found: list[tuple[Explained, str]] = []
         for kind in KINDS:
             found += [(kind, one) for one in sorted(d.id for d in self.stated(kind))]
         return [*found, *(("robot", one.who) for one in robots(self.nodes))]
 
     def because(self, clock: Callable[[float], str]) -> list[str]:
-        """Return a sentence for each alarm that lets robots stand. `clock(wall)`: the text of a
-        time."""
+        """Return a sentence for each alarm that makes robots stand. `clock(wall)` returns a time as
+        text."""
         return [one.because(clock) for one in self.alarms() if one.stands]
 
     def kinds(self, name: str) -> list[Explained]:
-        """Return the kinds of the devices with this name. States tell the kinds. Without states,
-        requests tell the kinds."""
+        """Return the kinds of the devices with this name. If such a device has published a state,
+        return only the kinds with a state. Otherwise return the kinds for which requests were heard."""
         found: list[Explained] = [kind for kind in KINDS if (kind, name) in self.known]
         stated = [kind for kind in found if self.known[kind, name].state is not None]  # type: ignore[index]
         if self.robot(name):
@@ -147,8 +150,8 @@ class HeardDevices(ObservedGraph[Device]):
     def explain(
         self, kind: Explained, name: str, zone: tzinfo | None, remedies: Remedies | None = None
     ) -> Explanation:
-        """Explain the device or robot at the last message. `zone`: time zone of the texts; None: this
-        machine's zone."""
+        """Explain the device or robot at the time of the last message. `zone` is the time zone of the
+        texts, or None for this machine's zone."""
         if kind != "robot":
             return self._explain(kind, name, zone, remedies)
         one = self.robot(name)
@@ -163,15 +166,15 @@ class HeardDevices(ObservedGraph[Device]):
     def _explain(
         self, kind: Kind, name: str, zone: tzinfo | None, remedies: Remedies | None
     ) -> Explanation:
-        """Explain the device at the last message. `zone` is the time zone of the texts, or None for
-        this machine's zone."""
+        """Explain the device at the time of the last message. `zone` is the time zone of the texts, or
+        None for this machine's zone."""
         began = self.began or self.now
         last = self.known.get((kind, name)) or self.make(kind, name)
         at_end = self.now, last, self.spoke
         now, device, spoke = self._then.get((kind, name), at_end)
         reason = self._reason.get(name) or self._reason.get("")
         if reason and reason.fault in first_causes.OFFLINE and len(last.flaps(self.now)) >= FLAPS:
-            now, device, spoke = at_end  # only later messages show that the device comes and goes
+            now, device, spoke = at_end  # one moment cannot show repeated changes
         clock = TimePhrases(now, zone)
         around = self._around(spoke, reason, remedies or {})
         answer = self._answer(device, clock, around)
@@ -247,7 +250,7 @@ class HeardDevices(ObservedGraph[Device]):
     # ---- sort messages by device
 
     def make(self, kind: Kind, name: str) -> Device:
-        """Make a device that has not yet heard a message."""
+        """Make a device of which no message was heard yet."""
         made = super().make(kind, name)
         made.focus = self._session
         made.lines = deque(maxlen=self._most_lines)
@@ -283,7 +286,7 @@ class HeardDevices(ObservedGraph[Device]):
                 self.known[kind, note.subject].note(moment, note)
 
     def _keep(self, name: str) -> None:
-        """Copy the present state of the devices with this name. With "", copy the state of all
+        """Remember a copy of the present state of the devices with this name. With "", copy all
         devices."""
         for key, device in self.known.items():
             if name in ("", device.id) and key not in self._then:
@@ -303,7 +306,8 @@ class HeardDevices(ObservedGraph[Device]):
 
 
 def _act_on(answer: Answer, reason: FileReason, remedies: Remedies) -> None:
-    """Propose a step for the file's reason, if the device's state alone calls for no step."""
+    """Propose a step that fits the recorder's reason to keep the file. Do so only if the device's state
+    alone calls for no step."""
     if any(step.who != "nobody" for step in answer.next):
         return
     do = remedies[reason.fault][1] if reason.fault in remedies else ""
@@ -325,11 +329,11 @@ def _before(device: Device, clock: TimePhrases) -> str:
                     f"; the longest wait for the car was {lasted(rides.longest_s)}"
                     f" ({rides.longest_who}, until {clock.time(rides.longest_at.wall)})"
                 )
-            return f"{_count(rides.ended, 'ride')} ended in this time{longest}."
+            return f"{_count(rides.ended, 'ride')} ended in the time heard{longest}."
         case DoorFacts() if device.passages:
-            return f"{_count(device.passages, 'hold')} ended in this time."
+            return f"{_count(device.passages, 'hold')} ended in the time heard."
         case ChargerFacts() if device.charges:
-            return f"{_count(device.charges, 'charge')} began in this time."
+            return f"{_count(device.charges, 'charge')} began in the time heard."
     return ""
 
 

@@ -1,10 +1,10 @@
 """Known defects of RMF, each with its issue. A note appears only if the messages leave no doubt.
 
-No note names three other defects, because messages of lifts and doors cannot prove these three:
+Three other defects never appear in a note, because messages of lifts and doors cannot prove them:
 
 - #389: a robot enters without a session.
-- PR#490: mutex groups.
-- Jazzy's RequestLift accepts a match without arrival.
+- PR#490: a defect of mutex groups.
+- Jazzy: RequestLift accepts a matching state although the lift has not arrived.
 """
 
 from collections.abc import Callable, Iterator
@@ -16,8 +16,8 @@ from bridges.observe.requesters import Moment
 from workbench.explain.device import Device
 
 SPAM: Final = 10
-"""Number of END requests that shows a defect. A sound adapter sends one END, or a few until a state
-comes."""
+"""Number of END requests that shows a defect. A correct adapter sends one END, or repeats END a few
+times until the next state."""
 
 
 def _calls_back(lift: ObservedLift, now: Moment) -> str:
@@ -41,13 +41,13 @@ def _ends_for_ever(lift: ObservedLift, now: Moment) -> str:
 PATTERNS: Final[tuple[tuple[Callable[[ObservedLift, Moment], str], str], ...]] = (
     (
         _calls_back,
-        "In mid-ride {who} calls the car back to the floor where it got in: a known defect of fleet"
-        " adapters that replan (rmf_ros2#555, mended by PR#556).",
+        "In mid-ride {who} calls the car back to the floor where the robot got in: a known defect of"
+        " fleet adapters that replan (rmf_ros2#555, mended by PR#556).",
     ),
     (
         _taken_away,
-        "The lift's node has taken the session from {who} without END, and RMF's robots then wait for"
-        " ever (rmf_ros2#314).",
+        "The lift's node has taken the session from {who} without END. After that, RMF's robots wait"
+        " for ever: a known defect (rmf_ros2#314).",
     ),
     (
         _ends_for_ever,
@@ -64,8 +64,7 @@ def notes(device: Device, now: Moment) -> Iterator[str]:
     waits = any(one.ended is None and not one.gone for one in device.requesters)
     if device.kind != "charger" and waits and (device.state is None or device.is_silent(now)):
         yield (
-            "RMF has no timeout: its robots wait for ever for a silent lift or door (rmf_ros2#472,"
-            " #248)."
+            "RMF has no timeout: robots wait for ever for a silent lift or door (rmf_ros2#472, #248)."
         )
     if isinstance(device, ObservedLift):
         found = ((pattern(device, now), text) for pattern, text in PATTERNS)

@@ -20,20 +20,21 @@ from workbench.explain.phrases import TimePhrases
 from workbench.explain.rows import label
 
 STANDS_S: Final = 5.0
-"""Maximum time (s) from a recall's open door to a request for the recall floor.
+"""Maximum time (s) that a fleet adapter needs to request the recall floor. The time begins when the
+lift opens its door at the recall floor.
 
 Only a fleet adapter that knows the recall floor sends this request.
 """
 FLOOR_S: Final = 20.0
-"""Maximum normal time (s) of a car's move between two floors."""
+"""Maximum normal time (s) that a car needs from one floor to the next."""
 ALARMS: Final = {"FIRE": "fire alarm", "EMERGENCY": "emergency (stop, code blue, earthquake)"}
 
 
 def answer(
     lift: LiftFacts, clock: TimePhrases, around: common.OthersHeard, focus: str = ""
 ) -> Answer:
-    """Explain the lift at the last message. `focus` is the session to explain. With "", explain a
-    session that waits."""
+    """Explain the lift's state at the time of the last message. `focus` is the session to explain. With
+    "", explain a session that waits."""
     if lift.last_state is None:
         return _with_askers(common.unheard(lift, around), lift, clock)
     stopped = common.stopped(lift, around, clock)
@@ -46,10 +47,10 @@ def answer(
     found = Answer(since=_begins(lift, claim))
     if focus and claim is None:
         told = "its last ride is shown below" if lift.kept else "no request from it was heard"
-        found.say(f"{label(focus)} neither has {lift.name} nor asks for it now: {told}.")
+        found.say(f"{label(focus)} does not have {lift.name} and does not request it now: {told}.")
     if claim is not None and claim.ended is None and not lift.matches(claim):
         where = claim.wants or "no floor"
-        found.say(f"{claim.who} has waited for {lift.name} at {where} {clock.since(claim.since)}.")
+        found.say(f"{claim.who} has waited {clock.since(claim.since)} for {lift.name} at {where}.")
     _hold(found, lift, clock)
     if len(lift.flaps(clock.now)) < FLAPS and (old := common.old_reading(lift, clock)):
         found.say(old)
@@ -68,8 +69,8 @@ def _why(
     clock: TimePhrases,
     around: common.OthersHeard,
 ) -> None:
-    """Find the cause. Look first at the lift itself, then at the path of the requests, then at the
-    holder."""
+    """Find the cause. Look first for a fault of the lift itself. Then look whether requests reach the
+    lift. Then look at the holder of the lift."""
     silent = lift.not_passed_on(clock.now)
     if first_causes.two_nodes(found, lift, clock, around, "lift_states"):
         return
@@ -98,10 +99,10 @@ def _why(
 
 
 def _in_question(lift: LiftFacts, clock: TimePhrases, focus: str) -> DeviceRequester | None:
-    """Return the claim to explain, or None.
+    """Return the requester to explain, or None.
 
-    The claim is the claim of `focus`. Without `focus`, it is the claim of the requester who waits
-    longest. If nobody waits, it is the holder's claim.
+    With `focus`, this is the requester of that name. Without `focus`, it is the requester who waits
+    longest. If nobody waits, it is the holder.
     """
     if focus:
         return lift.requesters.get(focus)
@@ -128,7 +129,7 @@ def _begins(lift: LiftFacts, claim: DeviceRequester | None) -> float:
 def _with_askers(found: Answer, lift: LiftFacts, clock: TimePhrases) -> Answer:
     for claim in [one for one in lift.asking(clock.now) if one.met is None][:3]:
         since = clock.since(claim.since)
-        found.say(f"{claim.who} has waited for the lift at {claim.wants or 'no floor'} {since}.")
+        found.say(f"{claim.who} has waited {since} for the lift at {claim.wants or 'no floor'}.")
         if lift.state is None:
             found.say(lift.in_car(claim.who, clock.now))
         found.since = min(found.since, claim.first.at)
@@ -136,13 +137,13 @@ def _with_askers(found: Answer, lift: LiftFacts, clock: TimePhrases) -> Answer:
 
 
 def _hold(found: Answer, lift: LiftFacts, clock: TimePhrases, *, then: bool = False) -> None:
-    """Name the holder and the place of the car. `then` selects the past tense, for the last state
-    before silence."""
+    """Name the holder, and tell where the car is. With `then`, use the past tense, because the last
+    state came before a silence."""
     holder = "nobody" if lift.session.value == NOBODY else lift.session.value
     motion = "" if lift.motion.value == "unknown" else f", {_motion(lift.motion.value)}"
     car = f"at {lift.floor.value}, door {lift.door.value}{motion}, mode {lift.mode.value}"
     if then:
-        found.say(f"Then {holder} had the lift, and the car was {car}.")
+        found.say(f"At that time {holder} had the lift, and the car was {car}.")
         return
     has = f"{holder[:1].upper()}{holder[1:]}" if holder == "nobody" else holder
     found.say(f"{has} has had the lift {clock.since(lift.session.since)}. The car is {car}.")
@@ -155,8 +156,8 @@ def _motion(motion: str) -> str:
 def _fields(
     lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases
 ) -> tuple[CheckedField, ...]:
-    """Return RequestLift's fields, as this requester's fleet adapter sees the fields. The lift's name
-    always counts as a match."""
+    """Return the fields that RequestLift checks, with the values that this requester's fleet adapter
+    sees. The lift's name always counts as a match."""
     since = (lift.session.since, lift.floor.since, lift.door.since)
     return tuple(
         CheckedField(*check, clock.since(moment))
@@ -175,7 +176,9 @@ def _others_wait(
     texts = [f"{one.who} at {one.wants} {clock.since(one.since)}" for one in others[:4]]
     if texts:
         more = f", and {len(others) - len(texts)} more" if len(others) > len(texts) else ""
-        found.say(f"{'Others wait' if claim else 'These wait'}: {'; '.join(texts)}{more}.")
+        found.say(
+            f"{'Other requesters wait' if claim else 'Requesters wait'}: {'; '.join(texts)}{more}."
+        )
 
 
 # ---- why the requester waits
@@ -188,7 +191,7 @@ def _alarm(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
         f"The lift has been in {mode} mode {clock.since(lift.mode.since)}: the lift takes no robot"
         " until this mode ends. RMF ignores the mode, and only sees that the lift does not come."
     )
-    ends = f"the {ALARMS[mode]} has to end, and be reset where the lift's settings ask for that"
+    ends = f"the {ALARMS[mode]} has to end, with a reset if the lift's settings require one"
     if holder == NOBODY:
         found.acts("the controller", ends)
         return
@@ -214,7 +217,8 @@ def _alarm(found: Answer, lift: LiftFacts, clock: TimePhrases) -> None:
 
 
 def _held(found: Answer, lift: LiftFacts, clock: TimePhrases, around: common.OthersHeard) -> None:
-    """Explain why the holder waits, or why the holder keeps the lift."""
+    """Explain a lift that somebody holds. Tell why the holder waits, or why the holder does not release
+    the lift."""
     holder = lift.session.value
     theirs = lift.requesters.get(holder)
     if theirs is not None and theirs.ended is not None:
@@ -227,22 +231,22 @@ def _held(found: Answer, lift: LiftFacts, clock: TimePhrases, around: common.Oth
         if found.asks != holder:
             where = theirs.wants or "no floor"
             found.say(
-                f"{holder} itself has waited for the lift at {where} {clock.since(theirs.since)}."
+                f"{holder} itself has waited {clock.since(theirs.since)} for the lift at {where}."
             )
         _missing(found, lift, theirs, clock)
     lift_holder.forgotten(found, lift, holder, clock)
 
 
 def _missing(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
-    """Explain which conditions a granted session still lacks. The conditions are mode, floor and
-    door."""
+    """Explain which condition is not yet met for the robot that has the session. The conditions are
+    mode, floor and door."""
     on = common.relays(lift, clock)
     if lift.floor.value == NO_FLOOR and lift.door.value == "open":
         found.say(
             f"The door has been open {clock.since(lift.door.since)}, but the car is at no known floor,"
             f" so RMF does not let the robot drive{on}.",
             "the controller",
-            f"show its floor ({claim.wants}): check the floor code's wires",
+            f"show the car's floor ({claim.wants}): check the floor code's wires",
         )
     elif lift.mode.value == "HUMAN":
         _human(found, lift, clock, on)
@@ -250,7 +254,8 @@ def _missing(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: Time
         found.say(
             f"The car has stood at no known floor {clock.since(lift.floor.since)}{on}.",
             "the controller",
-            "show its floor: a wire of the floor code, or a stop on the way",
+            "show the car's floor: check the floor code's wires, and whether the car stands between"
+            " floors",
         )
     elif lift.floor.value != claim.wants and _rides(lift, claim, clock):
         found.say(
@@ -282,8 +287,8 @@ def _rides(lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> bool:
 
 
 def _human(found: Answer, lift: LiftFacts, clock: TimePhrases, on: str) -> None:
-    """Explain a session in HUMAN mode. Tell whether the daemon asks the controller for AGV mode at
-    all."""
+    """Explain why a lift with a session is still in HUMAN mode. Tell whether the daemon has asked the
+    controller for AGV mode."""
     human = (
         f"{lift.session.value} has the session, but the lift has been in HUMAN mode"
         f" {clock.since(lift.mode.since)}"
@@ -302,5 +307,5 @@ def _human(found: Answer, lift: LiftFacts, clock: TimePhrases, on: str) -> None:
     found.say(
         f"{human}{on}{unknown}.",
         "the controller",
-        "confirm AGV mode: a key switch, people's calls that it serves first, or the contact",
+        "confirm AGV mode; a key switch, earlier calls by people, or the AGV contact may prevent this",
     )

@@ -31,7 +31,8 @@ class Rides:
 
 
 class LiftFacts(Device, ObservedLift):
-    """A lift with its story. `kept` is the story of the last ride of session `focus`."""
+    """A lift with its story (a list of its events). `kept` is the story of the last ride of session
+    `focus`."""
 
     def __init__(self, name: str, began: Moment) -> None:
         super().__init__(name, began)
@@ -60,17 +61,17 @@ class LiftFacts(Device, ObservedLift):
         return f"Whether {who} is in the car is not known."
 
     def keeps(self, now: Moment) -> str:
-        """Say that the holder keeps the session during a hazard. Say also whether the holder may be in
-        the car."""
+        """Say that the holder keeps its session while the lift serves no robot. Say also whether the
+        holder may be in the car."""
         who = self.session.value
         return (
-            f"{who} keeps the session meanwhile, because only END from {who} ends it."
+            f"{who} keeps the session meanwhile, because only END from {who} ends the session."
             f" {self.in_car(who, now)}"
         )
 
     def retain(self, request: d.LiftRequest, now: Moment) -> None:
-        """Take a request that the fleet adapter sent before we listened. The request's stamp tells the
-        time of the request."""
+        """Take a request that the fleet adapter sent before we listened. The request's stamp tells when
+        the adapter sent it."""
         wall, who = in_seconds(request.request_time), self.text(request.session_id)
         if request.request_type == END:
             self.requesters.drop(who)
@@ -80,7 +81,7 @@ class LiftFacts(Device, ObservedLift):
         one, _ = self.requesters.ask(who, wants, asked, stands=True)
         one.own = True
         if one.times > 1 and one.given_up:
-            one.boarded = asked  # a robot is in the car if the robot asks for another floor
+            one.boarded = asked  # a robot asks for a second floor only from inside the car
 
     def says(self, one: News) -> str:
         """Return a line of the story. Return "" if the story leaves the event out."""
@@ -90,16 +91,18 @@ class LiftFacts(Device, ObservedLift):
                 return self._asks(by, human=one.text == "HUMAN")
             case "passed on" if who and self.session.value not in (NOBODY, who):
                 return (
-                    f"{self.sender(who)} asks for {who}, though {self.session.value} has the lift"
+                    f"{self.sender(who)} requests the lift for {who}, though {self.session.value}"
+                    " has the lift"
                 )
             case "ends" if one.passed_on:
                 return (
-                    f"{DIRECT} ends the session of {who}{'' if by else ', which nobody asks for'}"
+                    f"{DIRECT} ends the session of {who}"
+                    f"{'' if by else ', from whom no request was heard'}"
                 )
             case "ends":
                 return f"{who} ends its session"
             case "lost":
-                unasked = "" if by and by.ended else ", without an END that was heard"
+                unasked = "" if by and by.ended else ", and no END was heard"
                 free = self.session.value == NOBODY
                 return f"the lift is no longer {who}'s{unasked}" if free or unasked else ""
             case "has":
@@ -108,7 +111,7 @@ class LiftFacts(Device, ObservedLift):
             case "changed":
                 return ", ".join(self._changes())
             case "met" if by:
-                return f"RMF sees what {who} waits for: {by.wants}, door open, its session"
+                return f"RMF sees what {who} waits for: floor {by.wants}, door open, session {who}"
             case "gone":
                 return f"{who} has stopped asking, without END"
         return ""

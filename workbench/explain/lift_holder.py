@@ -1,5 +1,5 @@
-"""Explain a lift's holder. The holder may be silent, may have sent END, or may see all conditions
-met."""
+"""Explain why a lift's holder does not release the lift. The holder may be silent, or may have sent
+END. RMF's conditions for its robot may also be met, so that the robot has to drive."""
 
 from shlex import quote
 from typing import Final
@@ -15,7 +15,8 @@ from workbench.explain.phrases import TimePhrases, lasted, listed
 from workbench.explain.rows import label
 
 LONG_S: Final = 60.0
-"""Maximum normal time (s) from the moment at which all conditions are met to the robot's start."""
+"""Maximum normal time (s) from the moment at which all conditions are met until the robot drives
+off."""
 
 
 def release(lift: LiftFacts) -> str:
@@ -29,7 +30,7 @@ def without_word(found: Answer, lift: LiftFacts, clock: TimePhrases, around: Oth
     heard_s = clock.now.at - max(lift.began.at, lift.session.since.at)
     if theirs is None and heard_s < common.LISTENS_S:
         found.say(
-            f"{holder} has not been heard yet; that takes a few seconds.",
+            f"No request from {holder} has been heard yet; this may take a few seconds.",
             "nobody",
             "listen for longer",
         )
@@ -37,8 +38,8 @@ def without_word(found: Answer, lift: LiftFacts, clock: TimePhrases, around: Oth
     since = f"since {clock.time(theirs.last.wall)}" if theirs else f"for at least {lasted(heard_s)}"
     found.because = ()
     found.say(
-        f"{holder} has sent no request and no END {since}, though a robot that waits or rides asks at"
-        " each state."
+        f"{holder} has sent no request and no END {since}, though a robot that waits or rides sends a"
+        " request after each state."
     )
     fleet = holder.rpartition("/")[0]
     speaks, together = _of_fleet(fleet, holder, theirs, clock, around)
@@ -49,8 +50,8 @@ def without_word(found: Answer, lift: LiftFacts, clock: TimePhrases, around: Oth
         )
     elif speaks:
         found.say(
-            f"The fleet adapter lives, as it speaks for {listed(speaks)}: {holder} is dead, or the"
-            " adapter has dropped it."
+            f"The fleet adapter is running, because it sends messages for {listed(speaks)}. Therefore"
+            f" {holder} is dead, or the adapter has dropped this robot."
         )
     elif together or around.senders is not None:
         silent = f"Nothing from any robot of {fleet} was heard either"
@@ -59,12 +60,13 @@ def without_word(found: Answer, lift: LiftFacts, clock: TimePhrases, around: Oth
         found.say(f"{silent}: the fleet adapter of {fleet} is gone or cut off.")
         look = (
             f"look into the car, then restart the fleet adapter of {fleet}. It then sends END for"
-            f" {holder}: if {holder} stands in the car, give it a task within a minute, or take it"
-            " out"
+            f" {holder}: if {holder} stands in the car, give the robot a task within a minute, or take"
+            " the robot out"
         )
     else:
         found.say(
-            "Its fleet adapter is gone or cut off, or has dropped the robot: nothing here tells which."
+            "Its fleet adapter is gone or cut off, or has dropped the robot. The messages do not tell"
+            " which."
         )
     found.say(lift.in_car(holder, clock.now), "a person", look)
 
@@ -76,8 +78,9 @@ def _of_fleet(
     clock: TimePhrases,
     around: OthersHeard,
 ) -> tuple[list[str], list[str]]:
-    """Return two lists. The holder's adapter speaks now for the robots in the first list. The robots in
-    the second list fell silent together with the holder."""
+    """Return two lists of robots of the holder's fleet. For the robots in the first list, the fleet
+    adapter has sent messages lately. The robots in the second list fell silent together with the
+    holder."""
     ended = theirs.last.at if theirs else float("-inf")
     speaks: list[str] = []
     together: list[str] = []
@@ -114,7 +117,7 @@ def end_not_obeyed(
         found.say(
             f"{claim.who} sent END at {at}, and the supervisor has not passed it on.",
             "the supervisor",
-            f"pass on END of {claim.who}; its log says why it does not",
+            f"pass on END of {claim.who}; the supervisor's log says why it does not",
         )
     else:
         found.say(
@@ -125,16 +128,16 @@ def end_not_obeyed(
 
 
 def drives(found: Answer, claim: DeviceRequester, clock: TimePhrases) -> None:
-    """Explain a robot whose conditions are all met."""
+    """Explain a robot for which RMF's conditions are all met: session, floor and open door."""
     met = claim.met or claim.since
     found.say(
-        f"{claim.who} has all that it waits for: its lift at {claim.wants} with the door open"
-        f" {clock.since(met)}."
+        f"All conditions of {claim.who} have been met {clock.since(met)}: {claim.who} has the lift, at"
+        f" {claim.wants}, with the door open."
     )
     if clock.now.at - met.at > LONG_S:
         found.say(
-            "That is long, and the lift has done its part: the robot is dead or blocked, or its fleet"
-            " adapter hangs.",
+            "That is too long, and the lift has done its part: the robot is dead or blocked, or its"
+            " fleet adapter hangs.",
             "a person",
             f"look at {claim.who}, and at its fleet adapter's log",
         )
@@ -142,7 +145,7 @@ def drives(found: Answer, claim: DeviceRequester, clock: TimePhrases) -> None:
     found.acts(
         "the robot",
         f"{claim.who} has to drive in or out; then its fleet adapter asks for the next floor, or"
-        " sends END. If it stays for more than a minute, a person has to look at it",
+        " sends END. If the robot stays for more than a minute, a person has to look at the robot",
     )
 
 
@@ -154,10 +157,10 @@ def forgotten(found: Answer, lift: LiftFacts, holder: str, clock: TimePhrases) -
     if clock.now.at - asks.since.at < SETTLES_S and asks.since.seen:
         return
     sender = lift.sender(asks.value)
-    it = "a supervisor that does so" if sender == DIRECT else "it"
+    it = "a supervisor that does this" if sender == DIRECT else "the supervisor"
     found.say(
-        f"{sender.capitalize()} has asked for {asks.value} {clock.since(asks.since)}, though {holder}"
-        f" has the lift: {it} has forgotten {holder} after a restart or a lost END, and passes none of"
-        f" the requests of {holder} on. Our node then hears the robot's own requests and END; other"
-        " nodes do not."
+        f"{sender.capitalize()} has requested the lift for {asks.value} {clock.since(asks.since)},"
+        f" though {holder} has the lift: {it} has forgotten {holder} after a restart or a lost END, and"
+        f" does not pass on the requests of {holder}. A node of rmf-bridges also hears the robot's own"
+        " requests and END; other nodes do not."
     )

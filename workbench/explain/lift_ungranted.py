@@ -11,8 +11,8 @@ from workbench.explain.lift_facts import LiftFacts
 from workbench.explain.phrases import TimePhrases, lasted
 
 SETTLES_S: Final = 2.0
-"""Normal time (s) from a request to the lift's grant. The supervisor needs the same time to change the
-holder."""
+"""Normal time (s) from a request until the lift grants the session. After a session has ended, the
+supervisor needs the same time to turn to the next session."""
 
 
 def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases) -> None:
@@ -22,7 +22,7 @@ def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: T
             f"{lift.name} serves {', '.join(lift.floors[:12])}, not {claim.wants or 'an empty name'}:"
             " the request is refused.",
             "a person",
-            "give the floor one name, on RMF's map and in the lift's settings",
+            "give the floor the same name on RMF's map and in the lift's settings",
         )
         return
     if clock.now.at - claim.since.at < SETTLES_S and claim.since.seen:
@@ -33,23 +33,24 @@ def not_granted(found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: T
     reasons = lift.refusals(clock.now, max(claim.since.at, clock.now.at - 10.0))
     if reasons:
         found.say(
-            f"Its daemon refuses the request: {', '.join(reasons)}.",
+            f"The lift's daemon refuses the request: {', '.join(reasons)}.",
             "the device's node",
-            "grant the session once that is over; its log has the details",
+            "grant the session when this reason is gone; the node's log has the details",
         )
     else:
         found.say(
             "The request is passed on to the lift's node, which does not grant it and gives no reason"
-            " on the graph.",
+            " in its messages.",
             "the device's node",
-            "grant the session; its log says why it does not",
+            "grant the session; the node's log says why it does not",
         )
 
 
 def _asks_for_another(
     found: Answer, lift: LiftFacts, claim: DeviceRequester, clock: TimePhrases
 ) -> bool:
-    """Explain that the supervisor does not forward this request. Return whether this is the cause."""
+    """Check whether the supervisor fails to forward this request. If so, explain this and return
+    True."""
     passed = claim.passed_on
     if not claim.own or (passed is not None and clock.now.at - passed.at < 5.0):
         return False
@@ -60,7 +61,7 @@ def _asks_for_another(
     found.say(
         f"The supervisor does not pass the request on.{instead}",
         "the supervisor",
-        f"pass on the request of {claim.who}; its log says why it does not",
+        f"pass on the request of {claim.who}; the supervisor's log says why it does not",
     )
     return True
 
@@ -76,22 +77,23 @@ def not_passed_on(
     what = "repeats its END" if claim.ended else f"asks for {claim.wants or 'no floor'}"
     last, nodes = lift.supervisor_last, around.publishers("lift_requests")
     since = f" since {clock.time(last.wall)}" if last else ""
-    says = f"{claim.who} {what} at each state, and nothing has come on `lift_requests`{since}:"
-    restart = "restart the lift supervisor (rmf_lift_supervisor, or that of rmf-bridges)"
+    says = f"{claim.who} {what} after each state, and nothing has come on `lift_requests`{since}:"
+    restart = "restart the lift supervisor (rmf_lift_supervisor, or the one of rmf-bridges)"
     if any(one.kind == "lift_supervisor" for one in lift.heard_from(clock.now)):
         reasons = ", ".join(lift.refusals(clock.now, clock.now.at - 30.0))
         found.say(
-            f"{says} its supervisor is running, and does not pass that on"
+            f"{says} the lift supervisor is running, but does not pass it on"
             + (f": it refuses the request, {reasons}." if reasons else "."),
             "a person",
-            "end what the supervisor waits for; `rmf-bridge status` on its machine says how",
+            "remove the cause for which the supervisor waits; `rmf-bridge status` on its machine names"
+            " the cause",
         )
         return
     found.because = ()
     if around.nobody_publishes("lift_requests"):
-        found.say(f"{says} no node publishes there, so the lift supervisor is not running.")
+        found.say(f"{says} no node publishes this topic, so the lift supervisor is not running.")
     elif nodes:
-        found.say(f"{says} {nodes} publishes there, but hangs, is passive or is cut off.")
+        found.say(f"{says} {nodes} publishes this topic, but hangs, is passive or is cut off.")
         restart = f"look at the log of {nodes}, then {restart}"
     else:
         found.say(f"{says} the lift supervisor is not running, hangs, or is cut off.")
@@ -108,13 +110,13 @@ def _clock(found: Answer, lift: LiftFacts, claim: DeviceRequester) -> None:
     """Explain that the supervisor drops requests because of wrong stamps."""
     whose = f"the machine with the fleet adapter of {claim.who.rpartition('/')[0] or claim.who}"
     if abs(lift.stamp_age_s) >= CLOCKS_DIFFER_S:
-        whose += ", or of this machine (the states' stamps do not fit either)"
+        whose += ", or of this machine (the stamps of the lift's states differ from it too)"
     side = "behind" if claim.stamp_age_s > 0 else "ahead"
     found.because, found.notes = (), ()
     found.say(
         f"Nothing comes on `lift_requests` for {claim.who}, whose requests are stamped by a clock"
-        f" {lasted(abs(claim.stamp_age_s))} {side}: a supervisor that compares stamps takes them for"
-        " replays and drops them.",
+        f" {lasted(abs(claim.stamp_age_s))} {side}: a supervisor that compares stamps regards the"
+        " requests as replays and drops them.",
         "a person",
         f"set the clock of {whose} (NTP); if that does not help, look at the supervisor's log",
     )

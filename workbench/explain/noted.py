@@ -1,5 +1,6 @@
-"""Notes in a recording. Our daemons note inputs, outputs, faults, bus errors and refusals of their own
-devices. Our recorder notes the reason to keep a file.
+"""Notes, which are entries that our own programs write into a recording. Our daemons note inputs,
+outputs, faults, bus errors and refusals of their devices. Our recorder notes its reason to keep the
+file.
 
 In an incident file, the notes are JSON texts under `/rmf_bridge/` (`bridges/blackbox/incident.py`,
 `readable`). A file may come from anywhere, so the reader ignores texts of another shape.
@@ -23,7 +24,7 @@ class Noted:
     """One note about `subject`.
 
     - `inputs`, `outputs`, `faults`: name -> value; "" means off. Each lists everything that is on. None
-      means that the note has another topic.
+      means that this note is about something else.
     - `refused`: why the daemon refused a request.
     - `bus_error`: why the bus failed.
     - `kept_for`: the recorder's reason to keep the file, as a fixed name and a text.
@@ -66,8 +67,8 @@ def noted(topic: str, text: str) -> Noted | None:
 
 
 def levels(at: float, note: Noted, on: dict[tuple[str, str], str]) -> Iterator[Level]:
-    """Yield the changes that this note makes. `on` is name -> value before the note. This function
-    updates `on`."""
+    """Yield the changes that this note reports. `on` has the values before the note, as name -> value.
+    This function updates `on`."""
     lanes = (("inputs", note.inputs), ("relays", note.outputs), ("faults", note.faults))
     for lane, found in lanes:
         if found is None:

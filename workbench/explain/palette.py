@@ -1,4 +1,5 @@
-"""The look of each tone in the light and the dark theme. Patterns help where colours are not enough.
+"""The colours and patterns of each tone, in the light and the dark theme. A tone is the meaning of a
+span in a timeline.
 
 The colours are safe for colour-blind readers, and come from Okabe and Ito
 (https://jfly.uni-koeln.de/color/). Colour alone never tells two tones apart. Each span has a label, and
@@ -25,8 +26,8 @@ MEANING: Final[dict[Tone, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class ToneStyle:
-    """A tone's look in one theme. `text` is the colour of text on the fill. `pattern` names the lines
-    over the fill, or is ""."""
+    """The colours of a tone in one theme. `text` is the colour of text on the fill. `pattern` is the
+    colour of the pattern's lines over the fill, or "" without a pattern."""
 
     fill: str
     text: str
@@ -58,7 +59,8 @@ PAPER: Final[dict[Theme, tuple[str, str, str, str]]] = {
 }
 """Colours of the background, the text, the weaker text and the grid, in this order."""
 STEP: Final[dict[Theme, str]] = {"light": "#b54a12", "dark": "#e8854a"}
-"""Colour of the line at a clock's step, or at the moment for which a file was kept."""
+"""Colour of a vertical line. The line marks a step of the clock, or the moment for which a recording
+was kept."""
 
 
 def css(theme: Theme) -> str:
@@ -81,8 +83,8 @@ def css(theme: Theme) -> str:
 
 
 def style(theme: Theme | None) -> str:
-    """Return the style sheet of one theme. With None, return both themes, and let the reader's screen
-    choose."""
+    """Return the style sheet of one theme. With None, return both themes, so that the reader's screen
+    setting selects one."""
     if theme is not None:
         return css(theme)
     return f"{css('light')}@media (prefers-color-scheme: dark){{{css('dark')}}}"

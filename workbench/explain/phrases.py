@@ -41,7 +41,7 @@ def on_graph(text: str, options: Sequence[str]) -> str:
     def joined(found: re.Match[str]) -> str:
         command, name = found.groups()
         words = [*options]
-        if name == "doctor" and "--config" in words:  # doctor's FILE names the graph
+        if name == "doctor" and "--config" in words:  # doctor's FILE replaces `--config`
             at = words.index("--config")
             del words[at : at + 2]
         return f"`{command} {shlex.join(words)}`" if words else found[0]
@@ -51,8 +51,8 @@ def on_graph(text: str, options: Sequence[str]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class TimePhrases:
-    """A writer of times in words, as seen from the time `now`. `zone` is the time zone, or None for
-    this machine's zone."""
+    """A writer of times in words. `now` is the present time, for phrases such as "(12 s)". `zone` is
+    the time zone, or None for this machine's zone."""
 
     now: Moment
     zone: tzinfo | None

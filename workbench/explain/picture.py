@@ -24,9 +24,9 @@ TOP: Final = 82.0
 BOTTOM: Final = 56.0
 RIGHT: Final = 16.0
 CHAR: Final = 6.6
-"""Width (pixels) of one character, rounded up. The font has 12 pixels."""
+"""Width (pixels) of one character, rounded up. The font size is 12 pixels."""
 NARROW: Final = 1.2
-"""Width (pixels). A narrower span is drawn together with its neighbours."""
+"""Width (pixels) below which a span is drawn together with its neighbours."""
 TICKS: Final = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200)
 ROBOT: Final = re.compile(r"(?:^|(?<= for ))[^\s/]+/(?=[^\s/]+(?: \(request \S*\))?$)")
 """Pattern of the fleet's name and slash in front of a robot's name."""
@@ -256,8 +256,8 @@ def _wide(text: str) -> float:
 def _fitted(text: str, room: float) -> str:
     """Shorten the text to fit. Return "" if almost nothing fits.
 
-    A robot's text loses the fleet, but never the robot's name. Thus two robots of a fleet never look
-    the same.
+    Drop the name of the fleet from a robot's text, but never shorten the robot's name. Thus two robots
+    of a fleet never look the same.
     """
     if _wide(text) <= room:
         return text
@@ -291,8 +291,8 @@ WORST: Final[dict[Tone, int]] = {"wrong": 2, "unknown": 1}
 def _drawable(
     spans: Iterable[LaneSpan], x: Callable[[float], float]
 ) -> Iterator[tuple[LaneSpan, int]]:
-    """Yield each span with the number of original spans in the span. Join spans that are too narrow to
-    see."""
+    """Join spans that are too narrow to see. Yield each resulting span with the number of spans joined
+    in it."""
     joined: list[LaneSpan] = []
     for span in spans:
         gap = joined and x(span.from_s) - x(joined[-1].to_s) > NARROW
@@ -309,7 +309,7 @@ def _drawable(
 
 
 def _one(spans: list[LaneSpan]) -> LaneSpan:
-    """Join narrow spans into one span. The new span has the worst tone of the narrow spans."""
+    """Join narrow spans into one span. The new span has the most serious tone of the narrow spans."""
     tone = max(spans, key=lambda span: (WORST.get(span.tone, 0), span.to_s - span.from_s)).tone
     label = spans[0].label if len(spans) == 1 else ""
     return LaneSpan(spans[0].from_s, spans[-1].to_s, label, tone)

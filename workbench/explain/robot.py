@@ -1,7 +1,8 @@
 """Explain a robot of our fleet's daemon: why it stands, and who must act next.
 
-Its daemon reports place, command and faults on `/diagnostics`. The lifts, doors and chargers on the
-graph show what the robot waits for; their own explanations say why.
+The robot's daemon reports its place, its command and its faults on `/diagnostics`. The states of lifts,
+doors and chargers show what the robot waits for. The explanation of such a device says why it does not
+serve the robot.
 """
 
 from collections.abc import Mapping
@@ -27,17 +28,17 @@ STANDS: Final[Mapping[str, str]] = {
     "ROBOT_NOT_CHARGING": "has docked, and gets no charge",
     "ROBOT_AT_WRONG_STATION": "is at the wrong charger",
     "ROBOT_NOT_THERE": "reports an arrival, and is elsewhere",
-    "ROBOT_PASSED_LIGHT": "drove on where RMF's traffic light had not let it",
+    "ROBOT_PASSED_LIGHT": "drove on without permission of RMF's traffic light",
     "ROBOT_NOT_STOPPING": "does not stop",
     "ROBOT_WITHOUT_PATH": "drives on a path that RMF does not know",
 }
-"""Faults of a robot that explain why it stands or gets nothing to do, the most telling first."""
+"""Faults because of which a robot stands, or gets no task. The fault that explains most comes first."""
 LETS: Final[Mapping[str, str]] = {
     "no answer": "has not answered about its path yet",
-    "stay": "holds it: the way ahead belongs to another robot, or is being negotiated",
+    "stay": "makes it stand: another robot has the way ahead, or the robots still negotiate",
     "pause": "has told it to pause for a new plan",
     "wait": "lets it drive to its next checkpoint, and holds it there",
-    "error": "has an error: the robot is where it was not let go",
+    "error": "has an error: the robot has gone to a place for which it had no permission",
 }
 
 
@@ -48,8 +49,8 @@ def explanation(
     remedies: Remedies,
     began: Moment,
 ) -> Explanation:
-    """Explain the robot. `waits`: its wish in words -> the explanation of the lift, door or charger
-    for which it waits."""
+    """Explain the robot. `waits` maps each thing that the robot waits for, in words, to the explanation
+    of that lift, door or charger."""
     said = robot.said
     found = _answer(robot, waits, clock, remedies)
     faults = (
@@ -79,7 +80,7 @@ def _answer(
             f"The last report on {who} came at {clock.time(said.last.wall)}, {for_s} ago: its daemon is"
             " not running, or is cut off.",
             "a person",
-            "look at the fleet's daemon: `rmf-bridge status` on its machine",
+            "run `rmf-bridge status` on the machine of the fleet's daemon",
         )
     for code in [code for code in STANDS if code in said.faults][:1]:
         detail = said.faults[code][0].rstrip(".")
@@ -97,7 +98,7 @@ def _answer(
 
 
 def _mission(found: Answer, who: str, doing: str) -> Answer:
-    """Explain a robot without a trouble by its mission."""
+    """Explain what a robot without faults does, from its mission."""
     way, _, light = doing.partition(", RMF's light: ")
     says, _, paused = light.partition(", ")
     if doing in ("", "nothing"):

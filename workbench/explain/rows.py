@@ -23,8 +23,8 @@ def label(text: str, longest: int = LONGEST_LABEL) -> str:
 class LaneRow:
     """A row of marks and of spans that never overlap.
 
-    A value holds for `keeps_s` (s) at most. If `fills` is true, a span NOT_HEARD follows. The row
-    forgets spans that ended more than `past_s` (s) before the newest span.
+    A value holds for `keeps_s` (s) at most. If `fills` is true, the time after an expired value gets a
+    span NOT_HEARD. The row forgets spans that ended more than `past_s` (s) before the newest span.
     """
 
     def __init__(
@@ -61,7 +61,8 @@ class LaneRow:
         self.heard_at = max(self.heard_at, at)
 
     def spans(self, from_s: float, to_s: float) -> Iterator[LaneSpan]:
-        """Yield the spans between these times, cut at both ends. The last span may still go on."""
+        """Yield the parts of the spans that lie between these times. The last span may not have ended
+        yet."""
         for span in (*self._spans, *self._going_on(to_s)):
             if span.to_s > from_s and span.from_s < to_s:
                 yield LaneSpan(
@@ -82,8 +83,8 @@ class LaneRow:
             yield LaneSpan(self.heard_at, to_s, NOT_HEARD, "unknown")
 
     def _expire(self, at: float) -> None:
-        """End a span that no message has confirmed for `keeps_s`. The span ends at the last
-        confirmation."""
+        """End the present span if no message has repeated its value for `keeps_s`. The span ends at the
+        last such message."""
         if at <= self.heard_at + self._keeps_s or self.heard_at == float("-inf"):
             return
         self._close(self.heard_at)

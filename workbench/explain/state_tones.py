@@ -1,5 +1,5 @@
-"""The tones for the values in RMF's states. A number that RMF does not define has the tone
-`unknown`."""
+"""The tones (meanings in a timeline) of the values in RMF's states. A number that RMF does not define
+has the tone `unknown`."""
 
 from collections.abc import Mapping
 from enum import IntEnum

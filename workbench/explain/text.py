@@ -48,7 +48,7 @@ def _answer(one: Explanation, width: int) -> Iterator[str]:
         remedy = f": {fault.cause}. Do: {fault.do}" if fault.cause else ""
         yield from _wrapped(f"Fault {fault.code}{detail} {fault.since}{remedy}.", width)
     if len(one.faults) > MOST_FAULTS:
-        yield f"And {len(one.faults) - MOST_FAULTS} more faults: `rmf-bridge status` has them all."
+        yield f"And {len(one.faults) - MOST_FAULTS} more faults: `rmf-bridge status` shows all faults."
     for note in one.notes:
         yield from _wrapped(f"Note: {note}", width)
     if one.before:
@@ -75,8 +75,8 @@ def _story(one: Explanation, zone: tzinfo | None, room: int) -> Iterator[str]:
 
 
 def _table(fields: tuple[CheckedField, ...]) -> Iterator[str]:
-    """Yield a row for each field. A row has the present value. If the wanted value differs, the row has
-    that value too."""
+    """Yield a text row for each field. The row shows the present value. If the requester waits for
+    another value, the row shows the wanted value too."""
     widths = [
         max(len(text) for text in column) for column in zip(*map(_cells, fields), strict=True)
     ]

@@ -25,7 +25,7 @@ LANES: Final[tuple[LaneName, ...]] = (
 )
 """Names of the lanes, in the order of drawing."""
 Tone = Literal["calm", "works", "open", "held", "asks", "wrong", "unknown"]
-"""The meaning of a span's look.
+"""The meaning of a span's colour and pattern.
 
 - calm: the device rests.
 - works: the device moves, charges or is on.
@@ -93,11 +93,11 @@ class Timeline:
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """A note of our daemon about its device. From `at` on, `name` has the value `value`. The value ""
-    means off or over.
+    """A change that our daemon noted about its device. From `at` on, `name` has the value `value`. The
+    value "" means off or over.
 
-    `lane` is `relays`, `inputs` or `faults`. A relay has an output's value, and a fault has a code and
-    its detail.
+    `lane` is `relays`, `inputs` or `faults`. For a relay, `value` is the output's value. For a fault,
+    `name` is the code and `value` is the detail.
     """
 
     at: float

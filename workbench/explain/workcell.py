@@ -1,8 +1,9 @@
-"""Explain a dispenser or ingestor. The sentences tell which request waits, and who must act next.
+"""Explain a workcell, which is a dispenser or an ingestor. The sentences tell which request waits, and
+who must act next.
 
-RMF's fleet adapter continues after a result SUCCESS. The adapter also continues after a newer state
-that no longer lists an acknowledged request (rmf_ros2, DispenseItem.cpp and IngestItem.cpp). The
-adapter has no time limit.
+RMF's fleet adapter continues after a result SUCCESS. The adapter also continues if a request was
+acknowledged, and a newer state no longer lists this request (rmf_ros2, DispenseItem.cpp and
+IngestItem.cpp). The adapter has no time limit.
 """
 
 from typing import Final
@@ -15,16 +16,17 @@ from workbench.explain.phrases import TimePhrases
 from workbench.explain.workcell_facts import WorkcellFacts
 
 DECIDE: Final = (
-    "look at robot and machine, then `rmf-bridge workcell done FILE`, or `again`, `failed`"
+    "look at robot and machine, then run `rmf-bridge workcell done FILE`; write `again` or `failed`"
+    " in place of `done` if that is true"
 )
 ENDS: Final = {
-    "success": "It has succeeded: RMF goes on with its next state or result.",
+    "success": "It has succeeded: RMF goes on after the workcell's next state or result.",
     "failed": "It has failed: RMF ends the task.",
 }
 
 
 def answer(workcell: WorkcellFacts, clock: TimePhrases, around: common.OthersHeard) -> Answer:
-    """Explain the workcell at the last message."""
+    """Explain the workcell's state at the time of the last message."""
     if workcell.last_state is None:
         return common.unheard(workcell, around)
     stopped = common.stopped(workcell, around, clock)
@@ -45,7 +47,8 @@ def answer(workcell: WorkcellFacts, clock: TimePhrases, around: common.OthersHea
 
 
 def _doubt(found: Answer, workcell: WorkcellFacts, clock: TimePhrases) -> None:
-    """Say that the outcome of a request is in doubt. No repeat and no restart will end this doubt."""
+    """Say that an offline workcell has not answered a request. The outcome stays in doubt, because
+    neither a repeat nor a restart answers the request."""
     for wait in workcell.waits(clock.now):
         if workcell.mode.value == "offline" and wait.who not in workcell.results:
             found.say(f"Request {wait.who} has had no answer, and RMF repeats it without end.")
@@ -55,12 +58,12 @@ def _next(found: Answer, workcell: WorkcellFacts, clock: TimePhrases) -> None:
     asks = [one for one in workcell.requesters if one.asks(clock.now)]
     if not asks:
         queue = workcell.queue.value
-        left = f" Its state still lists {queue}, which no fleet adapter repeats." if queue else ""
+        left = f" Its state still lists {queue}, but no fleet adapter repeats it." if queue else ""
         found.say(f"Nobody requests the workcell.{left}", "nobody", "there is nothing to do")
         return
     waits = [one for one in asks if workcell.results.get(one.who) not in FINAL]
     first = (waits or asks)[0]
-    said = f"Request {first.who} asks for {first.wants} {clock.since(first.since)}."
+    said = f"Request {first.who} has asked for {first.wants} {clock.since(first.since)}."
     if not waits:
         ended = (
             f"Request {first.who} for {first.wants} is over. {ENDS[workcell.results[first.who]]}"
@@ -71,6 +74,10 @@ def _next(found: Answer, workcell: WorkcellFacts, clock: TimePhrases) -> None:
     elif workcell.mode.value == "busy":
         found.say(said, "the controller", "finish its cycle")
     elif workcell.lists(first.who):
-        found.say(said, "the controller", "become ready; the daemon's `waits` gives the reason")
+        found.say(
+            said,
+            "the controller",
+            "become ready; the daemon's diagnostics give the reason (`waits`)",
+        )
     else:
         found.say(said, "the device's node", "list the request, and acknowledge it")

@@ -1,4 +1,5 @@
-"""Facts about one dispenser or ingestor, from its messages, and the workcell's story."""
+"""Facts about one workcell (dispenser or ingestor), from its messages, and the workcell's story (a list
+of its events)."""
 
 from bridges.observe.news import News
 from bridges.observe.workcell import ObservedDispenser, ObservedIngestor, ObservedWorkcell
@@ -6,7 +7,7 @@ from workbench.explain.device import Device
 
 
 class WorkcellFacts(Device, ObservedWorkcell):
-    """A workcell with its story."""
+    """A workcell with its story (a list of its events)."""
 
     def says(self, one: News) -> str:
         """Return a line of the story. Return "" if the story leaves the event out."""

@@ -1,2 +1,2 @@
-"""Join RMF's graph, watch the graph, and send requests. The commands that people use need this
+"""Join RMF's graph, watch the graph, and send requests. The command-line tools for people use this
 package."""

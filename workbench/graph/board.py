@@ -1,7 +1,7 @@
 """The rows of `watch`, made from messages and a time. All functions are pure.
 
-RMF's states have no fields for faults, queues and simulations. Our daemons publish this information on
-`/diagnostics`.
+RMF's states have no fields for faults, for waiting robots, or for "this device is simulated". Our
+daemons publish this information on `/diagnostics`.
 """
 
 import json
@@ -26,8 +26,8 @@ from bridges.system.columns import aligned, clipped, hanging, width
 from bridges.system.paint import repainted
 
 SETTLES_S: Final = 1.5
-"""Time (s) after the first state. Within this time, the daemon's diagnostics must have come, because
-they come at 1 Hz."""
+"""Time (s) from a device's first state until its daemon's diagnostics must have come. Diagnostics come
+at 1 Hz."""
 HEADINGS: Final = ("kind", "name", "state", "held by", "waiting", "age", "", "faults")
 MOST_PLACES: Final = 500
 """Maximum number of robots in memory. Anybody can invent names, and the page listens for months."""
@@ -72,7 +72,8 @@ class BoardRow(Struct, frozen=True):
         return (*state, self.waiting, self.age, marks, self.faults)
 
     def news(self) -> tuple[object, ...]:
-        """The row's values without running seconds. A change of these values deserves a new line."""
+        """The row's values without the seconds that count up. If these values change, `watch` prints a
+        new line."""
         told = (self.state, self.held_by, self.waiting, self.mark, self.faults)
         return (self.simulated, *(SECONDS.sub("", text) for text in told))
 
@@ -81,8 +82,8 @@ class Board:
     """The latest state and diagnosis of each device."""
 
     def __init__(self, graph: ObservedGraph[Any] | None = None) -> None:
-        """Begin without messages. `graph` is the memory of the devices, if another object fills that
-        memory."""
+        """Begin without messages. Pass a `graph` that another object fills, if there is one. Otherwise
+        the board fills its own."""
         self._graph = graph or PlainGraph()
         self._places: dict[str, str] = {}
 
@@ -102,8 +103,8 @@ class Board:
                 self._places[who] = place
 
     def unsettled(self, now: float) -> set[Device]:
-        """Return kind and name of the devices that were first heard a moment ago. Their daemons may
-        still report a simulation."""
+        """Return kind and name of the devices that were first heard a moment ago. Their daemons may not
+        have said yet whether the devices are simulated."""
         return {
             (one.kind, words.printable(one.id))
             for one in self._graph.stated()
@@ -116,8 +117,8 @@ class Board:
         return [self._device(one, now, wall) for one in devices]
 
     def rows(self, now: float, wall: float) -> list[BoardRow]:
-        """Return the rows, sorted by kind and name. `now` is monotonic (s). `wall` is the time (s) on
-        the stamps' clock."""
+        """Return the rows, sorted by kind and name. `now` is monotonic (s). `wall` is the present time
+        (s since the epoch), by the clock that stamps the messages."""
         every = [one for kind in words.KINDS for one in sorted(self._graph.stated(kind), key=_name)]
         devices = self.rows_of(every, now, wall)
         return [*devices, *self._alarms(now), *self._coordinators(now), *self._robots(now)]
@@ -141,7 +142,7 @@ class Board:
         )
 
     def _alarms(self, now: float) -> Iterator[BoardRow]:
-        """Yield a row for each daemon's alarm, and for each alarm panel."""
+        """Yield a row for each daemon that raises an alarm, and for each alarm panel."""
         nodes = self._graph.nodes
         for one in alarms(nodes, self._graph.published, now):
             daemon = nodes.get(f"{one.node}: daemon")
@@ -184,7 +185,8 @@ class Board:
             )
 
     def _robots(self, now: float) -> Iterator[BoardRow]:
-        """Yield a row for each robot of our daemons, and each other robot with an assigned place."""
+        """Yield a row for each robot that our daemons report. Then yield a row for each other robot
+        that has an assigned charging place."""
         found = {one.who: one for one in robots(self._graph.nodes)}
         yield from (self._robot(one, now) for one in found.values())
         for who, place in sorted(self._places.items()):
@@ -216,7 +218,7 @@ class Board:
         daemon = self._daemon(diagnosis, now)
         simulated = (
             daemon.value("simulated") == "yes" if daemon else False
-        )  # the row shows a fault instead of the daemon's message
+        )  # a fault may hide SIMULATED in the message
         return daemon is not None and (simulated or SIMULATED in daemon.message)
 
 
@@ -259,7 +261,8 @@ def _age(stamped_at: float, wall: float) -> str:
 
 
 def _seconds(age_s: str, more_s: float) -> str:
-    """Return the age of a reading that was so old (s, as text) in a report of `more_s` ago."""
+    """Return the present age of a reading as text. `age_s` is the age in the last report, which came
+    `more_s` (s) ago."""
     try:
         return f"{float(age_s.removesuffix(' s')) + more_s:.1f} s"
     except ValueError:
@@ -276,8 +279,8 @@ def _mark(device: AnyDevice, now: float) -> str:
 
 
 def table(rows: Iterable[BoardRow]) -> list[str]:
-    """Format the rows in columns under headings. Columns for queues, marks and faults appear only if a
-    row needs them."""
+    """Format the rows in columns under headings. The columns for waiting robots, marks and faults
+    appear only if a row needs them."""
     shown = [row.cells() for row in rows]
     if not shown:
         return ["nothing heard yet"]
@@ -291,7 +294,7 @@ def table(rows: Iterable[BoardRow]) -> list[str]:
 
 
 def changes(before: list[BoardRow], after: list[BoardRow]) -> list[BoardRow]:
-    """Return the rows that have changed. A new age or a running second does not count as a change."""
+    """Return the rows that have changed. A new age, or seconds that count up, are no change."""
     known = {(row.kind, row.name): row.news() for row in before}
     return [row for row in after if known.get((row.kind, row.name)) != row.news()]
 
@@ -317,8 +320,8 @@ def repaint(
 ) -> tuple[str, int]:
     """Return the text that redraws the table on a terminal, and the new number of lines.
 
-    `lines_before` is the number of table lines on the terminal now. No line wraps, and nothing scrolls
-    away.
+    `lines_before` is the number of table lines on the terminal now. The text is cut so that no line
+    wraps and the table never scrolls.
     """
     shown = list(fitting(rows, columns - 1))
     if len(shown) >= lines:

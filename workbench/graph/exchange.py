@@ -1,4 +1,5 @@
-"""Decide when `send` publishes, when `send` ends, and the text if the request has no effect.
+"""Decide when `send` publishes and when `send` ends. If the request has no effect, compose the text
+that says why.
 
 `step(request, seen, now)` is pure. Like RMF, `send` repeats a request at 1 Hz until a state shows the
 effect. Only a state heard after the first request counts. An earlier state may show the same effect for
@@ -15,8 +16,8 @@ from workbench.graph.requests import Failed, Fulfilled, Obstacle, Request, Reque
 
 REPEAT_S: Final = 1.0
 PATIENCE_S: Final = 2.0
-"""Time (s) to wait for the device's first state. After this time, `send` sends the request to a silent
-device too. States come at 1 Hz."""
+"""Time (s) to wait for the device's first state. After this time, `send` sends the request even though
+the device is silent. States come at 1 Hz."""
 HINT_AFTER_S: Final = 3.0
 """Time (s) after which `send` prints a hint about a missing node. A starting node needs a second or two
 to find other nodes."""
@@ -71,7 +72,7 @@ def _hint(request: Request, seen: RequestProgress, now: float) -> str:
 
 
 def _reason(request: Request, seen: RequestProgress, now: float) -> str:
-    """Return why the request timed out, and where to look next."""
+    """Return why the request timed out, and what the user should check next."""
     if missed := _missed(request, seen):
         return _given_up("", seen) if _said(missed) in seen.hinted else _said(missed)
     silent_s = now - seen.stated_at
@@ -86,14 +87,15 @@ def _reason(request: Request, seen: RequestProgress, now: float) -> str:
 
 
 def _missed(request: Request, seen: RequestProgress) -> Obstacle | None:
-    """Return the node that is missing on the graph: the request's receiver, or the device."""
+    """Return the obstacle that a node is missing on the graph. The missing node is the request's
+    receiver or the device. Return None if neither is missing."""
     if seen.first_sent_at is None and seen.listeners == 0:
         return request.nobody(seen)
     return None if seen.states else request.unheard(seen)
 
 
 def _given_up(more: str, seen: RequestProgress) -> str:
-    """Return the text of a timeout. An earlier hint has already given the reason."""
+    """Return the text of a timeout whose reason an earlier hint has already given."""
     return f"gave up after {seen.timeout_s:g} s{more}"
 
 

@@ -1,4 +1,5 @@
-"""Functions that all commands on a graph share: options, joining, durations and ending."""
+"""Functions that all commands on a graph share: their options, joining the graph, parsing durations,
+and ending on a signal."""
 
 import argparse
 import ipaddress
@@ -115,7 +116,7 @@ class Renamed:
         return self._transport.release
 
     def faults(self) -> list[tuple[str, str]]:
-        """Return (code, detail) of each present obstacle between this node and other nodes."""
+        """Return (code, detail) for each present problem of the connection to other nodes."""
         return self._transport.faults()
 
     @property
@@ -149,9 +150,10 @@ def _configured(file: Path | None) -> Rmf:
 
 
 def interruptible() -> AbstractContextManager[None]:
-    """Let SIGINT, SIGTERM and SIGHUP raise KeyboardInterrupt.
+    """Let SIGINT, SIGTERM and SIGHUP raise KeyboardInterrupt, so that the command leaves the graph
+    properly.
 
-    Without this exception, the node of a killed command would stay on the graph for over 10 s.
+    Otherwise the node of a killed command would seem to stay on the graph for over 10 s.
     """
     return ended_by(signal.default_int_handler)
 
@@ -176,11 +178,11 @@ def complain(command: str, text: object) -> None:
 
 @dataclass(frozen=True, slots=True)
 class CommandLine:
-    """The command line as the user typed it. Proposed commands repeat these options, so that a user can
+    """The command line as the user typed it. Proposed commands repeat its options, so that a user can
     copy the proposed commands.
 
-    `typed` has every word after `rmf-bridge`. `options` has the options for another command on the same
-    graph.
+    `typed` has every word after `rmf-bridge`. `options` has only the options that another command needs
+    to join the same graph.
     """
 
     typed: tuple[str, ...] = ()
@@ -191,7 +193,7 @@ class CommandLine:
         return shlex.join(("rmf-bridge", *self.typed, option))
 
     def other(self, *command: str) -> str:
-        """Return another command for the same graph. Leave out `--direct`, unless the command is
+        """Return another command for the same graph. Keep `--direct` only if the other command is
         `send`."""
         options = [one for one in self.options if one != "--direct" or command[0] == "send"]
         return shlex.join(("rmf-bridge", *command, *options))

@@ -1,4 +1,4 @@
-"""A live graph as a stream of `Heard`. A reader of a recording gives the same stream."""
+"""A live graph as a stream of `Heard`. The readers of recordings give the same kind of stream."""
 
 import time
 from collections.abc import Callable, Iterable
@@ -36,8 +36,9 @@ OF_DEVICES: Final[tuple[AnyTopic, ...]] = (
     topics.FIRE_ALARM_TRIGGER,
     topics.EMERGENCY_SIGNAL,
 )
-"""Topics about devices. The subscriptions are volatile, so that no retained request looks like a new
-request; only alarms are retained, because they stand until they are ended."""
+"""Topics about devices. The subscriptions to requests and states are volatile, so that no retained
+request looks like a new request. Only the alarm topics deliver retained messages, because an alarm
+lasts until a later message ends it."""
 
 
 def subscribed(
@@ -47,8 +48,8 @@ def subscribed(
     *,
     others_only: bool = False,
 ) -> dict[str, Subscription]:
-    """Subscribe to these topics. Return topic -> subscription. A ROS machine without the packages of
-    workcells hears no workcells."""
+    """Subscribe to these topics. Return topic -> subscription. If a ROS machine lacks the message
+    packages of dispensers and ingestors, leave out the topics of these devices."""
     ends: dict[str, Subscription] = {}
     for topic in heard:
         try:
@@ -60,8 +61,8 @@ def subscribed(
 
 
 class Ear:
-    """Hears these topics from now on. `others_only`: without the messages of this transport itself.
-    `ends`: topic -> subscription."""
+    """A listener that hears these topics from now on. With `others_only`, it does not hear the messages
+    that its own transport sends. `ends` is topic -> subscription."""
 
     def __init__(
         self,

@@ -1,5 +1,5 @@
-"""Talk to the plants of a running simulation, which are simulated devices. The plants have control
-sockets (`hal_fakes/control.py`)."""
+"""Talk to the simulated devices ("plants") of a running simulation. The plants have control sockets
+(`hal_fakes/control.py`)."""
 
 import argparse
 import json
@@ -17,7 +17,7 @@ ANSWER_S = 5.0
 
 
 def add_simulation(parser: argparse.ArgumentParser) -> None:
-    """Add the options that name a simulation and one of its devices."""
+    """Add the options that name a simulation and one of its simulated devices."""
     parser.add_argument("file", type=Path, metavar="FILE", help="the YAML that is simulated")
     device = parser.add_argument(
         "--device", metavar="NAME", help="which device, if the file has several"
@@ -27,7 +27,8 @@ def add_simulation(parser: argparse.ArgumentParser) -> None:
 
 
 def names(verb: str) -> Completer:
-    """Return a completer of the names for `press` or `fail`. A running simulation lists these names."""
+    """Return a function that completes names on the command line of `press` or `fail`. A running
+    simulation lists these names."""
 
     def complete(prefix: str, parsed_args: argparse.Namespace, **_: object) -> list[str]:
         found = set[str]()
@@ -52,8 +53,8 @@ def _folder(args: argparse.Namespace) -> Path:
 
 
 def tell(args: argparse.Namespace, verb: str) -> int:
-    """Print the names that each device offers to `press` or `fail`. Return 0, or 69 if no simulation
-    runs."""
+    """Print the names of everything that `press` or `fail` can change, for each simulated device.
+    Return 0, or 69 if no simulation runs."""
     try:
         answers = [json.loads(ask(path, ["names"])) for path in _sockets(args)]
     except (OSError, ValueError) as error:

@@ -1,15 +1,18 @@
 """The retained MQTT messages that show RMF's devices to other systems.
 
-    PREFIX/status                     online, or offline by the last will
+    PREFIX/status                     online; after our end offline (MQTT's last will)
     PREFIX/KIND/ID/state              one JSON object
     PREFIX/KIND/ID/availability       online if states come and their reading is fresh, else offline
     HOMEASSISTANT/device/…/config     Home Assistant's discovery, one message for each device:
                                       https://www.home-assistant.io/integrations/mqtt/#device-discovery-payload
 
 A reader cannot see the age of a retained message. Therefore each message expires at the broker if
-nobody renews the message (MQTT 5, 3.3.2.3.3). ID is the device's name. A byte of the name other than
-A-Z a-z 0-9 and - becomes _XX, in hexadecimal. All functions are pure, because rows and the time are
-arguments.
+nobody renews the message (MQTT 5, 3.3.2.3.3).
+
+ID is the device's name. The characters A-Z a-z 0-9 and - stay. Every other byte of the name becomes
+_XX, in hexadecimal.
+
+All functions are pure, because rows and the time are arguments.
 """
 
 import json
@@ -27,15 +30,15 @@ from workbench.graph.board import BoardRow
 
 RENEWED_S: Final = 60.0
 EXPIRES_S: Final = 180
-"""Time (s) until a message expires, which is three renewals. If nobody renews a device's messages, the
-broker drops the device."""
+"""Time (s) until a message expires. This time is three times RENEWED_S. If nobody renews a device's
+messages, the broker drops the device."""
 TEXT_MAX: Final = 255
 """Maximum length (characters) of an entity's state in Home Assistant."""
 
 
 class Retained(NamedTuple):
-    """One message. `news` is the message's content without times. When `news` changes, the message is
-    published immediately."""
+    """One message. `news` is the part of the content that is compared: everything except times. When
+    `news` changes, the message is published immediately."""
 
     topic: str
     payload: str
@@ -43,7 +46,7 @@ class Retained(NamedTuple):
 
 
 class ShownDevice(NamedTuple):
-    """A device, together with its row of `watch`."""
+    """A device, together with the row that `watch` shows for this device."""
 
     device: AnyDevice
     row: BoardRow
@@ -156,7 +159,7 @@ def _is_lift(device: AnyDevice) -> bool:
 
 
 def _content(state: object) -> dict[str, object]:
-    """Return the fields that only this kind of state has, in RMF's words."""
+    """Return the fields that only this kind of device has. The values are RMF's words."""
     match state:
         case d.LiftState():
             return {

@@ -1,4 +1,4 @@
-"""Find the device of a file that a command names."""
+"""Find the device that a command names, among the devices of a YAML file."""
 
 from bridges.settings.config import Config
 

@@ -1,5 +1,5 @@
-"""The history of a fleet adapter: its robots' requests to lifts and doors, and these devices'
-states."""
+"""The history of a fleet adapter: the requests of its robots to lifts and doors, and the states of
+these lifts and doors."""
 
 from collections import deque
 from copy import copy
@@ -18,29 +18,29 @@ from bridges.observe.requesters import DeviceRequester, Moment
 from workbench.judge.history import NOT_YET, REMEMBERED, AnyHistory, keep
 
 IGNORED: Final = 5
-"""Number of states in a row without the adapter's answer, although its fleet is heard. After so many
-states, lost messages can no longer be the cause."""
+"""Number of states in a row after which an adapter counts as not answering, although its fleet is
+heard. Lost messages cannot explain so many states without a request."""
 ALARMS_S: Final = 60.0
-"""Time (s) after the start or end of an alarm. Within this time, robots may change their way."""
+"""Time (s) after the start or end of an alarm in which robots may change their route."""
 BACK_S: Final = 0.5
 ADAPTERS: Final = (topics.ADAPTER_LIFT_REQUESTS.name, topics.ADAPTER_DOOR_REQUESTS.name)
 
 
 @dataclass(slots=True)
 class Wish(DeviceRequester):
-    """One robot's visit to one device.
+    """One robot's visit to one device, from its first request to END or CLOSE.
 
     - `met`: when a state after the latest request first fulfilled all of RMF's conditions.
     - `whole`: whether the visit was heard from its beginning.
     - `inside`: whether the robot is in the car, because it requested another floor after `met`.
     - `came_from`: the floor that the robot requested before.
-    - `held_at`: when a state last showed the visit's session.
+    - `held_at`: when a state last showed the robot's session.
     - `ignored`: number of states in a row without a request by the robot, although its fleet was heard.
     - `ignored_since`: when the first of these states came.
-    - `lapsed`: whether the adapter failed to repeat the first request for IGNORED states.
-    - `spare`: number of ENDs after the last state that showed the visit's session.
-    - `passed`: whether a later passage began before the robot sent CLOSE for this passage.
-    - `visits`: the kind of device, and the visitor.
+    - `lapsed`: whether the adapter sent the first request only once, and then ignored IGNORED states.
+    - `spare`: number of ENDs after the last state that showed the robot's session.
+    - `passed`: whether the robot asked for another door before it sent CLOSE for this door.
+    - `visits`: the kind of device and the robot's name, as a key for `AdapterHistory.lapses`.
     """
 
     whole: bool = False
@@ -56,24 +56,24 @@ class Wish(DeviceRequester):
     visits: str = ""
 
     def ignored_s(self, now: float) -> float:
-        """Return the time (s) for which the robot has ignored states. Return 0 for fewer than IGNORED
-        states."""
+        """Return the time (s) for which the robot has sent no request although states came. Return 0
+        for fewer than IGNORED states."""
         return now - self.ignored_since if self.ignored >= IGNORED else 0.0
 
 
 class AdapterHistory(AnyHistory):
-    """The history of one fleet adapter.
+    """The history of one fleet adapter. A visit is a robot's use of one device (`Wish`).
 
     - `name`: a fleet, or fleet/robot.
-    - `device`: the device of the latest request.
-    - `wish`: the visit of the latest request.
-    - `was`: the same visit as it was before the request.
-    - `stated`: the visits to the device of the latest state.
+    - `device`: the device that the latest request names.
+    - `wish`: the visit to which the latest request belongs.
+    - `was`: a copy of this visit from before the request.
+    - `stated`: the visits to the device that published the latest state.
     - `listed`: the robots in the fleet's states.
     - `lists`: number of fleet states heard.
-    - `back`: number of times that stamps stepped back, by robot and topic.
-    - `lapses`: number of waits in a row in which the adapter sent only one request, by `Wish.visits`.
-    - `unclosed`: number of passages without CLOSE, by robot.
+    - `back`: robot -> how often the stamp of a request was older than the stamp before.
+    - `lapses`: `Wish.visits` -> number of waits in a row in which the adapter sent only one request.
+    - `unclosed`: robot -> number of passages in a row without CLOSE.
     """
 
     def __init__(self, name: str) -> None:
@@ -125,7 +125,7 @@ class AdapterHistory(AnyHistory):
         return False
 
     def checked(self) -> None:
-        """Note that the laws have read the latest message."""
+        """Forget how long the network was silent, after the laws have checked the latest message."""
         self.network_s = 0.0
 
     def is_ours(self, who: str) -> bool:
@@ -133,16 +133,16 @@ class AdapterHistory(AnyHistory):
         return who == self.name or who.startswith(f"{self.name}/")
 
     def excused(self, wish: Wish) -> bool:
-        """Return whether the robot may change its way. A hazard, an alarm, or a new task after the
-        robot's request is an excuse."""
+        """Return whether the robot may change its route. A hazard, an alarm, or a new task since the
+        robot's request is a good reason."""
         state = self.device.state if self.device else None
         hazard = isinstance(state, d.LiftState) and state.current_mode in HAZARDS
         task_at = self._tasks.get(wish.who, ("", NOT_YET))[1]
         return hazard or self.now - self._alarm_at < ALARMS_S or task_at >= wish.since.at
 
     def _forget(self, now: float) -> None:
-        """Forget the visits after the whole network was silent, because the listener may have missed
-        messages."""
+        """Forget the visits. Nothing was heard on the whole network for a while, so the listener may
+        have missed messages."""
         self._began = now
         self._wishes.clear()
 
@@ -160,8 +160,8 @@ class AdapterHistory(AnyHistory):
     # ---- requests
 
     def _is_replayed(self, message: d.LiftRequest | d.DoorRequest) -> bool:
-        """Note the stamp. Return whether this is an old message that its publisher retained for late
-        listeners."""
+        """Return whether this is an old message that its publisher retained for late listeners.
+        Otherwise remember the message's stamp."""
         who = message.session_id if isinstance(message, d.LiftRequest) else message.requester_id
         key, at = f"{words.kind(message)} {who}", in_seconds(message.request_time)
         newest, recent = self._stamps.get(key, (0.0, deque(maxlen=100)))
@@ -215,7 +215,7 @@ class AdapterHistory(AnyHistory):
         return True
 
     def _say(self, wish: Wish, wants: str, now: Moment) -> None:
-        """Note the visitor's request. `wants` is empty for END and CLOSE."""
+        """Update the visit after a request. `wants` is empty for END and CLOSE."""
         if not wants:
             wish.ended = wish.ended or now
             wish.spare += 1
@@ -237,7 +237,7 @@ class AdapterHistory(AnyHistory):
         return silent_s > GIVEN_UP_S and not _holds(device, wish.who)
 
     def _begin_passage(self, begun: Wish, device: AnyDevice) -> None:
-        """Count the robot's earlier passages through doors if no CLOSE was heard for them."""
+        """When the robot asks for a door, count its earlier passages for which no CLOSE was heard."""
         if not isinstance(device, ObservedDoor) or begun.wants != "open":
             return
         for key, wish in self._wishes.items():
@@ -264,12 +264,12 @@ class AdapterHistory(AnyHistory):
             if _holds(device, wish.who):
                 wish.held_at, wish.spare = self.now, 0
             elif wish.held_at > NOT_YET and self.now - wish.last.at > REQUESTER_SILENT_S:
-                wish.ended = wish.ended or now  # the END was not heard
+                wish.ended = wish.ended or now  # we must have missed the END
         self._meet(device, now)
         return bool(self.stated)
 
     def _count(self, wish: Wish, before: float) -> None:
-        """Count the state as ignored if the robot has sent no request since the previous state."""
+        """If the robot has sent no request since the previous state, count that state as ignored."""
         if wish.last.at >= before:
             wish.ignored = 0
         elif self._alive_at > before:

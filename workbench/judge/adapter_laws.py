@@ -1,7 +1,8 @@
 """The laws of a fleet adapter, for all lifts and doors that the adapter uses.
 
-The robot's place is not on the graph. Therefore a request for another floor counts as the robot's
-entry, and END counts as the robot's exit. The published states show the adapter's possible knowledge.
+No message tells where the robot is. Therefore a request for another floor counts as the robot's entry,
+and END counts as the robot's exit. The judge expects the adapter to know only what published states
+have shown.
 """
 
 from collections.abc import Callable
@@ -18,14 +19,15 @@ CONTEXT: Final = "rmf_ros2 agv/RobotContext.cpp:1700-1735"
 REQUEST_LIFT: Final = "rmf_ros2 phases/RequestLift.cpp:322-326"
 DOOR_OPEN: Final = "rmf_ros2 phases/DoorOpen.cpp"
 NEVER_ENDS_S: Final = 60.0
-"""Time (s). A robot that has been silent for longer can no longer be on its way out of a car."""
+"""Time (s) of silence after which a robot can no longer be on its way out of a car."""
 FOR_EVER_S: Final = 60.0
 AGAIN: Final = 2
-"""Number of breaches in a row that a restart of the adapter cannot explain."""
+"""Number of breaches in a row that count. A restart of the adapter may explain one breach, but not so
+many."""
 SPAM: Final = 5
 LISTS: Final = 5
 TASKS_S: Final = 3.0
-"""Maximum delay (s) with which a fleet state tells of a new task."""
+"""Maximum delay (s) from a new task to the fleet state that shows the task."""
 GOES: Final = (d.LiftRequestType.REQUEST_END_SESSION, d.LiftRequestType.REQUEST_AGV_MODE)
 
 
@@ -83,7 +85,7 @@ def _repeats(kind: str) -> Callable[[AdapterHistory], Finding]:
             if not isinstance(history.news, STATES[kind]):
                 return None
             if one.lapsed and one.ignored and history.lapses.get(one.visits, 0) >= AGAIN:
-                return f"{shown(one.who)} asked for {shown(one.wants)} once, and waits"
+                return f"{shown(one.who)} asked for {shown(one.wants)} only once, and still waits"
         return None
 
     return check
@@ -93,8 +95,8 @@ STATES: Final = {"lift": d.LiftState, "door": d.DoorState}
 
 
 def _changes(history: AdapterHistory) -> Wish | None:
-    """Return the visit as it was before this request, if the request is for another floor. Otherwise
-    return None."""
+    """If this request is for another floor than before, return a copy of the visit from before the
+    request. Otherwise return None."""
     wish, was = history.wish, history.was
     if wish is None or was is None or wish.ended or not isinstance(history.device, ObservedLift):
         return None
@@ -103,8 +105,8 @@ def _changes(history: AdapterHistory) -> Wish | None:
 
 
 def _explained(history: AdapterHistory, was: Wish, text: str) -> Finding:
-    """Return a breach. The judge withdraws the breach if a late message excuses it. Such a message is a
-    state, an alarm or a new task."""
+    """Return a possible breach. A late message (a state, an alarm or a new task) may still excuse it.
+    Then the judge drops the breach."""
     lift = history.device
     assert lift is not None
     return Doubt(text, lambda: lift.matches(was) or history.excused(was), TASKS_S)
@@ -118,7 +120,7 @@ def _enters(history: AdapterHistory) -> Finding:
         return KEPT
     text = (
         f"{shown(was.who)} requests {shown(history.wish.wants)} before a state showed its session"
-        f" OPEN at {shown(was.wants)} (RMF's own: rmf_ros2#389, or Jazzy's replan)"
+        f" OPEN at {shown(was.wants)} (a defect of RMF: rmf_ros2#389, or Jazzy's replan)"
     )
     return _explained(history, was, text)
 
@@ -131,7 +133,7 @@ def _rides(history: AdapterHistory) -> Finding:
     if was is None or wish is None or not was.inside or was.met:
         return None
     text = f"{shown(was.who)} asks for {shown(wish.wants)} on its ride to {shown(was.wants)}"
-    known = ", where it came from (RMF's own: rmf_ros2#555)"
+    known = ", where the robot came from (a defect of RMF: rmf_ros2#555)"
     return _explained(history, was, text + (known if wish.wants == was.came_from else ""))
 
 
@@ -144,7 +146,7 @@ def _ends(history: AdapterHistory) -> Finding:
     for one in _holders(history):
         silent_s = one.ignored_s(history.now)
         if silent_s > NEVER_ENDS_S and not one.ended and (one.met or not one.wants):
-            return f"{shown(one.who)} has the lift, and sends neither request nor END: {silent_s:.0f} s"
+            return f"{shown(one.who)} has the lift, but sent no request and no END for {silent_s:.0f} s"
     return None
 
 
@@ -161,8 +163,8 @@ def _ends_again(history: AdapterHistory) -> Finding:
 
 
 def _holders(history: AdapterHistory) -> list[Wish]:
-    """Return a list with the visit whose session the latest message shows. Return [] if no visit
-    matches."""
+    """Return a list with the visit of the lift's present holder. Return [] if the holder is none of the
+    judged robots."""
     news = history.news
     holder = news.session_id if isinstance(news, d.LiftState) else None
     return [one for one in history.stated if one.who == holder]
@@ -174,7 +176,9 @@ def _stops_ending(history: AdapterHistory) -> Finding:
         late_s = history.now - max(wish.ended.at, wish.held_at)
         if wish.spare < SPAM or late_s < SLOWEST_S or history.device.state is None:
             return None
-        return f"{wish.spare} ENDs without its session in a state (RMF's own: rmf_ros2#382, #415)"
+        return (
+            f"{wish.spare} ENDs after its session had ended (a defect of RMF: rmf_ros2#382, #415)"
+        )
     for one in history.stated:
         silent = history.now - one.last.at > REQUESTER_SILENT_S
         if silent and one.ended and one.held_at > NOT_YET and one not in _holders(history):
@@ -190,7 +194,9 @@ def _closes(history: AdapterHistory) -> Finding:
         return KEPT if was is not None and was.met and not was.ended else None
     passages = history.unclosed.get(wish.who, 0)
     begins = wish.times == 1 and passages >= AGAIN
-    return f"OPEN again, and no CLOSE in its last {passages} passages" if begins else None
+    return (
+        f"it sends OPEN, but sent no CLOSE after its last {passages} passages" if begins else None
+    )
 
 
 def _stops_opening(history: AdapterHistory) -> Finding:
@@ -202,7 +208,7 @@ def _stops_opening(history: AdapterHistory) -> Finding:
     open_s = history.now - was.met.at
     goes_on = wish.met is was.met and open_s > FOR_EVER_S
     return (
-        f"still asks for OPEN, {open_s:.0f} s after the door was open for this robot"
+        f"still asks for OPEN, {open_s:.0f} s after the door opened for this robot"
         if goes_on
         else None
     )
@@ -211,7 +217,7 @@ def _stops_opening(history: AdapterHistory) -> Finding:
 LAWS: Final[tuple[Law[AdapterHistory], ...]] = (
     Law(
         "T1.numbers",
-        "Requests are AGV_MODE with DOOR_OPEN, or END; doors are asked for OPEN or CLOSED",
+        "A lift request is AGV_MODE with DOOR_OPEN, or END; a door request is OPEN or CLOSED",
         "a request",
         "Numbers differ between requests and states: AGV is 1 in a request and 2 in a state",
         "LiftRequest.msg, DoorMode.msg",
@@ -221,13 +227,13 @@ LAWS: Final[tuple[Law[AdapterHistory], ...]] = (
         "A7.id",
         "Each robot has one id, fleet/robot, for lifts and doors",
         "a request after 5 fleet_states of the fleet",
-        "A lift grants a session by its name. Under a second name the same robot is a stranger",
+        "A lift knows a robot by its session's name. With a second name, the robot is a stranger",
         "rmf_ros2 agv/RobotContext.cpp:1425",
         _one_id,
     ),
     Law(
         "A7.stamp",
-        "The stamps of a robot's requests do not go back",
+        "No request of a robot has an older stamp than the robot's request before",
         "two requests with stamps",
         "RMF's door supervisor ignores a CLOSE older than the OPEN. The door stays open",
         "rmf_ros2 door_supervisor/Node.cpp",
@@ -243,33 +249,33 @@ LAWS: Final[tuple[Law[AdapterHistory], ...]] = (
     ),
     Law(
         "A7.repeats",
-        "While a robot waits for the lift, its request is repeated at each state",
-        "a wait of three requests, or of 5 states without a request; fleet_states in between",
+        "While a robot waits for the lift, its adapter repeats the request after each state",
+        "three requests in one wait, or 5 states without a request while fleet_states come",
         "A request may be lost, and a supervisor forgets requests in a restart",
         CONTEXT,
         _repeats("lift"),
     ),
     Law(
         "A7.enters",
-        "The ride is requested only after a state showed the session, the floor and OPEN",
+        "A robot requests its next floor only after a state has shown its session, its floor and OPEN",
         "a robot asks for its second floor",
         "The request for the next floor shows that the robot is in the car. If a condition was"
-        " missing, the robot drove at a closed door or took another robot's car",
+        " missing, the robot has driven against a closed door or into another robot's car",
         REQUEST_LIFT,
         _enters,
     ),
     Law(
         "A7.rides",
-        "On the ride no other floor is requested, except in an alarm or for a new task",
-        "a ride to its end",
-        "The car turns round with the robot inside",
+        "During the ride, a robot requests no other floor, except in an alarm or for a new task",
+        "a complete ride",
+        "Otherwise the car would turn round with the robot inside",
         "rmf_ros2#555, PR#556",
         _rides,
     ),
     Law(
         "A7.ends",
-        "A robot outside the car sends END. A robot with a session is never silent for 60 s",
-        "END during the session; or 60 s of silence, with fleet_states",
+        "A robot that has left the car sends END. A robot with a session is never silent for 60 s",
+        "END during the session, or 60 s without a request while fleet_states come",
         "A session ends only by END. Without END the lift is lost to everybody else",
         CONTEXT,
         _ends,
@@ -286,14 +292,14 @@ LAWS: Final[tuple[Law[AdapterHistory], ...]] = (
         "A7.stops",
         "After the session has ended, the adapter stops sending END",
         "3.5 s after the end of its session",
-        "Such an END ends a person's requests, or the requests for the robot's next ride",
+        "A late END would end a person's requests, or the requests for the robot's next ride",
         "rmf_ros2#382, #415",
         _stops_ending,
     ),
     Law(
         "A8.repeats",
         "While a robot waits for the door, OPEN is repeated each second",
-        "a wait of three requests, or of 5 states without a request; fleet_states in between",
+        "three requests in one wait, or 5 states without a request while fleet_states come",
         "door_requests are not retained, and a supervisor forgets the robot in a restart",
         DOOR_OPEN,
         _repeats("door"),
@@ -301,7 +307,7 @@ LAWS: Final[tuple[Law[AdapterHistory], ...]] = (
     Law(
         "A8.closes",
         "After the passage the adapter sends CLOSE",
-        "CLOSE after an OPEN that was fulfilled; or two passages without",
+        "CLOSE after the door has opened for the robot, or two passages without CLOSE",
         "The supervisor has no timeout. It keeps the door open for a robot that has gone",
         "rmf_ros2 door_supervisor/Node.cpp, phases/DoorClose.cpp",
         _closes,
@@ -309,7 +315,7 @@ LAWS: Final[tuple[Law[AdapterHistory], ...]] = (
     Law(
         "A8.stops",
         "The adapter stops requesting OPEN after the door is open and the heartbeat lists the robot",
-        "CLOSE after an OPEN that was fulfilled; or OPEN 60 s later",
+        "CLOSE after the door has opened for the robot, or another OPEN 60 s after it has opened",
         "RMF's DoorOpen ends at these conditions. Each further OPEN renews the robot's hold",
         DOOR_OPEN,
         _stops_opening,

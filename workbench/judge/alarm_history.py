@@ -1,6 +1,7 @@
-"""The history of one node's alarm: its messages, its statements, and the alarms of other nodes.
+"""The history of one node's alarm. It has the node's `true` and `false` messages, the node's statements
+on /diagnostics, and the alarms of other nodes.
 
-A wire may hide a message's sender. Such a message is nobody's: no law blames a node for it.
+Some transports hide the sender of a message. No law blames a node for such a message.
 """
 
 from bridges.kinds.shared import alarming
@@ -16,22 +17,39 @@ from workbench.judge.history import NOT_YET, REMEMBERED, AnyHistory, keep
 
 
 class AlarmHistory(AnyHistory):
-    """The history of one node's alarm. `name`: the node.
+    """The history of the alarm of the node `name`. A message is `true` (alarm) or `false` (end of the
+    alarm), with the fleets that it concerns. A statement is the alarm's state in the node's
+    diagnostics.
 
-    - `said`: the node's message, if it is the latest message.
-    - `told`: the fleets of the node's `true`, until its `false`. `told_at`: the time of that `true`.
-      `told_before`: `told` before `said`.
-    - `needless`: the number of its `false` in a row, without a `true` before them.
-    - `stated`, `stated_before`: the states in its latest two statements; "" before a statement.
-      `stated_at`: the time of the latest. `new`: it is the latest message. `rose`: the statements have
-      gone from `quiet` to the present raised alarm. `quiet_at`: the last statement `quiet`.
-    - `ended_at`: the last `false` of any node for one of the fleets of `told`.
-    - `against_at`: another node's `false` against the node's alarm, until the node repeats `true`.
-      `again`: the node has just repeated `true` after such a `false`.
-    - `hidden_at`: the time of the last message whose sender the wire has hidden.
-    - `standing`: the fleets of each other node's alarm. `stood`: the nodes whose alarms `said`, a
-      `false`, has ended. `over`: the time at which each node has itself ended its last alarm.
-    - `volatile`: the publisher of the alarm's topic retains nothing; None if unknown.
+    Messages of this node:
+
+    - `said`: the latest message heard, if this node sent it.
+    - `told`: the fleets that the node has alarmed with `true` and not yet released with `false`. An
+      empty set means all fleets. None means no alarm.
+    - `told_at`: the time of the node's last `true`.
+    - `told_before`: the value of `told` before the message `said`.
+    - `needless`: how many `false` in a row the node has sent without an alarm of its own.
+
+    Statements of this node:
+
+    - `stated`, `stated_before`: the states in the last two statements; "" if there was none.
+    - `stated_at`: the time of the last statement.
+    - `new`: whether the latest message heard is a statement of this node.
+    - `rose`: whether the present alarm was stated directly after `quiet`.
+    - `quiet_at`: the time of the last statement `quiet`.
+
+    Messages of other nodes:
+
+    - `ended_at`: the time of the last `false`, of any node, for one of the alarmed fleets.
+    - `against_at`: the time of another node's `false` against this node's alarm. It is
+      forgotten when this node repeats `true`, or ends its alarm.
+    - `again`: whether this node has just repeated `true` after such a `false`.
+    - `hidden_at`: the time of the last message with a hidden sender.
+    - `standing`: other node -> the fleets of its present alarm.
+    - `stood`: the other nodes whose alarm the message `said` has ended.
+    - `over`: other node -> the time at which this node itself ended its last alarm.
+
+    `volatile` tells whether the publisher of the alarm's topic retains nothing; None if unknown.
     """
 
     def __init__(self, name: str) -> None:
@@ -52,7 +70,8 @@ class AlarmHistory(AnyHistory):
         self._fleets: Fleets = frozenset()
 
     def take(self, heard: Heard, own: bool = False) -> bool:
-        """Take a message on an alarm's topic, or statements of our daemons."""
+        """Take a message on an alarm's topic, or the diagnostics in which daemons state their
+        alarms."""
         self._begin(heard, own)
         self.said, self.new, self.again = None, False, False
         message = heard.message
@@ -72,12 +91,12 @@ class AlarmHistory(AnyHistory):
         return True
 
     def checked(self) -> None:
-        """Note that the laws have read the latest message."""
+        """Forget how long the network was silent, after the laws have checked the latest message."""
         self.network_s = 0.0
 
     @property
     def raised(self) -> bool:
-        """Does the node state a raised alarm?"""
+        """Does the node's last statement tell of an alarm or a drill?"""
         return self.stated in alarming.RAISED
 
     def _say(self, event: AlarmHeard) -> None:
@@ -112,7 +131,8 @@ class AlarmHistory(AnyHistory):
                 self.ended_at = self.against_at = self.now
 
     def _end(self, fleets: Fleets) -> None:
-        """Let a `false` end the alarms of nodes that make no statements: RMF's robots drive."""
+        """End the alarms of these fleets, because a `false` lets RMF's robots drive. An alarm stays if
+        its node still states the alarm in its diagnostics."""
         for node, told in [*self.standing.items()]:
             if node not in self._stating and overlap(told, fleets):
                 del self.standing[node]

@@ -1,5 +1,5 @@
-"""The laws of a node that tells the fleets of an alarm. RMF's fleet adapters obey the last word of any
-node: a `true` stops their robots, and any `false` lets the robots drive."""
+"""The laws of a node that tells fleets about an alarm. RMF's fleet adapters obey the latest message of
+any node: a `true` stops their robots, and any `false` lets the robots drive."""
 
 from typing import Final
 
@@ -11,10 +11,12 @@ HANDLES: Final = "rmf_ros2 FleetUpdateHandle::handle_emergency"
 ALARMS_END_S: Final = 3.0
 """The longest time (s) between the `false` messages of nodes that end one alarm together."""
 FALSES: Final = 3
-"""The number of needless `false` in a row that no missed `true` can explain."""
+"""Number of needless `false` in a row that is a breach. One needless `false` may mean that the listener
+missed a `true`."""
 TOLD_S: Final = 2.0
-"""The longest time (s) between a statement and its message, and from a `false` to the next `true`.
-Statements come each second."""
+"""The longest time (s) between a statement in the diagnostics and the message that belongs to it. It is
+also the longest time from another node's `false` to the repeated `true`. Statements come each
+second."""
 
 
 def _is_false(history: AlarmHistory) -> bool:
@@ -22,16 +24,18 @@ def _is_false(history: AlarmHistory) -> bool:
 
 
 def _no_false(history: AlarmHistory) -> Finding:
-    """Check that a `false` ends a `true` of the node. A first `true` may have been missed."""
+    """Check that the node sends `false` only after its own `true`. A few needless `false` are no
+    breach, because the listener may have missed the `true`."""
     if not _is_false(history):
         return None
     if history.needless >= FALSES:
-        return f"`false` {FALSES} times, with no alarm of its own to call off"
+        return f"it sent `false` {FALSES} times without an alarm of its own"
     return None if history.needless else KEPT
 
 
 def _others(history: AlarmHistory) -> Finding:
-    """Check that the node ends no other node's alarm. Several nodes may end one alarm together."""
+    """Check that the node's `false` ends no other node's alarm. If the other node ends its own alarm
+    within ALARMS_END_S, this is no breach."""
     if not _is_false(history):
         return None
     at, stood = history.now, history.stood
@@ -53,13 +57,16 @@ def _same_fleets(history: AlarmHistory) -> Finding:
 
 
 def _again(history: AlarmHistory) -> Finding:
-    """Check that the node repeats `true` as long as it states its alarm. Without statements it is
-    unknown whether the alarm goes on."""
+    """Check that the node repeats `true` after another node's `false`, as long as its diagnostics state
+    the alarm. Without diagnostics nobody knows whether the alarm goes on."""
     if history.again:
         return KEPT
     against = history.against_at
     if history.new and history.raised and 0.0 <= against < history.stated_at - TOLD_S:
-        return f"another node's `false` was {history.now - against:.1f} s ago: robots drive"
+        return (
+            f"another node sent `false` {history.now - against:.1f} s ago, so robots drive during the"
+            " alarm"
+        )
     return None
 
 
@@ -69,7 +76,7 @@ def _told(history: AlarmHistory) -> Finding:
         return None
     if history.told is not None:
         return KEPT
-    text = f"it states {history.stated}, and has published no `true`"
+    text = f"its diagnostics state {history.stated}, but it has published no `true`"
     return Doubt(text, lambda: history.told is not None or not history.raised, TOLD_S)
 
 
@@ -79,7 +86,8 @@ def _ends(history: AlarmHistory) -> Finding:
     if history.ended_at >= history.told_at:
         return KEPT if history.stated_before not in ("", "quiet") else None
     text = (
-        "it states quiet, and nobody has published `false` since its `true`: robots stand for ever"
+        "its diagnostics state quiet, but nobody has published `false` since its `true`, so robots"
+        " stand for ever"
     )
     return Doubt(text, lambda: _is_ended(history), TOLD_S)
 
@@ -91,7 +99,11 @@ def _is_ended(history: AlarmHistory) -> bool:
 def _retained(history: AlarmHistory) -> Finding:
     if history.volatile is None:
         return None
-    return "its publisher is volatile: fleet adapters do not match it" if history.volatile else KEPT
+    return (
+        "its publisher is volatile, so fleet adapters do not receive its messages"
+        if history.volatile
+        else KEPT
+    )
 
 
 LAWS: Final[tuple[Law[AlarmHistory], ...]] = (
@@ -121,24 +133,24 @@ LAWS: Final[tuple[Law[AlarmHistory], ...]] = (
     ),
     Law(
         "A2.told",
-        "A node that states an alarm or a drill has published `true`",
-        "a node's statement of an alarm, after the statement `quiet`",
-        "Robots obey messages. A statement on /diagnostics stops no robot",
+        "A node whose diagnostics state an alarm or a drill has published `true`",
+        "the node's diagnostics change from `quiet` to an alarm",
+        "Robots obey messages. An alarm that only /diagnostics state stops no robot",
         HANDLES,
         _told,
     ),
     Law(
         "A2.again",
-        "A raised alarm is published again after another node's `false`",
-        "another node's `false` during the node's stated alarm",
-        "The robots have obeyed the `false`, and drive during the alarm",
+        "A node repeats its `true` after another node's `false`, as long as its alarm lasts",
+        "another node's `false` while the node's diagnostics state an alarm",
+        "Otherwise the robots obey the `false`, and drive during the alarm",
         HANDLES,
         _again,
     ),
     Law(
         "A2.ends",
-        "An alarm that is stated as over was called off by a `false`",
-        "a statement `quiet` after the node's `true`",
+        "When the diagnostics state that an alarm is over, a `false` has been published",
+        "the node's diagnostics state `quiet` after its `true`",
         "Without a `false` the robots stand for ever",
         HANDLES,
         _ends,

@@ -1,4 +1,4 @@
-"""The play for a charger, with two requests and the end of each request."""
+"""The play (a series of test messages) for a charger, with two requests and the end of each request."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -14,16 +14,16 @@ from workbench.rmf_model import Said
 SERVED: Final = (d.ChargerStateValue.CHARGER_ASSIGNED, d.ChargerStateValue.CHARGER_CHARGING)
 START_TIMEOUT_S: Final = 10.0
 LATEST_S: Final = START_TIMEOUT_S + 15.0
-"""Time (s) after which the play cancels the first request, if start_timeout has not ended the request
-by then."""
+"""Maximum time (s) for which the play waits until start_timeout has ended the first request. After this
+time, the play goes on to the second request."""
 REPEATS: Final = 6
 
 
 class ChargeScenario(Scenario):
-    """Request a station for a robot that does not come.
+    """A play that requests a station for a robot that does not come.
 
-    After start_timeout has ended this request, make a second request and cancel the second request.
-    More messages give a wrong node an occasion to break each law about requests:
+    The station should end this request after start_timeout. Then the play makes a second request and
+    cancels the second request. Further messages tempt a faulty node to break a law about requests:
 
     - a request for another station
     - a second request for this station
@@ -57,7 +57,7 @@ class ChargeScenario(Scenario):
         return self.tick(now)
 
     def _play(self) -> Iterator[list[Said]]:
-        """Yield the messages of each step. REPEAT_S (s) lie between two steps."""
+        """Yield the messages of each step. Between two steps, REPEAT_S (s) pass."""
         first, second = self._ids
         yield [self._ask(f"{first}-elsewhere", station=NOWHERE)]
         yield from [[]] * 3
@@ -98,7 +98,7 @@ class ChargeScenario(Scenario):
         return said or []
 
     def wake_at(self) -> float:
-        """Time of the next step."""
+        """Return the time of the next step."""
         return self._wake_at
 
     def leave(self, now: float) -> list[Said]:

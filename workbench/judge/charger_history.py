@@ -13,9 +13,9 @@ CHARGING: Final = d.ChargerStateValue.CHARGER_CHARGING
 RELEASED: Final = d.ChargerStateValue.CHARGER_RELEASED
 ERROR: Final = d.ChargerStateValue.CHARGER_ERROR
 LOST: Final = float("inf")
-"""Noted time of a cancel, if the station may not have received the cancel."""
+"""Time that is recorded for a cancel, if the station may not have received the cancel."""
 UNREQUESTED: Final = "unrequested/"
-"""Prefix of a charge's id if nobody requested the charge. A station may use the same id again."""
+"""Prefix of the id of a charge that nobody requested. A station may use such an id again later."""
 
 
 class ChargerHistory(History[d.ChargerState]):
@@ -24,12 +24,12 @@ class ChargerHistory(History[d.ChargerState]):
     - `requests`: id -> the latest request.
     - `first_asked`: id -> time of the first request.
     - `elsewhere`: ids of requests to other stations.
-    - `second_at`: time of the last request whose id differs from the served request's id.
+    - `second_at`: time of the last request that came while the station served another request.
     - `cancels`: id -> time of the first cancel. The cancel of an unrequested charge is forgotten when
       that charge ends.
     - `foreign_at`: time of the last cancel of an id that the station does not show.
-    - `same_since`: when the present state and request began.
-    - `same_before`: when the previous state and request began.
+    - `same_since`: since when the station has shown its present combination of state and request.
+    - `same_before`: since when it had shown the combination before that.
     """
 
     seen: ObservedCharger
@@ -45,11 +45,11 @@ class ChargerHistory(History[d.ChargerState]):
 
     @staticmethod
     def claims(state: d.ChargerState) -> bool:
-        """Return whether the state differs from ERROR."""
+        """Return whether a robot would act on this state. This is true for every state except ERROR."""
         return state.state != ERROR
 
     def take_other(self, heard: Heard) -> bool:
-        """Note a request or a cancellation for this charger. Return whether the message was one."""
+        """Take a request or a cancel. Return whether the message was for this charger."""
         match heard.message:
             case d.ChargerRequest(charger_name=self.name):
                 self.asked()
@@ -70,12 +70,14 @@ class ChargerHistory(History[d.ChargerState]):
         return True
 
     def forget(self) -> None:
-        """Forget the requests that may have ended during a silence."""
+        """After a silence, treat every cancel as perhaps not received. Forget the cancel of an
+        unrequested charge."""
         self.cancels.pop(UNREQUESTED + self.name, None)
         self.cancels = dict.fromkeys(self.cancels, LOST)
 
     def settle(self, state: d.ChargerState) -> None:
-        """Note when the state began. Forget the cancels of finished charges."""
+        """Note the time if the station shows another state or request than before. Forget the cancel of
+        an unrequested charge that has ended."""
         if self.before is None or _served(self.before) != _served(state):
             self.same_before, self.same_since = self.same_since, self.now
         if state.state in (IDLE, RELEASED):

@@ -1,7 +1,7 @@
 """The laws of a charger's node.
 
 No part of RMF sends ChargerRequest. Therefore these laws follow from the comments in the message files,
-and from the needs of robots and coordinators.
+and from what robots and coordinators need.
 """
 
 from typing import Final
@@ -24,10 +24,10 @@ from workbench.judge.shared_laws import ANSWERED, ONE, RATE, STAMP, fresh, named
 
 LATE_S: Final = 10.0
 SEEN_S: Final = 1.0
-"""Maximum delay (s) with which an ASSIGNED state may be heard."""
+"""Maximum delay (s) from the beginning of ASSIGNED to the state that shows it."""
 ENDS_WITHIN_S: Final[dict[int, float]] = {int(ASSIGNED): 5.0, int(CHARGING): 120.0}
-"""Maximum time (s) for which a station may serve a cancelled request, by state. A charger needs up to
-120 s to ramp down."""
+"""State -> maximum time (s) for which a station may go on to serve a cancelled request. A charger needs
+up to 120 s to reduce its current."""
 FOREIGN_S: Final = 2.0
 UNREACHED_S: Final = 15.0
 _NUMBERS: Final = frozenset(d.ChargerStateValue)
@@ -82,10 +82,10 @@ def _same_robot(history: ChargerHistory) -> Finding:
 
 
 def _keeps(history: ChargerHistory) -> Finding:
-    """Check that a station belongs to one request until that request ends.
+    """Check that a station serves one request until that request ends.
 
-    Two changes are allowed. The request of the robot on the pad may take over an unrequested charge. A
-    node may have forgotten its request in a restart.
+    Two changes are allowed. First, the charge that nobody requested may become the charge of the robot
+    on the pad. Second, a restarted node may have forgotten the request that it served.
     """
     state, before = history.new, history.before
     if state is None or before is None or not {state.state, before.state} <= ENDS_WITHIN_S.keys():
@@ -96,12 +96,12 @@ def _keeps(history: ChargerHistory) -> Finding:
         return None
     if unrequested(before.request_id) and before.robot_name and _robot(before) == _robot(state):
         return None
-    return f"it was {_whose(before)}, and is {_whose(state)} now"
+    return f"the station was {_whose(before)}, and now is {_whose(state)}"
 
 
 def _is_over(history: ChargerHistory, before: d.ChargerState) -> bool:
-    """Return whether a cancel or the start_timeout may have ended this promise between the two
-    states."""
+    """Return whether the assignment in the state `before` may have ended before the new state. A cancel
+    or the start_timeout may have ended it."""
     if before.state != ASSIGNED or unrequested(before.request_id):
         return False
     known = before.request_id in history.requests and before.request_id not in history.cancels
@@ -111,8 +111,8 @@ def _is_over(history: ChargerHistory, before: d.ChargerState) -> bool:
 
 
 def _overdue_s(history: ChargerHistory, state: d.ChargerState, since: float) -> float:
-    """Return the time (s) since the end of the start_timeout, if it began at `since`. The time is
-    negative before that end."""
+    """Return for how long (s) the start_timeout has been over, if the assignment began at `since`. The
+    result is negative as long as the start_timeout runs, and if there is no start_timeout."""
     asked = history.requests.get(state.request_id)
     limit_s = in_seconds(asked.start_timeout) if asked else 0.0
     return history.now - since - limit_s if limit_s > 0.0 else NOT_YET
@@ -150,7 +150,9 @@ def _cancels(history: ChargerHistory) -> Finding:
         return KEPT if before and served and before.request_id in history.cancels else None
     if history.now - at <= limit_s:
         return None
-    return f"{words.described(state)} {history.now - at:.0f} s after its ChargerCancel"
+    return (
+        f"{words.described(state)} {history.now - at:.0f} s after the ChargerCancel of this request"
+    )
 
 
 def _foreign_cancel(history: ChargerHistory) -> Finding:
@@ -158,7 +160,7 @@ def _foreign_cancel(history: ChargerHistory) -> Finding:
     if state is None or before is None or before.state != ASSIGNED or not before.request_id:
         return None
     if unrequested(before.request_id):
-        return None  # an unrequested charge ends when its robot leaves, without a message
+        return None  # nobody cancels an unrequested charge: it ends when the robot leaves
     if history.now - history.foreign_at > FOREIGN_S:
         return None
     if state.state not in (IDLE, RELEASED):
@@ -182,7 +184,8 @@ LAWS: Final[tuple[Law[ChargerHistory], ...]] = (
     named(
         ANSWERED,
         "C4.answer",
-        reason="A node that repeats its request until a state answers would never stop",
+        reason="If states answered requests, a node that sends a request after each state would"
+        " never stop",
         source="as for lifts: rmf_ros2 agv/RobotContext.cpp:1732-1735",
     ),
     named(ONE, "B0.one"),
@@ -191,7 +194,8 @@ LAWS: Final[tuple[Law[ChargerHistory], ...]] = (
         "C1.numbers",
         "state is a number of ChargerState.msg: 1, 2, 3, 4 or 200",
         "a state",
-        "A vendor's codes mean something else. An Xnergy's 3, a handshake, would read as CHARGING",
+        "A vendor's codes mean something else. For example, Xnergy's code 3 is a handshake, and RMF"
+        " would read 3 as CHARGING",
         CHARGER_STATE,
         _numbers,
     ),
@@ -207,13 +211,13 @@ LAWS: Final[tuple[Law[ChargerHistory], ...]] = (
         "C5.robot",
         "robot_fleet and robot_name are those of the request, and the request is for this station",
         "a request is served",
-        "Two robots would believe that the station is theirs",
+        "Otherwise two robots would believe that the station is theirs",
         CHARGER_STATE,
         _same_robot,
     ),
     Law(
         "C5.text",
-        "error_message says what is wrong in ERROR, and is blank otherwise",
+        "In ERROR, error_message says what is wrong. In other states error_message is blank",
         "a state",
         "A technician reads only error_message",
         CHARGER_STATE,
@@ -221,8 +225,8 @@ LAWS: Final[tuple[Law[ChargerHistory], ...]] = (
     ),
     Law(
         "C1.keeps",
-        "ASSIGNED and CHARGING keep their request_id until they end; a charge that nobody requested"
-        " (`unrequested/…`) may get the request_id of the robot on the pad",
+        "While a station is ASSIGNED or CHARGING, its request_id does not change; only a charge that"
+        " nobody requested (`unrequested/…`) may get the request_id of the robot on the pad",
         "a second request while the first is served",
         "The next robot's request must not take over a station that is promised to the first robot",
         "ChargerRequest.msg, request_id",
@@ -240,7 +244,7 @@ LAWS: Final[tuple[Law[ChargerHistory], ...]] = (
         "C3.cancel",
         "A ChargerCancel ends its request: at once if ASSIGNED, after the ramp-down if CHARGING",
         "a ChargerCancel of the request that is served",
-        "The station is promised to the next robot",
+        "The coordinator promises the station to the next robot",
         "ChargerCancel.msg",
         _cancels,
         sensed=True,
@@ -257,7 +261,7 @@ LAWS: Final[tuple[Law[ChargerHistory], ...]] = (
         "C4.fresh",
         "A station that cannot be reached is shown as ERROR; in other states charger_time advances",
         "states other than ERROR for more than 15 s",
-        "A remembered IDLE sends a robot to a station that may be on fire",
+        "An old IDLE that is shown again sends a robot to a station that may be on fire",
         "ChargerState.msg, charger_time",
         fresh(UNREACHED_S),
         sensed=True,

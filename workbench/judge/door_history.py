@@ -15,7 +15,7 @@ BLIND: Final = (d.DoorModeValue.MODE_OFFLINE, d.DoorModeValue.MODE_UNKNOWN)
 REOPENS_WITHIN_S: Final = 1.0
 AT_ONCE_S: Final = 0.3
 CROSSES_S: Final = 0.5
-"""Maximum delay (s) with which a state may be heard after the CLOSE that caused the state."""
+"""Maximum delay (s) from a CLOSE until the state that it has caused is heard."""
 DWELLS_S: Final = 0.5
 """Minimum time (s) for which a door operator keeps a door open for people."""
 OPENING_S: Final = 1.0
@@ -23,22 +23,23 @@ OPENING_S: Final = 1.0
 
 
 class DoorHistory(History[d.DoorState]):
-    """The history of one door. A latch lasts from an OPEN request to the next CLOSE request.
+    """The history of one door. A latch is the time from an OPEN request to the next CLOSE request.
 
-    - `latched`: whether the last request was OPEN.
-    - `was_closed`: whether the door was closed at that request.
+    - `latched`: whether a latch lasts now, because the last request was OPEN.
+    - `was_closed`: whether the door was closed when this latch began.
     - `asked_at`: time of the first OPEN of this latch.
-    - `openings`: number of OPENs after `not_closed_at`.
+    - `openings`: number of OPEN requests since the door was last seen not closed.
     - `not_closed_at`: when the door was last seen not closed.
     - `closed_at`: time of the last CLOSE on door_requests.
     - `adapter_closed_at`: time of a fleet adapter's last CLOSE to the supervisor in this latch.
     - `was_open`: whether the door has been open in this latch.
-    - `reopened`: times at which the door reopened immediately, in this latch.
+    - `reopened`: times at which the door opened again immediately after it had left OPEN, in this
+      latch.
     - `instant`: how many times in a row the door showed OPEN immediately after the request.
     - `opened`: whether the latest state is the first OPEN state of this latch.
     - `shut`: how many times in a row RMF's CLOSE closed a door that people had opened.
-    - `left`: whether the latest state ends an opening by people, and RMF sent CLOSE during that
-      opening.
+    - `left`: whether people had opened the door, RMF sent CLOSE during that time, and the latest state
+      shows that the door closes or is closed.
     """
 
     observes = ObservedDoor
@@ -66,7 +67,7 @@ class DoorHistory(History[d.DoorState]):
 
     @staticmethod
     def claims(state: d.DoorState) -> bool:
-        """Return whether the door is OPEN."""
+        """Return whether a robot would act on this state, because the door is OPEN."""
         return state.current_mode.value == OPEN
 
     def take_other(self, heard: Heard) -> bool:
@@ -86,7 +87,7 @@ class DoorHistory(History[d.DoorState]):
         return True
 
     def forget(self) -> None:
-        """Forget the requests from before a silence, because the node may have restarted."""
+        """Forget the requests that came before a silence, because the node may have restarted."""
         self.latched = self.was_open = False
         self._people_at = NOT_YET
         self.not_closed_at = self.now
@@ -129,7 +130,7 @@ class DoorHistory(History[d.DoorState]):
             self._people_open_at = self.now
 
     def _people_leave(self, at_once: bool) -> None:
-        """Note that an opening by people has ended."""
+        """Note that a door that people had opened closes again."""
         if self._people_at > NOT_YET and self._people_close_at > NOT_YET:
             self.left = True
             self.shut = self.shut + 1 if at_once else 0

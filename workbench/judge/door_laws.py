@@ -9,7 +9,8 @@ from workbench.judge.shared_laws import ANSWERED, ONE, RATE, STAMP, fresh, named
 
 OPENS_WITHIN_S: Final = 30.0
 SILENCE_S: Final = 10.0
-"""Time (s) of RMF's silence. Within this time, faulty nodes such as lci-rmf-adapter close a door."""
+"""Time (s) without a request. Faulty nodes such as lci-rmf-adapter close an open door after a shorter
+time."""
 ASKED: Final = 5
 INSTANT: Final = 2
 SHUT: Final = 3
@@ -40,8 +41,7 @@ def _opens(history: DoorHistory) -> Finding:
 
 
 def _left_open(history: DoorHistory) -> bool:
-    """Return whether the door was open for a requester up to the previous state, and is no longer
-    open."""
+    """Return whether the door was open for a requester in the previous state, and is not open now."""
     moves = history.mode in (CLOSED, d.DoorModeValue.MODE_MOVING)
     return history.latched and history.was_open and moves and history.mode_before == OPEN
 
@@ -61,10 +61,11 @@ def _stays(history: DoorHistory) -> Finding:
 
 
 def _left(text: str, history: DoorHistory) -> Doubt:
-    """Return a doubt. A CLOSE that is still on its way excuses the door. A flickering contact excuses
-    the door too, because another law covers such a contact.
+    """Return a possible breach. It is excused if a CLOSE was still on its way. It is also excused if
+    the door is soon open again, because another law covers a flickering contact.
 
-    Stamps count too, because a busy network may deliver the next state late.
+    The time until then is measured by arrival and by stamps, because a busy network may deliver the
+    next state late.
     """
     left_at, read_at = history.now, history.seen.stamped_at
 
@@ -90,7 +91,7 @@ def _holds(history: DoorHistory) -> Finding:
     if history.new is None or not history.latched or history.mode != OPEN:
         return None
     if history.often(history.reopened):
-        return "open, not open and open again within 1 s, 3 times while it is held"
+        return "while it is held, the door left OPEN and was OPEN again within 1 s, 3 times"
     return KEPT if history.mode_before == OPEN else None
 
 
@@ -99,7 +100,7 @@ def _travels(history: DoorHistory) -> Finding:
         return None
     if history.instant < INSTANT:
         return None if history.instant else KEPT
-    return f"closed, and OPEN within 0.3 s of the request, {history.instant} times in a row"
+    return f"OPEN within 0.3 s of the request to the closed door, {history.instant} times in a row"
 
 
 def _people(history: DoorHistory) -> Finding:
@@ -122,7 +123,8 @@ LAWS: Final[tuple[Law[DoorHistory], ...]] = (
     named(
         ANSWERED,
         "D1.answer",
-        reason="RMF repeats its request at each state. A state for each request would loop for ever",
+        reason="RMF repeats its request after each state. If each request caused a state, the loop"
+        " would never end",
         source=SUPERVISOR,
     ),
     named(ONE, "B0.one"),
@@ -137,9 +139,10 @@ LAWS: Final[tuple[Law[DoorHistory], ...]] = (
     ),
     Law(
         "D2.opens",
-        "OPEN opens the door: after 30 s of requests the door is no longer CLOSED",
-        "OPEN is requested of the closed door",
-        "DoorOpen has no timeout, so the robot waits for ever. OPEN is 2 in requests and states",
+        "OPEN opens the door: if OPEN is requested for 30 s, the door is no longer CLOSED",
+        "OPEN is requested while the door is closed",
+        "DoorOpen has no timeout, so the robot would wait for ever. A wrong number may be the"
+        " cause: OPEN is 2 in requests and states",
         DOOR_OPEN + "; DoorMode.msg",
         _opens,
         sensed=True,
@@ -148,7 +151,7 @@ LAWS: Final[tuple[Law[DoorHistory], ...]] = (
         "D2.stays",
         "OPEN is held until CLOSE: silence closes no door",
         "the door is OPEN for a robot, and RMF is silent for 10 s",
-        "After the door is OPEN, RMF sends nothing until the robot is through",
+        "After the door is OPEN, RMF sends nothing until the robot has passed the door",
         DOOR_OPEN + "; " + SUPERVISOR,
         _stays,
         sensed=True,
@@ -157,7 +160,7 @@ LAWS: Final[tuple[Law[DoorHistory], ...]] = (
         "D1.bypass",
         "A CLOSE on adapter_door_requests closes nothing; only the supervisor's CLOSE does",
         "a fleet adapter's CLOSE while the supervisor holds the door OPEN",
-        "One robot sends CLOSE. Only the supervisor knows whether another robot is in the doorway",
+        "When one robot sends CLOSE, only the supervisor knows whether another robot is in the doorway",
         "rmf_ros2 door_supervisor/Node.cpp; door_adapter_template",
         _bypassed,
         sensed=True,
@@ -165,7 +168,7 @@ LAWS: Final[tuple[Law[DoorHistory], ...]] = (
     Law(
         "D2.holds",
         "A door that is held stays OPEN, and does not flap",
-        "the door is OPEN for a robot for two states",
+        "two states in a row show the door OPEN for a robot",
         "A robot drives off at the first OPEN",
         DOOR_OPEN,
         _holds,
@@ -173,7 +176,8 @@ LAWS: Final[tuple[Law[DoorHistory], ...]] = (
     ),
     Law(
         "D2.people",
-        "CLOSE releases the door and never drives it shut: people keep a door that they opened",
+        "CLOSE releases the door and never drives it shut: a door that people opened stays open"
+        " for them",
         "people open the door, and RMF sends CLOSE",
         "RMF's supervisor sends CLOSE to every open door that no robot has requested",
         SUPERVISOR,
@@ -182,7 +186,7 @@ LAWS: Final[tuple[Law[DoorHistory], ...]] = (
     ),
     Law(
         "D3.travel",
-        "OPEN is what a sensor sees at the end of the travel, not what was requested",
+        "A door shows OPEN when a sensor sees it fully open, not when OPEN was requested",
         "the closed door opens for a robot",
         "A robot drives off at OPEN. A leaf that still moves would be in its way",
         DOOR_OPEN,
@@ -191,7 +195,7 @@ LAWS: Final[tuple[Law[DoorHistory], ...]] = (
     ),
     Law(
         "D3.fresh",
-        "OPEN is never a remembered state: its door_time advances",
+        "OPEN is always a new reading, never an old one: its door_time advances",
         "the door is OPEN for more than 5 s",
         "An unreachable controller may have closed the door. The node must show OFFLINE",
         "DoorState.msg, door_time",

@@ -25,20 +25,22 @@ FROZEN_S: Final = 0.05
 ANSWERS_WITHIN_S: Final = 0.1
 OFTEN_S: Final = 30.0
 EARLY_S: Final = 0.15
-"""Time (s). If a state comes early by more than this time, a timer's jitter cannot be the cause."""
+"""Limit (s) for a timer's jitter. If a state comes early by more than this time, the jitter is not the
+cause."""
 PAUSE_S: Final = 2.0
 PAUSE: Final = 1.4
-"""Number of usual gaps. A pause may be a restart if the pause lasts this many usual gaps, and at least
-PAUSE_S."""
+"""Limit for a pause, as a multiple of the usual gap between states. A longer pause may be a restart, if
+it also lasts PAUSE_S."""
 KNOWN: Final = 3
 RHYTHM: Final = 10
 TURNS: Final = 4
-"""Number of turns between two publishers within OFTEN_S. A restart of one node cannot explain so many
-turns."""
+"""Number of times within OFTEN_S that the publisher of the states changes. A restart of one node cannot
+explain so many changes."""
 STEADY_S: Final = 0.05
 UNEVEN_S: Final = 0.1
 CROSSED_S: Final = 1.0
-"""Time (s) after which a state shows the effect of a request, if the request has an effect."""
+"""Time (s) from a request until a state must show the request's effect. After this time without a
+change, the request has had no effect."""
 TESTED_S: Final = 5.0
 SILENCES: Final = 5
 
@@ -50,7 +52,8 @@ V = TypeVar("V")
 
 
 def keep(known: dict[str, V], key: str, value: V, most: int = REMEMBERED) -> None:
-    """Put an entry last. If there are more than `most` entries, forget the oldest entry."""
+    """Put an entry at the end of `known`. If there are more than `most` entries, forget the oldest
+    entry."""
     known.pop(key, None)
     known[key] = value
     if len(known) > most:
@@ -65,9 +68,10 @@ class AnyHistory(ABC):
     - `states`: number of states; for an adapter, number of its requests.
     - `senders`: the publishers on the topic of the states; empty for a recording.
     - `others`: names of other devices of the same kind.
-    - `network_s`: how long (s) the whole network was silent after the previous state. Silence counts
-      only after another device was heard.
-    - `silences`: the first SILENCES such silences, each with its beginning (wall clock) and length (s).
+    - `network_s`: how long (s) the whole network was silent after the previous state. A silence counts
+      only if another device was heard shortly before it.
+    - `silences`: the first SILENCES silences of the network that lasted longer than SLOWEST_S. Each has
+      its beginning (wall clock) and its length (s).
     - `burst_s`: duration (s) of the latest BURST unchanged states.
     """
 
@@ -86,8 +90,8 @@ class AnyHistory(ABC):
 
     @abstractmethod
     def take(self, heard: Heard, own: bool = False) -> bool:
-        """Take a message. `own` tells whether the judge sent the message. Return False if no law needs
-        a check."""
+        """Take a message. `own` tells whether the judge sent the message. Return whether the laws have
+        to be checked now."""
 
     @property
     def state(self) -> words.Stated | None:
@@ -96,7 +100,8 @@ class AnyHistory(ABC):
 
     @abstractmethod
     def checked(self) -> None:
-        """Note that the laws have read the latest message."""
+        """Forget what lasts only until the next check, because the laws have checked the latest
+        message."""
 
     def pass_time(self, now: float, wall: float) -> None:
         """Note that time has passed without a message."""
@@ -112,11 +117,11 @@ class AnyHistory(ABC):
             self._any_at = heard.at
 
     def _end_silence(self, now: float, wall: float) -> None:
-        """Note a silence of the network. In such a silence no device is heard, although other devices
-        were heard before."""
+        """If the whole network was silent until now, add the silence to `network_s` and `silences`. A
+        silence counts only if other devices were heard shortly before it."""
         silent_s = now - self._any_at
         if silent_s > PAUSE_S and self._any_at - self._other_at <= SLOWEST_S:
-            self.network_s += silent_s - PAUSE_S  # even a sound network may pause for PAUSE_S
+            self.network_s += silent_s - PAUSE_S  # a healthy network may pause for PAUSE_S
             if silent_s > SLOWEST_S:
                 self.silences = [*self.silences, (wall - silent_s, silent_s)][:SILENCES]
 
@@ -129,9 +134,9 @@ class History(AnyHistory, Generic[T]):
       the node may have restarted.
     - `since`: the time at which `before` was last None.
     - `frozen_s`: how long (s) the states have shown the same stamp.
-    - `claimed_s`: how long (s) every state has had a claim on which a robot acts (see `claims`).
+    - `claimed_s`: for how long (s) a robot would have acted on every state (see `claims`).
     - `asked_last`: time of the latest request.
-    - `turns`: times at which two publishers took turns.
+    - `turns`: times at which a state came from another publisher than the state before.
     """
 
     observes: ClassVar[type[AnyDevice]]
@@ -153,8 +158,8 @@ class History(AnyHistory, Generic[T]):
         self.turns: deque[float] = deque(maxlen=TURNS)
 
     def take(self, heard: Heard, own: bool = False) -> bool:
-        """Take a message. `own` tells whether the judge sent the message. Return False for a message
-        about another device, which needs no check."""
+        """Take a message. `own` tells whether the judge sent the message. Return False if no check is
+        needed, for example after a message about another device."""
         self._begin(heard, own)
         message = heard.message
         if not isinstance(message, StatedOrRequested):
@@ -174,7 +179,8 @@ class History(AnyHistory, Generic[T]):
         return self.take_other(heard)
 
     def _published_by(self, heard: Heard) -> None:
-        """Note the state's publisher. If two publishers have taken turns, note the time."""
+        """Note the state's publisher. If another publisher sent the state before, and both still
+        publish, note the time in `turns`."""
         moment, before = Moment(heard.at, heard.wall), self._sender
         self.seen.published_by(heard.sender, moment)
         self._sender = heard.sender
@@ -187,16 +193,16 @@ class History(AnyHistory, Generic[T]):
 
     @abstractmethod
     def settle(self, state: T) -> None:
-        """Update the memory of this kind of device with the new state. `before` and `state` already
-        have their new values."""
+        """Note what a history of this kind of device needs from the new state. `before` and `state`
+        already have their new values."""
 
     @staticmethod
     @abstractmethod
     def claims(state: Any) -> bool:
-        """Return whether a robot would act on this state."""
+        """Return whether the state claims something on which a robot would act."""
 
     def forget(self) -> None:
-        """Forget the requests that may have ended during a silence."""
+        """Forget requests after a pause, because the node may have restarted."""
 
     def often(self, times: deque[float]) -> bool:
         """Return whether `times` is full, and all its times are within OFTEN_S."""
@@ -223,22 +229,23 @@ class History(AnyHistory, Generic[T]):
 
     @property
     def tested(self) -> int:
-        """How many of the latest 8 requests were followed by an unchanged state."""
+        """Number of requests, out of the latest 8, that an unchanged state has followed."""
         return len(self._answers)
 
     @property
     def answers(self) -> int:
-        """How many of the latest 8 requests were followed immediately by a state that was not due.
+        """Number of requests, out of the latest 8, that a state has followed immediately, although no
+        state was due.
 
-        A loaded machine sends messages in bunches, but sends no more states than usual. Therefore no
-        state counts as an answer if states come at the usual pace.
+        A loaded machine sends messages in bunches, but sends no more states than usual. Therefore the
+        result is 0 if states come at the usual pace.
         """
         pace_s = sum(gap_s for _, gap_s in self._answers) / max(1, self.tested)
         return sum(early for early, _ in self._answers) if pace_s < self._early_s else 0
 
     @property
     def has_rhythm(self) -> bool:
-        """Return whether states have come for long enough to show their rhythm and their publishers."""
+        """Return whether enough states have come to judge their pace and to find their publishers."""
         return len(self._gaps) == RHYTHM
 
     @property
@@ -251,7 +258,8 @@ class History(AnyHistory, Generic[T]):
         return self.has_rhythm and steady and uneven
 
     def was_tested(self, at: float) -> bool:
-        """Return whether later states have had enough time to show the effect of a request at `at`."""
+        """Return whether a request at time `at` was recent, and later states have had time to show its
+        effect."""
         return CROSSED_S < self.now - at < TESTED_S
 
     @property
@@ -272,15 +280,15 @@ class History(AnyHistory, Generic[T]):
         return True
 
     def checked(self) -> None:
-        """Begin the next gap, because the laws have read the present gap."""
+        """Forget the network's silence, because the laws have checked the gap before this state."""
         if self.new is not None:
             self.network_s = 0.0
 
     def _paused(self, stamped_before: float) -> bool:
         """Return whether there was a pause that is long enough for a restart.
 
-        After a pause, a network may deliver several states together. All these states belong to the
-        same pause.
+        After a pause, a network may deliver several delayed states together. For all these states the
+        result is True.
         """
         gap_s, step_s = self.seen.gap_s, self.seen.stamped_at - stamped_before
         known = len(self._quiet) >= KNOWN
@@ -301,8 +309,8 @@ class History(AnyHistory, Generic[T]):
         self.claimed_s = self.now - self._claims_since
 
     def _look_at_pace(self, state: T, earlier: float) -> None:
-        """Note the pace of unchanged states. A node sends unchanged states at its own rate, and never
-        as the answer to a request."""
+        """Note how fast unchanged states come. A correct node sends unchanged states at its own rate,
+        and never as the answer to a request."""
         self._gaps.append(self.seen.gap_s)
         quiet_since, self._quiet_since = self._quiet_since, earlier
         if self.before is None or _content(state) != _content(self.before):

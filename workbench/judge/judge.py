@@ -50,8 +50,7 @@ SCENES: Final[Mapping[JudgedKind, Callable[[str], AnyHistory]]] = MappingProxyTy
     }
 )
 MUTE_S: Final = 10.0
-"""Time (s) without a state after which a publisher counts as mute. RMF also calls such a publisher
-mute."""
+"""Time (s) without a state after which a publisher counts as mute. RMF uses the same time."""
 SHOWN: Final = 3
 """Maximum number of breaches that a law keeps as evidence."""
 
@@ -59,7 +58,7 @@ SHOWN: Final = 3
 @dataclass
 class _Tally:
     """The score of one law. `doubt` is a possible breach with its evidence. A later message may still
-    excuse the doubt."""
+    show that it was no breach."""
 
     law: Law[Any]
     kept: int = 0
@@ -81,7 +80,7 @@ class _Tally:
 
 
 class Judge:
-    """A judge of one device, in limited memory. The judge knows the device by its name in RMF.
+    """A judge of one device. Its memory is limited. `name` is the device's name in RMF.
 
     - `only`: the ids of the laws to check; empty means all laws of the kind.
     - `broken`: whether the device has broken a law of `only`.
@@ -110,8 +109,9 @@ class Judge:
     def alarm_ends(
         self, names: Collection[str], retaining: Collection[str], at: float, wall: float
     ) -> None:
-        """Take the nodes that publish alarms, and those among them that retain their messages. Only a
-        repeated finding counts, because publishers are discovered one by one."""
+        """Tell the judge which nodes publish alarms (`names`), and which of them retain their messages
+        (`retaining`). The judge believes only what two calls in a row tell, because publishers are
+        discovered one by one."""
         history = self.history
         if not isinstance(history, AlarmHistory | LiftHistory):
             return
@@ -125,7 +125,8 @@ class Judge:
                 self._check(tally, at, wall)
 
     def end(self, at: float, wall: float, heard_s: float = 0.0) -> tuple[JudgedLaw, ...]:
-        """End the judgement after `heard_s`. Return each law with its verdict, in the laws' order."""
+        """End the judgement. `heard_s` is for how long (s) the judge has listened. Return each law with
+        its verdict, in the laws' order."""
         self.history.pass_time(at, wall)
         mute = heard_s > MUTE_S and len(self.history.senders) > len(self.history.others)
         if self.history.states or mute:

@@ -1,5 +1,5 @@
-"""Run a judgement. Listen, perform a play, release the device, and give the verdict. A play needs a
-user who asks for it, and a device that allows it.
+"""Run a judgement: listen, perform a play (a series of test messages), release the device, and give the
+verdict. The play is performed only if the user asks for it, and if the device is free.
 
 This module has no I/O and no clock, so a judgement is the same on a wire and in virtual time. The
 caller passes messages in, publishes the returned messages, and calls `turn` at `wake_at`.
@@ -39,7 +39,7 @@ class JudgeRun:
 
     - `for_s`: time (s) of listening without a play; inf means until `stop`.
     - `strangers()`: names of other publishers on the play's topics; "" if there are none.
-    - `note`: why a play was not performed, or did not reach its end.
+    - `note`: why a play was not performed, or why it was not completed.
     """
 
     def __init__(
@@ -85,12 +85,14 @@ class JudgeRun:
         if self.act is not Act.PLAY:
             return []
         if self.judge.history.burst_s < BURST_WITHIN_S:
-            self.note = "stopped: each request causes a state, and RMF asks at each state"
+            self.note = (
+                "stopped: each request causes a state, and RMF sends a request after each state"
+            )
             return self._begin_leaving()
         return self._told(said)
 
     def turn(self, at: float, wall: float) -> list[Said]:
-        """Do everything whose time has come. Return messages to publish."""
+        """Do everything that is due at time `at`. Return messages to publish."""
         self._last = (at, wall)
         match self.act:
             case Act.LISTEN if at >= self._until:
@@ -110,8 +112,7 @@ class JudgeRun:
         return NEVER if self.act is Act.DONE else self._until
 
     def stop(self) -> list[Said]:
-        """End early. If we have the device, release the device first. A caller may call `stop`
-        again."""
+        """End early. If a play is running, release the device first. A caller may call `stop` again."""
         if self.act is Act.PLAY:
             self.note, self._in_haste = "interrupted", True
             return self._begin_leaving()
@@ -163,7 +164,7 @@ class JudgeRun:
         late = self._last[0] >= self._leave_until
         if self._scenario.left or late:
             if not self._scenario.left:
-                self.note = f"{self.note or 'played'}; and the device was not released".lstrip("; ")
+                self.note = f"{self.note or 'played'}; the device was not released".lstrip("; ")
             self._settle()
             return []
         self._until = self._last[0] + REPEAT_S

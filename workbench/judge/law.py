@@ -1,4 +1,4 @@
-"""Laws, and a judge's findings. A law is kept, broken, or not seen."""
+"""Laws, and what a judge finds about each law. A law is kept, broken, or not seen."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,10 +25,11 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Doubt:
-    """A possible breach of a law. A message that is still on its way may explain the breach.
+    """A possible breach of a law. A message that is still on its way may show that there was no breach.
 
     Topics have no common order on a wire. For example, a lift's state may be heard before the END that
-    caused the state. The judge calls `excused()` at each message, for `leeway_s`.
+    caused the state. Therefore the judge calls `excused()` after each message, until `leeway_s` has
+    passed.
     """
 
     text: str
@@ -37,8 +38,8 @@ class Doubt:
 
 
 Finding = str | Doubt | None
-"""A law's finding about the latest message: a breach as text, a doubt, KEPT, or None. None means that
-the message gave no occasion to break the law."""
+"""The result of a law's check of the latest message: a breach as text, a doubt, KEPT, or None. None
+means that the message tells nothing about this law."""
 KEPT: Final = ""
 
 
@@ -46,11 +47,12 @@ KEPT: Final = ""
 class Law(Generic[S_contra]):
     """One sentence of RMF's contract, and a check after each message.
 
-    - `occasion`: the event at which a wrong node would break the law. Without such an event, the
+    - `occasion`: the event at which a faulty node would break the law. Without such an event, the
       verdict is "not seen".
     - `source`: the reference.
     - `check(history)`: a pure function of the messages heard.
-    - `sensed`: whether a stuck or noisy wire at a correct node can break the law too.
+    - `sensed`: whether a correct node may seem to break the law, because an input wire is stuck or
+      noisy.
     """
 
     id: str

@@ -10,15 +10,16 @@ from workbench.judge.law import KEPT, Doubt, Finding, shown
 from workbench.judge.lift_history import ASKED_S, GRACE_S, LATE_S, LiftHistory, moves
 
 ENDS_WITHIN_S: Final = 3.0
-"""Maximum time (s) until an END takes effect, which is a state period of 2 s and one scan."""
+"""Maximum time (s) until an END takes effect. It allows one state period of 2 s, and one scan of the
+inputs."""
 GRANTS_WITHIN_S: Final = 30.0
 GRANT_ASKED: Final = 10
 JUMPS_WITHIN_S: Final = 1.5
 REFUSED: Final = 3
 FOREIGN_S: Final = 2.0
 SUPERVISED_S: Final = 10.0
-"""Time (s) without a request on lift_requests. After this time, the supervisor may be dead, or the
-recording may lack the supervisor."""
+"""Time (s) without a request on lift_requests after which no supervisor is assumed. The supervisor may
+be dead, or may be missing in the recording."""
 SETTLED_S: Final = 3.0
 """Time (s) after a node's first state in which the node may still obey requests that we have not
 heard."""
@@ -60,7 +61,7 @@ def other_lift(history: LiftHistory) -> Finding:
     if session in ("", history.session_before) or session not in history.elsewhere:
         return None
     return Doubt(
-        f"held by {shown(session)}, which only asked for another lift",
+        f"held by {shown(session)}, which asked only for another lift",
         lambda: session in history.asks,
     )
 
@@ -82,9 +83,10 @@ def own_name(history: LiftHistory) -> Finding:
 
 
 def grants(history: LiftHistory) -> Finding:
-    """Check that a free lift in service grants the first request for it.
+    """Check that a lift that is free and in service grants the first request.
 
-    After a ride, the node may keep the lift for GRACE_S, because the robot may still be in the car.
+    After a ride, the node may refuse other robots for GRACE_S, because the last robot may still be in
+    the car.
     """
     if history.new is None or history.before is None:
         return None
@@ -105,8 +107,8 @@ def grants(history: LiftHistory) -> Finding:
 
 
 def bypassed(history: LiftHistory) -> Finding:
-    """Check that a fleet adapter's request to the supervisor grants nothing. Only the supervisor may
-    act on this request."""
+    """Check that a fleet adapter's request alone gets no session. Only the supervisor may act on this
+    request."""
     session = history.session
     supervised = history.now - history.direct_at <= SUPERVISED_S
     if history.new is None or history.before is None or not supervised:
@@ -126,12 +128,12 @@ def bypassed(history: LiftHistory) -> Finding:
         later = history.asks.get(session)
         return later is not None and later.direct
 
-    text = f"held by {shown(session)}, for which the supervisor has not asked"
+    text = f"held by {shown(session)}, for which the supervisor has sent no request"
     return Doubt(text, excused)
 
 
 def ended_unasked(history: LiftHistory) -> Finding:
-    """Check that a session ends only at its own END."""
+    """Check that a session ends only after an END for this session."""
     old, new, since = history.session_before, history.session, history.held_since
     if history.new is None or history.before is None or not old:
         return None
@@ -149,12 +151,12 @@ def ended_unasked(history: LiftHistory) -> Finding:
     def excused() -> bool:
         return history.has_ended(old, since) or bool(_foreign_end(history, old, since))
 
-    return Doubt(f"{what}, and no END_SESSION for it was heard", excused)
+    return Doubt(f"{what}, and no END_SESSION for this session was heard", excused)
 
 
 def _foreign_end(history: LiftHistory, session: str, since: float) -> str:
-    """Return the other session whose END has come a moment ago, during this session. Return "" if there
-    is no such session."""
+    """Return the other session whose END came a moment ago, while this session held the lift. Return ""
+    if there is no such session."""
     if history.has_ended(session, since):
         return ""
     others = ((who, at) for who, at in history.ended.items() if who not in ("", session))
@@ -163,7 +165,7 @@ def _foreign_end(history: LiftHistory, session: str, since: float) -> str:
 
 
 def ended_by_another(history: LiftHistory) -> Finding:
-    """Check that the END of a session without the lift changes nothing."""
+    """Check that an END for a session that does not hold the lift changes nothing."""
     old = history.session_before
     if history.new is None or history.before is None or not old:
         return None
@@ -178,11 +180,15 @@ def ended_by_another(history: LiftHistory) -> Finding:
 
 
 def ends(history: LiftHistory) -> Finding:
-    """Check that the holder's END ends the session, whatever floor and door the request has."""
+    """Check that an END for the holder ends the session, whether or not the END names a floor and a
+    door."""
     if history.new is None:
         return None
     if history.bare_refused >= REFUSED:
-        return f"{REFUSED} sessions in a row outlived an END without a floor, as fleet adapters send it"
+        return (
+            f"{REFUSED} sessions in a row did not end after an END without a floor, which fleet"
+            " adapters send"
+        )
     if history.session_before and history.session != history.session_before:
         return KEPT if history.bare_end else None
     at = history.ending.at
@@ -220,7 +226,8 @@ def no_jump(history: LiftHistory) -> Finding:
 
 
 def in_agv(history: LiftHistory) -> Finding:
-    """Check that the door opens for a boarding robot only if the car is closed to the public."""
+    """Check that the door opens for a boarding robot only in AGV mode, when people cannot call the
+    car."""
     state = history.new
     if state is None or not (history.offers and history.offered):
         return None
@@ -230,12 +237,12 @@ def in_agv(history: LiftHistory) -> Finding:
 
 
 def holds(history: LiftHistory) -> Finding:
-    """Check that the door stays open for the robot."""
+    """Check that the door does not close and open again and again while the robot's floor is served."""
     state = _is_open(history)
     if state is None or not state.session_id or not history.was_asked_to(state.current_floor):
         return None
     if history.often(history.reopened):
-        return "open, not open and open again within 1 s, 3 times in one stop"
+        return "the door left OPEN and was OPEN again within 1 s, 3 times during one stop"
     stays = history.before is not None and history.claims(history.before)
     return KEPT if stays and history.session == history.session_before else None
 
@@ -308,19 +315,25 @@ def grants_nothing(history: LiftHistory) -> Finding:
 
 
 def no_false(history: LiftHistory) -> Finding:
-    """Check that the lift's node publishes `false` only after an alarm."""
+    """Check that the lift's node publishes the end of an alarm (`false`) only after an alarm
+    (`true`)."""
     if not isinstance(history.news, d.Bool) or history.others:
         return None
     if history.often(history.false_alarms):
-        return "`false` 3 times, with no alarm to call off"
+        return "it sent `false` 3 times without an alarm before"
     return KEPT if history.called_off else None
 
 
 def retained(history: LiftHistory) -> Finding:
-    """Check that fleet adapters can hear the alarm."""
+    """Check that the alarm's publisher is TRANSIENT_LOCAL. Fleet adapters receive nothing from a
+    volatile publisher."""
     if history.volatile is None:
         return None
-    return "its publisher is volatile: fleet adapters do not match it" if history.volatile else KEPT
+    return (
+        "its publisher is volatile, so fleet adapters do not receive its messages"
+        if history.volatile
+        else KEPT
+    )
 
 
 def blind(state: d.LiftState) -> bool:

@@ -12,31 +12,34 @@ from bridges.observe.limits import SLOWEST_S
 from workbench.judge.history import NOT_YET, History, keep
 
 GRACE_S: Final = 65.0
-"""Time (s) in which an ended session may resume, because its robot may still be in the car."""
+"""Time (s) after a session's end in which the same session may get the lift again at once. Its robot
+may still be in the car."""
 LATE_S: Final = 5.0
 """Maximum time (s) from an END to a late state that shows the ended session for the first time."""
 FLOORS: Final = 8
 OURS_S: Final = 2.0
-"""Time (s) after a session's end. If we send an END in this time, our END did not cause the session's
-end."""
+"""Time (s) after a session's end in which an END of our own does not count as that session's END. It
+came too late to cause the end."""
 ASKED_S: Final = 10.0
-"""Time (s) after which a floor counts as given up. An adapter repeats a request at each state."""
+"""Time (s) without a request for a floor after which the robot counts as not wanting this floor any
+more. An adapter repeats a request after each state."""
 AT_ONCE_S: Final = 0.3
-"""Time (s) that is longer than a scan. The time is also longer than the way of a state and a request on
-the wire."""
+"""Time (s) that counts as immediately. It is longer than a scan of the inputs plus the transport of a
+state and a request."""
 REOPENS_WITHIN_S: Final = 1.0
 END: Final = d.LiftRequestType.REQUEST_END_SESSION
 
 
 @dataclass
 class Ask:
-    """The requests of one session after `first_at`.
+    """The requests of one session after `first_at`. A series of requests ends with an END or a long
+    gap.
 
     - `floors`: floor -> time of the last request.
     - `direct`: whether a request was heard on lift_requests.
     - `direct_at`: time of the latest request on lift_requests.
-    - `times`: number of requests on lift_requests in the present row without a gap.
-    - `since`: the time at which this row began.
+    - `times`: number of requests on lift_requests in the present series.
+    - `since`: the time at which this series began.
     - `human`: whether the session requested HUMAN mode.
     """
 
@@ -56,14 +59,14 @@ class Ask:
 
 @dataclass
 class Ending:
-    """Times of the present session's ENDs on lift_requests.
-
-    - `at`: the first END.
-    - `bare_at`: the first END without a floor.
-    - `floor_at`: the first END with a floor.
+    """Times of the ENDs for the present session on lift_requests.
 
     RMF's supervisor first sends an END without a floor. If the lift still shows the session, the
     supervisor sends an END with a floor.
+
+    - `at`: the first END.
+    - `bare_at`: the first END, if it has no floor.
+    - `floor_at`: the first END with a floor.
     """
 
     at: float = NOT_YET
@@ -74,31 +77,33 @@ class Ending:
 class LiftHistory(History[d.LiftState]):
     """The history of one lift. The present session is the session that the latest state shows.
 
-    - `asks`: the requests for this lift.
-    - `elsewhere`: the requests for other lifts.
+    - `asks`: session -> its requests for this lift.
+    - `elsewhere`: session -> time of its last request for another lift.
     - `ended`: session -> its last END.
     - `granted_at`: when a state first showed the present session.
     - `held_since`: when a state first showed the previous session.
     - `known`: whether the beginning of the present session was seen.
-    - `last`: the previous session.
-    - `last_at`: the end of the previous session.
-    - `offered`: whether a state has shown the present session OPEN at its destination.
-    - `offers`: whether OPEN is shown before `offered` is true.
+    - `last`: the last session that has ended.
+    - `last_at`: the end of that session.
+    - `offered`: whether an earlier state has shown the door OPEN for this session at its destination.
+    - `offers`: whether the latest state shows the door OPEN while `offered` was still false.
     - `ending`: the ENDs of the present session.
-    - `bare_refused`: number of sessions in a row that outlived an END without a floor, and ended at an
-      END with a floor.
-    - `reopened`: times at which the door reopened immediately, in one stop.
+    - `bare_refused`: number of sessions in a row that did not end after an END without a floor, but
+      then ended after an END with a floor.
+    - `reopened`: times at which the door opened again immediately, during one stop at a floor.
     - `open_seen`: floor and time of the last OPEN at another floor.
-    - `direct_at`: time of the last request on lift_requests by another session, for any lift.
-    - `rival_at`: time of the last request on lift_requests by another session, for this lift.
-    - `foreign_end_at`: time of the last END of another session.
-    - `unserved_at`: time of the last request for an unserved floor, by the holder or for a free lift.
+    - `direct_at`: when another session last sent a request on lift_requests, for any lift.
+    - `rival_at`: when another session last sent a request on lift_requests for this lift, while it was
+      held.
+    - `foreign_end_at`: time of the last END for a session that did not hold the lift.
+    - `unserved_at`: time of the last request for a floor that the lift does not serve. The holder sent
+      the request, or the lift was free.
     - `travelled`: whether the car has moved in this session.
-    - `bare_end`: whether the previous session ended at an END without a floor.
-    - `free_since`: the beginning of the present time without session and hazard.
+    - `bare_end`: whether the previous session ended after an END without a floor.
+    - `free_since`: since when there has been neither a session nor a hazard.
     - `false_alarms`: times of needless `false` messages on the fire topic.
-    - `called_off`: the latest message on the fire topic ended an alarm.
-    - `volatile`: the fire topic's publisher retains nothing; None if unknown.
+    - `called_off`: whether the latest message on the fire topic ended an alarm.
+    - `volatile`: whether the fire topic's publisher retains nothing; None if unknown.
     """
 
     seen: ObservedLift
@@ -137,12 +142,13 @@ class LiftHistory(History[d.LiftState]):
         return self.before.session_id if self.before else ""
 
     def has_ended(self, session: str, since: float) -> bool:
-        """Return whether an END for this session has come after `since`."""
+        """Return whether an END for this session has come after `since`, or at most LATE_S before
+        it."""
         return self.ended.get(session, NOT_YET) > since - LATE_S
 
     def was_asked_to(self, floor: str, within_s: float = float("inf")) -> bool:
-        """Return whether the present session requested this floor in its last request or within
-        `within_s`."""
+        """Return whether the present session requested this floor. Only its last request counts, and
+        requests that came less than `within_s` ago."""
         ask = self.asks.get(self.session)
         if ask is None or floor not in ask.floors:
             return False
@@ -170,7 +176,8 @@ class LiftHistory(History[d.LiftState]):
         return True
 
     def forget(self) -> None:
-        """Forget the requests and sessions that may have ended during a silence."""
+        """Forget what the judge knows of the present session after a pause, because the node may have
+        restarted."""
         self.known = False
         if self.seen.before is not None and self.seen.before.session_id:
             self.last = self.seen.before.session_id
@@ -180,7 +187,7 @@ class LiftHistory(History[d.LiftState]):
         self.open_seen = self._open = ("", NOT_YET)
 
     def settle(self, state: d.LiftState) -> None:
-        """Note the session and the door. Note whether a state has shown OPEN for this session."""
+        """Note changes of the session and of the door. Update `offers` and `offered`."""
         if self.before is not None and self.session != self.session_before:
             self._changed_hands(state)
         if self.session or state.current_mode in HAZARDS:
@@ -196,7 +203,7 @@ class LiftHistory(History[d.LiftState]):
 
     @staticmethod
     def claims(state: d.LiftState) -> bool:
-        """Return whether the door is OPEN."""
+        """Return whether a robot would act on this state, because the door is OPEN."""
         return state.door_state == d.LiftDoor.DOOR_OPEN
 
     def _wanted(self) -> tuple[str, ...]:
@@ -216,8 +223,8 @@ class LiftHistory(History[d.LiftState]):
         self.reopened.clear()
 
     def _count_bare(self, before: str) -> None:
-        """Count whether the session ended at an END without a floor, or only later at an END with a
-        floor."""
+        """Update `bare_refused` when a session has ended. It counts sessions that ignored an END
+        without a floor."""
         ending = self.ending
         if not before or ending.bare_at == NOT_YET:
             return
@@ -273,7 +280,8 @@ class LiftHistory(History[d.LiftState]):
             self.reopened.clear()
 
     def _hear_direct(self, request: d.LiftRequest) -> None:
-        """Note requests on lift_requests that must not change the present session."""
+        """Note a request on lift_requests that tests the laws. The request comes from another session,
+        or is for a floor that the lift does not serve."""
         here, holds = request.lift_name == self.name, request.session_id == self.session
         served = self.state.available_floors if self.state else ()
         if not holds:
@@ -284,7 +292,7 @@ class LiftHistory(History[d.LiftState]):
             self.unserved_at = self.now if unserved else self.unserved_at
 
     def _alarm(self, on: bool, sender: Sender | None) -> bool:
-        """Take a message of this lift's node, or of an unknown node."""
+        """Take a message on the fire topic, if this lift's node or an unknown node sent it."""
         if sender and self._sender and sender.node != self._sender.node:
             return False
         self.called_off = self.alarmed and not on

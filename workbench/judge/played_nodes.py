@@ -1,10 +1,10 @@
-"""RMF's nodes as the judge plays them for one device: fleet adapters with their robots, and the
-supervisor.
+"""Copies of RMF's nodes, with which the judge tests one device: fleet adapters with their robots, and
+the supervisor.
 
-The played nodes follow RMF's rules (`workbench/rmf_model/`), without I/O and clock. The played
-supervisor does not get the states of other devices, because it would end the sessions of these devices.
-If the graph already has a supervisor, the judge plays only fleet adapters. Their requests go through
-that supervisor.
+The copies follow RMF's rules (`workbench/rmf_model/`), without I/O and clock. The judge hides the
+states of all other devices from its supervisor. Otherwise this supervisor would end the sessions of
+those devices. If the graph already has a supervisor, the judge plays only fleet adapters. Their
+requests go through that supervisor.
 """
 
 from collections import deque
@@ -19,14 +19,14 @@ from workbench.rmf_model.robot import Phase, RobotContext
 DEAF_S: Final = 6.0
 """Time (s) for which the played supervisor is silent after an END without a floor.
 
-RMF's supervisor would immediately send an END with a floor. That second END would hide that the lift
-refused the first END.
+Otherwise the supervisor, like RMF's, would immediately send an END with a floor. Then nobody would see
+that the lift refused the first END.
 """
 RETAINED: Final = topics.ADAPTER_LIFT_REQUESTS.publish.depth
 
 Step = Phase | float
 Script = Callable[[RobotContext], Iterator[Step]]
-"""A robot's steps. Each step is a phase, or a drive's duration (s)."""
+"""A robot's steps. Each step is a phase, or the time (s) that the robot drives."""
 
 
 class Traveller:
@@ -68,10 +68,10 @@ class Traveller:
 
 
 class PlayedNodes:
-    """One scenario for one device. `now` is RMF's clock (s since the epoch).
+    """One scenario for one device. `now` is the time by RMF's clock (s since the epoch).
 
     - `supervisor`: a function that makes a new supervisor; None if the graph has a supervisor.
-    - `over`: whether every step is done, or `failed` gives a reason.
+    - `failed`: why the scenario was ended early, or "".
 
     Methods return messages. The caller publishes and judges these messages.
     """
@@ -94,7 +94,7 @@ class PlayedNodes:
 
     @property
     def over(self) -> bool:
-        """Return whether there is nothing more to play."""
+        """Return whether every robot has done its steps, or the scenario has failed."""
         return bool(self.failed) or all(traveller.done for traveller in self.travellers)
 
     @property
@@ -128,8 +128,8 @@ class PlayedNodes:
         return min([*(t.wake_at() for t in self.travellers), *waits])
 
     def restart_supervisor(self, now: float) -> list[Said]:
-        """Replace the played supervisor. The new supervisor hears the retained messages of each fleet
-        adapter, one adapter after another."""
+        """Replace the played supervisor by a new one. Give the new supervisor the retained messages,
+        sorted by robot."""
         if self._makes is None:
             return []
         self._supervisor = self._makes()
@@ -139,8 +139,8 @@ class PlayedNodes:
         return said
 
     def deafen(self, until: float) -> None:
-        """Pass no states to the played supervisor before `until`. With states, the supervisor would
-        repair a wrong node's error."""
+        """Hide all states from the played supervisor until `until`. Otherwise the supervisor would
+        repair the error of a faulty node."""
         self._deaf_until = until
 
     def _go_on(self, now: float) -> list[Said]:

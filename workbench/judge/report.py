@@ -1,4 +1,4 @@
-"""Format the verdict for people, programs and CI servers."""
+"""Format a judge's verdict for people, programs and CI servers."""
 
 from dataclasses import dataclass
 from datetime import datetime
@@ -67,7 +67,8 @@ def text(report: Judgement, width: int) -> str:
         for judged in report.of(verdict):
             lines += _lines(judged, max(width, NARROWEST))
     quiet = [
-        f"{_time(wall)}  nobody on the network was heard for {silent_s:.0f} s: not counted"
+        f"{_time(wall)}  nobody on the network was heard for {silent_s:.0f} s, which counts as no"
+        " breach"
         for wall, silent_s in report.silences
     ]
     return "\n".join([*lines, *(f"\n{note}" for note in (*quiet, *report.notes))])
@@ -109,7 +110,7 @@ def _others(report: Judgement) -> str:
     if not report.others:
         return (
             ": check the name, the domain and the network. States that are published BEST_EFFORT are"
-            " not heard, nor does RMF on Cyclone DDS hear them"
+            " not heard. RMF on Cyclone DDS does not hear such states either"
         )
     some = ", ".join(shown(other) for other in report.others[:OTHERS])
     more = len(report.others) - OTHERS

@@ -1,5 +1,5 @@
-"""Plays for a lift and for a door. Each play has conditions, a course, and the release of the
-device."""
+"""Plays (series of test messages) for a lift and for a door. Each play checks that it may begin, sends
+its messages, and releases the device."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
@@ -20,11 +20,11 @@ from workbench.rmf_model.supervisors import DoorSupervisor, LiftSupervisor
 FLEET: Final = "rmf_bridge_judge"
 DRIVES_S: Final = 6.0
 DOORWAY_S: Final = 12.0
-"""Time (s) for which the robot stands in the doorway. A node that closes a door because of silence
-waits for a shorter time."""
+"""Time (s) for which the robot stands in the doorway. A faulty node that closes a door because of
+silence does so within this time."""
 SHOWS_S: Final = 4.0
-"""Time (s) to wait after a message that must have no effect. Within this time, a wrong node would show
-an effect."""
+"""Time (s) to wait after a message that must have no effect. A faulty node would show an effect within
+this time."""
 STRANGER: Final = f"{FLEET}/nobody"
 BYPASSER: Final = f"{FLEET}/robot_without_supervisor"
 NOWHERE: Final = f"{FLEET} nowhere"
@@ -37,7 +37,7 @@ MOST_FLOORS: Final = 20
 
 
 def busy(state: words.Stated) -> str:
-    """Return the reason why nobody may move the device now. Return "" if the device is idle."""
+    """Return the reason why a play must not use the device now. Return "" if the device is idle."""
     match state:
         case d.LiftState():
             idle = not state.session_id and state.current_mode not in HAZARDS
@@ -51,12 +51,13 @@ def busy(state: words.Stated) -> str:
 
 
 class Scenario(ABC):
-    """A play, its topics, and its end.
+    """A play for one device.
 
     - `speaks`: the topics on which we publish.
     - `sole`: topics that must have no other publisher, because two supervisors would spoil the test.
 
-    After every end of a play, the caller calls `leave` every REPEAT_S (s), until `left` is true.
+    When a play has ended, for whatever reason, the caller calls `leave` every REPEAT_S (s). The caller
+    stops when `left` is true.
     """
 
     speaks: tuple[AnyTopic, ...]
@@ -72,7 +73,7 @@ class Scenario(ABC):
 
     @property
     def why(self) -> str:
-        """The reason why the play did not reach its end; "" if the play did."""
+        """The reason why the play was not completed; "" if it was completed."""
         return self.failed or self.play.failed
 
     def unfit(self, state: words.Stated) -> str:
@@ -88,7 +89,7 @@ class Scenario(ABC):
         return self.play.hear(topic, message, now)
 
     def _disturb(self, now: float) -> list[Said]:
-        """Send the disturbing messages that belong between two states."""
+        """Send the disturbing message that is due after the present state, if there is one."""
         disturbs, self._disturbs = self._disturbs, None
         return disturbs(now) if disturbs else []
 
@@ -111,12 +112,14 @@ class Scenario(ABC):
 
 
 class RideScenario(Scenario):
-    """Robots ride from one floor to another, and every second robot rides back.
+    """A play in which robots ride from one floor to another. Every second robot rides in the other
+    direction.
 
     `through` tells whether a supervisor is on the graph. `restarts` tells whether the played supervisor
-    restarts with a robot in the car.
+    restarts while a robot is in the car.
 
-    Without `through`, more messages give a wrong node an occasion to break each law about sessions.
+    Without `through`, the play also sends messages that tempt a faulty node to break a law about
+    sessions.
 
     - Before the ride: a request for another lift, and a request that no supervisor forwards.
     - During the first robot's session: an END of another session in rmf-web's form, a request of that
@@ -173,8 +176,8 @@ class RideScenario(Scenario):
         yield EndLiftSession(self.lift)
 
     def _ask_aside(self, floor: str, first: bool) -> Iterator[Step]:
-        """Request another lift. Then request this lift without the supervisor. Meanwhile, the other
-        robots wait."""
+        """With `first`, request another lift. Then request this lift on the fleet adapters' topic, so
+        that no supervisor has forwarded the request. Meanwhile, the other robots wait."""
         if first:
             self._disturbs = lambda now: [self._send(STRANGER, floor, now, lift=NOWHERE)]
         yield SHOWS_S
@@ -184,15 +187,19 @@ class RideScenario(Scenario):
         yield SHOWS_S
 
     def unfit(self, state: words.Stated) -> str:
-        """Refuse a lift that is not idle, or that does not serve both floors."""
+        """Return the reason why the play may not use this lift. The lift must be idle, and must serve
+        both floors."""
         served = state.available_floors if isinstance(state, d.LiftState) else ()
         missing = [shown(floor) for floor in self._floors if served and floor not in served]
         if not missing:
             return busy(state)
-        return f"{', '.join(missing)}: it serves {', '.join(map(shown, served[:MOST_FLOORS]))}"
+        return (
+            f"the lift does not serve {', '.join(missing)}: it serves"
+            f" {', '.join(map(shown, served[:MOST_FLOORS]))}"
+        )
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
-        """Take states. The play fails if another session has the lift."""
+        """Take a message of the graph. The play fails if a session that is not ours has the lift."""
         stated = isinstance(message, d.LiftState) and message.lift_name == self.lift
         if isinstance(message, d.LiftState) and stated:
             self._state = message
@@ -232,9 +239,11 @@ class RideScenario(Scenario):
 
 
 class PassageScenario(Scenario):
-    """A robot passes a door, several times. The robot also stands in the doorway, where two CLOSE
-    messages come that must not close this door. One CLOSE is for another door. The other CLOSE is
-    from an unknown fleet adapter."""
+    """A play in which a robot passes a door, several times.
+
+    While the robot stands in the doorway, the play sends two CLOSE messages that must not close this
+    door. One CLOSE is for another door. The other CLOSE is from an unknown fleet adapter.
+    """
 
     def __init__(
         self,
@@ -278,7 +287,8 @@ class PassageScenario(Scenario):
             yield 1.0
 
     def hear(self, topic: str, message: d.Message, now: float) -> list[Said]:
-        """Take states and heartbeats. After the next state, a disturbing message follows."""
+        """Take a message of the graph. After a state of the door, send the disturbing message that is
+        due."""
         stated = isinstance(message, d.DoorState) and message.door_name == self.door
         if isinstance(message, d.DoorState) and stated:
             self._mode = message.current_mode.value
@@ -292,7 +302,8 @@ class PassageScenario(Scenario):
         return [] if direct and self._through else [_closes(door, now, who)]
 
     def leave(self, now: float) -> list[Said]:
-        """Send CLOSE to the supervisor, or send CLOSE in the supervisor's name."""
+        """Send CLOSE as the robot's fleet adapter. If the graph has no supervisor of its own, send
+        CLOSE in the supervisor's name too."""
         self._leaving += 1
         [name] = self.play.names
         said = [_closes(self.door, now, name)]

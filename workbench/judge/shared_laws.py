@@ -1,4 +1,5 @@
-"""Laws that all kinds of device share. Each kind gives these laws its own numbers."""
+"""Laws that all kinds of device share. Each kind of device gives each law an id of its own, such as
+`L2.rate`."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,7 +14,7 @@ from workbench.judge.law import KEPT, Finding, Law
 AnyScene = History[Any]
 
 STALE_S: Final = 5.0
-"""Age (s) from which a reading is old at every site."""
+"""Age (s) from which a reading counts as old."""
 BURST_WITHIN_S: Final = 1.0
 ANSWERS: Final = 5
 BACK_S: Final = 0.5
@@ -22,13 +23,13 @@ STEPS_WITHIN_S: Final = 30.0
 
 
 def rate(history: AnyScene) -> Finding:
-    """Check that states keep coming. A silence of the whole network is an excuse."""
+    """Check that states keep coming. If the whole network was silent, this is no breach."""
     if history.news is None and not history.states:
         return f"no state, though its topic has a publisher: {', '.join(history.senders[:4])}"
     if history.news is None:
         silent_s = history.now - history.heard_at
         own_s = silent_s - history.network_s
-        return f"silent since then, for {silent_s:.1f} s" if own_s > SLOWEST_S else None
+        return f"no state for the last {silent_s:.1f} s" if own_s > SLOWEST_S else None
     if history.new is None or history.states == 1:
         return None
     gap_s = history.seen.gap_s
@@ -49,8 +50,8 @@ def answers(history: AnyScene) -> Finding:
 
 
 def one_node(history: AnyScene) -> Finding:
-    """Check that stamps go forwards. The clock of a single node steps back once, but not again and
-    again."""
+    """Check that only one node publishes the states. Stamps that go back again and again show two
+    nodes. The clock of a single node may step back once."""
     if history.new is None:
         return None
     if history.seen.steps_back(history.now, BACK_S, STEPS_WITHIN_S) >= STEPS_BACK:
@@ -59,13 +60,13 @@ def one_node(history: AnyScene) -> Finding:
         both = history.seen.publishers(Moment(history.now, 0.0))
         return f"two publishers take turns: {', '.join(one.node or '?' for one in both)}"
     if len(history.senders) > 1 and history.two_rhythms:
-        return f"states come at two paces; publishers: {', '.join(history.senders[:4])}"
+        return f"states come at two different rates; publishers: {', '.join(history.senders[:4])}"
     return KEPT if len(history.senders) == 1 and history.has_rhythm else None
 
 
 def stamped(blind: Callable[[Any], bool]) -> Callable[[AnyScene], Finding]:
-    """Return a check that a state with a claim has a stamp. `blind(state)` tells whether the state
-    claims nothing."""
+    """Return a check that a state has a stamp, if a robot would act on the state. `blind(state)` tells
+    whether the state says only that nothing is known."""
 
     def check(history: AnyScene) -> Finding:
         state = history.new
@@ -79,7 +80,7 @@ def stamped(blind: Callable[[Any], bool]) -> Callable[[AnyScene], Finding]:
 
 
 def fresh(stale_s: float = STALE_S) -> Callable[[AnyScene], Finding]:
-    """Return a check that no reading gets old. A robot would act on an old reading."""
+    """Return a check that a state on which a robot would act is not based on an old reading."""
 
     def check(history: AnyScene) -> Finding:
         state = history.new
@@ -88,7 +89,7 @@ def fresh(stale_s: float = STALE_S) -> Callable[[AnyScene], Finding]:
         if history.frozen_s <= stale_s:
             return KEPT if history.claimed_s > stale_s else None
         return (
-            f"{words.described(state)}, and its stamp has stood still for {history.frozen_s:.1f} s"
+            f"{words.described(state)}, but its stamp has not changed for {history.frozen_s:.1f} s"
         )
 
     return check
@@ -96,39 +97,40 @@ def fresh(stale_s: float = STALE_S) -> Callable[[AnyScene], Finding]:
 
 RATE: Final[Law[AnyScene]] = Law(
     "RATE",
-    "States keep coming, whether the hardware answers or not: never 5 s without a state",
+    "States come at least every 5 s, whether the hardware answers or not",
     "two states",
-    "A fleet adapter sends a request at each state. Without states the robot waits for ever",
+    "A fleet adapter sends a request after each state. Without states the robot waits for ever",
     "rmf_ros2 agv/RobotContext.cpp:1700-1735",
     rate,
 )
 ANSWERED: Final[Law[AnyScene]] = Law(
     "ANSWER",
-    "No request causes a state: states come by timer and by change",
-    "5 requests between unchanged states, after states without any request",
-    "RMF repeats its request at each state. A state for each request would loop for ever",
+    "No request causes a state: only a timer or a change causes a state",
+    "5 requests between unchanged states, after a time without requests that shows the usual rate",
+    "RMF repeats its request after each state. If each request caused a state, the loop would"
+    " never end",
     "rmf_ros2 agv/RobotContext.cpp:1732-1735, lift_supervisor/Node.cpp:58-140",
     answers,
-    sensed=True,  # a noisy wire may change the state's other fields ten times a second
+    sensed=True,  # a noisy wire may change other fields of the state ten times a second
 )
 ONE: Final[Law[AnyScene]] = Law(
     "ONE",
     "Only one node publishes under this name",
-    "10 states on a live graph: kept only if their topic has one publisher",
+    "10 states on a live graph; `kept` also needs that their topic has only one publisher",
     "RMF believes the latest state. With two nodes the device would jump between two states",
-    "follows from RequestLift.cpp and DoorOpen.cpp, which keep one state",
+    "follows from RequestLift.cpp and DoorOpen.cpp, which use only the latest state",
     one_node,
 )
 STAMP: Final[Law[AnyScene]] = Law(
     "STAMP",
-    "A state that claims anything carries the time of its reading",
+    "A state on which a robot may act carries the time of its reading",
     "a state",
-    "Without this time, a remembered value looks like a reading. 0 means: never read",
+    "Without this time, an old value looks like a new reading. The time 0 means that nothing was read",
     "LiftState.msg, DoorState.msg, ChargerState.msg: the time of the state",
     stamped(lambda state: True),
 )
 
 
 def named(law: Law[AnyScene], id: str, **changes: Any) -> Law[Any]:
-    """Return a shared law with its number in the contract of one kind."""
+    """Return a shared law with the id that it has for one kind of device."""
     return replace(law, id=id, **changes)

@@ -17,9 +17,10 @@ class WorkcellHistory(History[d.DispenserState]):
 
     - `listed`: guid -> time of the first state that listed the guid.
     - `results`: guid -> the last status.
-    - `acknowledged`: guid -> stamp of its result ACKNOWLEDGED, until a state lists the guid.
-    - `left`: the guids that the latest state no longer lists.
-    - `unexplained`: guid -> the time at which the guid left without SUCCESS.
+    - `acknowledged`: guid -> stamp of its result ACKNOWLEDGED, as long as no state has listed the guid.
+    - `left`: the guids that the latest state no longer lists, although the state before listed them.
+    - `unexplained`: guid -> the time at which states stopped listing the guid, without a result
+      SUCCESS.
     - `asked_since`: guid -> the times of the requests after its last result.
     - `result`: the latest message, if the message is a result of this workcell.
     - `result_before`: the status of the previous result for the same guid.
@@ -38,11 +39,12 @@ class WorkcellHistory(History[d.DispenserState]):
 
     @staticmethod
     def claims(state: Any) -> bool:
-        """Return whether the state differs from OFFLINE."""
+        """Return whether RMF would act on this state. This is true for every mode except OFFLINE."""
         return bool(state.mode != d.WorkcellMode.OFFLINE)
 
     def take(self, heard: Heard, own: bool = False) -> bool:
-        """Take a message. A result of this workcell is neither a state nor a request."""
+        """Take a message of any device. Clear `result` and `left`, which belong to the message
+        before."""
         self.result, self.left = None, ()
         return super().take(heard, own)
 
@@ -83,7 +85,8 @@ class WorkcellHistory(History[d.DispenserState]):
                 keep(self.unexplained, guid, self.now)
 
     def waited_s(self, guid: str) -> float:
-        """Return the time (s) for which RMF has repeated this request without a result."""
+        """Return for how long (s) RMF has repeated this request since its last result. Return -inf for
+        fewer than three requests."""
         times = self.asked_since.get(guid) or [self.now]
         return self.now - times[0] if len(times) > 2 else NOT_YET
 

@@ -28,8 +28,8 @@ def _numbers(history: WorkcellHistory) -> Finding:
 def _lists_first(history: WorkcellHistory) -> Finding:
     """Check that a state newer than an acknowledgement lists the acknowledged request.
 
-    RMF compares stamps and ignores an older state. The network may have lost the first state that lists
-    the request.
+    An older state is no breach, because RMF compares stamps and ignores this state. The breach may
+    still be excused, because the network may have lost the first state that lists the request.
     """
     result, state = history.result, history.new
     if result is not None:
@@ -47,11 +47,11 @@ def _excused(history: WorkcellHistory, guid: str) -> bool:
 
 
 def _leaves_done(history: WorkcellHistory) -> Finding:
-    """Check that a listed request leaves only after SUCCESS.
+    """Check that states stop listing a request only after its result SUCCESS.
 
-    A message SUCCESS may get lost. RMF then continues, and asks for no repeat. Therefore one request
-    without a result is no breach, but the second is. After a restart of the node, the first is a breach
-    too.
+    The message SUCCESS may get lost. Then RMF continues, and does not repeat the request, so that the
+    node does not repeat SUCCESS. Therefore the first request without SUCCESS is no breach, but the
+    second is. After a FAILED, or a restart of the node, the first is a breach too.
     """
     for guid in history.left:
         result = history.results.get(guid)
@@ -59,7 +59,7 @@ def _leaves_done(history: WorkcellHistory) -> Finding:
             continue
         if result != FAILED and len(history.unexplained) < 2 and history.before is not None:
             return None
-        text = f"request {shown(guid)} left the queue without SUCCESS: RMF sends the robot on"
+        text = f"request {shown(guid)} left the queue without SUCCESS, so RMF sends the robot on"
         return Doubt(text, partial(_succeeded, history, guid))
     return KEPT if history.left else None
 
@@ -75,7 +75,7 @@ def _keeps_result(history: WorkcellHistory) -> Finding:
     if result.status == before:
         return KEPT
     was, now = words.plain(d.WorkcellStatus, before), words.result(result)
-    return f"request {shown(result.request_guid)} was {was}, and is {now} now"
+    return f"the result of request {shown(result.request_guid)} was {was}, and now is {now}"
 
 
 def _repeats(history: WorkcellHistory) -> Finding:
@@ -91,7 +91,7 @@ def _repeats(history: WorkcellHistory) -> Finding:
 LAWS: Final[tuple[Law[WorkcellHistory], ...]] = (
     Law(
         "W1.numbers",
-        "Modes and results are RMF's",
+        "Modes and results are numbers of RMF's messages",
         "a state or a result",
         "RMF ignores an unknown status, and the robot waits for ever",
         "DispenserState.msg, DispenserResult.msg",
@@ -101,22 +101,23 @@ LAWS: Final[tuple[Law[WorkcellHistory], ...]] = (
         "W2.lists",
         "A state that is newer than a request's acknowledgement lists the request",
         "a result ACKNOWLEDGED for a listed request",
-        "An acknowledged request that a newer state does not list is complete for RMF",
+        "If a newer state does not list an acknowledged request, RMF counts the request as complete",
         SOURCE,
         _lists_first,
     ),
     Law(
         "W2.done",
-        "A listed request leaves the queue only if it has succeeded",
+        "A listed request leaves the queue only if the request has succeeded",
         "a state that no longer lists a request",
-        "RMF counts the request as complete, even after FAILED, and sends the robot off",
+        "RMF counts a request that left the queue as complete, even after FAILED, and sends the"
+        " robot off",
         SOURCE,
         _leaves_done,
     ),
     Law(
         "W3.result",
         "A result is final",
-        "two results for one request, the first SUCCESS or FAILED",
+        "two results for one request, if the first is SUCCESS or FAILED",
         "RMF ends at the first result that it hears. Of two results, chance decides which comes first",
         SOURCE,
         _keeps_result,
@@ -125,7 +126,8 @@ LAWS: Final[tuple[Law[WorkcellHistory], ...]] = (
         "W3.repeats",
         "A node repeats a result whenever the request comes again",
         "a request that comes again after its result",
-        "RMF repeats a request until a result comes. Without a repeat, a lost result holds the robot",
+        "RMF repeats a request until a result comes. If a lost result is not repeated, the robot"
+        " waits for ever",
         SOURCE,
         _repeats,
     ),

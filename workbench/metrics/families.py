@@ -1,9 +1,10 @@
 """Metric families about RMF's graph, made from the memory of its devices. All functions are pure,
 because `now` is an argument.
 
-Names and labels follow Prometheus' conventions: base units, `_total` for counters, `_info` for facts.
-Every label from the network is printable and at most LONGEST characters long. `ObservedGraph` limits
-the number of devices, so invented names cannot create an unlimited number of series.
+Names and labels follow Prometheus' conventions: base units, `_total` for counters, and `_info` for
+values that are text. Every label from the network is printable and at most LONGEST characters long.
+`ObservedGraph` limits the number of devices, so invented names cannot create an unlimited number of
+series.
 """
 
 from collections.abc import Iterable, Iterator
@@ -48,7 +49,7 @@ def label(text: str) -> str:
 
 
 def of_graph(graph: ObservedGraph[Any], tally: SiteTally, now: Moment) -> Iterator[Metric]:
-    """Yield the families about our nodes, and about all devices that have published a state."""
+    """Yield the metric families about our nodes, and about all devices that have published a state."""
     devices = graph.stated()
     yield from _states(graph, devices, now)
     yield from _trouble(graph, devices, now)
@@ -60,7 +61,7 @@ def of_graph(graph: ObservedGraph[Any], tally: SiteTally, now: Moment) -> Iterat
 def _states(
     graph: ObservedGraph[Any], devices: Iterable[AnyDevice], now: Moment
 ) -> Iterator[Metric]:
-    up = _gauge("device_up", "1 while states of the device arrive, 0 in a silence.", DEVICE)
+    up = _gauge("device_up", "1 while states of the device arrive, 0 while it is silent.", DEVICE)
     age = _gauge(
         "device_reading_age_seconds",
         "Age of the reading in the last state, by this machine's clock; absent before any reading.",
@@ -87,7 +88,7 @@ def _trouble(
 ) -> Iterator[Metric]:
     fault = _gauge(
         "device_fault",
-        "1 while a daemon reports this fault of a device, an alarm panel, a robot or itself.",
+        "1 while a daemon reports this fault of itself, or of a device, an alarm panel or a robot.",
         (*DEVICE, "code"),
     )
     for report in graph.nodes.values():
@@ -96,7 +97,7 @@ def _trouble(
             fault.add_metric((*names, label(code)), 1)
     publishers = _gauge(
         "device_publishers",
-        "Number of nodes that publish states under this name; 0 if unknown.",
+        "Number of nodes that publish states of this device; 0 if unknown.",
         DEVICE,
     )
     refused = CounterMetricFamily(
@@ -126,7 +127,7 @@ def _waits(devices: Iterable[AnyDevice], now: Moment) -> Iterator[Metric]:
     held = _gauge("device_held", "1 while a robot has the lift, door or charger.", DEVICE)
     still = _gauge(
         "lift_session_still_seconds",
-        "Time without any change of a lift that a robot has; absent while nobody has it.",
+        "Time for which nothing has changed at a lift that a robot has; absent if nobody has it.",
         ("device",),
     )
     for one in devices:
@@ -146,14 +147,16 @@ def _counts(devices: Iterable[AnyDevice], tally: SiteTally) -> Iterator[Metric]:
     )
     rides = _histogram(
         "lift_ride_seconds",
-        "Time from a robot's request in the car to the requested floor.",
+        "Time from a robot's request in the car until the car is at the requested floor.",
         ("device",),
     )
     cycles = _counter(
         "device_cycles", "Number of door openings (lift, door) or charges (charger).", DEVICE
     )
     energy = _counter(
-        "charger_energy_joules", "Energy to robots, from reported V and A.", ("device",)
+        "charger_energy_joules",
+        "Energy given to robots, computed from the reported V and A.",
+        ("device",),
     )
     watched = _counter("device_watched_seconds", "Time in which states arrived.", DEVICE)
     served = _counter(
@@ -183,7 +186,9 @@ def _nodes(graph: ObservedGraph[Any], now: Moment) -> Iterator[Metric]:
         info.add_metric((node,), {"kind": label(report.kind), **facts})
         up.add_metric((node,), report.is_current(now.at))
     left_out = _gauge(
-        "devices_left_out", "1 if devices were dropped, because too many were heard.", ("kind",)
+        "devices_left_out",
+        "1 if devices of this kind were left out, because too many were heard.",
+        ("kind",),
     )
     for kind in words.KINDS:
         left_out.add_metric((kind,), kind in graph.crowded)

@@ -24,16 +24,16 @@ CERTIFICATE: Final = ("daemon", "key", "file")
 UNIT: Final = ("daemon", "bus", "unit")
 CALLS: Final = {
     "calls": "Calls to a Modbus unit, a CANopen node, an HTTP controller or a broker.",
-    "failed_calls": "Calls without a reply, or that the unit refused.",
+    "failed_calls": "Calls that got no reply, or that the unit refused.",
     "call_seconds": "Time spent in calls.",
 }
 
 
 def of_machine(found: Iterable[DaemonStatus]) -> Iterator[Metric]:
-    """Yield the families about these daemons. Leave out stopped daemons.
+    """Yield the metric families about these daemons. Leave out stopped daemons.
 
-    If a daemon no longer renews its status, only the status's age appears. If this user may not read a
-    daemon's files, only `unreadable` appears.
+    If a daemon no longer renews its status, yield only the age of the status. If this user may not read
+    a daemon's files, yield only `unreadable`.
     """
     every = [one for one in found if one.state != "stopped"]
     yield from _daemons(every)
@@ -45,12 +45,14 @@ def of_machine(found: Iterable[DaemonStatus]) -> Iterator[Metric]:
 def of_certificates(
     found: Iterable[DaemonStatus], others: Iterable[str], end: Callable[[str], CertificateEnd]
 ) -> Iterator[Metric]:
-    """Yield the ends of the certificates that these daemons use, and of the files `others`.
+    """Yield when each certificate expires: the certificates that these daemons use, and the files
+    `others`.
 
-    Of a file whose end is unknown nothing but `unreadable` is 1.
+    For a file whose expiry cannot be read, `unreadable` is 1, and there is no expiry time.
     """
     ends = _certificate(
-        "end_timestamp_seconds", "End of the certificate; of a file's first to end."
+        "end_timestamp_seconds",
+        "Time at which the certificate expires; for a file with several, the first such time.",
     )
     unreadable = _certificate("unreadable", "1 if the certificate's end cannot be read.")
     named = [used for one in found for used in one.certificates]
@@ -86,9 +88,11 @@ def _daemons(every: Iterable[DaemonStatus]) -> Iterator[Metric]:
     age = _gauge("status_age_seconds", "Age of the daemon's status.", DAEMON)
     unreadable = _gauge("unreadable", "1 if this user may not see the daemon.", DAEMON)
     slack = _gauge(
-        "watchdog_slack_seconds", "Time that was left before systemd's watchdog acts.", DAEMON
+        "watchdog_slack_seconds",
+        "Shortest time that was left before systemd's watchdog would act, since the report before.",
+        DAEMON,
     )
-    fault = _gauge("fault", "1 while the daemon has this fault of its own.", (*DAEMON, "code"))
+    fault = _gauge("fault", "1 while the daemon itself has this fault.", (*DAEMON, "code"))
     for one in every:
         names = (printable(one.name),)
         unreadable.add_metric(names, one.state == "unknown")

@@ -1,6 +1,6 @@
 """Three ways to send a notice: to a webhook, to an ntfy topic, or by a mail server.
 
-Each way raises ChannelError if the recipient did not accept the notice. For ntfy, the notice is sent
+Every way raises ChannelError if the recipient did not accept the notice. For ntfy, the notice is sent
 with headers (docs.ntfy.sh/publish: Title, Priority, Tags, Click, Authorization). Mail is sent only over
 TLS: with STARTTLS, or with TLS from the beginning on port 465 (RFC 8314).
 """
@@ -38,7 +38,7 @@ def send(to: Recipient, notice: NoticeText) -> None:
     elif to.ntfy:
         _post(to.ntfy, notice.text.encode(), _ntfy_headers(notice) | _bearer(secret))
     else:
-        assert to.webhook  # a recipient has exactly one way
+        assert to.webhook  # `Recipient.problems` refuses a recipient without ntfy, mail or webhook
         headers = {"Content-Type": "application/json"} | _bearer(secret)
         _post(to.webhook, msgspec.json.encode(notice), headers)
 
@@ -49,7 +49,7 @@ def _bearer(secret: str) -> dict[str, str]:
 
 def _ntfy_headers(notice: NoticeText) -> dict[str, str]:
     tag = "white_check_mark" if notice.event == "over" else "warning"
-    title = Header(notice.title, "utf-8", maxlinelen=10_000).encode()  # ntfy reads RFC 2047
+    title = Header(notice.title, "utf-8", maxlinelen=10_000).encode()  # ntfy decodes RFC 2047
     click = {"Click": notice.link} if notice.link else {}
     return {"Title": title, "Priority": PRIORITY[notice.severity], "Tags": tag} | click
 
@@ -91,7 +91,7 @@ def _mail(to: Recipient, notice: NoticeText, password: str) -> None:
 
 
 def _server(to: Recipient, context: ssl.SSLContext) -> smtplib.SMTP:
-    assert to.host  # `problems` refuses mail without `host`
+    assert to.host  # `Recipient.problems` refuses mail without `host`
     if to.port == SMTPS:
         return smtplib.SMTP_SSL(to.host, to.port, timeout=TIMEOUT_S, context=context)
     server = smtplib.SMTP(to.host, to.port, timeout=TIMEOUT_S)

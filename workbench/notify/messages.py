@@ -49,8 +49,8 @@ def worded(
 def _explained(explained: Explanation | None, code: str, remedies: Remedies) -> Iterator[str]:
     """Yield the sentences of `explain`, and the next steps.
 
-    If the trouble has its own remedy, leave out the step "nobody has to act", because this step is only
-    about robots' requests.
+    If the trouble has its own remedy, leave out the step "nobody has to act". That step says only that
+    no robot's request needs an action.
     """
     known = {code: remedies[code]} if code in remedies else {}
     if explained is not None:

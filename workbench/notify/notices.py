@@ -1,17 +1,15 @@
 """Decide when people get a notice of a trouble. All functions are pure, because time is an argument.
 
-NOTIFY-1. A trouble gets one notice, after the trouble has lasted `after_s`. A trouble that comes and
-   goes counts as present, unless it is gone for `after_s`.
-NOTIFY-2. The end of a trouble gets one notice, after the trouble has been gone for `over_s`. Only a
-   trouble that people know from a notice gets this second notice. A trouble that comes back earlier is
-   still the same trouble. If a device was not heard since the start, its trouble is not gone, because
-   nothing is known about the device.
-NOTIFY-3. In the quiet hours, only critical troubles get a notice. A warning that still lasts gets its
-   notice after the quiet hours. If a trouble ends before its first notice, the end gets no notice.
-NOTIFY-4. A critical trouble gets a notice again every `again_s`. The repeats stop when a person
-   acknowledges the trouble, or when the trouble ends.
-NOTIFY-5. After a restart, no notice is sent twice. The program keeps reported troubles on disk, and
-   counts them as reported at the start.
+NOTIFY-1. A trouble gets one notice, after the trouble has lasted `after_s`. If a trouble goes away and
+comes back within `after_s`, it counts as present without a break. NOTIFY-2. The end of a trouble gets
+one notice, after the trouble has been gone for `over_s`. Only a trouble that people know from a notice
+gets this second notice. A trouble that comes back earlier is still the same trouble. If a device was
+not heard since the start, its trouble is not gone, because nothing is known about the device. NOTIFY-3.
+In the quiet hours, only critical troubles get a notice. A warning that still lasts gets its notice
+after the quiet hours. If a trouble ends before its first notice, the end gets no notice. NOTIFY-4. A
+critical trouble gets a notice again every `again_s`. The repeats stop when a person acknowledges the
+trouble, or when the trouble ends. NOTIFY-5. After a restart, no notice is sent twice. The program keeps
+reported troubles on disk, and counts them as reported at the start.
 """
 
 from collections.abc import Container, Iterable
@@ -59,7 +57,7 @@ class KeptTrouble(Struct, frozen=True):
 
 @dataclass(slots=True)
 class Notices:
-    """The troubles of a site, and the notices that people were already sent."""
+    """The troubles of a site. Each trouble remembers whether people have got a notice of it."""
 
     settings: NotifySettings
     known: dict[str, KnownTrouble] = field(default_factory=dict)

@@ -1,11 +1,10 @@
-"""The file of `rmf-bridge notify`: the recipients, and when each of them is told.
+"""The file of `rmf-bridge notify`: the recipients, and which notices each recipient gets.
 
-page: https://rmf.hospital.example      # optional: the page that notices link to
-quiet: {from: "22:00", to: "06:00"}     # optional: warnings wait until the end of this time
-to:
-  - {ntfy: "https://ntfy.sh/our-topic", token_file: /etc/rmf-bridges/ntfy.token}
-  - {webhook: "https://chat.example/hook", least: critical}
-  - {mail: [lifts@hospital.example], from: rmf@hospital.example, host: mail.hospital.example}
+page: https://rmf.hospital.example      # optional: web page to which notices link quiet: {from:
+"22:00", to: "06:00"}     # optional: warnings wait until the end of this time to:
+- {ntfy: "https://ntfy.sh/our-topic", token_file: /etc/rmf-bridges/ntfy.token}
+- {webhook: "https://chat.example/hook", least: critical}
+- {mail: [lifts@hospital.example], from: rmf@hospital.example, host: mail.hospital.example}
 """
 
 from datetime import time
@@ -47,7 +46,7 @@ class QuietHours(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         name="from"
     )
     ends: Annotated[
-        Clock, tells("the end of the quiet hours; an earlier time is on the next day.")
+        Clock, tells("the end of the quiet hours; a time before `from` is on the next day.")
     ] = msgspec.field(name="to")
 
     def contains(self, at: time) -> bool:
@@ -65,11 +64,13 @@ class Recipient(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     webhook: Annotated[Url | None, tells("an address that takes a JSON object by POST.")] = None
     mail: Annotated[list[Name], Meta(max_length=20), tells("addresses for mail.")] = []
     least: Annotated[
-        Severity, tells("`critical`: only critical notices, such as of a silent device.")
+        Severity, tells("`critical`: send only critical notices, for example of a silent device.")
     ] = "warning"
     token_file: Annotated[
         AbsolutePath | None,
-        tells("a file with a bearer token or a mail password, which only this user reads."),
+        tells(
+            "a file with a bearer token or a mail password; only this program's user may read it."
+        ),
     ] = None
     host: Annotated[Name | None, tells("the mail server.")] = None
     port: Annotated[
@@ -89,13 +90,13 @@ class Recipient(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         return f"{way} at {(url or '').split('/')[2]}"
 
     def problems(self) -> Remarks:
-        """Yield a problem if the recipient has no way, several ways, or incomplete settings for
-        mail."""
+        """Yield a problem if the recipient has none or several of ntfy, webhook and mail. Also yield a
+        problem if the settings for mail are incomplete."""
         ways = [bool(self.ntfy), bool(self.webhook), bool(self.mail)]
         if sum(ways) != 1:
             yield (
                 (),
-                "write exactly one of ntfy, webhook and mail; for another way, add another entry",
+                "write exactly one of ntfy, webhook and mail; add another entry for a second one",
             )
             return
         mails = {"host": self.host, "from": self.sender}
@@ -105,21 +106,26 @@ class Recipient(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
             if value and not self.mail:
                 yield (key,), "is only for mail"
         if self.user and not (self.mail and self.token_file):
-            yield ("user",), "is for mail, and needs token_file: the file with the user's password"
+            yield (
+                ("user",),
+                "is only for mail, and needs token_file, the file with the user's password",
+            )
 
 
 class NotifySettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The recipients of notices, and the rules for when a notice is sent."""
 
     to: Annotated[list[Recipient], Meta(min_length=1, max_length=20), tells("the recipients.")]
-    page: Annotated[Url | None, tells("the page of `rmf-bridge page`, for links.")] = None
+    page: Annotated[
+        Url | None, tells("the address of `rmf-bridge page`, to which notices link.")
+    ] = None
     quiet: Annotated[
         QuietHours | None, tells("a time of day in which only critical notices are sent.")
     ] = None
     certificates: Annotated[
         list[AbsolutePath],
         Meta(max_length=20),
-        tells("further certificates of this machine whose end is told, such as the page's."),
+        tells("more certificates of this machine; a notice tells when each of them expires."),
     ] = []
     after_s: Annotated[Patience, tells("how long a trouble must last before its first notice.")] = (
         30.0
@@ -129,7 +135,8 @@ class NotifySettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     ] = 60.0
     waits_s: Annotated[Patience, tells("a robot that waits longer than this is a trouble.")] = 300.0
     stuck_s: Annotated[
-        Patience, tells("a lift with a robot in which nothing changes for this long is critical.")
+        Patience,
+        tells("if nothing changes for this long at a lift that a robot has, it is critical."),
     ] = 180.0
     again_s: Annotated[
         Seconds, tells("a critical notice is repeated after this long without --ack; 0: never.")
@@ -142,5 +149,5 @@ def load(file: Path) -> NotifySettings:
     root = compose(page, read(str(file), SORT), SORT)
     found = Values(page).make(NotifySettings, Spot(root, root, "the file"))
     page.check()
-    assert found is not BROKEN  # after any problem, `check` raises
+    assert found is not BROKEN  # if there was a problem, `check` has raised
     return found

@@ -13,9 +13,9 @@ from bridges.system.certificates import SOON_S, URGENT_S, CertificateEnd, told
 from workbench.notify.settings import NotifySettings, Severity
 
 RAISED: Final = "ALARM_RAISED"
-"""The fault of a daemon whose alarm lets robots stand."""
+"""The fault of a daemon whose alarm makes robots stand."""
 ALARMS: Final = "ALARM_"
-"""The beginning of the faults whose details say why robots stand."""
+"""The first letters of the fault codes whose details say why robots stand."""
 
 
 class Trouble(Struct, frozen=True):
@@ -58,9 +58,10 @@ def troubles(graph: ObservedGraph[Any], now: Moment, settings: NotifySettings) -
 def of_certificates(
     named: Iterable[tuple[str, str, str]], end: Callable[[str], CertificateEnd], now: float
 ) -> Iterator[Trouble]:
-    """Yield the troubles of these certificates, each (daemon, key, file). `now`: wall time (s).
+    """Yield the troubles of these certificates, each (daemon, key, file). `now` is the wall time (s).
 
-    A certificate that ends within a week is a trouble of its own, so that people are told again.
+    A certificate whose validity ends within a week is a second trouble besides SOON. Thus people get a
+    second notice.
     """
     for daemon, key, file in named:
         found = end(file)
@@ -79,7 +80,8 @@ def of_certificates(
 def _of_nodes(graph: ObservedGraph[Any], now: Moment) -> Iterator[Trouble]:
     """Yield the troubles of alarm panels, robots, coordinators and our daemons.
 
-    If the daemon of a lift, door or charger is silent, the device already has that trouble.
+    Leave out a silent daemon of a lift, door or charger, because `troubles` already yields SILENT for
+    that device.
     """
     for report in graph.nodes.values():
         kind, named = report.subject[0], printable(report.subject[1])

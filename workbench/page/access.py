@@ -1,4 +1,4 @@
-"""Access to the page's actions: passwords, sessions, and a limit of failed logins.
+"""Access to the page's actions: passwords, login sessions, and a limit for failed logins.
 
 A password file has a line `user:scrypt$N$r$p$salt$hash` for each user. `rmf-bridge page --add-user`
 writes the line, with a new salt for each password (scrypt, RFC 7914, from Python's hashlib).
@@ -23,7 +23,7 @@ COST: Final = (2**14, 8, 1)
 """Parameters N, r and p of scrypt. Each try takes 16 MB and about 50 ms."""
 MOST_COST: Final = 2**17
 SESSION_S: Final = 12 * 3600.0
-"""Duration (s) of a login, which is one shift."""
+"""Duration (s) of a login. Twelve hours are one shift."""
 IDLE_S: Final = 3600.0
 MOST_SESSIONS: Final = 100
 TRIES: Final = 5
@@ -54,15 +54,16 @@ def matches(password: str, stored: str) -> bool:
 
 
 def _parts(stored: str) -> tuple[tuple[int, int, int], bytes, bytes]:
-    """Return N, r and p, then the salt, then the hash. Raises PasswordError."""
+    """Return three parts of the stored text: (N, r, p), the salt, and the hash. Raises
+    PasswordError."""
     try:
         name, n, r, p, salt, expected = stored.split("$")
         cost = (int(n), int(r), int(p))
         raw, wanted = (base64.b64decode(part, validate=True) for part in (salt, expected))
     except ValueError:
-        raise PasswordError("not a hash of `rmf-bridge page --add-user`") from None
+        raise PasswordError("not a hash as `rmf-bridge page --add-user` writes it") from None
     if name != "scrypt" or cost[0] > MOST_COST or cost[1] > 16 or cost[2] > 4:
-        raise PasswordError("not a hash of `rmf-bridge page --add-user`")
+        raise PasswordError("not a hash as `rmf-bridge page --add-user` writes it")
     return cost, raw, wanted
 
 
@@ -86,7 +87,7 @@ def users(file: Path) -> dict[str, str]:
             continue
         user, _, stored = line.partition(":")
         if not USER.fullmatch(user) or user in found:
-            raise PasswordError(f"{file}:{number}: not a user's name, or the same name twice")
+            raise PasswordError(f"{file}:{number}: not a user name, or a name that came before")
         try:
             _parts(stored)
         except PasswordError as error:
@@ -116,7 +117,8 @@ def add_user(file: Path, user: str, password: str) -> None:
 
 
 class Tries:
-    """Failed logins by address. If there are too many addresses, the oldest address is forgotten."""
+    """The times of failed logins from each address. If there are too many addresses, the oldest address
+    is forgotten."""
 
     def __init__(self) -> None:
         self._failed_at: OrderedDict[str, list[float]] = OrderedDict()
@@ -183,8 +185,11 @@ class PasswordCheck:
         self._nobody = hashed(secrets.token_urlsafe(16))
 
     def refuses(self, user: str, password: str, address: str, now: float) -> str:
-        """Return the reason to refuse the login. Return "" for an accepted login. The check takes the
-        same time for an unknown user."""
+        """Return the reason to refuse the login. Return "" for an accepted login.
+
+        The check takes as long for an unknown user as for a known user. Thus nobody can find out user
+        names from the time.
+        """
         if not self._tries.allowed(address, now):
             return "too many wrong passwords; wait a minute"
         right = matches(password[:1024], self._known.get(user, self._nobody))

@@ -4,8 +4,8 @@ The page has no rights and no topics of its own. Each action is a command of thi
 runs as the page's user, as if this user had typed the command in a shell on this machine. A log records
 each action with the logged-in user.
 
-Names come from the network, and a name may look like an option. Therefore an option's value follows
-`=`, and names follow `--`.
+Names come from the network, and a name may look like an option. Therefore a command line writes
+`--option=value`, and puts names after `--`.
 """
 
 import asyncio
@@ -56,10 +56,10 @@ class Action:
 
 @dataclass(frozen=True, slots=True)
 class Local:
-    """A daemon on this machine that serves the device, with the YAML and the simulation's actions.
+    """A daemon on this machine that serves the device.
 
-    `presses` and `fails` are signals and parts of the simulated plant. Without a simulation, both are
-    empty.
+    `file` is the daemon's YAML. If the daemon runs a simulation, `presses` has the signals that can be
+    pressed, and `fails` has the parts that can fail. Otherwise both are empty.
     """
 
     file: str
@@ -82,7 +82,7 @@ class PastAction:
 
     @property
     def came(self) -> str:
-        """Describe the outcome in a few sentences."""
+        """Describe the outcome of the action in a few sentences."""
         if self.code is None:
             return f"{self.text}: no answer within {TIMEOUT_S:.0f} s. Check what the device does."
         if self.code:
@@ -106,7 +106,7 @@ def actions(view: DeviceView, local: Local | None, graph: Sequence[str]) -> list
         found.append(
             Action(
                 "Reset faults",
-                "May the latched faults clear, if their cause is gone?",
+                "Clear each latched fault whose cause is gone?",
                 words,
                 RESET,
             )
@@ -144,7 +144,7 @@ def queue(name: str, robot: str, graph: Sequence[str]) -> Action:
 
 
 def press(local: Local, device: str, signal: str, on: bool) -> Action:
-    """Return the action that presses or releases a signal of a simulation."""
+    """Return the action that switches a signal of a simulation on or off."""
     how = "on" if on else "off"
     words = ("press", f"--device={device}", *_runtime(local), "--", local.file, signal, how)
     did = f"In the simulation {signal} of {printable(device)} is {how}."

@@ -25,7 +25,7 @@ NO: Final = "No, change nothing"
 
 
 class Buttons:
-    """The buttons of a device, and the runner of their actions."""
+    """The buttons of a device. They run the device's actions."""
 
     def __init__(
         self, cards: Cards, here: LocalDaemons, login: Login, deeds: Deeds, graph: Sequence[str]

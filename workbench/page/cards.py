@@ -1,4 +1,5 @@
-"""The site's cards in all browsers. A changed card is drawn once, and all browsers get that drawing.
+"""The site's cards (one card for each device), as all browsers show them. A changed card is drawn once,
+and all browsers get that drawing.
 
 In each turn, all browsers get the same script with all changes. With a script for each card, a browser
 could not keep up with 300 changes in a second.
@@ -18,7 +19,7 @@ from workbench.page.listener import Listener
 from workbench.page.live_site import DeviceView, LiveSite
 
 AGES_S: Final = 1.0
-"""Time (s) between drawings of ages and silences. Ages and silences change without messages."""
+"""Time (s) after which ages and silences are drawn again. They change even if no message comes."""
 Key = tuple[str, str]
 """A device's kind, and the device's name in a printable form."""
 
@@ -40,7 +41,7 @@ def script(changed: Mapping[str, str]) -> str:
 
 
 class Wall(Protocol):
-    """One browser's live view."""
+    """One browser's view of the site, which is kept up to date."""
 
     def change(self, script: str) -> None:
         """Run this script, which shows a change of the site."""
@@ -49,14 +50,15 @@ class Wall(Protocol):
         """Draw all cards again, because a device was added or dropped."""
 
     def answer(self, wrong: int) -> None:
-        """Tell the browser that all messages from before its last question have been sent.
+        """Answer the browser's last question. The answer tells the browser that it has got everything
+        that was heard before the question.
 
         `wrong` is the number of devices that need attention.
         """
 
 
 class Cards:
-    """All cards, and the browsers' walls that show the cards."""
+    """All cards, and the browsers that show the cards."""
 
     def __init__(
         self, site: LiveSite, listener: Listener, clock: Callable[[], float] = time.monotonic
@@ -74,7 +76,7 @@ class Cards:
         self._remedies = faults.for_explain()
 
     def turn(self) -> None:
-        """Take the messages heard, and draw the changes."""
+        """Take the messages that have arrived, and draw the changes."""
         heard = self._listener.turn()
         now = self._clock()
         changed: dict[str, str] = {}
@@ -100,7 +102,7 @@ class Cards:
         return {place: html for place, html in self._parts.items() if before.get(place) != html}
 
     def parts(self) -> dict[str, str]:
-        """Draw everything except the cards: place -> content."""
+        """Draw everything except the cards. Return element id -> content."""
         return {
             STATUS: self.status(),
             STANDING: self.standing(),
@@ -124,7 +126,7 @@ class Cards:
         return f'<p class="status" role="status">{told}</p>'
 
     def robots(self) -> str:
-        """Draw the robots that fleets report and that have no card of their own."""
+        """Draw the robots that fleets report, except robots that have a card."""
         own = {
             name
             for (kind, name), one in self.shown.items()
@@ -153,7 +155,7 @@ class Cards:
             yield f"{self._listener.cut} messages were too long and are shown in part"
 
     def _draw(self, every: Iterable[DeviceView]) -> dict[str, str]:
-        """Draw the changed cards. Return place -> content."""
+        """Draw the changed cards. Return element id -> content."""
         changed, added = {}, False
         for shown in every:
             key = (shown.row.kind, shown.row.name)

@@ -1,5 +1,5 @@
-"""A view of each device's last day and week, and a CSV file. The numbers are counts of this machine's
-recorder."""
+"""A view of what happened at each device in the last day and week, and a CSV file. The numbers come
+from the recorder on this machine, which counts events."""
 
 from datetime import date
 from pathlib import Path

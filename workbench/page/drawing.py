@@ -18,14 +18,12 @@ from workbench.page.live_site import DeviceView, RobotShown, Stands
 
 OLD: Final = ' class="old"'
 NOW: Final = '<span class="now">now</span><span class="was">was</span>'
-"""HTML of the word for a fresh state. If the page's server is silent, the browser shows `was`
-instead."""
+"""HTML with the two words `now` and `was`, of which the browser shows one. It shows `was` if the page's
+server is silent."""
 WAS: Final = "was"
 NO_FLOOR: Final = "at no known floor"
-SILENT_DO: Final = (
-    "look at its daemon, with `rmf-bridge status` on its machine, and at the network."
-)
-STALE_DO: Final = "look at the device, its bus, and the clock of its daemon's machine."
+SILENT_DO: Final = "run `rmf-bridge status` on the machine of its daemon, and check the network."
+STALE_DO: Final = "check the device, its bus, and the clock of its daemon's machine."
 MOST_TOLD: Final = 10
 ROBOT_SILENT_S: Final = 10.0
 HALF: Final[Mapping[int, float]] = {d.LiftMotion.MOTION_UP: -0.5, d.LiftMotion.MOTION_DOWN: 0.5}
@@ -40,13 +38,13 @@ place."""
 FLOOR_PX, SHAFT_PX, LABEL_PX = 22, 44, 46
 ARROWS: Final = {d.LiftMotion.MOTION_UP: "▲", d.LiftMotion.MOTION_DOWN: "▼"}
 LEAVES: Final = {"open": 0.12, "moving": 0.3, "closed": 0.5}
-"""Door state -> the part of the doorway that each door leaf covers."""
+"""Door state -> the part of the doorway that each of the two door leaves covers."""
 
 
 def card(view: DeviceView, left: float | None = None) -> str:
     """Draw one device as a box with name, state and faults.
 
-    `left` is the place of a lift's car in the last drawing.
+    `left` is where the last drawing showed a lift's car, as `car_place` returns it.
     """
     row = view.row
     name = f"<h3>{_told(row.name)}</h3>"
@@ -167,7 +165,7 @@ def _fact(name: str, value: str) -> str:
 
 
 def _told(text: str, longest: int = LONGEST) -> str:
-    """Format a text as HTML. Drop the text after `longest` characters."""
+    """Format a text as HTML. Cut the text after `longest` characters."""
     return escape(text if len(text) <= longest else f"{text[:longest]}…")
 
 
@@ -204,7 +202,7 @@ def car_place(state: Stated | None, left: float | None) -> float | None:
 
 
 def _placed(told: str, state: d.LiftState, left: float | None) -> str:
-    """Add the place of a car between floors to `told`, the description of its state."""
+    """If the car is between floors, add where it is to `told`, the description of the lift's state."""
     place = car_place(state, left)
     if state.current_floor or (place is None and state.motion_state not in HALF):
         return told
@@ -217,7 +215,7 @@ def _placed(told: str, state: d.LiftState, left: float | None) -> str:
 def shaft(state: d.LiftState, left: float | None = None, *, old: bool = False) -> str:
     """Draw a lift's shaft with the car, its door and its direction. The highest floor is at the top.
 
-    `left` is the car's place in the last drawing.
+    `left` is where the last drawing showed the car, as `car_place` returns it.
     """
     floors = floors_of(state)
     if not floors:

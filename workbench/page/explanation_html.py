@@ -20,7 +20,8 @@ def timeline(svg: str, opens_at: float = 1.0) -> str:
     """Format a timeline's picture. On a narrow screen, people scroll the picture by hand or by
     keyboard.
 
-    `opens_at` is the place that the screen shows first, as a fraction of the picture's width.
+    `opens_at` tells which part of the picture the screen shows first, as a fraction of the picture's
+    width.
     """
     where = f'tabindex="0" role="region" aria-label="Timeline" data-open="{opens_at:.4f}"'
     return f'<div class="timeline" {where}>{svg}</div>'

@@ -48,7 +48,8 @@ def refused(scope: Scope, hosts: Collection[str]) -> str:
     """Return the reason to refuse this request. Return "" for an accepted request. `hosts` has the
     page's names, with or without a port.
 
-    An IP address as host is accepted, because an attacker can redirect only a name to another machine.
+    If the request names the host by an IP address, it is accepted. An attacker can make a name lead to
+    another machine, but not an address.
     """
     headers = Headers(scope=scope)
     host = headers.get("host", "").lower()
@@ -80,9 +81,9 @@ def _is_address(host: str) -> bool:
 
 
 class RequestGuard:
-    """The outermost layer of the page.
+    """The outermost layer of the page's server, which checks each request first.
 
-    `gate` is one more check, for each request whose Host and Origin are right.
+    `gate` checks each request whose Host and Origin are right once more.
     """
 
     def __init__(
@@ -117,12 +118,12 @@ class RequestGuard:
             async with asyncio.timeout(ANSWER_S if scope["type"] == "http" else None):
                 await self._app(scope, receive, sending)
         except TimeoutError:
-            return  # the server closes a connection whose answer is incomplete
+            return  # the answer stays incomplete, so the server closes the connection
 
 
 async def _whole(receive: Receive) -> tuple[Receive, HttpRefusal | None]:
-    """Read the whole body. Return a `receive` that yields the body, and None. After a refusal, return
-    the reason instead of None."""
+    """Read the whole body of a request. Return a new `receive`, which yields this body, and None. If
+    the request must be refused, return the refusal instead of None."""
     body, more = b"", True
     try:
         async with asyncio.timeout(BODY_S):
@@ -131,9 +132,11 @@ async def _whole(receive: Receive) -> tuple[Receive, HttpRefusal | None]:
                 body += message.get("body", b"")
                 more = message.get("more_body", False)
                 if len(body) > MOST_BODY:
-                    return receive, HttpRefusal(413, f"a request takes at most {MOST_BODY} bytes")
+                    return receive, HttpRefusal(
+                        413, f"a request may have at most {MOST_BODY} bytes"
+                    )
     except TimeoutError:
-        return receive, HttpRefusal(408, f"a request takes at most {BODY_S:.0f} s")
+        return receive, HttpRefusal(408, f"a request must arrive within {BODY_S:.0f} s")
     parts = [{"type": "http.request", "body": body, "more_body": False}]
 
     async def whole() -> Message:

@@ -12,7 +12,7 @@ from workbench.page.login import Login
 BLUE: Final = "#005a93"
 """Colour of buttons. White text is readable on this colour in both themes."""
 GREEN: Final = "#00674c"
-"""Colour of success. On the library's own green, white text is unreadable."""
+"""Colour of success. White text would be unreadable on the green of the library (NiceGUI)."""
 RED: Final = "#b02a00"
 """Colour of a failure. The button that confirms an action has this colour too."""
 
@@ -31,7 +31,8 @@ def head(title: str, login: Login, request: Request) -> None:
 
 
 def main(style: str = "") -> ui.element:
-    """Make the content of a view. The library places the content inside its `main` element."""
+    """Make the content of a view. The library (NiceGUI) puts the content inside its own `main`
+    element."""
     return ui.element("div").props("id=main").classes(style)
 
 

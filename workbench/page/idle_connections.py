@@ -1,11 +1,11 @@
-"""Find connections on which no request has come for too long."""
+"""Find connections that have brought no request for too long."""
 
 from collections.abc import Hashable, Iterable
 from typing import Final
 
 MOST_SILENT_S: Final = 10.0
-"""Maximum time (s) for a connection to send the whole head of its next request. The web server has no
-such limit."""
+"""Maximum time (s) for a connection to send the whole head of its next request. The web server itself
+has no limit for this time."""
 
 
 class Silent:

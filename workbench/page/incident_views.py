@@ -32,7 +32,8 @@ FILTER: Final = (
 
 
 class IncidentViews:
-    """The views of one folder's recordings, or of a single `recording`."""
+    """The views of the recordings in a folder. If `recording` is given, the start page shows this
+    file."""
 
     def __init__(self, folder: Path, recording: Path | None, login: Login) -> None:
         self._folder = folder
@@ -121,7 +122,7 @@ def _item(one: incidents.File) -> str:
     file = printable(one.name)
     link = f'<a href="{_address(one.name)}">{escape(one.title)}</a>'
     if not one.name.isprintable():
-        link = f"<span>{escape(file)}: a strange name; rename it to see it here</span>"
+        link = f"<span>{escape(file)}: unprintable name; rename the file to open it here</span>"
     wanted = escape(f"{one.title if one.device else file}".lower())
     return f'<li class="panel" data-find="{wanted}">{when(one.wall)}{link}{_file_of(one)}</li>'
 
@@ -143,7 +144,7 @@ def _told(found: incidents.ExplainedRecording, zone: tzinfo | None) -> Iterator[
     yield "".join(f"<p>{escape(note)}</p>" for note in found.notes)
     yield "".join(f"<p>Kept for: {escape(text)}</p>" for _, text in found.reasons)
     if not found.devices:
-        yield "<p>It has nothing about RMF's lifts, doors and chargers.</p>"
+        yield "<p>The recording has nothing about RMF's lifts, doors and chargers.</p>"
     for told, drawing in found.devices:
         yield f"<h2>{escape(f'{told.kind} {told.device}')}</h2>"
         yield explanation(told)

@@ -36,15 +36,15 @@ MOST_DEVICES: Final = 50
 """Maximum number of one recording's devices on the page. The page also tells the number of further
 devices."""
 LONGEST_S: Final = 20.0
-"""Maximum time (s) for reading a recording. After this time, the page says that the rest is left
-out."""
+"""Maximum time (s) for reading a recording. What could not be read in this time is left out, and the
+page says so."""
 
 ENDED_S: Final = 60.0
-"""Time (s) after which the page kills the reading process. The process takes so long only for a
-recording full of messages outside RMF."""
+"""Time (s) after which the page kills the reading process. Reading takes so long only if a recording is
+full of messages that are not RMF's."""
 MOST_MEMORY: Final = 128 << 20
-"""Maximum memory (bytes) of the reading process. The process and the page share 256 MB, the limit of
-the unit."""
+"""Maximum memory (bytes) of the reading process. The systemd unit allows 256 MB for this process and
+the page together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +80,8 @@ class ExplainedRecording:
     reasons: tuple[tuple[float, str], ...] = ()
 
     def opens_at(self, timeline: Timeline) -> float:
-        """Return the place of the file's reason, as a fraction of the timeline's length. Return 1 if
-        there is no reason."""
+        """Return the moment for which the file was kept, as a fraction of the timeline's length. Return
+        1 if there is no such moment."""
         length = timeline.to_s - timeline.from_s
         at = max((at for at, _ in self.reasons), default=timeline.to_s)
         return min(1.0, max(0.0, (at - timeline.from_s) / length)) if length else 1.0
@@ -171,7 +171,7 @@ def read(path: Path, remedies: Remedies, zone: tzinfo | None = None) -> Explaine
 
 
 def _reason(own: Own) -> Iterator[tuple[float, str]]:
-    """Yield the time and text of the recorder's note about its reason. Yield nothing for other
+    """Yield the time and text of the recorder's reason to keep the file. Yield nothing for other
     notes."""
     note = noted(own.topic.rpartition("/")[2], own.text)
     if note is not None and note.kept_for is not None:

@@ -1,7 +1,7 @@
-"""The present inputs and outputs of a daemon on this machine, from the daemon's ring.
+"""The present inputs and outputs of a daemon on this machine, read from the daemon's ring.
 
-The ring is a file with the daemon's latest decisions. The ring has the contacts as the driver decodes
-them, and the decisions of the daemon's core, but no voltages.
+The ring is a file of fixed size with the daemon's latest decisions. It has the contacts as the driver
+decodes them, and the decisions of the daemon's core, but no voltages.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -17,8 +17,8 @@ Rows = Mapping[str, str]
 
 
 class Levels:
-    """A follower of one daemon's ring. `sensed` is device name -> its inputs. `driven` is device name
-    -> its outputs."""
+    """A reader that follows one daemon's ring. `sensed` is device name -> its inputs. `driven` is
+    device name -> its outputs."""
 
     def __init__(self, folder: Path) -> None:
         self.sensed: dict[str, Rows] = {}

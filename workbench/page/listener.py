@@ -21,15 +21,16 @@ from workbench.page.live_site import HEARD, LiveSite
 log = logging.getLogger(__name__)
 
 WAITING: Final = 20_000
-"""Maximum number of waiting messages. Only a flood brings more messages. The listener drops and counts
-these messages."""
+"""Maximum number of messages that wait for the next turn. The listener drops and counts further
+messages. Only a flood brings so many."""
 LONGEST_TURN_S: Final = 0.05
-"""Maximum time (s) of a turn. Even during a flood, the browsers must not wait longer."""
+"""Maximum time (s) in which one call of `turn` takes messages. Even during a flood, the browsers must
+not wait longer."""
 AGAIN_S: Final = 3.0
 
 
 class Listener:
-    """A thread that fills a site from the graph."""
+    """A thread that joins RMF's graph and passes its messages to the page's `site`."""
 
     def __init__(self, site: LiveSite, join: Callable[[], Transport]) -> None:
         self._site = site

@@ -34,12 +34,12 @@ from workbench.graph.board import Board, BoardRow
 from workbench.graph.live import OF_DEVICES
 
 KEPT_S: Final = 600.0
-"""Time (s) before now that a device's page shows."""
+"""Length (s) of the past that a device's page shows."""
 STEP_S: Final = 10.0
 """Time (s) by which the timeline moves in each step."""
 MOST_LINES: Final = 100
-"""Maximum number of a device's story lines. The device's view shows forty. With six hundred lines for
-each device, a large site would take 150 MB."""
+"""Maximum number of story lines that the page keeps for a device. A device's view shows forty lines.
+With six hundred lines for each device, a large site would take 150 MB."""
 MOST_ROBOTS: Final = 500
 
 HEARD: Final[tuple[AnyTopic, ...]] = (
@@ -69,7 +69,8 @@ class Stands:
 
 @dataclass(frozen=True, slots=True)
 class DeviceView:
-    """A device ready to be drawn, with its row from `watch`, and its last state, if there is one.
+    """A device ready to be drawn: the row that `watch` shows for it, and its last state, if there is
+    one.
 
     - `stands`: how long the device's robot has had the charger.
     - `heard_wall`: when the device's last state arrived (s since the epoch; 0 means never).
@@ -84,10 +85,11 @@ class DeviceView:
 
 
 class LiveSite:
-    """Everything heard up to now, within limits."""
+    """Everything that the page has heard up to now, within limits."""
 
     def __init__(self, graph: Sequence[str] = ()) -> None:
-        """Begin without messages. `graph` has the options that name the page's graph, for commands."""
+        """Begin without messages. `graph` has the command-line options that name the page's graph.
+        Commands that the page proposes get these options."""
         self._story = heard_devices.HeardDevices(most_lines=MOST_LINES, graph=graph)
         self._board = Board(self._story)
         self._drawings: dict[Key, Drawing] = {}
@@ -121,9 +123,10 @@ class LiveSite:
             self._board.note(heard)
 
     def devices(self, now: float, wall: float) -> list[DeviceView]:
-        """Return devices, coordinators and scheduled robots.
+        """Return the devices, the charger coordinators, and the robots that have an assigned charger.
 
-        `now` is the steady clock (s). `wall` is the stamps' clock (s since the epoch).
+        `now` is the steady clock (s). `wall` is the present time (s since the epoch), by the clock that
+        stamps the messages.
         """
         every, rows = self._story.stated(), self._board.rows(now, wall)
         shown = {f"{one.kind} {words.printable(one.id)}": one for one in every}
@@ -145,8 +148,8 @@ class LiveSite:
         remedies: Remedies,
         zone: tzinfo | None = None,
     ) -> Explanation | None:
-        """Explain why a robot waits for this device, what the device does, or why this robot stands.
-        `zone` is the time zone of the texts."""
+        """Explain a device or robot: why a robot waits for the device, what the device does, or why the
+        robot stands. Return None if it is unknown. `zone` is the time zone of the texts."""
         device = self._found(kind, name)
         if device is None and not (kind == "robot" and self._story.robot(name)):
             return None
@@ -162,8 +165,8 @@ class LiveSite:
     def timeline(self, kind: str, name: str, now: float) -> Timeline | None:
         """Return the last ten minutes of a device. `name` is the device's printable name.
 
-        The timeline ends up to STEP_S after `now`. Thus the parts already drawn move only once in
-        STEP_S.
+        The end of the timeline is rounded up to a multiple of STEP_S. Thus the picture shifts only once
+        in STEP_S, and between two shifts the browser gets only the new parts.
         """
         device = self._found(kind, name)
         drawing = self._drawings.get((device.kind, device.id)) if device else None
@@ -242,7 +245,8 @@ class LiveSite:
 
 
 def _view(row: BoardRow, device: Device | None) -> DeviceView:
-    """Return the view to draw. A robot's time at its charger counts up to the last state heard."""
+    """Return the view to draw. A robot's time at its charger counts only up to the last state heard.
+    Thus the time does not grow during a silence."""
     stands = None
     if isinstance(device, ObservedCharger) and device.last_state and device.robot.value != NOBODY:
         since = device.robot.since

@@ -1,5 +1,5 @@
-"""The daemons on this machine that the page's user may see. Each served device has the YAML that serves
-the device.
+"""The daemons on this machine that the page's user may see, and the YAML file of each device that they
+serve.
 
 The page reads the same files as `rmf-bridge status`. The page asks a simulation for the names of its
 signals and parts.
@@ -25,7 +25,8 @@ from workbench.page.levels import Levels, Rows
 class ServedDevice:
     """A device that a daemon on this machine serves, with its YAML, its present inputs and its outputs.
 
-    `contacts` is known signal -> whether the signal is asserted. `device` is its name in the YAML.
+    `contacts` is known signal -> whether the signal is asserted. `device` is the device's name in the
+    YAML.
     """
 
     local: Local
@@ -36,11 +37,12 @@ class ServedDevice:
 
 
 class LocalDaemons:
-    """This machine's daemons at the page's last look. `served` is (kind, name) -> the device."""
+    """The daemons on this machine, as of the last call of `look`. `served` is (kind, name) -> the
+    device."""
 
     def __init__(self, base: Path | None) -> None:
-        """Begin without daemons. `base` is the folder of runtime directories. None means the folders of
-        `run` and systemd."""
+        """Begin without daemons. `base` is the folder of runtime directories. None means the folders
+        that `run` and systemd use."""
         self.served: Mapping[tuple[str, str], ServedDevice] = {}
         self._base = base
         self._levels: dict[Path, Levels] = {}

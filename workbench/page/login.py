@@ -1,9 +1,9 @@
-"""Identify the user of a request. The user comes from a login's cookie, or from the header of a trusted
-proxy.
+"""Identify the user of a request. The user's name comes from the cookie of a login session, or from the
+header of a trusted proxy.
 
 A session's cookie is HttpOnly and SameSite=Strict. If the form came over TLS, the cookie is also
-Secure. Besides the cookie, each form has a proof. The header of a reverse proxy counts only if the
-request comes from the proxy's address.
+Secure. Besides the cookie, each form contains a secret value (`proof`), against forged forms. The
+header of a reverse proxy counts only if the request comes from the proxy's address.
 """
 
 import asyncio
@@ -35,7 +35,7 @@ FORM: Final = """<!doctype html><html lang="en"><head><meta charset="utf-8">
 
 
 class Login:
-    """An identifier of users. Without a password file and without a proxy, nobody can log in or act."""
+    """The logins of users. Without a password file and without a proxy, nobody can log in or act."""
 
     def __init__(self, door: PasswordCheck | None, *, proxy: str = "", header: str = "") -> None:
         """Begin without sessions. `proxy` is the proxy's address. `header` is the proxy's header that
@@ -85,7 +85,7 @@ class Login:
         address = request.client.host if request.client else ""
         if self._door is None:
             return self._page(request, status=403)
-        async with self._one_at_a_time:  # one check takes 16 MB and 50 ms
+        async with self._one_at_a_time:  # each check takes 16 MB and 50 ms
             why = await asyncio.to_thread(
                 self._door.refuses, user, password, address, time.monotonic()
             )

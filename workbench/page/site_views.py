@@ -49,14 +49,14 @@ FILTERS: Final = (
     '<label><input id="only" type="checkbox"> Only what needs attention</label></div>'
 )
 NOT_HERE: Final = (
-    "Its daemon is not on this machine, or the page's user may not see it: wiring, limits and live"
-    " levels are shown by a page on the daemon's own machine."
+    "The device's daemon is not on this machine, or the page's user may not see the daemon. To see"
+    " wiring, limits and live levels, open a page on the daemon's own machine."
 )
 
 
 class SiteWall(Tab):
-    """One browser's view of the site. The view has few elements of the library, because the browser
-    visits every such element at each update."""
+    """One browser's view of the site. The view has few NiceGUI elements, because the browser visits
+    every such element at each update."""
 
     def __init__(self, cards: Cards, client: Client) -> None:
         super().__init__(client)
@@ -71,15 +71,16 @@ class SiteWall(Tab):
         self.rebuild()
 
     def change(self, script: str) -> None:
-        """Send a change. A browser that is away gets all cards when it returns."""
+        """Send a change. If the browser is disconnected, remember that it needs all cards when it
+        returns."""
         if not self.is_here:
             self._missed = True
         elif not self._missed:
             self.run(script)
 
     def answer(self, wrong: int) -> None:
-        """Send everything that the browser has missed, even if nothing changes any more. Then answer
-        the browser's question."""
+        """Answer the browser's question. First send all cards if the browser has missed a change.
+        Otherwise it would wait for the next change of the site."""
         if self._missed and self.is_here:
             self.rebuild()
         super().answer(wrong)
@@ -87,7 +88,7 @@ class SiteWall(Tab):
     def rebuild(self) -> None:
         """Draw all cards, by kind and name."""
         self._missed = not self.is_here
-        self._built += 1  # a new number makes the content differ, because equal content is not sent
+        self._built += 1  # equal content is not sent, so a new number makes it differ
         html = "".join(self._section(*section) for section in SECTIONS)
         none = "<p>No device is shown.</p>"
         self._box.set_content(
@@ -102,8 +103,8 @@ class SiteWall(Tab):
         return f"<section{many}><h2>{title}</h2>{cards}</section>" if keys else ""
 
     def _slot(self, key: Key) -> str:
-        """Make a card's slot. The link is outside the part that is redrawn, so the link keeps the
-        keyboard's focus."""
+        """Make the slot (the HTML around a card). The link is outside the card, which is redrawn, so
+        the link keeps the keyboard's focus."""
         card = f'<div id="{place_of(key)}">{self._cards.cards[key]}</div>'
         name, path = escape(key[1]), path_of(*key)
         link = f'<a class="cover" href="{path}" aria-label="{name}"></a>' if linked(key[0]) else ""

@@ -1,4 +1,5 @@
-"""One browser's tab: its time zone, its question for the latest changes, and its view's changes."""
+"""One browser's tab. A tab has a time zone, asks again and again for the latest changes, and gets the
+changes of its view."""
 
 import json
 import math
@@ -20,8 +21,8 @@ WHOLE: Final = 1_000_000
 """A number greater than the number of pieces in any part."""
 
 Edit = tuple[int, int, Sequence[str]]
-"""An edit: the first replaced piece's number, the number of the first piece kept after it, and the new
-pieces."""
+"""An edit: the number of the first piece that is replaced, the number of the first piece after the
+replaced pieces, and the new pieces."""
 
 
 def edits(before: Sequence[str], after: Sequence[str]) -> list[Edit]:
@@ -69,7 +70,8 @@ class Tab:
         """Do nothing, because a device's view has no cards."""
 
     def answer(self, wrong: int) -> None:
-        """Tell the browser that all messages from before its question have been sent.
+        """Answer the browser's question. The answer tells the browser that it has got everything that
+        was heard before the question.
 
         `wrong` is the number of devices that need attention.
         """
@@ -78,7 +80,8 @@ class Tab:
             self.run(f"fresh({asked}, {wrong})")
 
     def _ask(self, event: GenericEventArguments) -> None:
-        """Take the browser's question, which has the browser's steady clock and time zone."""
+        """Take the browser's question. It contains the browser's steady clock, which the answer
+        repeats, and the browser's time zone."""
         match event.args:
             case [int() | float() as asked, str() as zone] if math.isfinite(asked):
                 self._asked, self.zone = float(asked), zone_of(zone)

@@ -9,7 +9,10 @@ from bridges.kinds.shared.table import Table
 from bridges.settings.load import SettingsError, load
 from bridges.settings.sheets.findings import SETTINGS, WIRES, findings
 
-NO_RING = "Its daemon keeps no ring, or the page's user may not read it: no live levels."
+NO_RING = (
+    "There are no live levels: the device's daemon keeps no ring file, or the page's user may not read"
+    " the file."
+)
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]], caption: str) -> str:
@@ -34,8 +37,8 @@ def _cell(heading: str, cell: str) -> str:
 def wiring(file: str, device: str, contacts: Mapping[str, bool]) -> str:
     """Return the tables of wires and limits from the device's YAML, as `rmf-bridge check` prints them.
 
-    `contacts` is known signal -> whether the signal is asserted. The table of wires has a column for
-    this.
+    `contacts` is known signal -> whether the signal is asserted. The table of wires shows these values
+    in a column.
     """
     found = _tables(file, _changed_at(file), device)
     if isinstance(found, str):

@@ -1,4 +1,4 @@
-"""The page's application: the views' addresses, admission, and the serving process.
+"""The page's application: the views' addresses, who may open the page, and the serving process.
 
 Only this module and the views import NiceGUI. A browser's action reaches the graph only through a
 command (`actions.py`).
@@ -45,7 +45,8 @@ log = logging.getLogger(__name__)
 PUMP_S: Final = 0.1
 HERE_S: Final = 1.0
 RECONNECT_S: Final = 30.0
-"""Time (s). If a browser was away for longer, the browser reloads its view."""
+"""Maximum time (s) for which a browser may be disconnected. After a longer time, the browser reloads
+its view."""
 MOST_HISTORY: Final = 100
 """Maximum number of missed updates that a returning browser gets. After more missed updates, the
 browser reloads its view."""
@@ -64,8 +65,8 @@ LOOK_S: Final = 1.0
 QUIET_S: Final = 60.0
 """Minimum time (s) between log lines about browsers that do not read."""
 MOST_WAITING: Final = 50
-"""Maximum number of a browser's unread packets. So many packets come in about five seconds. A browser
-that reads has few unread packets."""
+"""Maximum number of packets that a browser has not read yet. A browser that does not read gets so many
+packets in about five seconds. A browser that reads never has so many."""
 
 
 class Gate:
@@ -109,7 +110,8 @@ def serve(
     )
     ui.add_css(STYLE, shared=True)
     ui.add_head_html(f"<script>{SCRIPT}</script>", shared=True)
-    # Without this setting, Quasar draws a progress bar without a name during each request of a script.
+    # Otherwise Quasar draws a progress bar during each request of a script. That bar has no name for
+    # screen readers.
     app.config.quasar_config["loadingBar"]["skipHijack"] = True
     app.get("/login")(login.show)
     app.post("/login")(login.log_in)
@@ -122,7 +124,7 @@ def serve(
     gate = Gate(login, closed=not ipaddress.ip_address(address).is_loopback)
     app.add_middleware(RequestGuard, hosts=_hosts(address, netloc, args.host), gate=gate)
     for name in ("engineio.server", "socketio.server"):
-        logging.getLogger(name).handlers.clear()  # malformed frames would fill the log
+        logging.getLogger(name).handlers.clear()  # they log each malformed frame
     app.on_startup(lambda: _end_useless())
     app.on_startup(lambda: _say(f"the page is at http://{netloc}/ (Ctrl-C ends it)"))
     try:
@@ -140,7 +142,7 @@ def serve(
                 message_history_length=MOST_HISTORY,
                 limit_concurrency=MOST_CONNECTIONS,
                 ws_max_size=MOST_BYTES,
-                log_config=None,  # our log formats the server's lines
+                log_config=None,  # our own log formats the server's lines
                 language="en-GB",
             )
     finally:
@@ -197,8 +199,8 @@ async def _end_useless() -> None:
 
 
 def _unasked(connections: Iterable[Any]) -> Iterator[tuple[Hashable, Any]]:
-    """Yield the connections on which no request waits for its answer. Each connection comes with its
-    last request."""
+    """Yield the connections that are idle, because no request is being answered. Each connection comes
+    with its last request."""
     for one in connections:
         last = getattr(one, "cycle", one)
         if last is None or getattr(last, "response_complete", False):

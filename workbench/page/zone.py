@@ -14,5 +14,5 @@ def zone_of(name: object) -> tzinfo | None:
         return None
     try:
         return ZoneInfo(name)
-    except (ZoneInfoNotFoundError, ValueError, OSError):  # anybody may send any name
+    except (ZoneInfoNotFoundError, ValueError, OSError):  # the name comes from a browser
         return UTC if name == "UTC" else None

@@ -1,1 +1,1 @@
-"""Read recordings of every format, and replay the recorded decisions."""
+"""Read recordings of every format, and replay the daemons' recorded decisions."""

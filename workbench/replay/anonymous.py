@@ -1,9 +1,10 @@
-"""Anonymise an incident. Each of the site's names becomes `name01`, `name02` …, the same name
-everywhere.
+"""Anonymise an incident. Each name of the site is replaced by `name01`, `name02` and so on. One name
+gets the same replacement everywhere.
 
 Names come from four places: name fields of RMF's messages, single words in cores' memories, the
-devices, and the YAML. This module replaces the names in messages, memories, notes and the YAML, also
-inside longer texts. The new names sort in the same order, because cores sort by names.
+devices, and the YAML. A core is the part of a daemon that decides. This module replaces the names in
+messages, memories, notes and the YAML, also inside longer texts. The new names sort in the same order
+as the old names, because cores sort by names.
 
 The program's own words stay, because new words would change the recording. These words are keys and
 values of the YAML, words of a core, and topics. The YAML's comments are removed. The addresses of the
@@ -51,7 +52,7 @@ from workbench.replay.replayed import of_head
 from workbench.replay.sources import TOPICS
 
 SAID: Final = FREE_TEXTS | {"code", "detail", "reason", "code_fault", "errors", "lost", "io_fault"}
-"""Fields whose words come from a core itself."""
+"""Fields in which a core writes its own words, so that they contain no names."""
 NAME: Final = re.compile(r"(?!\d+$)[\w./-]{1,128}")
 ADDRESS: Final = "192.0.2.1"
 HOSTS: Final = ("host", "api_base", "url")
@@ -76,8 +77,8 @@ def anonymous(incident: Incident) -> Incident:
 
 
 def _swap(names: list[str]) -> Swap:
-    """Return a function that replaces names, which may be inside a text. The longest name is replaced
-    first."""
+    """Return a function that replaces names in a text. A name may be only a part of the text. The
+    longest name is replaced first."""
     if not names:
         return lambda text: text
     width = len(str(len(names)))
@@ -113,7 +114,8 @@ def _names_in(value: object, field: str = "") -> Iterator[str]:
 
 
 def _remembered(incident: Incident) -> Iterator[str]:
-    """Yield each single-word text in a memory or an event, except a core's own words."""
+    """Yield each text of a single word in a memory or an event, except the words that a core itself
+    uses."""
     for entry in incident.entries:
         if isinstance(entry, Known):
             yield from _tree_names([entry.memory, entry.reading])
@@ -141,8 +143,8 @@ def _subjects(incident: Incident) -> Iterator[str]:
 
 
 def _own_names(config: Config, content: dict[str, Any]) -> Iterator[str]:
-    """Yield the devices and places of the YAML. For a kind without hardware, yield every word that the
-    site chose."""
+    """Yield the names of the devices and places in the YAML. For a kind without hardware, yield every
+    word that the site chose."""
     kind = kind_called(config.kind)
     yield from content.get("rmf", {}).get("topics", {}).values()
     if isinstance(kind, GraphKind):
@@ -188,7 +190,7 @@ def _schema_words(part: object, found: set[str]) -> None:
 
 
 def _module_words(module: ModuleType) -> Iterator[str]:
-    """Yield the words in a module's types, which are literals and values of enumerations."""
+    """Yield the words that a module's types define: literals and values of enumerations."""
     for kind in vars(module).values():
         if inspect.isclass(kind) and issubclass(kind, enum.Enum):
             yield from (str(member.value) for member in kind)

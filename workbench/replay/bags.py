@@ -2,11 +2,12 @@
 sqlite3), or a daemon's ring.
 
 This module reads a recording as a stream, in limited memory. Topics and types outside RMF are skipped
-and counted. In a damaged recording, the readable part comes first, and then the damage is noted.
+and counted. If a recording is damaged, the messages before the damage come first. Then the damage is
+written into `notes`.
 
 In our own files, `log_time` is from a clock that never steps, and `publish_time` is from the wall
-clock. Other recordings have only one clock. If that clock steps back, `at` continues from its last
-value.
+clock. Other recordings have only one clock. If that clock steps back, `at` goes on from the value that
+it had before the step.
 """
 
 import logging
@@ -31,8 +32,8 @@ log = logging.getLogger(__name__)
 
 NS: Final = 1e-9
 STEPPED_NS: Final = 10**9
-"""Minimum step back (ns) of a clock that was set back. A smaller step only means that the recording is
-out of order."""
+"""Minimum step back (ns) in recorded times that counts as a clock set back. A smaller step only means
+that the recording is out of order."""
 LONGEST_MESSAGE: Final = 8 << 20
 
 
@@ -51,9 +52,10 @@ def all_in(
 ) -> Iterator[Heard | Own]:
     """Yield RMF's messages and our recorder's texts, in the order of recording.
 
-    `path` is an MCAP file, a `.db3` file, a directory of rosbag2, or a ring. Skipped messages and
-    damage go to `notes`. Without `notes`, the damage is logged. Samples that `keep` refuses stay
-    undecoded, which saves nine tenths of the time. Raises BagError if `path` is no recording.
+    `path` is an MCAP file, a `.db3` file, a directory of rosbag2, or a ring. `notes` gets the numbers
+    of skipped messages, and the damage. Without `notes`, the damage is logged. Samples that `keep`
+    refuses stay undecoded, which saves nine tenths of the time. Raises BagError if `path` is no
+    recording.
     """
     noted = Notes() if notes is None else notes
     clock = _Clock()
@@ -114,8 +116,8 @@ def _parts(path: Path) -> list[Path]:
 
 
 def continuous(files: list[Path]) -> list[Path]:
-    """Return our recorder's files that follow each other without overlap. If there are no such files,
-    return all files."""
+    """Return our recorder's continuous files. Each of them begins where the one before ends. If there
+    are no such files, return all files."""
     return [file for file in files if f"_{CONTINUOUS}_" in file.name] or files
 
 

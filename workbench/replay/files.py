@@ -13,7 +13,8 @@ from workbench.replay.sources import BagError, Notes
 
 
 def opened(path: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
-    """Return a daemon's run, and the entries of this run.
+    """Return the head of a daemon's run (the time from its start to its end), and the entries of this
+    run.
 
     For a directory, return the first run. The run's entries come from all files, in the order of file
     names. Raises BagError.
@@ -38,8 +39,8 @@ def opened(path: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
 
 
 def _of_all(files: list[Path], folder: Path, notes: Notes) -> tuple[Head, Iterator[AnyEntry]]:
-    """Return the run of the first file's daemon, and the run's entries. If there are continuous files,
-    use only those files."""
+    """Return the run in the first file, and the entries of this run from all files. If there are
+    continuous files, use only those files."""
     if not files:
         raise BagError(f"{folder} holds no recording: it has no .mcap file")
     files = continuous(files)

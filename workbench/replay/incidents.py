@@ -1,4 +1,5 @@
-"""Read our recorder's files for a replay. A file has a daemon's run and the run's entries."""
+"""Read our recorder's files for a replay. A file has the head of a daemon's run, and the run's entries
+(the recorded events and decisions)."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +15,7 @@ from bridges.messages import cdr
 from workbench.replay.mcap_read import Damaged, records
 from workbench.replay.sources import BagError, Notes, NotReplayable
 
-NONE = "{} has no entries of an rmf-bridge daemon, and only such entries can be replayed"
+NONE = "{} has no recorded decisions of an rmf-bridge daemon, and only these can be replayed"
 
 
 def head_of(path: Path) -> Head:
@@ -31,7 +32,8 @@ def head_of(path: Path) -> Head:
 
 
 def entries_in(path: Path, notes: Notes) -> Iterator[AnyEntry]:
-    """Yield a file's entries in order. If damage ends the entries, the damage goes to `notes`."""
+    """Yield a file's entries in order. If the file is damaged, stop there and write the damage into
+    `notes`."""
     for told in _texts(path, ENTRIES, notes):
         try:
             yield entries.of_json(told)

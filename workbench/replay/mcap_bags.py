@@ -17,8 +17,8 @@ NO_CHANNEL: Final = Source("", None, "of no channel")
 
 
 def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
-    """Yield a file's RMF messages, undecoded. If damage ends the messages, the damage goes to
-    `notes`."""
+    """Yield a file's RMF messages, undecoded. If the file is damaged, stop there and write the damage
+    into `notes`."""
     declared = _Declared()
     try:
         for record in records(path):
@@ -37,7 +37,7 @@ def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
 
 
 class _Declared:
-    """The declarations in a file up to the present position.
+    """The declarations of a file that were read so far: its writer, its types and its channels.
 
     - `ours`: whether our recorder wrote the file.
     - `sources`: channel -> source.
@@ -51,7 +51,7 @@ class _Declared:
         self._types: dict[int, tuple[str, list[Release]]] = {}
 
     def is_ours(self, found: Source) -> bool:
-        """Return whether this is a topic for our recorder's own texts."""
+        """Return whether this topic has texts that our recorder wrote itself."""
         return self.ours and found.topic.startswith(OWN_TOPICS)
 
     def take(self, record: McapRecord) -> None:

@@ -1,4 +1,5 @@
-"""Read the records of any writer's MCAP file, in limited memory. The file's size limits the time.
+"""Read the records of any writer's MCAP file, in limited memory. The time for reading grows only with
+the file's size.
 
 The reader checks everything in the file before use. A length may be false, a chunk may unpack to
 gigabytes, and the end may be missing. The reader ignores the index, so the index may be missing.
@@ -72,7 +73,8 @@ def records(path: Path) -> Iterator[McapRecord]:
 
 
 class _Allowances:
-    """The limits that are left for a file: bytes to unpack, and channels and schemas to declare."""
+    """The amounts that a file may still contain: bytes to unpack, and channels and schemas to
+    declare."""
 
     def __init__(self, size: int) -> None:
         self._unpacked = FIRST_UNPACKED + MOST_UNPACKED * size

@@ -1,4 +1,5 @@
-"""Functions that all commands on a recording share: the span to read, refusals, and thinning out."""
+"""Functions that all commands on a recording share. They select the part to read, report an unreadable
+recording, and skip samples that bring nothing new."""
 
 import argparse
 import os
@@ -19,8 +20,8 @@ from workbench.replay.sources import BagError, Notes
 
 CLOCK = re.compile(r"(?:(\d{4}-\d\d-\d\d)[ T])?(\d\d?):(\d\d)(?::(\d\d(?:\.\d+)?))?")
 SAME_S = 2.4
-"""Time (s) between samples that differ only in numbers. A daemon counts as silent after 3 s, so this
-time is shorter."""
+"""Time (s) after which a diagnostics sample is taken even if only its numbers have changed. A daemon
+counts as silent after 3 s, so this time is shorter."""
 STAMPED = 12
 """Number of bytes before a DiagnosticArray's status, which are CDR's head and the stamp (OMG DDSI-RTPS
 10.2; Header)."""
@@ -31,8 +32,8 @@ COORDINATOR = b"charger_coordinator"
 
 @dataclass(frozen=True, slots=True)
 class TypedTime:
-    """A time as the user typed it: seconds from the beginning, or a local time of a day. If the day is
-    None, the recording's first day is meant."""
+    """A time as the user typed it: seconds after the recording's beginning, or a local time of day. If
+    `day` is None, the recording's first day is meant."""
 
     after_s: float | None = None
     day: str | None = None
@@ -50,8 +51,8 @@ class TypedTime:
 
 @dataclass(slots=True)
 class RecordingSpan:
-    """The part of a recording to read. `begins_at` is the recording's beginning (s) on `Heard.at`'s
-    clock."""
+    """The part of a recording to read. `begins_at` is the time (s) at which this part begins, by the
+    clock of `Heard.at`."""
 
     from_: TypedTime | None
     to: TypedTime | None
@@ -68,7 +69,7 @@ def unreadable(command: str, error: BagError) -> int:
 def add_span_arguments(parser: argparse.ArgumentParser) -> None:
     """Add `--from` and `--to`."""
     times = (
-        "14:03, 14:03:07, '2026-11-22 14:03' (this machine's time), or +90: s from the beginning"
+        "14:03, 14:03:07, '2026-11-22 14:03' (this machine's time), or +90 (s after the beginning)"
     )
     parser.add_argument(
         "--from", dest="from_", type=_time, metavar="TIME", help=f"begin then: {times}"
@@ -100,7 +101,7 @@ def _plus(text: str) -> float:
 
 
 class Sieve:
-    """A filter that chooses the samples to decode, for one device or, with name "", for all devices.
+    """A filter that chooses the samples to decode, for one device. The name "" stands for all devices.
 
     Diagnostics come each second and seldom change. A sample may differ from the node's last sample only
     in numbers, such as ages and counts. The sieve takes only one such sample every SAME_S. The sieve
@@ -122,8 +123,8 @@ class Sieve:
         return topic != topics.DIAGNOSTICS.name or self._is_news(sample, at)
 
     def _is_common(self, topic: str, sample: bytes) -> bool:
-        """Return whether the topic concerns all devices. The heartbeat does, because a door that is
-        missing in the heartbeat is not held."""
+        """Return whether the topic concerns all devices. The heartbeat of the door supervisor does: if
+        the heartbeat does not list a door, this tells that nobody holds the door."""
         return topic == topics.DOOR_SUPERVISOR_HEARTBEAT.name or COORDINATOR in sample
 
     def _is_news(self, sample: bytes, at: float) -> bool:
@@ -140,10 +141,10 @@ class Sieve:
 def told_between(
     path: Path, span: RecordingSpan, command: str, device: str
 ) -> Iterator[Heard | Own]:
-    """Yield messages and our recorder's texts about the device, as `between` does. "" stands for all
-    devices.
+    """Yield messages and our recorder's texts about the device, from the same part as `between`. ""
+    stands for all devices.
 
-    The `Sieve` thins out messages that differ little from second to second.
+    The `Sieve` skips messages that differ little from second to second.
     """
     return between(path, span, command, Sieve(device).keep)
 

@@ -1,9 +1,9 @@
-"""Replay a recording. Today's core decides on the recorded events. Each decision is compared with the
-recorded decision.
+"""Replay a recording. The core of this version decides again on the recorded events. Each new decision
+is compared with the recorded decision.
 
-A core is a pure function of its memory, an event, the time and its limits. A recording has the initial
-memory and every event. Therefore a decision differs, even by a bit, only if the core or its limits have
-changed.
+A core is the part of a daemon that decides. It is a pure function of its memory, an event, the time and
+its limits. A recording has the initial memory and every event. Therefore a decision differs, even by a
+bit, only if the core or its limits have changed.
 """
 
 import struct
@@ -40,15 +40,16 @@ Parts = tuple[str, Tree, Tree]
 CONTEXT: Final = 6
 """Number of events that the report shows before a difference."""
 PARTS: Final = ("outputs", "news", "refused")
-"""Parts of a decision that are visible outside the core. If a replay tries other limits, only these
+"""Parts of a decision that are visible outside the core. If a replay tries out other limits, only these
 parts are compared."""
 LASTING: Final = ("outputs", "news", "faults")
-"""Parts of a decision that stay until a later decision changes them."""
+"""Parts of a decision that stay in force until a later decision changes them."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReplayedCore:
-    """The core of one subject, with the subject's limits. `types` is the result of `typed.types_of`."""
+    """The core of one subject (a device, or a node without devices), with the subject's limits. `types`
+    is the result of `typed.types_of`."""
 
     decide: Callable[[Any, Any, float], Any]
     published: Callable[[Any, Any], Any]
@@ -77,9 +78,9 @@ class Course:
     """Progress of a replay.
 
     - `decisions`: number of decisions compared.
-    - `unusable`: number of entries that belong to subjects without a replay.
+    - `unusable`: number of entries of subjects whose initial memory was not recorded.
     - `subjects`: the subjects that can be replayed.
-    - `others`: the subjects that the settings lack.
+    - `others`: the subjects that the settings do not contain.
     - `began`, `ended`: times (s since the epoch).
     """
 
@@ -130,7 +131,7 @@ class ReplayedCores:
             return None
         debounce = config.debounce(subject)
         limits = kind.limits(config.devices[subject], debounce)
-        if kind.section:  # the recording has RMF's files, which set a fleet's limits
+        if kind.section:  # a fleet's limits come from RMF's files, which the recording contains
             limits = limits_of(config, subject, debounce)
         return ReplayedCore(_with(kind.decide, limits), kind.published, types_of(kind.decide))
 
@@ -140,7 +141,8 @@ def _with(decide: Callable[..., Any], limits: Any) -> Callable[[Any, Any, float]
 
 
 class _Subject:
-    """One subject. The replay repeats the subject's decisions, beginning with the recorded memory."""
+    """The replay of one subject. It repeats the subject's decisions, beginning with the recorded
+    memory."""
 
     def __init__(self, core: ReplayedCore, known: Known) -> None:
         self._core = core
@@ -155,12 +157,12 @@ class _Subject:
 
     @property
     def has_decided(self) -> bool:
-        """Return whether the subject has made a decision. Only then can a reading be repeated, or a
-        report be published."""
+        """Return whether the subject has made a decision. Before its first decision, there is no
+        reading to repeat and no report to publish."""
         return self._report is not None
 
     def memory(self) -> Tree:
-        """The present memory, in the form of recordings."""
+        """Return the present memory, in the form that recordings use."""
         return tree(self._memory)
 
     def published(self) -> None:
@@ -181,8 +183,8 @@ class _Subject:
         return self._compared(told, decision)
 
     def again(self, at: float) -> list[Parts]:
-        """Repeat the last reading, which changed nothing in the recording. Return the parts that
-        differ."""
+        """Decide on the last reading again. In the recording, this reading was repeated without any
+        effect. Return the parts that differ."""
         outputs, news, report = self._outputs, self._news, self._report
         decision = self._decide(self._reading, at)
         if (
@@ -205,7 +207,7 @@ class _Subject:
         self.last.append((at, event))
         try:
             decision: AnyDecision = self._core.decide(self._memory, event, at)
-        except Exception as error:  # a core never raises for a memory that it made
+        except Exception as error:  # never for a memory that this core itself has made
             why = f"{type(error).__name__}: {error}"
             raise UnknownValue(f"the core cannot decide on the recorded event: {why}") from error
         self._memory, self._report = decision.memory, decision.report
@@ -255,8 +257,9 @@ class Replay:
     def changes(self) -> Iterator[Difference]:
         """Yield the effects of other limits.
 
-        An effect is a time at which outputs, state or refusal begin to differ, or differ in a new way.
-        When they match the recording again, today's value is None.
+        An effect is a time at which outputs, state or refusal begin to differ from the recording. It is
+        also a time at which they begin to differ in a new way. When the replay matches the recording
+        again, today's value is None.
         """
         shown: dict[tuple[str, str], tuple[Tree, Tree]] = {}
         for entry in self._entries:
@@ -304,7 +307,8 @@ class Replay:
                 yield at, subject.again(at)
 
     def _known(self, entry: Known, *, strict: bool) -> Iterator[tuple[float, list[Parts]]]:
-        """Begin the replay of a subject, or compare its memory with the recorded memory."""
+        """Begin the replay of a new or restarted subject with the recorded memory. For any other
+        subject, compare the replayed memory with the recorded memory."""
         name = entry.subject
         if entry.anew or name not in self._subjects:
             core = self._cores.of(name)
@@ -318,7 +322,8 @@ class Replay:
 
 
 def apart(was: Tree, now: Tree) -> tuple[Tree, Tree]:
-    """Return the elements in which two lists of the same length differ. Return other values whole."""
+    """Return only the elements that differ, if both values are lists of the same length. Otherwise
+    return both values unchanged."""
     if not (isinstance(was, list) and isinstance(now, list) and len(was) == len(now)):
         return was, now
     pairs = [pair for pair in zip(was, now, strict=True) if pair[0] != pair[1]]

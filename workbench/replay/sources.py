@@ -27,15 +27,15 @@ class NotReplayable(BagError):
 
 @dataclass(slots=True)
 class Notes:
-    """Notes about missing parts. `skipped` is reason -> number of messages. `damage` tells why the end
-    is missing, or is ""."""
+    """Notes about missing parts. `skipped` is reason -> number of skipped messages. `damage` tells why
+    the end of a recording could not be read, or is ""."""
 
     skipped: Counter[str] = field(default_factory=Counter)
     damage: str = ""
 
     def damaged(self, path: object, why: object) -> None:
         """Note why the rest of a file is missing."""
-        told = f"{path}: {why}; the part before is used"
+        told = f"{path}: {why}; only the part before this place is used"
         self.damage = f"{self.damage}; {told}" if self.damage else told
 
 
@@ -44,7 +44,7 @@ class Raw(NamedTuple):
 
     - `at`: time (ns) on the recorder's clock.
     - `wall`: time (ns) on the wall clock.
-    - `decode`: None for our own recorder's texts.
+    - `decode`: a function that decodes the sample; None if the sample is one of our recorder's texts.
     - `sender`: the publisher that our recorder has noted.
     """
 
@@ -72,13 +72,16 @@ def source(topic: str, type_name: str, releases: list[Release]) -> Source:
     if message_type is None or not (type_name.startswith("rmf_") or topic in TOPICS):
         return Source(topic, None, f"{short}: not RMF's")
     if not releases:
-        return Source(topic, None, f"{short}: {type_name} of an unknown release")
+        return Source(
+            topic, None, f"{short}: {type_name}, from an unknown release of RMF's messages"
+        )
     return Source(topic, lambda sample: _decoded(message_type, sample, releases))
 
 
 def releases(type_name: str, definition: str, digest: str = "") -> list[Release]:
-    """Return a message's possible releases. If the release is recorded, return only this release.
-    Otherwise return all releases that have the type.
+    """Return the releases of RMF's messages that may have written a message of this type. If the
+    recording tells the release, return only this release. Otherwise return all releases that have
+    the type.
 
     `definition` is the type's text, or "". `digest` is the type's RIHS01 hash, or "".
     """

@@ -13,8 +13,8 @@ from workbench.replay.sources import BagError, Notes, Raw, releases, source
 def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
     """Yield a recording's RMF messages, undecoded. `path` is a `.db3` file, or the file's directory.
 
-    If damage ends the messages, the damage goes to `notes`. Raises BagError if the recording cannot be
-    opened.
+    If the recording is damaged, stop there and write the damage into `notes`. Raises BagError if the
+    recording cannot be opened.
     """
     began = False
     try:
@@ -34,7 +34,7 @@ def raw_in(path: Path, notes: Notes) -> Iterator[Raw]:
     except Exception as error:  # arbitrary bytes can make the library raise any exception
         if not began:
             raise BagError(
-                f"{path} cannot be read: {error}; try sqlite3 .recover on the .db3 file"
+                f"{path} cannot be read: {error}; try the sqlite3 command .recover on the .db3 file"
             ) from error
         notes.damaged(path, error)
 

@@ -24,12 +24,12 @@ def types_of(decide: Callable[..., Any]) -> Mapping[str, Any]:
 
 
 def typed(told: Tree, hint: Any) -> Any:
-    """Return the value of a recorded tree. Raises UnknownValue if a part does not have its annotated
-    type."""
+    """Convert a recorded tree (nested lists and dicts) to the value that it stands for. Raises
+    UnknownValue if a part does not have its annotated type."""
     found = value(told)
     if not _fits(found, hint):
         shown = str(told)
-        raise UnknownValue(f"this version's core does not accept {shown[:LONGEST]}")
+        raise UnknownValue(f"the core of this version does not accept the value {shown[:LONGEST]}")
     return found
 
 
@@ -73,7 +73,8 @@ def _fields(kind: Hashable, args: tuple[Any, ...]) -> Mapping[str, Any]:
 
 
 def _closed(hint: Any, own: Mapping[Any, Any]) -> Any:
-    """Return a type in which the owner's arguments replace the type variables."""
+    """Return a type without type variables. `own` is type variable -> its type in the class that
+    contains the field."""
     if isinstance(hint, TypeVar):
         return own.get(hint, Any)
     open_ = getattr(hint, "__parameters__", ()) if get_origin(hint) else ()

@@ -3,9 +3,9 @@
 The rules come from rmf_ros2 9dedd0f (2026-05). RMF's weaknesses are included: RMF has no timeouts and
 no retries, and ignores a lift's mode.
 
-The module has no I/O and no clock. Each party hears a message, or the caller ticks the party at
-`wake_at`. The party returns the messages to publish. `now` is RMF's clock in seconds. If stamps matter,
-`now` counts since the epoch. A restarted party is a new object.
+The module has no I/O and no clock. The caller passes messages to a node (`hear`), and calls `tick` at
+`wake_at`. Both return the messages to publish. `now` is the time (s) by RMF's clock. If a node stamps
+its messages, `now` must count since the epoch. To restart a node, make a new object.
 """
 
 from abc import ABC, abstractmethod
@@ -23,7 +23,7 @@ NEVER: Final = float("inf")
 
 
 class Party(ABC):
-    """A node on RMF's side. A node without a timer never ticks."""
+    """A node on RMF's side. Without a timer, `tick` does nothing."""
 
     subscribes: Sequence[AnyTopic]
 

@@ -5,19 +5,18 @@ phases/WaitForCharge.cpp, FleetUpdateHandle.cpp), and from tests with Jazzy's ad
 1. ChargeBattery goes to the robot's dedicated waypoint and waits there for its battery. An assignment
    with a new waypoint or mode restarts a running ChargeBattery, and moves no other robot. A waypoint
    missing in the graph crashes the adapter.
-2. ChargeBattery is a task in two cases. RMF's planner plans the task, or RMF finds the battery too low
-   for the way to the dedicated waypoint (the automatic retreat). A robot at that waypoint never
-   retreats. With Jazzy, no robot below the recharge threshold retreats. The task ends at recharge_soc.
-   With `finishing_request: charge` the fleet's robots run ChargeBattery after their tasks. This
-   ChargeBattery is no task, and lasts until the next task, even with a full battery. With `nothing`
-   a robot stays. With `park` a robot drives to a parking spot. Jazzy's adapter (branch jazzy,
-   7eef65a) knows no parking spots. There the robot goes to its dedicated waypoint, and goes there
-   again at each assignment.
-3. A robot without a task shows the mode IDLE and no task id, even while it charges. Only
-   WaitForCharge sets CHARGING, and nothing resets CHARGING. Therefore every later task shows CHARGING
-   too.
-4. An EasyFullControl adapter forgets the assignments in a restart. First the adapter takes the
-   retained assignment. A moment later, the adapter replaces the assignment by the charger in its file.
+2. ChargeBattery is a task in two cases: RMF's planner plans it, or RMF starts the automatic retreat.
+   The retreat begins when the battery is too low for the drive to the dedicated waypoint. A robot at
+   that waypoint never retreats. With Jazzy, no robot below the recharge threshold retreats. The task
+   ends at recharge_soc. With `finishing_request: charge` the fleet's robots run ChargeBattery after
+   their tasks. This ChargeBattery is no task, and lasts until the next task, even with a full battery.
+   With `nothing` a robot stays. With `park` a robot drives to a parking spot. Jazzy's adapter (branch
+   jazzy, 7eef65a) knows no parking spots. With `park`, its robots go to their dedicated waypoints, and
+   go there again after each assignment.
+3. A robot without a task shows the mode IDLE and no task id, even while it charges. Only WaitForCharge
+   sets CHARGING, and nothing resets CHARGING. Therefore every later task shows CHARGING too.
+4. An EasyFullControl adapter forgets the assignments in a restart. First the adapter takes the retained
+   assignment. A moment later, the adapter replaces the assignment by the charger in its file.
 """
 
 from collections.abc import Mapping, Sequence
@@ -50,7 +49,7 @@ class FleetRobot:
     - `place`: the waypoint at which the robot stands; "" on the road.
     - `goes_to`: the robot's destination.
     - `dedicated`: the waypoint of the robot's charging assignment.
-    - `waits`: whether the assignment makes the robot wait there.
+    - `waits`: whether the assignment has MODE_WAIT, so that the robot waits at `dedicated`.
     - `doing`: the robot's task, or the robot's activity without a task.
     - `task_id`: the id of the task; "" without a task.
     - `mode`: the last mode that a phase set.
@@ -92,9 +91,9 @@ class FleetAdapter(Party):
     ) -> None:
         """Begin with `robots` at their parking spots.
 
-        - `drive_s`: time (s) of every drive.
+        - `drive_s`: time (s) that each drive takes.
         - `finishing`: the fleet's `finishing_request`.
-        - `jazzy`: whether Jazzy's rules apply where Jazzy differs.
+        - `jazzy`: whether the adapter is Jazzy's, whose rules differ in part.
         """
         self.name = name
         self.graph = graph
@@ -128,7 +127,7 @@ class FleetAdapter(Party):
             self._rest(robot, now)
 
     def strays(self, who: str, place: str, now: float) -> None:
-        """Drive the robot to a place outside its present task."""
+        """Let the robot drive to a place to which its task does not send it."""
         self._go(self.robots[who], place, now)
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
@@ -144,8 +143,8 @@ class FleetAdapter(Party):
         return []
 
     def tick(self, now: float) -> list[Said]:
-        """Move driving robots, retreat robots with a low battery, end the tasks of full robots, and
-        publish the state."""
+        """Publish the fleet's state when it is due. Before that, move driving robots, and end the
+        charging task of each full robot. Send robots with a low battery to their chargers."""
         for robot in self.robots.values():
             self._move(robot, now)
             self._retreat(robot, now)
@@ -178,8 +177,8 @@ class FleetAdapter(Party):
             self._go(robot, robot.dedicated if self.jazzy else self._spots[robot.name], now)
 
     def _retreat(self, robot: FleetRobot, now: float) -> None:
-        """Retreat by the rules of consider_retreating_to_charger. A robot with a task, or a robot at
-        its dedicated waypoint, does not retreat."""
+        """Begin the automatic retreat of a robot with a low battery (consider_retreating_to_charger). A
+        robot with a task, or a robot at its dedicated waypoint, does not retreat."""
         low = robot.battery_percent < RETREAT_PERCENT
         if self.jazzy and robot.battery_percent <= TOO_LATE_PERCENT:
             return

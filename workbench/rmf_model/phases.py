@@ -1,9 +1,9 @@
-"""The phases of a robot's task that send messages to us: RequestLift, EndLiftSession, DoorOpen,
+"""The phases of a robot's task that send messages to our nodes: RequestLift, EndLiftSession, DoorOpen,
 DoorClose.
 
 Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/phases/. No phase gives up. Three
-other phases are left out, because they send nothing to us: the lift watchdog, localisation, and holding
-points.
+other phases are left out, because they send nothing to our nodes: the lift watchdog, localisation, and
+holding points.
 """
 
 from typing import Final
@@ -18,10 +18,11 @@ REPEAT_S: Final = 1.0
 
 
 class RequestLift(Phase):
-    """Wait for a LiftState with our floor, DOOR_OPEN and our session. RMF ignores modes.
+    """The phase in which a robot waits for the lift. It ends at a LiftState with the robot's floor,
+    DOOR_OPEN and the robot's session. RMF ignores modes.
 
-    The phase has a 1 s timer, which publishes nothing after a destination is set. From then on, the
-    context repeats the request at each LiftState.
+    The context (RobotContext) repeats the request after each LiftState. The phase's own 1 s timer then
+    publishes nothing.
     """
 
     claims_lift = True
@@ -30,15 +31,16 @@ class RequestLift(Phase):
         self.wanted = LiftDestination(lift, floor, inside)
 
     def begin(self, robot: RobotContext, now: float) -> list[Said]:
-        """Send the request. If the robot is outside and the lift has already come, end the phase
-        immediately."""
+        """Send the request. If the lift has already come for a robot outside, end the phase. Note in
+        `inside` that the robot may be in the car from now on."""
         if not self.wanted.inside and robot.has_lift_arrived(self.wanted.lift, self.wanted.floor):
             self.done = True
             return robot.set_lift_destination(replace(self.wanted, inside=True), now)
         return robot.set_lift_destination(self.wanted, now)
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
-        """Take a message. After the lift has come, send the request of a robot inside the car
+        """Take a message. When the lift has come, end the phase. If the robot was outside, send the
+        request again, and note in `inside` that the robot may be in the car
         (RequestLift.cpp:322-326, _finish)."""
         match message:
             case d.LiftState(
@@ -56,13 +58,15 @@ class RequestLift(Phase):
 
 
 class EndLiftSession(Phase):
-    """Release the lift. The phase ends when a LiftState shows a session other than ours."""
+    """The phase in which a robot releases the lift. It ends when a LiftState shows another session, or
+    none."""
 
     def __init__(self, lift: str) -> None:
         self.lift = lift
 
     def begin(self, robot: RobotContext, now: float) -> list[Said]:
-        """Send nothing, because END_SESSION follows the next LiftState with our session."""
+        """Release the lift. END_SESSION is sent later, when the next LiftState shows the robot's
+        session. Jazzy also sends END_SESSION now."""
         return robot.release_lift()
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
@@ -73,10 +77,11 @@ class EndLiftSession(Phase):
 
 
 class DoorOpen(Phase):
-    """Send OPEN at the start and every second, until the door is OPEN *and* the heartbeat lists us.
+    """The phase in which a robot opens a door. It sends OPEN at the start and every second, until the
+    door is OPEN *and* the heartbeat lists the robot.
 
-    The messages before the start do not count. After the start, only the latest heartbeat and the
-    latest state count, and the state may be of any door.
+    Messages from before the start do not count. After the start, only the latest heartbeat and the
+    latest DoorState count. A DoorState of another door also replaces the latest state.
     """
 
     def __init__(self, door: str) -> None:
@@ -112,7 +117,8 @@ class DoorOpen(Phase):
 
 
 class DoorClose(Phase):
-    """Send CLOSE at the start and every second, until a heartbeat no longer lists us.
+    """The phase in which a robot releases a door. It sends CLOSE at the start and every second, until a
+    heartbeat no longer lists the robot.
 
     The phase does not wait for the door.
     """

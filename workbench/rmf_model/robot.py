@@ -1,8 +1,8 @@
 """A fleet adapter's context of one robot, with the actions that all phases share.
 
 Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/rmf_fleet_adapter/agv/RobotContext.cpp:1281-1324 and
-1600-1800. The phases are in `phases.py`. With `jazzy`, Jazzy's rules apply where Jazzy differs (branch
-jazzy, 7eef65a, RobotContext.cpp:1054-1095 and 1329-1419).
+1600-1800. The phases are in `phases.py`. With `jazzy`, the context follows Jazzy's adapter where it
+differs (branch jazzy, 7eef65a, RobotContext.cpp:1054-1095 and 1329-1419).
 """
 
 from abc import ABC, abstractmethod
@@ -17,7 +17,8 @@ from workbench.rmf_model import NEVER, Party, Said, door_request, has_session
 
 
 class LiftDestination(Struct, frozen=True):
-    """The lift's destination for the robot. `inside` tells whether the robot may be in the car."""
+    """The lift and the floor that the robot requests. `inside` tells whether the robot may be in the
+    car."""
 
     lift: str
     floor: str
@@ -27,8 +28,8 @@ class LiftDestination(Struct, frozen=True):
 class Phase(ABC):
     """One step of a robot's task.
 
-    `due_at` is the time (s) of the phase's wall timer. If `claims_lift` is true, the context must not
-    release an idle lift during this phase.
+    `due_at` is the time (s) of the phase's wall timer. With `claims_lift`, the robot still needs the
+    lift. Then the context does not release the lift, even if the robot seems not to use it.
     """
 
     done = False
@@ -41,7 +42,7 @@ class Phase(ABC):
 
     @abstractmethod
     def hear(self, robot: "RobotContext", message: d.Message, now: float) -> list[Said]:
-        """Take a message. The context has already applied its own rules to the message."""
+        """Take a message, after the context (RobotContext) has reacted to it."""
 
     def tick(self, robot: "RobotContext", now: float) -> list[Said]:
         """Fire the phase's wall timer."""
@@ -85,7 +86,7 @@ class RobotContext(Party):
         return self.phase is None or self.phase.done
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
-        """Apply the context's own rules, and then the rules of the phase."""
+        """Take a message. First the context reacts to it, and then the running phase."""
         said: list[Said] = []
         match message:
             case d.LiftState():
@@ -114,13 +115,13 @@ class RobotContext(Party):
         return self._publish_destination(now)
 
     def has_lift_arrived(self, lift: str, floor: str) -> bool:
-        """Return whether the lift has already come for this destination."""
+        """Return whether the lift has already come to this floor for the robot's present request."""
         at = self.destination
         return self.lift_arrived and at is not None and (at.lift, at.floor) == (lift, floor)
 
     def release_lift(self) -> list[Said]:
-        """Forget the lift. After the next LiftState with our session, END follows. Jazzy also sends END
-        immediately."""
+        """Stop requesting the lift. END follows when the next LiftState shows the robot's session.
+        Jazzy also sends END immediately."""
         said = []
         if self.jazzy and self.destination is not None:
             said = [self._end(self.destination.lift, self.destination.floor, 0.0)]

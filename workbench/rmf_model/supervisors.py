@@ -1,8 +1,8 @@
 """The rules of rmf_lift_supervisor and rmf_door_supervisor.
 
 Source: rmf_ros2 9dedd0f, rmf_fleet_adapter/src/lift_supervisor/Node.cpp and door_supervisor/Node.cpp.
-Both supervisors forget everything in a restart. With `jazzy`, Jazzy's rules apply where Jazzy differs
-(branch jazzy, 7eef65a).
+Both supervisors forget everything in a restart. With `jazzy`, the lift supervisor follows Jazzy's where
+it differs (branch jazzy, 7eef65a).
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,11 @@ from workbench.rmf_model import Party, Said, door_request
 class LiftSupervisor(Party):
     """The node rmf_lift_supervisor. For each lift, it remembers the holder's last request.
 
-    Jazzy's supervisor repeats the holder's request at every state, and sends END for an empty session.
+    The supervisor repeats this request until the lift's state matches it. Jazzy's supervisor repeats
+    the request after every state, even a matching one.
+
+    If a lift has a session, but the supervisor remembers no request, the supervisor sends END. Jazzy's
+    supervisor sends END even if the lift has no session.
     """
 
     subscribes: Sequence[topics.AnyTopic] = (topics.ADAPTER_LIFT_REQUESTS, topics.LIFT_STATES)
@@ -29,8 +33,8 @@ class LiftSupervisor(Party):
         self._jazzy = jazzy
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
-        """Take a message. Adopt, forward or silently drop an adapter's request. At a state, repeat the
-        holder's request."""
+        """Take a message. Remember and forward an adapter's request, or drop it silently if another
+        session holds the lift. After a state, repeat the holder's request."""
         match message:
             case d.LiftRequest():
                 return self._requested(message, now)
@@ -86,7 +90,7 @@ class DoorSupervisor(Party):
     """The node rmf_door_supervisor. It remembers each door's sessions, and the time of each session's
     newest open request.
 
-    The supervisor publishes a heartbeat only on an adapter request.
+    The supervisor publishes a heartbeat only when an adapter has sent a request.
     """
 
     subscribes: Sequence[topics.AnyTopic] = (topics.ADAPTER_DOOR_REQUESTS, topics.DOOR_STATES)
@@ -96,7 +100,8 @@ class DoorSupervisor(Party):
         self.sessions: dict[str, dict[str, d.Time]] = {}
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
-        """Take a message. An adapter request begins or ends a session. At a state, send a reminder."""
+        """Take a message. A request of an adapter begins or ends a session. After a state that does not
+        fit the sessions, repeat the order to the door."""
         match message:
             case d.DoorRequest(requested_mode=d.DoorMode(d.DoorModeValue.MODE_OPEN)):
                 return self._opened(message, now)

@@ -42,8 +42,8 @@ class WorkcellPhase(Party):
         self._last = 0.0
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
-        """Judge the latest result and the latest state. Leave out a message that has not yet come
-        (rxcpp's combine_latest)."""
+        """Check the latest result and the latest state. If there is none yet, skip this check (rxcpp's
+        combine_latest)."""
         if isinstance(message, WorkcellResult):
             self._result = message
         if isinstance(message, WorkcellState):
@@ -79,8 +79,8 @@ class WorkcellPhase(Party):
                 self.outcome, self.why = "failed", "a result FAILED"
 
     def _judge_state(self) -> None:
-        """Judge the latest state. As in `_get_status`, the state may still turn a failure into a
-        completion."""
+        """Check the latest state. As in `_get_status`, the state may still turn a failed request into a
+        completed request."""
         state, guid = self._state, self.request.request_guid
         if state is None or state.guid != self.request.target_guid:
             return

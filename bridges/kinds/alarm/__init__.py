@@ -1,5 +1,5 @@
-"""Alarm panels, such as a fire panel or a code blue. Their contacts stop the robots of the site's
-fleets."""
+"""Alarm panels, such as a fire panel or a hospital's code blue panel. Their contacts stop the robots of
+the site's fleets."""
 
 from bridges.kinds.alarm import core, memory, messages, report, signals
 from bridges.kinds.alarm.memory import PanelLimits, PanelMemory

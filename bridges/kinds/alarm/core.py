@@ -1,18 +1,19 @@
-"""The panel's decision core: which causes of an alarm does it see?
+"""The panel's decision core: it finds the causes of an alarm in the panel's readings.
 
-The latch, the reset and the messages to the fleets are those of every alarm
-(`bridges/kinds/shared/fleet_alarm.py`). A panel has no outputs.
+A source is a contact of the panel that reports an alarm. This file only finds the causes.
+`bridges/kinds/shared/fleet_alarm.py` latches them, resets them and sends the messages to the fleets, as
+for every kind. A panel has no outputs.
 
 Rules:
-ALARM-1. A source is active once it has been asserted for its debounce. It is over once it has been
-   clear for `clear_s`. Before its first debounce is over, a single asserted reading counts. A failed
-   reading restarts the debounce.
+ALARM-1. A source becomes active when it has been asserted for its debounce time. It is over when it has
+   not been asserted for `clear_s`. Until a source has settled for the first time, a single asserted
+   reading counts. A failed reading restarts the debounce.
 ALARM-2. After `stale_after_s` without a good reading the panel is silent, which is a fault. Its sources
-   stay as they were, and none of them can be reset.
-ALARM-3. A silence of `silent_alarm_after_s` is itself a cause of an alarm. The silence counts from the
-   last good reading or from the start. The next good reading ends that cause.
+   keep their last values, and none of them can be reset.
+ALARM-3. If the panel is silent for `silent_alarm_after_s`, the silence itself is a cause of an alarm.
+   The time counts from the last good reading, or from the start. The next good reading ends that cause.
 ALARM-4. A drill begins when the drill contact comes on after it was seen off. It ends `drill_s` later,
-   or when the contact goes off. A contact that is on at the start begins no drill.
+   or when the contact goes off. If the contact is already on at the start, no drill begins.
 """
 
 from collections.abc import Iterator
@@ -28,14 +29,15 @@ from bridges.kinds.shared.durations import AGES_AGO, NEVER
 
 
 def initial(limits: PanelLimits, now: float) -> PanelMemory:
-    """Return the memory at start: nothing was read."""
+    """Return the memory at start, before any reading."""
     return PanelMemory(began_at=now)
 
 
 def decide(
     memory: PanelMemory, event: Event, now: float, limits: PanelLimits
 ) -> Decision[PanelMemory, PanelOutputs, PanelReport]:
-    """Decide one scan. `now`: monotonic s, never earlier than in the last scan. Never raises."""
+    """Apply one event and decide. `now`: monotonic s, never earlier than in the last call. Never
+    raises."""
     match event:
         case Sampled(sample):
             memory = _read(memory, sample, now, limits)
@@ -69,8 +71,8 @@ def _read(memory: PanelMemory, sample: PanelSample, now: float, limits: PanelLim
 
 
 def _hold_s(name: str, before: Settled[bool] | None, on: bool, limits: PanelLimits) -> float:
-    """Return the time (s) for which this value must last. The end of a source that was active must last
-    `clear_s`."""
+    """Return the time (s) for which the value `on` must last before it counts. This is `clear_s` for
+    the end of an active source, and the debounce otherwise."""
     over = before is not None and before.value is not None and not on
     return limits.t.clear_s if over else limits.debounce.get(name, 0.0)
 

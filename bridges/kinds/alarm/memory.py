@@ -1,4 +1,5 @@
-"""The panel core's memory from scan to scan, and its limits."""
+"""The values that the panel core keeps from one scan to the next, and the settings that it needs (its
+limits)."""
 
 from collections.abc import Mapping
 
@@ -20,7 +21,8 @@ class PanelLimits(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, settings: PanelSettings, debounce: Mapping[str, float]) -> "PanelLimits":
-        """Make the limits from the YAML and the wiring table's debounce (signal -> s)."""
+        """Make the limits from the YAML and from `debounce`, which maps each wired signal to its
+        debounce (s)."""
         drill_s = settings.drill_s or 0.0
         return cls(settings.silent_alarm_after_s, drill_s, settings.limits, debounce)
 

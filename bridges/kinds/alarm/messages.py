@@ -1,5 +1,5 @@
-"""RMF has no message for a panel's state. The log, the status file and `/diagnostics` show the
-state."""
+"""The panel's state as a line of text. RMF has no message for it, so only the log, the status file and
+`/diagnostics` show it."""
 
 from collections.abc import Mapping
 

@@ -9,7 +9,8 @@ class PanelReport(msgspec.Struct, frozen=True):
     """The present state of a panel. `active`: its active sources. `silent`: the panel gives no
     readings.
 
-    `alarm`: the causes for the fleets. `read_at`: monotonic seconds, None before the first reading.
+    `alarm`: the causes of an alarm for the fleets. `read_at`: the time of the last good reading
+    (monotonic seconds), None before the first reading.
     """
 
     read_at: float | None
@@ -19,5 +20,5 @@ class PanelReport(msgspec.Struct, frozen=True):
     alarm: AlarmInputs = AlarmInputs()
 
     def news(self) -> object:
-        """Return everything except the age and the faults' details."""
+        """Return everything except the time of the reading and the faults' details."""
         return self.active, self.silent, self.alarm, tuple(fault.code for fault in self.faults)

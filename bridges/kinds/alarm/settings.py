@@ -18,7 +18,8 @@ class PanelDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     ] = 1.0
     clear_s: Annotated[
         Seconds,
-        tells("how long a source must be clear to count as over; after that a person may reset."),
+        tells("""how long a source must be without an alarm to count as over; after that a person
+        may reset it."""),
     ] = 1.0
 
 
@@ -27,30 +28,28 @@ class PanelSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_
 
     silent_alarm_after_s: Annotated[
         Patience,
-        tells("""how long the panel may be silent; after that its silence is an alarm. Weigh the
-        robots that a broken cable stops against a fire that a broken cable hides."""),
+        tells("""how long the panel may be silent; after that its silence is an alarm. With a short
+        time a broken cable soon stops the robots. With a long time a broken cable may hide a
+        fire."""),
     ]
     drill_s: Annotated[
         Timeout | None,
-        tells(
-            "how long a drill lasts, counted from the drill contact; then the drill ends by itself."
-        ),
+        tells("""how long a drill lasts after the drill contact has come on; then the drill ends by
+        itself."""),
     ] = None
     limits: Annotated[PanelDurations, tells("the durations that differ from their defaults.")] = (
         PanelDurations()
     )
 
     def stale_after(self) -> float:
-        """Return the limits' `stale_after_s`."""
+        """Return `stale_after_s` of the limits."""
         return self.limits.stale_after_s
 
     def problems(self) -> Remarks:
         """Yield the fields that contradict each other."""
         yield from alarm_problems(self)
         if self.alarm == "none":
-            text = (
-                "a panel is here to tell the fleets: write alarm: fire_alarm_trigger, which stops"
-            )
+            text = "a panel must tell the fleets: write alarm: fire_alarm_trigger, which stops"
             yield ("alarm",), f"{text} every fleet, or alarm: emergency_signal, which names fleets"
         if self.silent_alarm_after_s < self.limits.stale_after_s:
             least = f"must be at least stale_after_s ({self.limits.stale_after_s:g} s)"

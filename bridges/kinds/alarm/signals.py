@@ -1,4 +1,4 @@
-"""A panel's sample, outputs and events: the interface of its core."""
+"""A panel's readings (samples), outputs and events, which are the interface of its decision core."""
 
 from typing import Final
 
@@ -7,13 +7,14 @@ import msgspec
 from bridges.kinds.shared.decision import IoFailed, OperatorReset, RivalSeen, Sampled
 
 SILENT: Final = "silence"
-"""The cause of an alarm that a panel's silence raises."""
+"""The name of the alarm's cause if the cause is the panel's silence."""
 DRILL: Final = "drill"
-"""The signal of the drill contact."""
+"""The signal name of the drill contact."""
 
 
 class PanelSample(msgspec.Struct, frozen=True):
-    """Every input of one panel: active or not, in whichever way it is wired, and not debounced.
+    """Every input of one panel, not debounced. True means asserted, whether the contact is wired as
+    normally open or normally closed.
 
     `sources`: for each source, whether it is asserted. `drill`: the drill contact; None if it is not
     wired.
@@ -24,7 +25,7 @@ class PanelSample(msgspec.Struct, frozen=True):
 
 
 class PanelOutputs(msgspec.Struct, frozen=True):
-    """No output: a panel is only read."""
+    """The outputs of a panel: none, because a panel is only read."""
 
 
 Event = Sampled[PanelSample] | IoFailed | RivalSeen | OperatorReset

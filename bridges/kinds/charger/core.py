@@ -1,9 +1,10 @@
-"""The charger's decision core: its request, its power, and its report to RMF.
+"""The charger's decision core. It decides on requests, on the station's power, and on the report to
+RMF.
 
 CHARGER-1. The states are IDLE → ASSIGNED → CHARGING → RELEASED → IDLE, and ERROR from any of them. A
-   request can only bring the state ASSIGNED; the station's readings bring every other state. CHARGING
-   lasts as long as current flows, even if the current is already ramping down. In RELEASED the station
-   is disconnected from its robot, and the pad is not clear yet.
+   request can change the state only to ASSIGNED. The station's readings cause every other change.
+   CHARGING lasts as long as current flows, even if the current is already ramping down. In RELEASED the
+   station is disconnected from its robot, and the pad is not clear yet.
 CHARGER-2. A request is granted only in the state IDLE. A repeat of a granted request changes nothing,
    even after the request has ended. Every other request is refused until the station is IDLE. One
    exception: if the station can identify the robot on the pad, a request for that robot may be granted
@@ -15,16 +16,17 @@ CHARGER-4. A cancel ends only the request that the cancel names. If current flow
    off, and the state stays CHARGING until the station has stopped. A full battery ends a request in the
    same way.
 CHARGER-5. The station is energised only for its assigned robot. That robot must be on the pad and in
-   range, and a movable pad must be at its height. Another robot on the pad gets no power. The state is
-   then ERROR, the error message names that other robot, and the request goes on waiting.
+   range, and a movable pad must be at its height. If another robot is on the pad, it gets no power. The
+   state is then ERROR, and the error message names that other robot. The request stays assigned and
+   waits.
 CHARGER-6. At a fault the core first switches the power off and then reports the fault. Only a new
-   request brings power back. A station is out of service (PROTECTION) if it reports a fault, or goes on
-   charging after an order to stop. The state is then ERROR until the errors have been cleared and a
-   good reading follows. A fault of the robot does not take the station out of service.
-CHARGER-7. Failed polls say nothing about the charge. After `misses` failed polls the state is ERROR,
-   but the robot and the request stay. Only a good reading ends a request or frees a station. An
-   operator can free a silent station after `peer_internal_timeout_s`, when it must have switched itself
-   off.
+   request brings power back. A station is out of service (PROTECTION) if it reports a fault, or if it
+   does not stop charging after an order to stop. The state is then ERROR until the errors have been
+   cleared and a good reading follows. A fault of the robot does not take the station out of service.
+CHARGER-7. A failed poll does not show whether the charge goes on. After `misses` failed polls the state
+   is ERROR, but the robot and the request stay. Only a good reading ends a request or frees a station.
+   An operator can free a silent station after `peer_internal_timeout_s`, because by then it must have
+   switched itself off.
 CHARGER-8. A charge may be under way when the daemon starts, or when it reaches the station again. Such
    a charge is shown and not stopped. The next request takes that charge over only if the request's
    robot is seen on the pad.
@@ -69,12 +71,12 @@ from bridges.kinds.shared.durations import AGES_AGO, NEVER, RIVAL_QUIET_S
 REMEMBERED = 8
 """The number of ended requests that a charger remembers, in order to refuse late repeats."""
 CLEARED_WITHIN_S = 30.0
-"""The time (s) after the clearing of errors within which a good reading proves that the clearing
+"""The time (s) after an order to clear errors. A good reading within this time proves that the order
 succeeded."""
 
 
 def initial(limits: ChargerLimits, now: float) -> ChargerMemory:
-    """Return the memory at start: no reading, and no request."""
+    """Return the memory at start, before any reading or request."""
     return ChargerMemory()
 
 
@@ -139,7 +141,8 @@ def _sampled(
 
 
 def _held(memory: ChargerMemory, holder: ChargeSession | None) -> ChargerMemory:
-    """Set the session. If the new session is None, remember the ended request in `over`."""
+    """Replace the session (the request that has the station) by `holder`. If `holder` is None, remember
+    the id of the ended request in `over`."""
     if holder or not memory.holder:
         return replace(memory, holder=holder)
     ended = memory.holder.request.request_id
@@ -148,7 +151,7 @@ def _held(memory: ChargerMemory, holder: ChargeSession | None) -> ChargerMemory:
 
 
 def _watched(memory: ChargerMemory, now: float) -> ChargerMemory:
-    """Note since when the station has charged in spite of an order to stop."""
+    """Note the time since which the station has charged in spite of an order to stop."""
     sample = memory.sample
     charges = sample and (sample.activity is Activity.CHARGING or sample.charges)
     if memory.power is not False or not charges:
@@ -158,8 +161,8 @@ def _watched(memory: ChargerMemory, now: float) -> ChargerMemory:
 
 
 def _protected(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
-    """Put the station out of service at the station's own fault. A good reading after the errors were
-    cleared puts the station back into service."""
+    """Put the station out of service if the station itself is at fault. A good reading after an order
+    to clear errors puts the station back into service."""
     sample, since = memory.sample, memory.disobeyed_since
     assert sample
     if not limits.can_stop:
@@ -175,8 +178,8 @@ def _protected(memory: ChargerMemory, now: float, limits: ChargerLimits) -> Char
 
 
 def _served(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
-    """Serve a known robot on a free pad like a robot with a request, if `unrequested` is
-    `serve_known`."""
+    """Grant the station to a known robot that stands on its pad without a request. This is done only if
+    `unrequested` is `serve_known` and no request has the station."""
     who = pad.seen(memory.sample, limits).robot
     if limits.unrequested != "serve_known" or who is None or memory.holder:
         return memory
@@ -227,8 +230,8 @@ def _granted(
 
 
 def _in_the_way(memory: ChargerMemory, on_pad: bool, now: float, limits: ChargerLimits) -> bool:
-    """Return whether an error forbids a grant of this request. The error WRONG_DOCKING forbids nothing
-    if the robot on the pad is the request's robot (`on_pad`)."""
+    """Return whether an error forbids a grant of this request. If the request's robot is on the pad
+    (`on_pad`), the error WRONG_DOCKING does not count."""
     found = report.errors(memory, now, limits)
     return any(not (on_pad and fault.code == pad.WRONG_DOCKING) for fault in found)
 
@@ -256,8 +259,8 @@ def _reset(memory: ChargerMemory, now: float, limits: ChargerLimits) -> tuple[Ch
 
 
 def _freed(memory: ChargerMemory, now: float, limits: ChargerLimits) -> tuple[ChargerMemory, str]:
-    """Free a silent station at an operator's order, if the station must have switched itself off by
-    now."""
+    """Free a station that does not answer, because an operator orders it. The station must have been
+    silent for so long that it has switched itself off."""
     after_s = limits.t.peer_internal_timeout_s
     silent_s = NEVER if memory.read_at is None else now - memory.read_at
     if memory.holder is None or after_s is None or silent_s < after_s:
@@ -285,7 +288,7 @@ def _clear(memory: ChargerMemory, now: float) -> ChargerMemory:
 
 
 def _power(memory: ChargerMemory, now: float, limits: ChargerLimits) -> bool | None:
-    """Return whether the station may energise its pad. Return None if the station gets no order."""
+    """Return the order about the pad's power: True for on, False for off, None for no order."""
     holder = memory.holder
     if rivalled(memory, now) or memory.protection or (holder and holder.over):
         return False

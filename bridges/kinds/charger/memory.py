@@ -1,4 +1,5 @@
-"""The charger core's memory from scan to scan, and its limits."""
+"""The values that the charger core keeps from one scan to the next, and the settings that it needs (its
+limits)."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -19,8 +20,8 @@ from bridges.kinds.shared.durations import AGES_AGO, RIVAL_QUIET_S
 class ChargerLimits(msgspec.Struct, frozen=True):
     """The settings of a charger that its core needs. `t`: durations and counts.
 
-    `receivers` maps a receiver's id to its robot, and is empty if robots are not verified. `can_stop`:
-    the station obeys `power`.
+    A receiver is the part of a robot that takes the power. `receivers` maps a receiver's id to its
+    robot, and is empty if robots are not verified. `can_stop`: the station obeys `power`.
     """
 
     t: ChargerDurations = ChargerDurations()
@@ -38,12 +39,13 @@ class ChargerLimits(msgspec.Struct, frozen=True):
 
 
 class ChargeSession(msgspec.Struct, frozen=True):
-    """The request that holds the station, and the progress of its charge.
+    """The request to which the station is assigned, and the progress of its charge.
 
     `start_by`: the charge must start by this time (monotonic s). `paused_at`: another robot on the pad
     has prevented the start since this time. `checked_at`: the time of the last range check. `started`:
-    current has flowed for this request. `failed`: the station was at fault, so this request gets no
-    more power. `ended`: the reason why the request ended. `released_at`: the time of the disconnection.
+    current has flowed for this request. `failed`: the station reported a fault, so this request gets no
+    more power. `ended`: the reason why the request ended. `released_at`: the time at which the robot
+    was disconnected.
     """
 
     request: ChargeRequested
@@ -62,13 +64,13 @@ class ChargeSession(msgspec.Struct, frozen=True):
 
 
 class ChargerMemory(msgspec.Struct, frozen=True):
-    """The memory of one charger from scan to scan.
+    """The memory of one charger from one scan to the next.
 
     `sample`: the last good reading, at `read_at`. `misses`: the number of failed polls in a row.
     `write_misses`: the number of scans in a row with failed commands. `write_failed`: a command failed
-    in this scan. `over`: the ids of the requests that ended last. `adopted`: the station was charging
-    when the daemon reached it, and the daemon leaves that charge alone. `power`: the last decision
-    about the power. `disobeyed_since`: the station has charged since this time although `power` is off.
+    in this scan. `over`: the ids of the latest ended requests. `adopted`: the station was charging when
+    the daemon reached it, and the daemon does not stop that charge. `power`: the power that the core
+    last ordered. `disobeyed_since`: the station has charged since this time although `power` is off.
     `protection`: the reason why the station is out of service, "" in service. `clear_by`: a good
     reading up to this time proves that the errors were cleared.
     """

@@ -44,8 +44,8 @@ def accept_request(request: ChargerRequest, settings: ChargerSettings) -> Charge
 def accept_cancel(cancel: ChargerCancel, settings: ChargerSettings) -> Cancelled:
     """Turn a ChargerCancel into an event. Raises RequestRefused if the cancel is malformed.
 
-    A charge that nobody requested can be cancelled too. The cancel must name the request id in the
-    charger's published state.
+    A charge that nobody requested can be cancelled too. For this, the cancel must name the request id
+    that the charger's own state shows.
     """
     _check("request_id", cancel.request_id)
     if cancel.request_id == UNREQUESTED + cancel.charger_name:

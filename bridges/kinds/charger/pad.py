@@ -1,12 +1,14 @@
 """The robot on the pad, and the permission to energise the pad.
 
-The station sees a receiver on its pad. The YAML's `receivers` tell which robot carries the receiver.
-Without `receivers` every robot counts as the request's robot. With `receivers`, a station that sees a
-receiver but not its id charges nobody.
+A robot carries a receiver, and the station reads the id of the receiver on its pad. The YAML's
+`receivers` tell which robot carries which receiver. Without `receivers` the core assumes that the
+request's robot is on the pad. With `receivers`, a station gives no power as long as it sees a receiver
+but cannot read its id.
 
 Some stations move their pad, or check the robot's range. Such a station gives power only if the pad is
-at its height and the robot in range. No message announces that a robot leaves. Only the readings of
-height and range show that. If the pad leaves its height while current flows, the station is at fault.
+at its height and the robot in range. No message announces that a robot leaves, so only the readings of
+height and range show it. If the pad leaves its height while current flows, this is a fault of the
+station.
 
 ChargerState's error_message names a wrong robot or receiver on the pad. `Misplaced.text` writes that
 text and `misplaced_in` reads it. An id that would make the text ambiguous is quoted as in JSON, so
@@ -57,7 +59,7 @@ class PadOccupant(msgspec.Struct, frozen=True):
     robot: RobotName | None = None
 
     def may_be(self, who: RobotName) -> bool:
-        """Return whether this robot can be on the pad, as far as the station can tell."""
+        """Return whether this robot may be on the pad. Without `receivers` any robot may be there."""
         return self.sort == "unverified" or self.robot == who
 
     def is_another(self, who: RobotName) -> bool:
@@ -86,8 +88,8 @@ def not_ready(sample: ChargerSample) -> str:
 
 
 def judged(sample: ChargerSample) -> ChargerSample:
-    """Return the reading. If the pad has left its height under power, return the reading as a fault of
-    the station."""
+    """Return the reading. If the pad has left its height while the station charged, return the reading
+    as a fault of the station."""
     if sample.activity is not Activity.CHARGING or sample.measured.at_height is not False:
         return sample
     return replace(
@@ -100,7 +102,8 @@ def judged(sample: ChargerSample) -> ChargerSample:
 
 
 class Misplaced(msgspec.Struct, frozen=True):
-    """A wrong occupant of the pad: a `robot` of the YAML, else an unknown `receiver`.
+    """A wrong occupant of the pad. `robot`: its robot, if the YAML lists the receiver. `receiver`: the
+    id of a receiver that the YAML does not list.
 
     `expected`: the robot for which the station waits, None if it waits for none.
     """
@@ -120,7 +123,7 @@ class Misplaced(msgspec.Struct, frozen=True):
 
 
 def misplaced_in(text: str) -> Misplaced | None:
-    """Read a text of `Misplaced.text`; None for any other text."""
+    """Parse a text that `Misplaced.text` has written. Return None for any other text."""
     found = _TEXT.fullmatch(text)
     if found is None:
         return None
@@ -144,7 +147,8 @@ def _read(part: str) -> str:
 
 
 def misplaced(memory: ChargerMemory, limits: ChargerLimits) -> Fault | None:
-    """Return the fault of a wrong occupant that must get no power; None if power is allowed."""
+    """Return a fault if a wrong robot or an unknown receiver on the pad must get no power. Return None
+    if the occupant is not wrong."""
     pad, holder = seen(memory.sample, limits), memory.holder
     expected = holder.request.who if holder and not holder.over else None
     if pad.sort == "mute":
@@ -159,7 +163,7 @@ def misplaced(memory: ChargerMemory, limits: ChargerLimits) -> Fault | None:
 
 
 def left_alone(memory: ChargerMemory, limits: ChargerLimits) -> bool:
-    """Return whether current flows without a request and is left on."""
+    """Return whether current flows without a request and must not be switched off."""
     if memory.sample is None or memory.sample.activity not in CURRENT_FLOWS:
         return False
     return memory.adopted or not limits.can_stop or limits.unrequested == "serve_known"

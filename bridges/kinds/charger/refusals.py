@@ -21,18 +21,18 @@ from bridges.messages.words import LONGEST_NAME
 
 NAME = "ChargerRequest refused"
 OCCUPIED = "charger occupied"
-"""The reason for a refusal that ends by itself, because the robot that has the charger will release it.
-All other reasons remain."""
+"""The reason of a temporary refusal: it ends when the robot that has the charger releases it. Refusals
+for any other reason do not end by themselves."""
 LONGEST_REASON = 500
 
 
 class ChargerRefusal(msgspec.Struct, frozen=True, kw_only=True):
     """The reason of a refusal, and the robot that has the charger.
 
-    `robot`: the FLEET/ROBOT of the refused request. `state`: the charger's state, in RMF's word.
-    `held_by`: the robot that has the charger; "" if no robot has it. `held_request`: the id of that
-    robot's request; "" if no robot has the charger. `error`: the charger's error text, "" without an
-    error.
+    `robot`: the FLEET/ROBOT of the refused request. `state`: the charger's state, under its name in
+    RMF. `held_by`: the robot that has the charger; "" if no robot has it. `held_request`: the id of
+    that robot's request; "" if no robot has the charger. `error`: the charger's error text, "" without
+    an error.
     """
 
     request_id: str
@@ -52,7 +52,7 @@ class ChargerRefusal(msgspec.Struct, frozen=True, kw_only=True):
         return ": ".join(filter(None, (self.reason, "; ".join(filter(None, (who, self.error))))))
 
     def message(self) -> DiagnosticStatus:
-        """Make the published message. Its values are these fields, by their names."""
+        """Make the published message. Its key-value pairs are the fields of this struct."""
         values = tuple(KeyValue(key, value) for key, value in self.fields().items())
         return DiagnosticStatus(int(DiagnosticLevel.WARN), NAME, self.text, self.charger, values)
 
@@ -62,7 +62,7 @@ class ChargerRefusal(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def read(status: DiagnosticStatus) -> ChargerRefusal | None:
-    """Read a message of `ChargerRefusal.message`; None for any other status."""
+    """Parse a message that `ChargerRefusal.message` has made. Return None for any other status."""
     values = {pair.key: pair.value for pair in status.values}
     if status.name != NAME or not {"request_id", "charger", "robot", "reason"} <= values.keys():
         return None
@@ -70,7 +70,7 @@ def read(status: DiagnosticStatus) -> ChargerRefusal | None:
 
 
 def refused(request_id: str, charger: str, who: RobotName, reason: str) -> ChargerRefusal:
-    """Make the refusal of a request. The request may be malformed, and its names may have any
+    """Make the refusal of a request. Cut its names, because a malformed request may have names of any
     length."""
     return ChargerRefusal(
         request_id=_cut(request_id),
@@ -81,7 +81,8 @@ def refused(request_id: str, charger: str, who: RobotName, reason: str) -> Charg
 
 
 def answer(name: str, request: object, reason: str, report: ChargerReport) -> RefusalAnswer | None:
-    """Make the published answer to a request that charger `name` refuses; None for other messages.
+    """Make the published answer to a ChargerRequest that the charger `name` refuses. Return None if the
+    refused message is no ChargerRequest.
 
     `request`: the message itself if it is malformed, else the core's event. `report`: the charger's
     present report.

@@ -1,8 +1,8 @@
-"""A charger's report to RMF, the log and the status file, and the diagnosis of its error texts.
+"""A charger's report to RMF, the log and the status file, and the function that reads its error texts.
 
-RMF's ChargerState has one text for all errors. The coordinator (`bridges/kinds/charger_coordinator/`)
-must find in that text whether the robot or the station is at fault. `error_message` writes the text,
-and `diagnosis` reads it.
+RMF's ChargerState has one text for all errors. From that text the coordinator
+(`bridges/kinds/charger_coordinator/`) must find out whether the robot or the station is at fault.
+`error_message` writes the text, and `diagnosis` reads it.
 """
 
 from enum import StrEnum
@@ -26,25 +26,25 @@ ERROR = ChargerStateValue.CHARGER_ERROR
 
 UNREQUESTED = "unrequested/"
 """The beginning of a made-up request id. ChargerState needs an id in every state but IDLE. An error of
-a free station and an unrequested charge have no request. Their id is this text and the charger's
-name."""
+a free station and an unrequested charge have no request. In these cases the id is UNREQUESTED and
+the charger's name."""
 
 LOST = {
     "TWO_NODES_FOR_ONE_DEVICE": "two nodes for one device",
     "CHARGER_UNREACHABLE": "Charger unreachable",
     "CHARGER_NOT_COMMANDED": "Charger takes no commands",
 }
-"""Fixed error messages of stations that cannot be reached or commanded. The fault's detail gives the
-reason."""
+"""Fault codes of stations that cannot be reached or commanded, with the fixed error messages for RMF.
+The text of such an error is only in the fault's detail."""
 OUT_OF_SERVICE = "out of service after: "
 
 
 class FaultCause(StrEnum):
-    """The side at fault.
+    """The side that has caused an error.
 
-    PAD: a wrong robot or receiver is on the pad. LOST: the station cannot be reached or commanded. That
-    says nothing about a fault of the robot or the station. UNCLEAR: the text names no side. The robot
-    then tries a second station. A robot that fails at both stations is at fault.
+    PAD: a wrong robot or receiver is on the pad. LOST: the station cannot be reached or commanded, so
+    neither the robot nor the station is known to be at fault. UNCLEAR: the text names no side. In this
+    case the robot tries a second station. If it fails there too, the robot is at fault.
     """
 
     NONE = ""
@@ -72,8 +72,8 @@ def error_message(fault: Fault) -> str:
 
 
 def diagnosis(message: str) -> FaultCause:
-    """Find the side at fault in a ChargerState's error_message; UNCLEAR for a text of another
-    program."""
+    """Find the side at fault in a ChargerState's error_message. The beginning of the text names the
+    side. Return UNCLEAR for a text with another beginning."""
     found = (whose for start, whose in _BEGINNINGS.items() if message.startswith(start))
     return next(found, FaultCause.UNCLEAR)
 
@@ -82,11 +82,12 @@ class ChargerReport(msgspec.Struct, frozen=True):
     """The content of ChargerState, except its name and stamp.
 
     `read_at`: monotonic seconds of the last good reading, None before the first. `error_message`:
-    filled only in the state CHARGER_ERROR. `request_id`: blank if no request holds the station.
-    `fleet`, `robot`: the request's robot. Without a request, `fleet` and `robot` name the robot on the
-    pad if the station is not idle. `verified`: the station sees that robot's receiver. `waits`: the
-    reason why the robot is not charged yet; "" without a request, during and after the charge, and in
-    ERROR.
+    filled only in the state CHARGER_ERROR. `request_id`: blank if the station is assigned to no
+    request. `fleet`, `robot`: the request's robot. Without a request, `fleet` and `robot` name the
+    robot on the pad if the station is not idle. `verified`: the station sees the receiver of the robot
+    `fleet`/`robot`. `waits`: the reason why the robot is not charged yet. `waits` is "" in three cases:
+    without a request, after the charge, and in ERROR. During the charge it is "" unless the robot must
+    get no power now.
     """
 
     read_at: float | None
@@ -101,8 +102,8 @@ class ChargerReport(msgspec.Struct, frozen=True):
     waits: str = ""
 
     def news(self) -> object:
-        """Return everything except the age, the measurements and `waits`. Changes of these three alone
-        need no new message to RMF."""
+        """Return everything except the age, the measurements and `waits`. If only these three change,
+        RMF needs no new message at once."""
         measured = Measured(receiver_id=self.measured.receiver_id)
         return replace(self, read_at=None, measured=measured, waits="")
 
@@ -181,7 +182,8 @@ def errors(memory: ChargerMemory, now: float, limits: ChargerLimits) -> list[Fau
 
 
 def error_text(sample: ChargerSample) -> str:
-    """Return the station's own words about its error, with the side at fault in front."""
+    """Return the station's own error text. Put the side at fault before it, such as `robot: `, if the
+    station reports a side."""
     text = sample.error_text or f"the charger reports an error (vendor state {sample.code})"
     if diagnosis(text) in (FaultCause.PAD, FaultCause.LOST):
         text = f"the charger says: {text}"
@@ -213,8 +215,12 @@ def _irregular(
 def _who(
     memory: ChargerMemory, shown: ChargerStateValue, limits: ChargerLimits
 ) -> RobotName | None:
-    """Return the request's robot. Without a request, return the robot on the pad or the robot last seen
-    charging."""
+    """Return the request's robot. Without a request, return the robot that the last reading shows on
+    the pad.
+
+    Return None in the state IDLE. Return None for a station out of reach too, unless it was charging
+    without a request.
+    """
     if memory.holder:
         return memory.holder.request.who
     if shown is IDLE or (unreachable(memory, limits) and not memory.adopted):

@@ -56,15 +56,15 @@ def follow(
 
 
 def shown_released(holder: ChargeSession, now: float, limits: ChargerLimits) -> bool:
-    """Return whether RELEASED has been shown for `released_s`."""
+    """Return whether the state has been RELEASED for at least `released_s`."""
     return holder.released_at is not None and now - holder.released_at >= limits.t.released_s
 
 
 def _beside_another(
     holder: ChargeSession, now: float, limits: ChargerLimits
 ) -> ChargeSession | None:
-    """Advance the session at a reading of another robot on the pad. The request's robot still waits, or
-    has left after its charge."""
+    """Advance the session by a reading that shows another robot on the pad. The request's robot either
+    still waits for the pad, or has left after its charge."""
     if shown_released(holder, now, limits):
         return None
     if holder.released_at is not None:
@@ -87,8 +87,8 @@ def _flowing(holder: ChargeSession, sample: ChargerSample, limits: ChargerLimits
 
 
 def _sought_again(holder: ChargeSession, now: float, limits: ChargerLimits) -> ChargeSession:
-    """Let the session wait for the start again, because the station has lost the receiver and searches
-    again."""
+    """Let the session wait for a new start, because the station has lost the receiver and searches for
+    it again."""
     by = now + _patience_s(holder.request, limits)
     return replace(holder, started=False, start_by=by, checked_at=None)
 
@@ -122,8 +122,8 @@ def cleared_to_start(memory: ChargerMemory, limits: ChargerLimits) -> bool:
 
 
 def range_checked(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
-    """Order a range check if nothing else is missing for the start. A result from before the order does
-    not count."""
+    """Order a range check if the range is the only open condition for the start. A result counts only
+    if it was read after this order."""
     holder, sample = memory.holder, memory.sample
     if holder is None or sample is None or holder.started or holder.over:
         return memory

@@ -58,7 +58,9 @@ class ChargerDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
         is out of service."""),
     ] = 30.0
     released_s: Annotated[
-        Released, tells("the least time for which RELEASED is shown. States go out at 1 Hz.")
+        Released,
+        tells("""the least time for which the state RELEASED is shown. RMF gets states once a
+        second, so a shorter time could hide the state."""),
     ] = 2.0
     full_percent: Annotated[
         Percent,
@@ -94,9 +96,8 @@ class ChargerSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_
     ] = "refuse"
     on_death: Annotated[
         Literal["stop", "keep"],
-        tells(
-            "the present charge when the daemon ends: `stop` ends the charge, `keep` continues it."
-        ),
+        tells("""the effect on a present charge when the daemon ends: `stop` ends the charge,
+        `keep` continues it."""),
     ] = "stop"
 
     def can_stop(self) -> bool:

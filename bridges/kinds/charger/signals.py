@@ -1,4 +1,4 @@
-"""A charger's sample, outputs and events: the interface of its core.
+"""A charger's readings (samples), outputs and events, which are the interface of its decision core.
 
 The simplest stations on HTTP give only their activity and an error text. Other controllers (CANopen,
 Modbus, another maker's JSON) also obey `power`, and give measurements in `measured`.
@@ -37,14 +37,14 @@ FaultSide = Literal["", "station", "robot"]
 
 
 class Measured(msgspec.Struct, frozen=True):
-    """The facts that a controller reports beside its state. A value is None if the controller does not
-    report it.
+    """The measurements that a controller reports in addition to its state. A value is None if the
+    controller does not report it.
 
-    `receiver_id`: the receiver on the pad, "" for none. `in_range`: a range check has found the robot's
-    coil in range for charging; False before the check. `range_ok`: the robot's coil is in range, from a
-    station that reports the range all the time, without a check. `at_height`: a movable pad is at its
-    height for charging. `volts`, `amps`: the battery's voltage and current. `battery_percent`: the
-    battery's charge. `temperatures`: pairs of a name and °C.
+    `receiver_id`: the receiver on the pad, "" for none. `in_range`: the result of the last range check;
+    False before the first. True means that the robot's coil is in range for charging. `range_ok`: the
+    robot's coil is in range; only from a station that reports the range all the time, without a check.
+    `at_height`: a movable pad is at its height for charging. `volts`, `amps`: the battery's voltage and
+    current. `battery_percent`: the battery's charge. `temperatures`: pairs of a name and °C.
     """
 
     receiver_id: str | None = None
@@ -61,9 +61,9 @@ class Measured(msgspec.Struct, frozen=True):
 class ChargerSample(msgspec.Struct, frozen=True):
     """One reading of one station.
 
-    `code`: the vendor's number or word, for texts only. `error_text`: the station's own words,
-    printable and of bounded length. `side`: the side at fault. `charges`: the station reports a charge
-    in spite of its fault.
+    `code`: the vendor's number or word for the state; only log and error texts use it. `error_text`:
+    the station's own words, printable and of bounded length. `side`: the side at fault. `charges`: the
+    station reports a charge in spite of its fault.
     """
 
     activity: Activity
@@ -80,10 +80,11 @@ class ChargerOutputs(msgspec.Struct, frozen=True):
     `power`: whether the station may energise its pad. With None the driver sends no order, because we
     did not start the present charge, or because the station does not answer.
 
-    `clear_errors`, `range_checks`: the numbers of orders, since the daemon's start, to clear the errors
-    and to check the range. Such a command would do harm if it were sent twice, so the outputs hold
-    counts. A driver sends one command when a count rises, and never repeats it, even after a failure. A
-    station that always knows the robot's position ignores `range_checks`.
+    `clear_errors`, `range_checks`: how often the core has ordered, since the daemon's start, to clear
+    the errors and to check the range. Such a command would do harm if it were sent twice. Therefore
+    these two outputs are counts: a driver sends one command when a count rises. It never repeats the
+    command, even after a failure. A station that always knows the robot's position ignores
+    `range_checks`.
     """
 
     power: bool | None = None
@@ -95,8 +96,8 @@ class ChargeRequested(msgspec.Struct, frozen=True):
     """A well-formed ChargerRequest for this charger. If `start_timeout_s` is 0, the configured default
     applies.
 
-    A robot that is served without a request has a ChargeRequested with an empty `request_id` in its
-    session.
+    If the station serves a robot without a request, the core makes a ChargeRequested with an empty
+    `request_id` for the session.
     """
 
     request_id: str

@@ -1,4 +1,4 @@
-"""The coordinator's core: it allots all stations of a site to robots.
+"""The coordinator's core: it assigns all stations of a site to robots.
 
 The core's inputs are FleetState, ChargerState and the requests of operators. The core sends
 ChargerRequest and ChargerCancel, which no part of RMF sends. A wish is a robot's need to be charged.
@@ -9,18 +9,18 @@ COORDINATOR-1. `wishes.py` finds the robots with a wish. An operator's wish last
 COORDINATOR-2. Wishes are served in the order of their arrival, each at one of the robot's suitable
    stations (`queue.py`). A station has one robot at a time. The next robot gets the station only after
    the station's state shows that the first robot was released.
-COORDINATOR-3. A request is repeated until the station shows the request. If a station does not show the
-   request within TAKEN_S, the coordinator passes the station over for SHUNNED_S, and the wish goes to
-   the end of the queue.
+COORDINATOR-3. A request is repeated until the station's state shows the request. If the station does
+   not show the request within TAKEN_S, the coordinator does not use the station for SHUNNED_S. The wish
+   then goes to the end of the queue.
 COORDINATOR-4. The stations' states show when a request has ended, and whether the robot or the station
    was at fault (`stations.py`).
 COORDINATOR-5. The coordinator tells a robot on a wrong pad to leave the pad, or alerts a person
    (`wrong_pad.py`).
 COORDINATOR-6. If another node requests a station for one of our robots, the coordinator treats that
-   request like its own.
-COORDINATOR-7. During the quiet start the coordinator only listens. If another node publishes charging
-   assignments (RMF's rmf_charging_schedule), the coordinator sends no assignments. It then requests the
-   stations that the other node has dedicated to the robots.
+   request like a request of its own.
+COORDINATOR-7. During the quiet start, which is the first `quiet_start_s`, the coordinator only listens.
+   If another node publishes charging assignments (RMF's rmf_charging_schedule), the coordinator sends
+   no assignments. It then requests the stations that the other node has dedicated to the robots.
 """
 
 from msgspec.structs import replace
@@ -46,12 +46,12 @@ Decided = Decision[SiteMemory, None, SiteReport]
 
 
 def initial(subject: str, started_at: float) -> SiteMemory:
-    """Return the memory at start: nothing has been heard."""
+    """Return the memory at start, before any message was heard."""
     return SiteMemory(began_at=started_at)
 
 
 def idle(memory: SiteMemory, now: float) -> bool:
-    """Return False, because the only subject, the site, is never forgotten."""
+    """Return False: the only subject is the whole site, and the site is never forgotten."""
     return False
 
 
@@ -93,8 +93,8 @@ def _take(memory: SiteMemory, event: Event, now: float, site: SiteLimits) -> tup
 
 
 def _may_speak(memory: SiteMemory, yes: bool, alone: bool, now: float) -> SiteMemory:
-    """Start or stop publishing. The time in which a station must show its request starts again, and all
-    assignments are sent again."""
+    """Start or stop publishing. After the change, each station again has TAKEN_S to show its request,
+    and all assignments are sent again."""
     grants = {
         name: grant if grant.shown else replace(grant, made_at=now)
         for name, grant in memory.grants.items()
@@ -103,8 +103,8 @@ def _may_speak(memory: SiteMemory, yes: bool, alone: bool, now: float) -> SiteMe
 
 
 def _as_dedicated(memory: SiteMemory, site: SiteLimits) -> SiteMemory:
-    """Take a station back from a robot if another node's schedule has dedicated another station to the
-    robot. RMF would not bring the robot to the first station."""
+    """Take a station back from a robot on its way if another node's schedule has dedicated another
+    station to the robot. The reason is that RMF drives the robot only to the dedicated station."""
     if memory.alone:
         return memory
     for name, grant in memory.grants.items():

@@ -1,4 +1,5 @@
-"""The memory on disk, for a restart: the queue, each station's robot, and the robots' failures.
+"""The part of the memory that is saved to disk for a restart: the queue, each station's robot, and the
+robots' failures.
 
 States of robots and stations are not saved, because new states arrive within a second. A request may
 have been sent but not saved. In that case the station's state still shows the request's id, and the
@@ -22,7 +23,7 @@ SITE: Final = "site"
 
 
 class WishRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A Wish. `robot` is FLEET/ROBOT, as everywhere in this file."""
+    """A `Wish` as it is saved. `robot` is FLEET/ROBOT, as everywhere in this file."""
 
     robot: Text
     by: By
@@ -34,7 +35,7 @@ class WishRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class GrantRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A Grant, without the facts that the station's next state shows."""
+    """A `Grant` as it is saved, without the facts that the station's next state shows."""
 
     robot: Text
     request_id: str
@@ -44,7 +45,7 @@ class GrantRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class KeptCoordinator(keep.Kept, frozen=True, forbid_unknown_fields=True):
-    """The parts of SiteMemory that are kept."""
+    """The parts of SiteMemory that are saved to disk."""
 
     count: Annotated[int, Meta(ge=0)]
     wishes: list[WishRecord]
@@ -56,7 +57,7 @@ class KeptCoordinator(keep.Kept, frozen=True, forbid_unknown_fields=True):
 
 
 def persist(memories: Mapping[str, SiteMemory]) -> bytes:
-    """Encode the memory for the next start. The bytes change only when a kept part changes."""
+    """Encode the memory for the next start. The bytes change only when a part that is saved changes."""
     memory = memories.get(SITE, SiteMemory())
     record = KeptCoordinator(
         VERSION,
@@ -84,7 +85,8 @@ def _grant(g: Grant) -> GrantRecord:
 def restore(kept: bytes, settings: CoordinatorSettings, now: float) -> dict[str, SiteMemory]:
     """Make the memory at start, for the robots and stations that are still in the YAML.
 
-    Raises ValueError for bytes that `persist` did not make. Durations count from now.
+    Raises ValueError for bytes that `persist` did not make. The coordinator's timeouts start again at
+    `now`.
     """
     found = keep.read(kept, KeptCoordinator, VERSION, "a coordinator's memory")
     return {SITE: _memory(found, settings, now)}

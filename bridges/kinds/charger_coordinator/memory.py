@@ -1,4 +1,5 @@
-"""The coordinator's memory and its limits."""
+"""The values that the coordinator keeps from one event to the next, and the settings that it needs (its
+limits)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -21,10 +22,11 @@ V = TypeVar("V")
 
 NODE: Final = "charger_coordinator"
 STATION_SILENT_S: Final = 5.0
-"""The silence (s) after which a station counts as silent. States come at 1 Hz."""
+"""The time (s) without a state after which a station counts as silent. Stations publish states at 1
+Hz."""
 STRIKES: Final = 2
-"""The number of failures after which a robot is not tried again. If two stations suit the robot, the
-robot has failed at both."""
+"""The number of failures after which a robot is not tried again. If two stations suit the robot, it has
+then failed at both, so the robot is at fault."""
 
 IDLE: Final = ChargerStateValue.CHARGER_IDLE
 ASSIGNED: Final = ChargerStateValue.CHARGER_ASSIGNED
@@ -37,9 +39,9 @@ ERROR: Final = ChargerStateValue.CHARGER_ERROR
 class SiteLimits:
     """The settings that the core needs.
 
-    `robots` maps a robot to its suitable stations, best first. `waits_at` maps a robot to its waypoint
-    for waiting. `places` maps a station to a table from fleet to waypoint. `receivers` maps a
-    receiver's id to its robot.
+    `robots` maps a robot to its suitable stations, best first. `waits_at` maps a robot to the waypoint
+    where it waits. `places` maps a station and then a fleet to the station's waypoint in that fleet's
+    graph. `receivers` maps a receiver's id to its robot.
     """
 
     robots: Mapping[RobotName, tuple[str, ...]]
@@ -94,9 +96,9 @@ class Wish(msgspec.Struct, frozen=True):
     """One robot's need to be charged.
 
     `by`: the origin of the wish (the fleet's state, the schedule, an operator). `task_id`: the robot's
-    task; empty for an operator's wish. `called`: that task began after a station was allotted to the
-    robot, so the task is the drive to that station. `station`, `request_id`, `start_timeout_s`: from
-    the operator's request.
+    task; empty for an operator's wish. `called`: the task `task_id` is the robot's drive to the
+    station, because it began after the station was assigned to the robot. `station`, `request_id`,
+    `start_timeout_s`: from the operator's request.
     """
 
     robot: RobotName
@@ -109,7 +111,7 @@ class Wish(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, wanted: ChargeWanted) -> "Wish":
-        """Make the wish of an operator's request."""
+        """Make a wish from an operator's request."""
         return cls(
             wanted.robot,
             "operator",
@@ -120,13 +122,13 @@ class Wish(msgspec.Struct, frozen=True):
 
 
 class Grant(msgspec.Struct, frozen=True):
-    """A station that was allotted to a robot.
+    """A station that is assigned to a robot.
 
-    `request_id`: the request to the station. `made_at`: the time of the allotment. `shown`: the
+    `request_id`: the request to the station. `made_at`: the time of the assignment. `shown`: the
     station's state has shown the request. `started`: current has flowed. `over`: the robot has lost the
     station, but no other robot gets the station until the station releases this robot. `sent_at`: the
     time of the last request or cancel. `forgotten_at`: the time when the station's daemon last forgot
-    the request. The coordinator then sent the request again.
+    the request, so that the coordinator sent it again.
     """
 
     robot: RobotName
@@ -141,10 +143,10 @@ class Grant(msgspec.Struct, frozen=True):
 
 
 class Standing(msgspec.Struct, frozen=True):
-    """A robot, as its fleet's state showed the robot at the time `at`.
+    """The last known position and task of a robot, from its fleet's state at the time `at`.
 
-    `since`: the robot's place, mode and task have not changed since this time. `here_since`: the
-    robot's place has not changed since this time; -inf if it has not changed since the first state.
+    `since`: the robot's waypoint, mode and task have not changed since this time. `here_since`: the
+    robot's waypoint has not changed since this time; -inf if it has not changed since the first state.
     """
 
     sighting: Sighting
@@ -154,7 +156,7 @@ class Standing(msgspec.Struct, frozen=True):
 
     @property
     def works(self) -> bool:
-        """Return whether the fleet shows this robot in a task that is not for charging."""
+        """Return whether the robot has a task that is not for charging, according to its fleet."""
         return bool(self.sighting.task_id) and not self.sighting.charges
 
 
@@ -180,10 +182,10 @@ class StationSeen(msgspec.Struct, frozen=True):
 
 
 class Nudge(msgspec.Struct, frozen=True):
-    """The orders to a robot to leave a pad.
+    """The orders that told a robot to leave a pad.
 
-    `why`: the reason for the orders. The reason is the request for the robot's own station, or the name
-    of the station that the robot blocks. `count`: the number of orders. `at`: the time of the last
+    `why`: the id of the request for the robot's own station. If the robot has no station, `why` is the
+    name of the station that the robot blocks. `count`: the number of orders. `at`: the time of the last
     order.
     """
 
@@ -197,19 +199,19 @@ class SiteMemory(msgspec.Struct, frozen=True):
 
     Wishes and stations:
     - `wishes`: in the order of service. `grants`: by station. `count`: the number of requests made.
-    - `over`: the ids of the operators' requests that ended last. Late repeats of these requests are
+    - `over`: the ids of the latest ended requests of operators. Late repeats of these requests are
       refused.
     - `strikes`: the stations where each robot has failed. `served`: the task in which each robot was
       charged.
-    - `rested`: the robots that the schedule does not charge again in its present time.
-    - `absent`: a robot that did not leave its place when called -> the time when it may be called
+    - `rested`: the robots that are already full enough for the entry of the schedule that applies now.
+    - `absent`: a robot that did not drive to its assigned station -> the time when it may get a station
       again.
-    - `shunned`: a station that took no request -> the time until which the station is passed over.
+    - `shunned`: a station that took no request -> the time until which the station is not used.
     - `preferred`: the station that another node has dedicated to each robot.
     - `nudges`: the orders to robots to leave a pad.
 
-    Readings: `robots`, `stations`: their last states. `receivers`: the error of each robot's own
-    receiver. `when`: the local time.
+    Readings: `robots`, `stations`: the last state of each robot and each station. `receivers`: the
+    error of each robot's own receiver. `when`: the local time.
 
     Publishing: `may_speak`: the coordinator may publish. `passive`: if the coordinator may not publish,
     the reason why requesters must wait. `alone`: no other node publishes charging assignments.
@@ -273,14 +275,16 @@ class SiteMemory(msgspec.Struct, frozen=True):
         return station in self.stations and now < self.stations[station].at + STATION_SILENT_S
 
     def silent_since(self, station: str) -> float:
-        """Return the time from which the station counts as silent. The time may be past or future."""
+        """Return the time at which the station became silent, or will become silent if no state
+        comes."""
         seen = self.stations.get(station)
         return STATION_SILENT_S + (self.began_at if seen is None else seen.at)
 
     # ---- changed copies
 
     def with_grant(self, station: str, grant: Grant | None) -> "SiteMemory":
-        """Return the memory with this grant of the station. With None, nobody has the station."""
+        """Return the memory in which the station has this grant. With None, the station has no
+        robot."""
         rest = without(self.grants, station)
         return replace(self, grants=rest | ({} if grant is None else {station: grant}))
 
@@ -300,8 +304,8 @@ class SiteMemory(msgspec.Struct, frozen=True):
         return replace(self, wishes=(*(w for w in self.wishes if w is not wish), wish))
 
     def takes_back(self, robot: RobotName) -> "SiteMemory":
-        """Return the memory with this robot's station taken back. The station must then release the
-        robot."""
+        """Return the memory in which this robot loses its station. No other robot gets the station
+        until the station has released the robot."""
         station = self.station_of(robot)
         if station is None:
             return self

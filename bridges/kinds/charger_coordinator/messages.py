@@ -137,7 +137,7 @@ def accept_assignments(
     message: d.ChargingAssignments, settings: CoordinatorSettings, wall: float
 ) -> Dedicated:
     """Turn another node's charging assignments into an event. The event names the station of each of
-    our robots, "" for none."""
+    our robots, or "" for a robot without a station."""
     fleet, known = message.fleet_name, settings.robots()
     stations = {places.get(fleet): name for name, places in settings.places().items()}
     return Dedicated(
@@ -150,8 +150,8 @@ def accept_assignments(
 
 
 def subject(message: object) -> str:
-    """Return the site as the subject of every message, because one queue spans all stations of the
-    site."""
+    """Return the name of the only subject, the site. All messages are about the site, because one queue
+    spans all its stations."""
     return SITE
 
 

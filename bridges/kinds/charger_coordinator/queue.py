@@ -1,4 +1,5 @@
-"""The allotment of stations: the robot that came first gets the first suitable station.
+"""The assignment of stations to robots. The robot that came first chooses first, and gets its best
+suitable station that is free.
 
 A station is free under four conditions:
 - Its last state is IDLE, and is no older than STATION_SILENT_S.
@@ -38,7 +39,7 @@ from bridges.kinds.charger_coordinator.memory import (
 )
 
 REMEMBERED_S: Final = 30.0
-"""The greatest age (s) of a fleet's state from which a robot's place counts."""
+"""The greatest age (s) of a fleet's state. An older state does not show where a robot stands."""
 Here = Mapping[str, Sequence[RobotName]]
 """The robots standing at each station."""
 
@@ -69,7 +70,12 @@ def suiting(memory: SiteMemory, wish: Wish, site: SiteLimits) -> list[str]:
     """List the stations to try, best first.
 
     The operator's choice comes first, then the station at the robot's place, then the dedicated
-    station. The other suitable stations follow in the YAML's order.
+    station. The other suitable stations follow in the YAML's order. A station where the robot has
+    failed is left out, unless the robot has failed at every suitable station.
+
+    If another node publishes the schedule, list only the operator's choice and the dedicated station.
+    For a robot without a dedicated station, list the station where it stands in place of the dedicated
+    one.
     """
     here = memory.stands_at(wish.robot, site)
     dedicated = memory.preferred.get(wish.robot)

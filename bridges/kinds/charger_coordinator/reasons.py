@@ -1,9 +1,9 @@
-"""The queue, as shown to a person. Each waiting robot is shown with the origin of its wish, the
+"""The queue, as shown to a person. For each waiting robot it shows the origin of its wish, the
 obstacles to its charge, and its waiting time.
 
-The waiting time is known only if the station reports when its present charge ends. Each robot is shown
-with its probable station. This is the suitable station that becomes free first. The probable stations
-of robots ahead in the queue do not count.
+The waiting time is known only if a station reports when its present charge ends. It is given for the
+suitable station that becomes free first. The station given to a robot ahead in the queue is left out
+for the robots behind it.
 """
 
 from collections.abc import Iterator

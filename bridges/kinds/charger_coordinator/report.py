@@ -2,11 +2,11 @@
 
 COORDINATOR-REPORT-1. A request is repeated each second until its station shows the request. A cancel is
    repeated each second while the station still shows the cancelled request.
-COORDINATOR-REPORT-2. Every robot is assigned one place of its own. That place is the robot's station
-   (MODE_CHARGE). A robot without a station is assigned its waypoint for waiting (MODE_WAIT). When a
-   place changes, the assignments of all fleets are published. They are retained for fleet adapters that
-   start later. RMF drives a robot with a charging task to its assigned place (rmf_ros2 9dedd0f,
-   ChargeBattery.cpp, _consider_restart).
+COORDINATOR-REPORT-2. Every robot is assigned exactly one place. A robot with a station is assigned that
+   station (MODE_CHARGE). A robot without a station is assigned its waypoint for waiting (MODE_WAIT).
+   When a place changes, the assignments of all fleets are published. The publisher retains these
+   messages for fleet adapters that start later. RMF drives a robot with a charging task to its assigned
+   place (rmf_ros2 9dedd0f, ChargeBattery.cpp, _consider_restart).
 COORDINATOR-REPORT-3. Each fault is sent once as an Alert, which rmf-web shows to a person.
 """
 
@@ -55,8 +55,8 @@ TITLES: Final = {
     "REQUEST_NOT_TAKEN": "A charger takes no request",
 }
 ASKS_S: Final = 5.0
-"""The delay (s) of the fault about a robot that came to a pad unannounced. Within this time the fleet's
-next state normally brings the robot's wish."""
+"""The time (s) for which a robot may stand on a pad without a wish before this is a fault. Normally the
+fleet's next state brings the wish within this time."""
 AGAIN_S: Final = 15.0
 ERRORS: Final = ("ROBOT_FAULTY", "STATION_OUT_OF_SERVICE")
 
@@ -67,8 +67,9 @@ class SiteReport(msgspec.Struct, frozen=True):
     `read_at`: the time of the last state of any station (monotonic s). `stations`: pairs of a station's
     name and a text. The text has the station's state, its robot, and the origin of the robot's wish.
     `queue`: the waiting robots in order, with their reasons. `waiting`: the waiting robots without
-    reasons. `assigns`: whether we or another node assign the robots' places. `schedule`: the times of
-    the schedule. `absent`: robots that did not come when called.
+    reasons. `assigns`: whether this coordinator publishes the robots' places, or another node does.
+    `schedule`: the times of the schedule. `absent`: robots that did not drive to their assigned
+    station.
     """
 
     read_at: float | None
@@ -81,7 +82,8 @@ class SiteReport(msgspec.Struct, frozen=True):
     faults: tuple[Fault, ...] = ()
 
     def news(self) -> object:
-        """Return the facts whose change is logged. Running times are left out."""
+        """Return the facts whose change is logged. Durations are left out, because they change all the
+        time."""
         return self.stations, self.waiting, self.assigns, self.schedule, self.absent
 
 
@@ -158,9 +160,10 @@ def _misplaced(one: wrong_pad.OnWrongPad) -> Fault:
     if one.expected:
         text = f"{one.who} stands at {one.station}, but is expected at {one.expected}"
         return Fault("WRONG_STATION", text)
-    why = "RMF moves it only with a charging task (finishing_request: charge gives it one)"
+    why = "RMF moves this robot only with a charging task (as with finishing_request: charge)"
     return Fault(
-        "PAD_BLOCKED", f"{one.who} stands at {one.station}, and {one.waiter} waits for it: {why}"
+        "PAD_BLOCKED",
+        f"{one.who} stands at {one.station}, and {one.waiter} waits for that station: {why}",
     )
 
 
@@ -195,13 +198,13 @@ def messages(
 
 
 def _again_at(memory: SiteMemory, site: SiteLimits) -> Iterator[float]:
-    """Yield the times at which the assignments of robots that stand elsewhere without a task are
-    repeated.
+    """Yield the times at which assignments must be repeated. An assignment is repeated for a robot that
+    has a station, no task, and stands elsewhere.
 
     An EasyFullControl adapter takes the retained assignment at its start. A moment later the adapter
-    replaces that assignment by the charger of its own file (seen in Jazzy). No message shows this
-    moment. Therefore the assignment is published every AGAIN_S until the robot moves, or has lost the
-    station.
+    replaces that assignment by the charger in its own configuration file (seen in Jazzy). No message
+    shows this moment. Therefore the assignment is published every AGAIN_S until the robot moves, or has
+    lost the station.
     """
     for name, grant in memory.grants.items():
         standing = memory.robots.get(grant.robot)
@@ -240,8 +243,11 @@ def _to_station(name: str, grant: Grant) -> tuple[AnyTopic, d.Message]:
 def _assignments(
     memory: SiteMemory, now: float, site: SiteLimits
 ) -> Iterator[d.ChargingAssignments]:
-    """Assign every robot's place, fleet by fleet, in the order of names. A robot that is ordered to
-    leave a pad gets the other mode for TOLD_S (`wrong_pad.py`)."""
+    """Assign every robot's place, fleet by fleet, in the order of names.
+
+    For TOLD_S after an order to leave a pad, a robot with a station gets MODE_WAIT at its waypoint for
+    waiting, and a robot without a station gets MODE_CHARGE there (`wrong_pad.py`).
+    """
     fleets: dict[str, list[d.ChargingAssignment]] = {}
     for who in sorted(site.robots):
         station, told = memory.station_of(who), wrong_pad.is_nudged(memory, who, now)

@@ -1,4 +1,5 @@
-"""The coordinator's own charging schedule: times of the week at which robots are charged to a target.
+"""The coordinator's own charging schedule. Each entry is a time of the week at which robots are charged
+up to a target percentage.
 
 The functions are pure. The day of the week and the local time of day are arguments. If an entry's end
 is not later than its beginning, the end is on the next day. The whole entry then belongs to the day on

@@ -35,7 +35,7 @@ class Waypoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class StationSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A charger, under the name that its own daemon publishes."""
+    """A charger. Its key is the name under which the charger's own daemon publishes."""
 
     waypoint: Annotated[
         Name | None,
@@ -60,12 +60,12 @@ class RobotSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     rcu: Annotated[
         Name | None,
         tells("""the name under which the daemon of the robot's receiver publishes, if the receiver
-        has a daemon. The receiver is a part of the robot, and no station."""),
+        has a daemon. The receiver is a part of the robot, so do not list it under `stations`."""),
     ] = None
 
 
 class FleetSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A fleet, under the name of its adapter."""
+    """A fleet. Its key is the name that the fleet's adapter uses."""
 
     waypoints: Annotated[
         dict[Name, Waypoint],
@@ -100,8 +100,8 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
     ] = 100.0
     again_percent: Annotated[
         Low,
-        tells("""a robot without a task is charged below this percentage. A robot that was charged
-        during a task is charged again in the same task only below this percentage."""),
+        tells("""a robot without a task is charged if its battery is below this percentage. The
+        same holds for a robot that was already charged during its present task."""),
     ] = 90.0
     leaves_s: Annotated[
         Timeout,
@@ -184,13 +184,14 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
                     yield path, f"'{station}' is at '{place}', not in this fleet's list ({known})"
 
     def _doubles(self) -> Remarks:
-        """Yield a problem for each place, receiver or name that two robots or two stations share."""
+        """Yield a problem for each place that two stations or robots share, and for each receiver or
+        receiver name that two robots share."""
         taken: dict[tuple[str, str], str] = {}
         for station, places in self.places().items():
             for fleet, place in places.items():
                 owner = taken.setdefault((fleet, place), station)
                 if owner != station:
-                    text = f"'{station}' stands at '{place}', as '{owner}' does"
+                    text = f"'{station}' and '{owner}' both stand at '{place}'"
                     yield ("stations", station), text
                     break
         taken |= {("rcu", station): f"the station '{station}'" for station in self.stations}
@@ -211,7 +212,7 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
             yield ("schedule", *path), text
         try:
             ZoneInfo(self.timezone or "UTC")
-        except (KeyError, OSError, ValueError):  # ZoneInfoNotFoundError is a KeyError
+        except (KeyError, OSError, ValueError):  # KeyError includes ZoneInfoNotFoundError
             yield ("timezone",), f"no time zone '{self.timezone}' on this machine (Asia/Singapore)"
 
     def robots(self) -> dict[RobotName, RobotSettings]:
@@ -230,7 +231,7 @@ class CoordinatorSettings(GraphSettings, frozen=True, kw_only=True, forbid_unkno
         }
 
     def rcus(self) -> dict[str, RobotName]:
-        """Map the name under which each robot's receiver publishes to the robot."""
+        """Map the name of each receiver's own daemon (`rcu`) to the robot that carries the receiver."""
         return {robot.rcu: who for who, robot in self.robots().items() if robot.rcu}
 
 
@@ -265,7 +266,7 @@ def _named(places: dict[str, str]) -> str:
 
 
 def speaks_of(settings: CoordinatorSettings) -> Iterator[Place]:
-    """Yield the stations. Another file of the site must define each station as a charger."""
+    """Yield the stations, because another file of the site must define each of them as a charger."""
     for name in settings.stations:
         yield ("stations", name), CHARGER, name
 

@@ -12,9 +12,9 @@ from bridges.kinds.shared.graph_kind import MaySpeak, Woken
 from bridges.messages.definitions import ChargerStateValue
 
 _DISPATCHED: Final = re.compile(r"(?!charge)[^.]+\.dispatch-")
-"""The beginning of a task id from RMF's dispatcher: CATEGORY.dispatch-NUMBER. A fleet adapter calls its
-own charging task Charge and a UUID. (rmf_ros2 jazzy 7eef65a, Dispatcher.cpp; rmf_task jazzy,
-ChargeBatteryFactory.cpp.)"""
+"""The beginning of a task id from RMF's dispatcher: CATEGORY.dispatch-NUMBER. The id of a charging task
+that a fleet adapter starts itself is the word Charge and a UUID. (rmf_ros2 jazzy 7eef65a,
+Dispatcher.cpp; rmf_task jazzy, ChargeBatteryFactory.cpp.)"""
 
 
 def is_dispatched(task_id: str) -> bool:
@@ -27,7 +27,7 @@ class Sighting(msgspec.Struct, frozen=True):
     """One robot of a FleetState.
 
     `charges`: the robot's mode is CHARGING or DOCKING, and its task did not come from RMF's dispatcher.
-    `place`: the waypoint of our YAML where the robot stands; None elsewhere.
+    `place`: the waypoint of our YAML where the robot stands; None if it stands at no such waypoint.
     """
 
     who: RobotName
@@ -58,7 +58,8 @@ class ChargerStateHeard(msgspec.Struct, frozen=True):
 
 
 class ReceiverHeard(msgspec.Struct, frozen=True):
-    """A ChargerState of a robot's own receiver, which is no station. `error`: "" without an error."""
+    """A ChargerState from the daemon of a robot's own receiver, not from a station. `error`: "" without
+    an error."""
 
     robot: RobotName
     error: str

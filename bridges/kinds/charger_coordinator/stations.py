@@ -1,10 +1,12 @@
-"""The stations' states: the fate of requests, and the side at fault.
+"""The effects of a station's state: the end of requests, and the decision whether the robot or the
+station is at fault.
 
 COORDINATOR-STATIONS-1. A station's state shows that a request has ended.
    - If the station releases the robot after charging, the wish is fulfilled.
-   - If the station releases the robot without charging, the robot did not come. A fleet's wish then
-     goes to the end of the queue if its robot stands at one of our waypoints. Any other wish is over. A
-     robot that stands at that very station has failed there.
+   - If the station releases the robot without charging, the robot did not come. Its wish then goes to
+     the end of the queue if two conditions hold: the wish is not an operator's, and the robot stands at
+     one of our waypoints. Otherwise the wish is over. If the robot stands at that very station, the
+     robot has failed there.
    - If the station stops showing a request without a release, the station's daemon was restarted and
      has forgotten the request. The wish stays, and the request is sent again (`_forgot`). The restart
      may have switched the power off. Therefore a charge that ends within PROVEN_S of the restart counts
@@ -12,15 +14,16 @@ COORDINATOR-STATIONS-1. A station's state shows that a request has ended.
 COORDINATOR-STATIONS-2. After an error of the station, the robot gets another station and keeps its
    place in the queue. If the robot is at fault, or the side at fault is unclear, the error also counts
    as a failure of the robot. After a second failure the robot is not tried again, and the coordinator
-   alerts a technician. If two stations suit the robot, the second failure is at the second station.
+   alerts a technician. If two stations suit the robot, the first failure is at one of them and the
+   second at the other.
 COORDINATOR-STATIONS-3. A failure of a robot is forgotten when the robot has been charged for PROVEN_S,
    or fully. The failure is also forgotten when the station proves to be at fault. One proof is an error
    that names the station. The other proof is an error that lasts for more than PROVEN_S after the robot
    has left.
 COORDINATOR-STATIONS-4. If another robot is on the pad, the assigned robot keeps the station for its
-   start_timeout. The error of a station out of reach says nothing about the charge. If a robot was
-   charging at that station, the robot keeps the station. If the robot is still on its way, it gets
-   another station after LOST_S.
+   start_timeout. If a station is out of reach, its error does not show whether the charge goes on. If a
+   robot was charging at that station, the robot keeps the station. If the robot is still on its way, it
+   gets another station after LOST_S.
 """
 
 from typing import Final
@@ -80,8 +83,8 @@ def heard(memory: SiteMemory, state: ChargerStateHeard, now: float, site: SiteLi
 def _forgot(memory: SiteMemory, name: str, grant: Grant, now: float, site: SiteLimits) -> bool:
     """Return whether the station has forgotten the request that it has shown.
 
-    An IDLE station may instead have released the robot without our notice. In that case the robot has
-    left, or did not come in time.
+    If the station is IDLE, it may instead have released the robot between two states. In that case the
+    robot has left, or did not come in time.
     """
     seen = memory.stations[name]
     if seen.state is not IDLE:
@@ -92,8 +95,8 @@ def _forgot(memory: SiteMemory, name: str, grant: Grant, now: float, site: SiteL
 
 
 def _repeated(grant: Grant, seen: StationSeen, now: float) -> Grant | None:
-    """Return the grant as long as the station may still show the grant's request; None if the station
-    will not take the request."""
+    """Return the grant if the station may still take its request. Return None if the station will not
+    take it."""
     before = seen.state is RELEASED or seen.request_id.startswith(UNREQUESTED)
     may_come = seen.state is IDLE or (before and seen.robot == grant.robot)
     if not may_come or not grant.request_id.startswith(f"{NODE}/"):
@@ -136,7 +139,8 @@ def _ended(memory: SiteMemory, name: str, grant: Grant, now: float, site: SiteLi
 
 
 def _struck(memory: SiteMemory, name: str, who: RobotName) -> SiteMemory:
-    """Note the robot's failure at this station. After its second failure a robot is not tried again."""
+    """Count a failure of the robot at this station. After its second failure, drop the robot's wish,
+    because the robot is not tried again."""
     strikes = {**memory.strikes, who: (*memory.strikes.get(who, ()), name)}
     memory = replace(memory, strikes=strikes)
     return memory.without_wish(who) if memory.faulty(who) else memory
@@ -171,8 +175,8 @@ def _adopt(
 
 
 def _waits_at(memory: SiteMemory, station: str, site: SiteLimits) -> RobotName | None:
-    """Find the robot of a charge whose state names no robot. That robot has a wish and stands at this
-    station."""
+    """Find the robot that charges at this station when the station's state names no robot. It is a
+    robot that has a wish, has no station, and stands at this one."""
     here = (w.robot for w in memory.wishes if memory.stands_at(w.robot, site) == station)
     return next((who for who in here if memory.station_of(who) is None), None)
 
@@ -197,16 +201,16 @@ def in_time(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
 
 
 def not_taken_at(grant: Grant) -> float:
-    """Return the time by which a station must show this request. After that the station is passed
-    over."""
+    """Return the time by which a station must show this request. After that the coordinator does not
+    use the station for some time."""
     return max(grant.made_at, grant.forgotten_at) + TAKEN_S
 
 
 def hopeless_at(memory: SiteMemory, name: str, grant: Grant) -> float:
     """Return the time when a robot on its way should get another station.
 
-    The reason is a silent daemon of the station, a station out of the daemon's reach, or another robot
-    that does not leave the pad.
+    There are three reasons: the station's daemon is silent, the daemon does not reach the station, or
+    another robot does not leave the pad.
     """
     seen, at = memory.stations.get(name), memory.silent_since(name) + LOST_S
     if seen is not None and seen.diagnosis is FaultCause.LOST:
@@ -217,7 +221,8 @@ def hopeless_at(memory: SiteMemory, name: str, grant: Grant) -> float:
 
 
 def absent_at(memory: SiteMemory, name: str, grant: Grant, site: SiteLimits) -> float:
-    """Return the time when a called robot that does not come loses the station."""
+    """Return the time when a robot that does not drive to its assigned station loses it; NEVER for
+    other robots."""
     stays = memory.may_speak and grant.shown and stays_away(memory, name, grant, site)
     return grant.made_at + COMES_S if stays else NEVER
 
@@ -228,7 +233,8 @@ def absent_at(memory: SiteMemory, name: str, grant: Grant, site: SiteLimits) -> 
 def _acquitted(
     memory: SiteMemory, name: str, before: StationSeen | None, now: float, site: SiteLimits
 ) -> SiteMemory:
-    """Forget robots' failures at this station if the station proves to be at fault."""
+    """Forget the failures of robots at this station if its states prove that the station was at
+    fault."""
     for who, failed_at in memory.strikes.items():
         if name in failed_at and _was_the_stations(memory, who, name, before, now, site):
             left = tuple(station for station in failed_at if station != name)

@@ -1,4 +1,5 @@
-"""Robots that want to be charged. A robot's place, battery and task decide. Its mode is only a hint.
+"""The wishes of robots to be charged. A robot's place, battery and task decide. Its mode is only a
+hint.
 
 From a robot's first charge on, RMF's fleet adapter shows the mode CHARGING in every later task too. The
 adapter never shows IDLE in a task. (See rmf_ros2 9dedd0f: TaskManager::robot_mode;
@@ -10,18 +11,19 @@ COORDINATOR-WISHES-1. Below `again_percent` the robot wants to be charged if it 
    mode is CHARGING or DOCKING.
 COORDINATOR-WISHES-2. Between `again_percent` and `full_percent` the robot wants to be charged only if
    it shows CHARGING or DOCKING in its present task. A robot that was already charged in that task is
-   not charged again. A robot that has not left our waypoints since its charge may only be waiting for
-   traffic on its pad. The wish of such a robot counts after LINGERS_S.
-COORDINATOR-WISHES-3. A robot without a task wants to be charged when the schedule says so. The schedule
-   charges the robot only once in the same entry's time, unless the robot has worked in between.
+   not charged again. If a robot has not left our waypoints since its charge, it may only be waiting for
+   traffic on its pad. Therefore such a robot gets a wish only after LINGERS_S.
+COORDINATOR-WISHES-3. A robot without a task wants to be charged when the schedule says so. Within the
+   time of one entry, the schedule charges the robot only once, unless the robot has worked in between.
 COORDINATOR-WISHES-4. A wish lasts as long as these rules hold, and also during the robot's drive to its
    station. The robot drives to the station in the same task, or without a task after a station was
-   assigned to it. A task that begins within COMES_S of the assignment is that drive: RMF's automatic
-   retreat, or its restarted ChargeBattery. A task from RMF's dispatcher is no such drive.
+   assigned to it. If a task begins within COMES_S of the assignment, that task is the drive. It is
+   RMF's automatic retreat to a charger, or RMF has restarted the robot's task ChargeBattery. A task
+   from RMF's dispatcher is no such drive.
 COORDINATOR-WISHES-5. Under `finishing_request: nothing` RMF moves no robot without a task until its
    battery is very low. Under `park` RMF does not move such a robot either, but Jazzy's RMF does drive
    it to its assigned place. A robot that RMF does not move stays where it is when a station is
-   assigned. After COMES_S the robot loses the station, and ABSENT_S later it is called again.
+   assigned. After COMES_S the robot loses the station. ABSENT_S later it may get a station again.
 """
 
 from typing import Final
@@ -42,10 +44,11 @@ from bridges.kinds.charger_coordinator.memory import (
 from bridges.kinds.charger_coordinator.signals import ChargeWanted, Sighting, is_dispatched
 
 SETTLES_S: Final = 2.0
-"""The time (s) for which a robot must stand still before it can have a wish. A robot that only passes
-may also show the mode CHARGING."""
+"""The time (s) for which a robot must stand still before it can have a wish. The reason is that a robot
+that only passes a waypoint may also show the mode CHARGING."""
 LINGERS_S: Final = 300.0
-"""The time (s) on its pad after which a robot wants to be charged. No traffic jam lasts that long."""
+"""The time (s) after which a robot that stands on its pad wants to be charged again. No traffic jam
+lasts that long."""
 COMES_S: Final = 60.0
 """The time (s) within which RMF acts on a charging assignment, if it acts at all."""
 ABSENT_S: Final = 600.0
@@ -110,7 +113,8 @@ def fulfilled(memory: SiteMemory, who: RobotName, site: SiteLimits) -> SiteMemor
 
 
 def stays_away(memory: SiteMemory, station: str, grant: Grant, site: SiteLimits) -> bool:
-    """Return whether the robot has no task, and has not left the place where it stood at the call."""
+    """Return whether the robot does not drive to its assigned station. Such a robot has no task, and
+    has not moved since the assignment."""
     standing, wish = memory.robots.get(grant.robot), memory.wish(grant.robot)
     if standing is None or wish is None or wish.by == "operator" or standing.sighting.task_id:
         return False
@@ -119,12 +123,13 @@ def stays_away(memory: SiteMemory, station: str, grant: Grant, site: SiteLimits)
 
 
 def gives_up(memory: SiteMemory, who: RobotName, now: float) -> SiteMemory:
-    """Take the station from a robot that did not come when called."""
+    """Take the station from a robot that did not drive to it. The robot gets no station for
+    ABSENT_S."""
     absent = {**memory.absent, who: now + ABSENT_S}
     return replace(memory.takes_back(who).without_wish(who), absent=absent)
 
 
-# ---- inside
+# ---- helpers
 
 
 def _standing(before: Standing | None, sighting: Sighting, now: float) -> Standing:
@@ -139,7 +144,7 @@ def _standing(before: Standing | None, sighting: Sighting, now: float) -> Standi
 
 
 def _served(memory: SiteMemory, sighting: Sighting) -> SiteMemory:
-    """Forget the task in which a robot was charged, when the robot has left its place in a later
+    """Forget that a robot was charged in an earlier task, when it has left our waypoints in a later
     task."""
     who, task = sighting.who, sighting.task_id
     if sighting.place is None and task and memory.served.get(who, task) != task:
@@ -148,7 +153,7 @@ def _served(memory: SiteMemory, sighting: Sighting) -> SiteMemory:
 
 
 def _rested(memory: SiteMemory, sighting: Sighting, site: SiteLimits) -> SiteMemory:
-    """Note that a robot is full enough for the schedule. Forget this note when the schedule's time is
+    """Note that a robot is full enough for the schedule. Forget this note when the entry's time is
     over, or when the robot has worked."""
     who = sighting.who
     aim = schedule.target(site.schedule, who, memory.when)
@@ -161,8 +166,8 @@ def _rested(memory: SiteMemory, sighting: Sighting, site: SiteLimits) -> SiteMem
 
 
 def _called(memory: SiteMemory, sighting: Sighting, now: float) -> SiteMemory:
-    """Note the first task after the call as the robot's drive to the station, unless RMF's dispatcher
-    gave that task."""
+    """Note the first task after the assignment of a station as the robot's drive to that station,
+    unless RMF's dispatcher gave that task."""
     who, task = sighting.who, sighting.task_id
     wish, station = memory.wish(who), memory.station_of(who)
     if wish is None or wish.by == "operator" or wish.task_id or not task or station is None:
@@ -232,7 +237,8 @@ def _goal(memory: SiteMemory, wish: Wish, site: SiteLimits) -> float:
 
 
 def _full(memory: SiteMemory, wish: Wish, site: SiteLimits) -> bool:
-    """Return whether the robot has been charged up to the goal, as its fleet shows the battery."""
+    """Return whether the robot has been charged up to the goal. The fleet's state gives the battery
+    charge."""
     grant = memory.grants.get(memory.station_of(wish.robot) or "")
     percent = memory.robots[wish.robot].sighting.battery_percent
     return grant is not None and grant.started and percent >= _goal(memory, wish, site)

@@ -1,18 +1,19 @@
 """Robots on a wrong pad, and the orders that make them leave.
 
-An order is a change of the robot's charging assignment. RMF's fleet adapter starts a robot's
-ChargeBattery again when the assignment's waypoint or mode changes (rmf_ros2 9dedd0f, ChargeBattery.cpp,
-_consider_restart). Such a change moves a robot only during its ChargeBattery, as a task or by
-`finishing_request: charge`. A robot's place is known from its fleet (FleetState's position), or from a
-station that reads receivers.
+An order is a change of the robot's charging assignment. When the assignment's waypoint or mode changes,
+RMF's fleet adapter restarts the robot's ChargeBattery (rmf_ros2 9dedd0f, ChargeBattery.cpp,
+_consider_restart). Therefore an order moves a robot only while the robot runs ChargeBattery. It does so
+in a charging task, or by `finishing_request: charge`. A robot's place is known from its fleet
+(FleetState's position), or from a station that reads receivers.
 
 Rules:
 COORDINATOR-WRONG-PAD-1. A robot with a station may come to another station, or stay at another station
    for LEAVES_S. The coordinator then tells the robot to wait, and TOLD_S later to charge at its own
    station. The coordinator does so at most twice for one request.
 COORDINATOR-WRONG-PAD-2. A robot without a station may stand on a pad for which another robot waits. The
-   coordinator then tells the robot to wait once more: for TOLD_S the robot's assignment shows the other
-   mode. The order comes `leaves_s` after the robot arrived or the station released the robot.
+   coordinator then repeats its order to wait. For this, it publishes the robot's assignment with
+   MODE_CHARGE in place of MODE_WAIT for TOLD_S, and then with MODE_WAIT again. The order comes
+   `leaves_s` after the robot arrived or the station released the robot.
 COORDINATOR-WRONG-PAD-3. The coordinator gives no such order if it may not assign places. It gives no
    order to a robot in another task either, because RMF would not move the robot.
 COORDINATOR-WRONG-PAD-4. A person is alerted if the robot still stands on the wrong pad OBEYS_S after
@@ -56,8 +57,8 @@ class OnWrongPad(NamedTuple):
 
 
 def found(memory: SiteMemory, now: float, site: SiteLimits) -> dict[RobotName, OnWrongPad]:
-    """Find every robot at the wrong station or in another robot's way. With `now` = NEVER, also find
-    the robots that will count as such later if no robot moves."""
+    """Find every robot that stands at a wrong station or in another robot's way. If `now` is NEVER,
+    also find the robots that will count as wrong at a later time, if no robot moves."""
     astray: dict[RobotName, OnWrongPad] = {}
     for one in (*_strayed(memory, now, site), *_blocking(memory, now, site)):
         astray.setdefault(one.who, one)
@@ -96,7 +97,7 @@ def due(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[float]:
         yield _alarm_at(memory, one)
 
 
-# ---- inside
+# ---- helpers
 
 
 def _strayed(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWrongPad]:
@@ -114,8 +115,8 @@ def _strayed(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWro
 def _stands(
     memory: SiteMemory, who: RobotName, site: SiteLimits
 ) -> tuple[str | None, float, float]:
-    """Return the station where the robot stands, the time of its arrival, and the time from which its
-    stay counts."""
+    """Return the station where the robot stands, the time of its arrival, and the time from which it
+    counts as standing there."""
     for name, seen in memory.stations.items():
         if seen.diagnosis is FaultCause.PAD and on_pad(seen.error, site) == who:
             return name, seen.since, seen.since
@@ -151,8 +152,8 @@ def _idle_at(memory: SiteMemory, station: str, here: Here) -> RobotName | None:
 def _matters(
     memory: SiteMemory, who: RobotName, nudge: Nudge, astray: Mapping[RobotName, OnWrongPad]
 ) -> bool:
-    """Return whether these orders still count. Orders to a robot with a station count until the robot's
-    next request, even if the robot goes to a wrong pad twice."""
+    """Return whether the number of these orders must be remembered. It is remembered until the robot's
+    next request, even if the robot leaves and comes back to a wrong pad."""
     station = memory.station_of(who)
     if station is not None:
         return memory.grants[station].request_id == nudge.why

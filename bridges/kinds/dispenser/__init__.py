@@ -54,4 +54,4 @@ RECORDED: Recorded = {
     "dispenser.signals.WorkcellOutputs": signals.WorkcellOutputs,
     "dispenser.signals.WorkcellSample": signals.WorkcellSample,
 }
-"""The recorded names of a dispenser's values. An ingestor's values have the same names."""
+"""The names under which a dispenser's values are recorded. An ingestor's values have the same names."""

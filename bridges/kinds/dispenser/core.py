@@ -1,32 +1,32 @@
 """The decision core of a dispenser or ingestor: one pure decision for each event.
 
-RMF's side is in rmf_ros2 9dedd0f, phases/DispenseItem.cpp and IngestItem.cpp. The fleet adapter repeats
-its request each second, without a stamp and without end. A result SUCCESS completes the request. A
-state of the target that no longer lists the request completes it too, if the request was listed or
-acknowledged before. So a node that forgets a request, or stops listing a failed request, sends the
-robot off unloaded.
+How RMF treats a dispenser or ingestor is in rmf_ros2 9dedd0f, phases/DispenseItem.cpp and
+IngestItem.cpp. The fleet adapter repeats its request each second, without a stamp and without end. A
+result SUCCESS completes the request. A state can complete the request too. It does so if it no longer
+lists the request, and if an earlier state listed the request or a result acknowledged it. So if a node
+forgets a request, or stops listing a failed request, RMF sends the robot away unloaded.
 
 Rules:
 DISPENSER-1. One guid is one cycle, however often RMF repeats the request. If RMF requests the guid of a
    finished request again, that request's result is sent again.
 DISPENSER-2. A request is first written to disk, then listed in a newer state, then acknowledged. A
    cycle and its outcome are also on disk before an output or a message shows them.
-DISPENSER-3. A request stays listed until the disk says that it is done. A failed request stays listed,
-   because RMF may not have heard its result.
+DISPENSER-3. A request stays listed until it is recorded as done on the disk. A failed request stays
+   listed, because RMF may not have heard its result.
 DISPENSER-4. One cycle runs at a time, in the order of the requests. A cycle starts only if RMF still
    repeats its request, the inputs are fresh, `done` is off, `ready` is on or not wired, and nothing
    else forbids the start.
 DISPENSER-5. A cycle that ends with `done` is a SUCCESS. A cycle has FAILED in three cases: a fault is
    reported; `busy` has been over for `settle_s` without `done`; `cycle_limit_s` has passed. The outputs
    then go off at once. After a failure no cycle starts before an operator's reset.
-DISPENSER-6. The start goes off, and stays off in this cycle, after a failed read or write, and when
-   `busy` is over without `done`. Otherwise a controller that restarts could take a start that is still
-   on for another request. `done` may still come until the limit.
+DISPENSER-6. After a failed read or write, and when `busy` is over without `done`, the output `start`
+   goes off. It stays off until the cycle ends. Otherwise a controller that restarts could take a
+   `start` that is still on for another request. `done` may still come until the limit.
 DISPENSER-7. The outcome is in doubt in these cases: the daemon has died in mid-cycle; the memory on
    disk is lost; a guid comes again with other items; a guid comes again after `repeats_within_s` of
    silence. Then the state is OFFLINE, no cycle starts, and the request gets no result until a person
-   decides. If the memory is lost, or nothing has been read yet, the state has the stamp 0, which RMF
-   ignores, and lists nothing.
+   decides. If the memory is lost, or nothing has been read yet, the state has the stamp 0 and an empty
+   queue. RMF ignores a state with the stamp 0.
 DISPENSER-8. A finished request is forgotten a day after RMF's last request for it.
 """
 
@@ -62,7 +62,8 @@ from bridges.kinds.shared.decision import (
 from bridges.kinds.shared.durations import NEVER
 
 MOST_LISTED: Final = 100
-"""The greatest number of listed requests. No site has as many robots; a further request is refused."""
+"""The greatest number of listed requests. It is more than the robots of any site. A further request is
+refused."""
 REMEMBERED_S: Final = 86400.0
 
 Heard = tuple[WorkcellMemory, str]
@@ -77,7 +78,8 @@ def initial(limits: WorkcellLimits, now: float) -> WorkcellMemory:
 def decide(
     memory: WorkcellMemory, event: Event, now: float, limits: WorkcellLimits
 ) -> Decision[WorkcellMemory, WorkcellOutputs, WorkcellReport]:
-    """Decide one scan. `now`: monotonic s, never earlier than in the last scan. Never raises."""
+    """Apply one event and decide. `now`: monotonic s, never earlier than in the last call. Never
+    raises."""
     memory, refused = _hear(memory, event, now, limits)
     memory = _start(
         _end(_watch(_forget(memory, now, limits), now, limits), now, limits), now, limits
@@ -92,7 +94,7 @@ def decide(
 
 
 def published(memory: WorkcellMemory, shown: WorkcellReport) -> WorkcellMemory:
-    """Note that this report was sent, with its results."""
+    """Note that this report and its results were sent to RMF."""
     told = {guid for guid, _ in shown.results}
     jobs = (replace(job, due=False) if job.guid in told else job for job in memory.jobs)
     return replace(memory, jobs=tuple(jobs))
@@ -130,8 +132,12 @@ def _cut(memory: WorkcellMemory) -> WorkcellMemory:
 
 
 def _kept(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellMemory:
-    """Note that the phases are on disk. A cycle's time counts from now, because its start may now be
-    on. A request that RMF has given up since then waits again."""
+    """Note that the phases of all requests are on disk. The time of a new cycle counts from now,
+    because its output `start` comes on only now.
+
+    If RMF has stopped repeating the request in the meantime, the cycle does not start, and the request
+    is queued again.
+    """
     jobs = tuple(replace(job, kept=job.phase) for job in memory.jobs)
     cycle, kept = memory.cycle, replace(memory, jobs=jobs, not_kept="")
     before = memory.job(cycle.guid) if cycle else None
@@ -175,7 +181,7 @@ def _put(memory: WorkcellMemory, changed: Job) -> WorkcellMemory:
 
 
 def _judge(memory: WorkcellMemory, said: DecidedByPerson, now: float) -> Heard:
-    """Obey a person's decision on the outcome of one request in doubt, or of everything in doubt."""
+    """Apply a person's decision on the outcome of one request in doubt, or of all requests in doubt."""
     named = [job for job in memory.doubtful() if said.request in ("", job.guid)]
     if not named and (said.request or not memory.lost):
         return memory, f"nothing in doubt: {said.request or 'no request waits for a decision'}"
@@ -187,7 +193,8 @@ def _judge(memory: WorkcellMemory, said: DecidedByPerson, now: float) -> Heard:
 
 
 def _forget(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellMemory:
-    """Close the finished requests about which RMF is silent. Forget them after a day."""
+    """Mark a finished request as closed if RMF has not repeated it for `repeats_within_s`. Drop a
+    request after a day."""
     jobs = []
     for job in memory.jobs:
         silent_s = now - (now if job.asked_at is None else job.asked_at)
@@ -199,7 +206,8 @@ def _forget(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Workc
 
 
 def _watch(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellMemory:
-    """Note the progress of the cycle that the inputs show."""
+    """Note in the running cycle how far it has come, according to the inputs `busy` and the age of the
+    reading."""
     cycle, senses = memory.cycle, memory.senses
     if cycle is None:
         return memory
@@ -212,7 +220,7 @@ def _watch(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Workce
 
 
 def _end(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellMemory:
-    """End the cycle if the inputs or the time say so."""
+    """End the cycle if the inputs show its end, or if its time is over."""
     cycle, job, senses, t = memory.cycle, memory.running(), memory.senses, limits.t
     if cycle is None or job is None:
         return memory

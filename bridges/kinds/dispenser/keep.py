@@ -1,4 +1,5 @@
-"""The memory on disk of one dispenser or ingestor: its requests with their outcomes, and its halt."""
+"""The part of the memory of a dispenser or ingestor that is saved to disk: its requests with their
+outcomes, and the failure that stops further cycles."""
 
 from typing import Annotated, Final
 
@@ -13,7 +14,7 @@ from bridges.kinds.shared.keep import Text
 from bridges.kinds.shared.kind import Keeping
 
 VERSION: Final = 1
-CUT_OFF: Final = "the daemon ended in the middle of its cycle"
+CUT_OFF: Final = "the daemon ended in the middle of the request's cycle"
 
 
 class JobRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -30,7 +31,7 @@ class JobRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class KeptWorkcell(keep.Kept, frozen=True, forbid_unknown_fields=True):
-    """The parts of WorkcellMemory that are kept. `lost`: the memory that was kept before this file is
+    """The parts of WorkcellMemory that are saved to disk. `lost`: the reason why an earlier file is
     missing."""
 
     jobs: list[JobRecord]
@@ -39,17 +40,17 @@ class KeptWorkcell(keep.Kept, frozen=True, forbid_unknown_fields=True):
 
 
 def persist(memory: WorkcellMemory) -> bytes:
-    """Encode the memory for the next start. The bytes change only when a kept part changes."""
+    """Encode the memory for the next start. The bytes change only when a part that is saved changes."""
     jobs = [_record(job) for job in memory.jobs]
     return msgspec.json.encode(KeptWorkcell(VERSION, jobs, memory.halted, memory.lost))
 
 
 def restore(kept: bytes, now: float) -> WorkcellMemory:
-    """Decode the memory. If a cycle was running, its outcome is unknown. Raises ValueError for other
-    bytes.
+    """Decode the memory. If a cycle was running, its outcome is unknown. Raises ValueError for bytes
+    that `persist` did not make.
 
-    The silence of RMF counts anew from `now` (monotonic s), because nobody knows how long the daemon
-    was down.
+    The time for which RMF is silent about a finished request starts again at `now` (monotonic s). The
+    reason is that nobody knows how long the daemon was down.
     """
     found = keep.read(kept, KeptWorkcell, VERSION, "the memory of a dispenser or ingestor")
     jobs = tuple(_job(record, now) for record in found.jobs)

@@ -1,4 +1,5 @@
-"""The memory of a dispenser or ingestor from scan to scan, and its limits."""
+"""The values that the core of a dispenser or ingestor keeps from one scan to the next, and the settings
+that it needs (its limits)."""
 
 from collections.abc import Iterator, Mapping
 from typing import Final, Literal
@@ -13,7 +14,8 @@ from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
 
 SIGNALS: Final = ("done", "busy", "ready", "fault")
 Contact = Settled[bool | None]
-"""One debounced input. An input that is not wired has the value None and the candidate None."""
+"""One debounced input. If an input is not wired, both its settled value and its newest reading
+(`candidate`) are None."""
 DECIDE: Final = "decide: rmf-bridge workcell done, again or failed"
 SHOWN: Final = 3
 """The greatest number of requests in doubt that a fault's text names."""
@@ -23,7 +25,7 @@ Phase = Literal["queued", "running", "done", "failed", "doubtful"]
 
 class WorkcellLimits(msgspec.Struct, frozen=True):
     """The settings that the core needs. `debounce` maps a signal to its debounce (s). `pulse_s`: the
-    length of the start's pulse; None for a start that stays on."""
+    length of the pulse on the output `start`; None for an output that stays on."""
 
     t: WorkcellDurations = WorkcellDurations()
     debounce: Mapping[str, float] = {}
@@ -31,7 +33,8 @@ class WorkcellLimits(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, settings: WorkcellSettings, debounce: Mapping[str, float]) -> "WorkcellLimits":
-        """Make the limits from the YAML and the wiring table's debounce (signal -> s)."""
+        """Make the limits from the YAML and from `debounce`, which maps each wired signal to its
+        debounce (s)."""
         return cls(settings.limits, debounce, settings.pulse_s)
 
 
@@ -63,8 +66,9 @@ class WorkcellSenses(msgspec.Struct, frozen=True):
 
 
 class Job(msgspec.Struct, frozen=True):
-    """One request. `kept`: its phase on disk, None if it is not on disk yet. Other nodes and the
-    outputs follow `kept`, so a restart never contradicts them.
+    """One request. `kept`: its phase as the disk has it, None if it is not on disk yet. Messages and
+    outputs follow `kept`. So after a restart the daemon never contradicts what it has already
+    published or switched.
 
     `transporter`: the fleet that asks. `why`: the reason for a failure or a doubt. `asked_at`: the time
     of RMF's last request. `due`: RMF waits for a result. `closed`: RMF has been silent about a finished
@@ -94,16 +98,18 @@ class Job(msgspec.Struct, frozen=True):
 
     @property
     def is_listed(self) -> bool:
-        """Return whether the request is in the published queue. If RMF no longer finds a request there,
-        RMF takes the request for done. So a request leaves the queue only when it is done on disk; a
-        failed request stays."""
+        """Return whether the request is in the published queue.
+
+        If a request is no longer in the queue, RMF assumes that it is done. So a request leaves the
+        queue only when its phase on disk is `done`. A failed request stays in the queue.
+        """
         return self.kept is not None and (self.phase, self.kept) != ("done", "done")
 
 
 class Cycle(msgspec.Struct, frozen=True):
-    """The cycle that runs. `started_at`: the start may be on since this time. `worked`: `busy` was
-    seen. `rested_at`: `busy` has been over since this time. `cut`: something has failed in this
-    cycle, so the start stays off until the cycle's end."""
+    """The cycle that runs. `started_at`: the output `start` may be on since this time. `worked`: `busy`
+    was seen on. `rested_at`: `busy` has been off again since this time. `cut`: something has failed
+    in this cycle, so `start` stays off until the cycle's end."""
 
     guid: str
     started_at: float
@@ -175,7 +181,7 @@ def rivalled(memory: WorkcellMemory, now: float) -> bool:
 
 def obstacles(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Iterator[Fault]:
     """Yield every fault that keeps a cycle from starting, most serious first. No text contains a number
-    that runs on, because every change of a text is published."""
+    that changes all the time, because every change of a text is published."""
     if memory.lost:
         yield Fault("MEMORY_LOST", f"{memory.lost}; {DECIDE}")
     if doubtful := memory.doubtful():
@@ -188,7 +194,9 @@ def obstacles(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> Ite
         silent = f"no reading for {limits.t.stale_after_s} s"
         yield Fault("COMMUNICATION_LOST", memory.io_failure or silent)
     if memory.halted:
-        yield Fault("WORKCELL_HALTED", f"{memory.halted}; rmf-bridge reset when it is clear")
+        yield Fault(
+            "WORKCELL_HALTED", f"{memory.halted}; rmf-bridge reset when the workcell is clear"
+        )
     if memory.senses.is_on("fault") or memory.senses.errors:
         errors = "; ".join(memory.senses.errors)
         yield Fault("WORKCELL_FAULT", errors or "its fault contact is on")

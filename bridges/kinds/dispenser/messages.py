@@ -30,8 +30,8 @@ Request = DispenserRequest | IngestorRequest
 State = DispenserState | IngestorState
 Result = DispenserResult | IngestorResult
 UNSAYABLE: Final = "cannot be asked here"
-"""The kind of a refusal whose answer is FAILED, because no repeat of the request will ever be
-obeyed."""
+"""The first words of a refusal for which RMF gets the result FAILED. No repeat of such a request could
+ever be obeyed."""
 
 
 def accept(message: Request, settings: WorkcellSettings) -> ItemRequested:
@@ -51,7 +51,7 @@ def _item(message: Request, settings: WorkcellSettings) -> Item:
         return Item()
     if len(message.items) != 1:
         raise RequestRefused(
-            UNSAYABLE, f"{len(message.items)} sorts of items; one cycle is for one"
+            UNSAYABLE, f"{len(message.items)} sorts of items; one cycle handles one sort"
         )
     [one] = message.items
     found = settings.items.get(one.type_guid)
@@ -74,15 +74,16 @@ def device_name(message: Request | State) -> str:
 
 
 def state_of(made: type[State]) -> Callable[[str, object, WorkcellReport, Time], State]:
-    """Return the kind's function `state_message`. The state has no `seconds_remaining`, because nobody
-    knows that time."""
+    """Return the function `state_message` of a kind whose states are of the type `made`. The state has
+    no `seconds_remaining`, because nobody knows that time."""
     return lambda name, settings, report, stamp: made(
         time=stamp, guid=name, mode=int(report.mode), request_guid_queue=report.queue
     )
 
 
 def results_on(topic: Topic[Result]) -> Callable[[str, WorkcellReport], tuple[Said, ...]]:
-    """Return the kind's function `results`. Its messages have no stamps."""
+    """Return the function `results` of a kind that sends its results on this topic. The results have no
+    stamps yet."""
     return lambda name, report: tuple(
         (topic, topic.type(request_guid=guid, source_guid=name, status=int(status)))
         for guid, status in report.results
@@ -92,8 +93,8 @@ def results_on(topic: Topic[Result]) -> Callable[[str, WorkcellReport], tuple[Sa
 def answer_on(
     topic: Topic[Result],
 ) -> Callable[[str, object, str, WorkcellReport], RefusalAnswer | None]:
-    """Return the kind's function `answer`. Its answer to a request that no repeat can improve is
-    FAILED, without a stamp."""
+    """Return the function `answer` of a kind that sends its results on this topic. The function answers
+    FAILED, without a stamp, if no repeat of the request could ever be obeyed."""
 
     def answer(
         name: str, request: object, reason: str, report: WorkcellReport
@@ -101,7 +102,7 @@ def answer_on(
         if not isinstance(request, Request) or not reason.startswith(UNSAYABLE):
             return None
         if request.request_guid in report.queue:
-            return None  # the guid's request with other items still waits for its own result
+            return None  # the request in the queue has other items and gets its own result
         failed = topic.type(
             request_guid=request.request_guid, source_guid=name, status=WorkcellStatus.FAILED
         )

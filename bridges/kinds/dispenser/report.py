@@ -15,12 +15,12 @@ from bridges.messages.constants import WorkcellMode, WorkcellStatus
 
 
 class WorkcellReport(msgspec.Struct, frozen=True):
-    """The state for RMF and the status file. `queue`: the guids that are listed. `results`: a pair of
-    guid and result for each request that waits for a result; a state with `queue` is published
-    before them.
+    """The state for RMF and the status file. `queue`: the guids of the listed requests. `results`: a
+    pair of guid and result for each request that waits for a result. A state with `queue` is
+    published before these results.
 
-    `running`: the guid of the running cycle. `item`: the content of that request. `start`: the cycle's
-    start may be on. `waits`: the reason why the next request does not run.
+    `running`: the guid of the running cycle. `item`: the content of that request. `start`: the output
+    `start` may be on. `waits`: the reason why the next request does not run.
     """
 
     mode: WorkcellMode
@@ -39,9 +39,11 @@ class WorkcellReport(msgspec.Struct, frozen=True):
 
 
 def report(memory: WorkcellMemory, now: float, limits: WorkcellLimits) -> WorkcellReport:
-    """Report the present state, as far as it is on disk. If the memory is lost, the state has no time:
-    RMF takes a request for done if a newer state does not list it. A state without a time has no
-    list either, so that RMF never compares two such states."""
+    """Report the present state, as far as it is on disk.
+
+    If the memory is lost, the state has no time and an empty queue, and RMF ignores it. With a time,
+    RMF would assume that every request is done that the state does not list.
+    """
     runs = memory.running()
     read_at = None if memory.lost else memory.senses.read_at
     listed = [job for job in memory.jobs if job.is_listed and read_at is not None]

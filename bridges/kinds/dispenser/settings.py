@@ -18,9 +18,8 @@ class WorkcellDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
 
     stale_after_s: Annotated[
         StaleAfter,
-        tells(
-            "the time without a good reading after which the state is OFFLINE and the start is off."
-        ),
+        tells("""the time without a good reading after which the state is OFFLINE and the output
+        `start` is off."""),
     ] = 1.0
     cycle_limit_s: Annotated[
         Timeout,
@@ -32,8 +31,8 @@ class WorkcellDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
     ] = 1.0
     asked_within_s: Annotated[
         Patience,
-        tells("""a request starts only if RMF has repeated it in this time, because later its robot
-        may be gone."""),
+        tells("""a cycle starts only if RMF has repeated its request within this time. If RMF has
+        not, the robot may be gone."""),
     ] = 5.0
     repeats_within_s: Annotated[
         Patience,
@@ -60,17 +59,18 @@ class WorkcellSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown
     ] = WorkcellDurations()
     items: Annotated[
         dict[Name, AskedFor],
-        tells("""type_guid -> what a request may say about it. A request for anything else is
-        answered FAILED. When absent, requests carry no items."""),
+        tells("""type_guid of an item -> the quantity and compartments that a request for it may
+        name. A request for any other item is answered FAILED. When absent, requests carry no
+        items."""),
     ] = msgspec.field(default_factory=dict)
     pulse_s: Annotated[
         Pulse | None,
-        tells("""how long the start is on; when absent, the start stays on until `done`, a fault or
-        the limit."""),
+        tells("""how long the output `start` is on; when absent, `start` stays on until `done`, a
+        fault or the limit."""),
     ] = None
 
     def stale_after(self) -> float:
-        """Return the limits' `stale_after_s`."""
+        """Return `stale_after_s` of the limits."""
         return self.limits.stale_after_s
 
     def problems(self) -> Remarks:
@@ -78,7 +78,7 @@ class WorkcellSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown
         if self.pulse_s is not None and self.pulse_s >= self.limits.cycle_limit_s:
             yield (
                 ("pulse_s",),
-                "must be shorter than cycle_limit_s; leave it out for a steady start",
+                "must be shorter than cycle_limit_s; delete the key if the output must stay on",
             )
         if self.limits.repeats_within_s < self.limits.asked_within_s:
             yield ("limits", "repeats_within_s"), "must not be shorter than asked_within_s"

@@ -1,4 +1,5 @@
-"""The sample, outputs and events of a dispenser or ingestor: the interface of its core."""
+"""The readings (samples), outputs and events of a dispenser or ingestor, which are the interface of its
+decision core."""
 
 import msgspec
 
@@ -26,7 +27,8 @@ class Item(msgspec.Struct, frozen=True):
 
 
 class WorkcellSample(msgspec.Struct, frozen=True):
-    """Every input: active or not, in whichever way it is wired, and not debounced. None if not wired.
+    """Every input, not debounced. True means asserted, whether the contact is wired as normally open or
+    normally closed. None: not wired.
 
     `done`: the cycle has succeeded. `busy`: a cycle runs. `ready`: a cycle may start. `fault`: the
     workcell reports a fault. `errors`: the faults that its controller names.
@@ -40,8 +42,8 @@ class WorkcellSample(msgspec.Struct, frozen=True):
 
 
 class WorkcellOutputs(msgspec.Struct, frozen=True):
-    """Every output: the start of a cycle, and the item that was requested. `item` stays the same as
-    long as the cycle runs."""
+    """Every output: `start`, which starts a cycle, and the item that was requested. `item` stays the
+    same as long as the cycle runs."""
 
     start: bool = False
     guid: str = ""
@@ -49,8 +51,8 @@ class WorkcellOutputs(msgspec.Struct, frozen=True):
 
 
 class ItemRequested(msgspec.Struct, frozen=True):
-    """RMF requests one dispensing or ingesting, and repeats the request each second until it has a
-    result."""
+    """RMF's request to dispense or ingest something. RMF repeats the request each second until it gets
+    a result."""
 
     guid: str
     item: Item = Item()

@@ -1,13 +1,15 @@
 """The door's decision core: one pure decision for each event.
 
+The hold is the output that opens the door and keeps it open.
+
 Rules:
-DOOR-1. An OPEN from any requester latches the hold; a repeated OPEN is harmless. A CLOSE releases the
-   hold after `close_grace_s`. An OPEN within that time cancels the CLOSE. A repeated CLOSE does not
-   prolong that time. The delay is needed because RMF's supervisor sends a CLOSE when it restarts, even
-   if a robot stands in the doorway.
-DOOR-2. Nothing ever drives the door shut. Silence never releases the hold, because RMF is silent while
-   a robot passes. One exception: if the site has set `supervisor_lost_s`, the hold ends when no node
-   has published door requests for that time.
+DOOR-1. An OPEN from any requester switches the hold on until a CLOSE comes (the latch). A repeated OPEN
+   is harmless. A CLOSE releases the hold after `close_grace_s`. An OPEN within that time cancels the
+   CLOSE. A repeated CLOSE does not prolong that time. The delay is needed because RMF's supervisor
+   sends a CLOSE when it restarts, even if a robot stands in the doorway.
+DOOR-2. No output closes the door. Silence never releases the hold, because RMF is silent while a robot
+   passes. One exception: if the site has set `supervisor_lost_s`, the hold ends when no node has
+   published door requests for that time.
 DOOR-3. After the end of a hold, an obstruction switches the hold on again, as long as the obstruction
    lasts. When the door has been seen closed, an obstruction has no effect any more.
 DOOR-4. In a fire alarm the site's `on_fire` decides. `open` holds the door open, and no CLOSE releases
@@ -22,8 +24,8 @@ DOOR-6. The state is OPEN only if the limit contact of the open door is active. 
 DOOR-7. If another node publishes states under this door's name, the state is OFFLINE and the hold is
    off.
 
-A fault only describes; it changes no output. A fault ends with its cause, so an operator has nothing to
-reset.
+A fault is only a text for people; it changes no output. A fault ends when its cause ends, so an
+operator has nothing to reset.
 """
 
 from collections.abc import Iterator
@@ -57,7 +59,7 @@ from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
 
 
 def initial(limits: DoorLimits, now: float) -> DoorMemory:
-    """Return the memory at start: nothing is known, and the hold is off."""
+    """Return the memory at start, before any reading. The hold is off."""
     return DoorMemory(held_since=now)
 
 
@@ -83,7 +85,8 @@ def decide(
 
 
 def repeated(memory: DoorMemory, now: float) -> DoorMemory:
-    """Return the memory after the last reading was read once more, if only its time moves on."""
+    """Return the memory after the same reading came once more. The caller has checked that only the
+    time of the reading differs."""
     return replace(memory, senses=replace(memory.senses, read_at=now))
 
 
@@ -141,8 +144,8 @@ def _look(memory: DoorMemory, now: float, limits: DoorLimits) -> BelievedDoor:
 
 
 def _hold(memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits) -> DoorMemory:
-    """Switch the hold on or off. Also note since when the door has been between its end positions, and
-    since when it has not been open."""
+    """Switch the hold on or off. Also note the time since which the door has been between its end
+    positions, and the time since which it has not been open."""
     if released_by_fire(view, limits):
         memory = replace(memory, latched_at=None, close_at=None)
     able = view.fresh and not rivalled(memory, now)

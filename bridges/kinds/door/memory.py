@@ -1,4 +1,5 @@
-"""The door core's memory from scan to scan, and its limits."""
+"""The values that the door core keeps from one scan to the next, and the settings that it needs (its
+limits)."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -13,8 +14,8 @@ from bridges.kinds.shared.durations import NEVER, RIVAL_QUIET_S
 class DoorLimits(msgspec.Struct, frozen=True):
     """The settings of a door that its core needs.
 
-    `t`: the durations. `debounce` maps a signal to its debounce (s). `estimated`: the time since the
-    hold was switched replaces a missing limit contact.
+    `t`: the durations. `debounce` maps a signal to its debounce (s). `estimated`: if a limit contact is
+    missing, estimate the door's position from the time since the hold was switched.
     """
 
     t: DoorDurations = DoorDurations()
@@ -25,7 +26,8 @@ class DoorLimits(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, settings: DoorSettings, debounce: Mapping[str, float]) -> "DoorLimits":
-        """Make the limits from the YAML and the wiring table's debounce (signal -> s)."""
+        """Make the limits from the YAML and from `debounce`, which maps each wired signal to its
+        debounce (s)."""
         return cls(
             settings.limits,
             debounce,
@@ -36,7 +38,8 @@ class DoorLimits(msgspec.Struct, frozen=True):
 
 
 Contact = Settled[bool | None]
-"""One debounced input. An input that is not wired has the value None and the candidate None."""
+"""One debounced input. If an input is not wired, both its settled value and its newest reading
+(`candidate`) are None."""
 
 
 class DoorSenses(msgspec.Struct, frozen=True):
@@ -60,11 +63,12 @@ class DoorMemory(msgspec.Struct, frozen=True):
     """The facts of the past that the next decision needs. Times are monotonic seconds.
 
     `latched_at`: RMF has wanted the door open since this time. `close_at`: the time when a CLOSE
-    releases the hold. `held`: the hold is on. `held_since`: the time when the hold was last switched.
-    `closing`: since the end of the hold, the door has not been seen closed. `between_since`: the door
-    has been between its end positions since this time. `shut_since`: the door has not been fully open
-    since this time. `rival_at`: the time when another node for this door was last heard.
-    `unattended_since`: no node has published requests since this time.
+    releases the hold. `held`: the hold (the output that keeps the door open) is on. `held_since`: the
+    time when the hold was last switched. `closing`: the hold has ended, and the door has not been seen
+    closed since then. `between_since`: the door has been between its end positions since this time.
+    `shut_since`: the door has not been fully open since this time. `rival_at`: the time when another
+    node for this door was last heard. `unattended_since`: no node has published requests since this
+    time.
     """
 
     latched_at: float | None = None
@@ -97,23 +101,24 @@ def travel_ends_at(memory: DoorMemory, limits: DoorLimits) -> float:
 
 
 def opening_ends_at(memory: DoorMemory, limits: DoorLimits) -> float:
-    """Return the time by which a held door must be open; NEVER for an open door, and without a hold."""
+    """Return the time by which a held door must be open. Return NEVER if the door is open or not
+    held."""
     if memory.shut_since is None or not memory.held:
         return NEVER
     return max(memory.shut_since, memory.held_since) + limits.t.open_timeout_s
 
 
 def too_long_at(memory: DoorMemory, limits: DoorLimits) -> float:
-    """Return the time when RMF will have held the door for `max_hold_s`; NEVER without a limit or a
-    hold."""
+    """Return the time when RMF will have held the door for `max_hold_s`. Return NEVER without a limit,
+    and for a door that RMF does not hold."""
     if memory.latched_at is None or limits.t.max_hold_s is None:
         return NEVER
     return memory.latched_at + limits.t.max_hold_s
 
 
 def lost_at(memory: DoorMemory, limits: DoorLimits) -> float:
-    """Return the time when the hold ends because no supervisor is present. Return NEVER if a supervisor
-    is present, or without `supervisor_lost_s`."""
+    """Return the time when the hold ends because no node publishes door requests. Return NEVER if a
+    node publishes them, or without `supervisor_lost_s`."""
     if memory.unattended_since is None or limits.t.supervisor_lost_s is None:
         return NEVER
     return memory.unattended_since + limits.t.supervisor_lost_s

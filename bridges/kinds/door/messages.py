@@ -13,8 +13,8 @@ from bridges.messages.definitions import DoorMode, DoorModeValue, DoorRequest, D
 def accept(message: DoorRequest, settings: DoorSettings) -> OpenRequested | CloseRequested:
     """Turn a request into an event. Raises RequestRefused if the request is malformed.
 
-    A door obeys every requester. But a request without a requester_id is refused. Nobody filled in the
-    fields of such a request, and its default mode, 0, would mean CLOSE.
+    A door obeys every requester. But a request without a requester_id is refused. The sender has left
+    its fields empty, and the default mode, 0, would mean CLOSE.
     """
     if not message.requester_id:
         raise RequestRefused("no requester", "requester_id is empty")

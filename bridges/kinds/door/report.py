@@ -21,9 +21,9 @@ from bridges.messages.definitions import DoorModeValue
 class DoorReport(msgspec.Struct, frozen=True):
     """The door's state for RMF and the status file.
 
-    `hold`: we hold the door open, even if the relay is off between two pulses. `estimated`: no contact
-    proves `mode`. `waits`: the reason why the door is not open although RMF wants the door open;
-    otherwise "". `alarm`: the fire input, for the fleets.
+    `hold`: we hold the door open. With a pulsed relay, `hold` is True between two pulses too.
+    `estimated`: no contact proves `mode`. `waits`: the reason why the door is not open although RMF
+    wants the door open; otherwise "". `alarm`: the fire input, for the fleets.
     """
 
     mode: DoorModeValue
@@ -35,7 +35,8 @@ class DoorReport(msgspec.Struct, frozen=True):
     alarm: AlarmInputs = AlarmInputs()
 
     def news(self) -> object:
-        """Return the report without its age, and without `waits` and `alarm`, which DoorState lacks."""
+        """Return the report without its age, and without `waits` and `alarm`. DoorState has no field
+        for these two."""
         return self.mode, self.faults, self.hold, self.estimated
 
 
@@ -68,7 +69,7 @@ _PROOFS = {
     DoorModeValue.MODE_CLOSED: frozenset({"closed"}),
     DoorModeValue.MODE_MOVING: frozenset({"opened", "closed"}),
 }
-"""The contacts that prove each mode."""
+"""For each mode, the limit contacts without which the mode is only an estimate."""
 
 
 def _mode(memory: DoorMemory, view: BelievedDoor, now: float, limits: DoorLimits) -> DoorModeValue:

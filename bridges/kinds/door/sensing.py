@@ -1,13 +1,14 @@
-"""Judgement of a door's inputs: debounce, age, and estimates for contacts that are not wired.
+"""The core's belief about a door's inputs: debounce, age, and estimates for contacts that are not
+wired.
 
 Rules:
 DOOR-SENSING-1. A change of an input counts when it has lasted for the signal's debounce. The end of a
-   fire alarm or of an obstruction counts when it has lasted for `hazard_clear_s`. Until the input of a
-   hazard has settled for the first time, a single reading of the hazard counts.
+   fire alarm or of an obstruction counts when it has lasted for `hazard_clear_s`. Before the input of a
+   hazard has settled once, a single reading of the hazard counts.
 DOOR-SENSING-2. After `stale_after_s` without a reading all inputs are unknown again, because the door
    may have moved.
-DOOR-SENSING-3. If the YAML sets `feedback: estimated`, the time for which the relay has been on or off
-   replaces a missing limit contact. A failed read or write restarts that time.
+DOOR-SENSING-3. If the YAML sets `feedback: estimated`, a missing limit contact is estimated from the
+   time for which the relay has been on or off. A failed read or write restarts that time.
 DOOR-SENSING-4. If a controller reports that it does not know the door's position (`lost`), the report
    counts at once, without debounce.
 """
@@ -27,11 +28,11 @@ HAZARDS = ("obstruction", "fire")
 
 
 class BelievedDoor(msgspec.Struct, frozen=True):
-    """The judged inputs at one instant.
+    """The inputs as the core believes them at one instant.
 
     `fresh`: the last reading is younger than `stale_after_s`. `seen`: the reading is fresh and each
     input has settled, so the door's position is known. `estimated`: the end positions that have no
-    contact. `changes_at`: the next time (s) when these judgements may change without a reading. `lost`,
+    contact. `changes_at`: the next time (s) when these values may change without a reading. `lost`,
     `errors`: see DoorSample.
     """
 
@@ -67,7 +68,8 @@ def take(senses: DoorSenses, sample: DoorSample, now: float, limits: DoorLimits)
 
 
 def miss(senses: DoorSenses) -> DoorSenses:
-    """Restart the debounce, and the time behind the estimates, after a failed read."""
+    """Restart the debounce after a failed read, and the time from which the end positions are
+    estimated."""
     return replace(
         senses,
         opened=forget(senses.opened),
@@ -86,7 +88,8 @@ def is_fresh(senses: DoorSenses, now: float, limits: DoorLimits) -> bool:
 def look(
     senses: DoorSenses, held: bool, held_since: float, now: float, limits: DoorLimits
 ) -> BelievedDoor:
-    """Judge the inputs now. The relay has been on (`held`) or off since `held_since`."""
+    """Decide which inputs to believe now. The relay has been on (if `held`) or off since
+    `held_since`."""
     opened, closed = _believed(senses.opened), _believed(senses.closed)
     opened_at, closed_at = _estimates(senses, held, held_since, limits)
     guessed = frozenset(s for s in ("opened", "closed") if _unwired(getattr(senses, s)))
@@ -141,8 +144,9 @@ def _feared(contact: Contact | None) -> bool:
 def _estimates(
     senses: DoorSenses, held: bool, held_since: float, limits: DoorLimits
 ) -> tuple[float, float]:
-    """Return the times from which a door without contacts counts as open, and as closed. A held door
-    never counts as closed, and a released door never counts as open (NEVER)."""
+    """Return two times: the time from which a door without contacts counts as open, and the time from
+    which it counts as closed. A held door never counts as closed, and a released door never counts
+    as open (NEVER)."""
     if not limits.estimated or senses.linked_since is None:
         return NEVER, NEVER
     since = max(held_since, senses.linked_since)

@@ -54,7 +54,8 @@ class DoorDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
 
 class Pulse(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Pulses on the relay while RMF holds the door, for a door operator that closes by itself."""
+    """Pulses on the relay while RMF holds the door. They are for a door operator that closes the door
+    by itself after each pulse."""
 
     on_s: Annotated[PulseSeconds, tells("how long each pulse lasts.")]
     every_s: Annotated[PulseSeconds, tells("the time from one pulse's start to the next.")]
@@ -81,7 +82,7 @@ class DoorSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
     ] = None
 
     def stale_after(self) -> float:
-        """Return the limits' `stale_after_s`."""
+        """Return `stale_after_s` of the limits."""
         return self.limits.stale_after_s
 
     def problems(self) -> Remarks:
@@ -95,7 +96,7 @@ class DoorSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
         if self.pulse and self.pulse.on_s >= self.pulse.every_s:
             yield (
                 ("pulse", "on_s"),
-                "must be shorter than every_s; delete pulse for a steady hold",
+                "must be shorter than every_s; delete pulse if the relay must stay on",
             )
         delay_s = self.limits.open_delay_s
         if self.feedback == "estimated" and delay_s is None:

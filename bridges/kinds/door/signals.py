@@ -1,4 +1,4 @@
-"""A door's sample, outputs and events: the interface of its core."""
+"""A door's readings (samples), outputs and events, which are the interface of its decision core."""
 
 import msgspec
 

@@ -1,4 +1,5 @@
-"""The door supervisor between the fleet adapters and all doors. This supervisor replaces RMF's."""
+"""The door supervisor between the fleet adapters and all doors. It replaces the door supervisor of
+RMF."""
 
 from bridges.kinds.door_supervisor import core, keep, memory, messages, report, signals
 from bridges.kinds.door_supervisor.memory import DoorSupervisorLimits, SupervisedDoor

@@ -1,4 +1,5 @@
-"""The door supervisor's core, for one door: its holders, and the requests to the door's node.
+"""The door supervisor's core, for one door: its holders (requesters that want it open), and the
+requests to the door's node.
 
 This supervisor replaces RMF's supervisor (rmf_ros2, door_supervisor/Node.cpp). Fleet adapters and web
 users send their requests on `adapter_door_requests`. The supervisor sends its requests on
@@ -10,17 +11,19 @@ DOOR-SUPERVISOR-1. OPEN adds its requester to the holders, or renews the holder'
 DOOR-SUPERVISOR-2. When the first holder comes, the supervisor sends OPEN to the door's node. When the
    last holder leaves, the supervisor sends CLOSE.
    - The request is repeated when a requester repeats OPEN. The request is also repeated when the door's
-     state contradicts it: a held door is CLOSED or MOVING, or a door without holders is OPEN or MOVING.
+     state contradicts the request: a held door is CLOSED or MOVING, or a door without holders is OPEN
+     or MOVING.
    - For INSIST_S after a holder has come, OPEN is repeated at every state of the door. The first OPEN
      may have been lost, or an earlier CLOSE may be about to close the door.
-   - The states OFFLINE and UNKNOWN cause no request.
+   - In the states OFFLINE and UNKNOWN no request is repeated because of the state.
 DOOR-SUPERVISOR-3. Silence ends no hold, because a robot in the doorway is silent. After `open_alarm_s`
    a fault is shown, and the door stays open.
-DOOR-SUPERVISOR-4. During the quiet start, and whenever another supervisor publishes, our supervisor
-   only listens. After that it sends OPEN at once to a door with holders. It sends CLOSE only when a new
-   state of the door contradicts CLOSE. The quiet start has one exception. A door that was held before
-   the restart, and is not seen CLOSED, is held from the start if no other supervisor is there. The
-   reason is that the door's node may have died too, with a robot in the doorway.
+DOOR-SUPERVISOR-4. During the quiet start (the first `quiet_start_s`), and whenever another supervisor
+   publishes, our supervisor only listens. After that it sends OPEN at once to a door with holders. It
+   sends CLOSE only when a new state of the door contradicts CLOSE. There is one exception during the
+   quiet start. OPEN is sent at once to a door that was held before the restart, if the door is not seen
+   CLOSED and no other supervisor is there. The reason is that the door's node may have died too, with a
+   robot in the doorway.
 DOOR-SUPERVISOR-5. Two messages are at least GAP_S apart. An unchanged message is repeated after
    REPEAT_S at the earliest.
 
@@ -56,7 +59,7 @@ Decided = Decision[SupervisedDoor, None, DoorHoldReport]
 
 
 def initial(door: str, started_at: float) -> SupervisedDoor:
-    """Return the memory at start: nothing has been heard, and we may not publish yet."""
+    """Return the memory at start, before any message was heard. We may not publish yet."""
     return SupervisedDoor(door)
 
 
@@ -68,7 +71,7 @@ def idle(memory: SupervisedDoor, now: float) -> bool:
 
 
 def urgent(memory: SupervisedDoor) -> bool:
-    """Return whether a door must be held before the quiet start is over."""
+    """Return whether this door must be held at once, even during the quiet start."""
     return memory.holds_restored
 
 
@@ -91,7 +94,7 @@ def decide(
     )
 
 
-# --- messages in -------------------------------------------------------------------------------
+# --- events that come in ------------------------------------------------------------------------
 
 
 def _take(memory: SupervisedDoor, event: Event, now: float) -> tuple[SupervisedDoor, str]:
@@ -138,7 +141,7 @@ def _see(memory: SupervisedDoor, now: float) -> SupervisedDoor:
     return replace(memory, prompted=memory.disagrees or insists)
 
 
-# --- messages out ------------------------------------------------------------------------------
+# --- messages that go out -----------------------------------------------------------------------
 
 
 def _request(memory: SupervisedDoor) -> DoorRequest:

@@ -1,6 +1,7 @@
-"""The doors' holders, saved across a restart.
+"""The doors' holders (requesters that want a door open), saved across a restart.
 
-A holder is saved before the heartbeat lists the holder, because a listed robot drives on at once.
+A holder is saved before the heartbeat lists the holder, because a robot drives on as soon as it is
+listed.
 """
 
 from collections.abc import Mapping
@@ -22,7 +23,7 @@ Stamp = Annotated[int, Meta(ge=0, lt=2**31 * SECOND_NS)]
 
 class KeptDoors(keep.Kept, frozen=True, forbid_unknown_fields=True):
     """The saved holders. `doors` maps a door to its holders, and each holder to a stamp (ns). This is
-    the stamp of the first OPEN of the holder's present visit."""
+    the stamp of the OPEN with which the holder came to the door."""
 
     doors: dict[Text, dict[Text, Stamp]]
 
@@ -41,8 +42,8 @@ def restore(kept: bytes, settings: DoorSupervisorSettings, now: float) -> dict[s
     """Make the memories at start from the bytes of `persist`, for the doors that the supervisor still
     serves.
 
-    Raises ValueError for other bytes. Every hold counts from now, because monotonic times from before
-    the restart mean nothing.
+    Raises ValueError for bytes that `persist` did not make. The time of every hold starts again at
+    `now`, because monotonic times from before the restart mean nothing.
     """
     found = keep.read(kept, KeptDoors, VERSION, "a table of doors and their holders")
     served = found.doors if settings.doors is None else set(settings.doors)

@@ -1,4 +1,5 @@
-"""The door supervisor's memory of one door, and its limits."""
+"""The values that the door supervisor keeps for one door, and the settings that it needs (its
+limits)."""
 
 from typing import Final
 
@@ -12,8 +13,8 @@ from bridges.kinds.shared.graph_kind import LISTENS
 from bridges.messages.definitions import DoorModeValue
 
 VISIT_S: Final = 2.5
-"""The longest silence (s) within one visit. A waiting robot repeats OPEN at 1 Hz. An OPEN after a
-longer silence begins a new visit."""
+"""The longest silence (s) of a robot that still waits at the door, because a waiting robot repeats OPEN
+at 1 Hz. An OPEN after a longer silence begins a new visit."""
 
 CLOSED: Final = DoorModeValue.MODE_CLOSED
 MOVING: Final = DoorModeValue.MODE_MOVING
@@ -58,8 +59,8 @@ class SupervisedDoor(msgspec.Struct, frozen=True):
     `passive`: if we may not publish, the reason why requesters must wait. `at_once`: a door with a
     restored holder may be held even before we may publish. `holders`: the requesters that hold the
     door, in the order of arrival. `requesters`: the record of each requester's stamps. `mode`: the
-    door's last mode, heard at `shown_at`. `sent`: the last request to the door's node; None after a
-    change of the permission to publish. `prompted`: the request must be repeated.
+    door's last mode, heard at `shown_at`. `sent`: the last request to the door's node; None after the
+    permission to publish has come or gone. `prompted`: the request must be repeated.
     """
 
     door: str
@@ -81,8 +82,11 @@ class SupervisedDoor(msgspec.Struct, frozen=True):
 
     @property
     def may_send(self) -> bool:
-        """Return whether we may send to the door's node now. During the quiet start this needs a
-        restored holder and a door that is not closed, because a robot may stand in the doorway."""
+        """Return whether we may send to the door's node now.
+
+        During the quiet start we may send only if a holder from before the restart holds the door, and
+        the door is not closed. A robot may then stand in the doorway.
+        """
         stands_open = self.mode not in (None, CLOSED)
         return self.may_speak or (self.at_once and stands_open and self.holds_restored)
 

@@ -26,9 +26,9 @@ def accept_request(
     """Turn an adapter's request into an event. Raises RequestRefused. `wall` is not used, because
     stamps are compared only with stamps of the same requester.
 
-    A request without a requester_id is refused. Nobody filled in the fields of such a request, and its
-    default mode, 0, would mean CLOSE. A request with our own requester_id is refused too, because it is
-    our own request to a door. A renamed topic has brought it back to us.
+    A request without a requester_id is refused. The sender has left its fields empty, and the default
+    mode, 0, would mean CLOSE. A request with our own requester_id is refused too. It is our own request
+    to a door, which comes back to us because somebody has renamed a topic.
     """
     check_listed("door", request.door_name, settings.doors)
     who = request.requester_id
@@ -69,8 +69,8 @@ def requester(event: RequesterOpens | RequesterCloses | DoorStateHeard) -> str:
 def stamped(
     message: DoorRequest | SupervisorHeartbeat, time: Time
 ) -> DoorRequest | SupervisorHeartbeat:
-    """Add the time of sending to a message. A heartbeat stays unchanged, because it has only the stamps
-    of its requesters."""
+    """Add the time of sending to a message. A heartbeat stays unchanged, because it has no stamp of its
+    own."""
     if isinstance(message, SupervisorHeartbeat):
         return message
     return replace(message, request_time=time)

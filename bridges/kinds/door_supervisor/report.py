@@ -5,9 +5,9 @@ Their phase DoorClose ends only when the heartbeat no longer lists the robot. If
 robot for a door that the robot does not hold, the adapter sends CLOSE (rmf_ros2, RobotContext.cpp
 _check_door_supervisor).
 
-RMF's own supervisor sends the heartbeat only after adapter requests. Therefore the sessions of a
-restarted fleet adapter stay in that heartbeat for ever. Our supervisor also sends the heartbeat each
-second.
+RMF's own supervisor sends the heartbeat only after adapter requests. Therefore that heartbeat lists the
+robots of a restarted fleet adapter for ever. Our supervisor sends the heartbeat after requests, and
+each second.
 """
 
 from collections.abc import Iterator, Mapping
@@ -30,8 +30,8 @@ from bridges.messages.topics import DOOR_SUPERVISOR_HEARTBEAT, AnyTopic
 class DoorHoldReport(msgspec.Struct, frozen=True):
     """One door, for the log and the status file. Times are monotonic seconds.
 
-    `holders`: pairs of a requester and the start of its hold. `mode`: the door's last mode, heard at
-    `read_at`. `waits`: the reason why we send nothing to a held door; else "".
+    `holders`: pairs of a requester and the time since which it holds the door. `mode`: the door's last
+    mode, heard at `read_at`. `waits`: the reason why we send nothing to a held door; else "".
     """
 
     read_at: float | None

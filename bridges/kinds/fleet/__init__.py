@@ -1,4 +1,5 @@
-"""Fleets: RMF's adapter gives goals, and each robot is driven to them through its maker's interface."""
+"""Fleets: RMF's fleet adapter gives goals, and the daemon sends each robot to its goals through the
+maker's interface."""
 
 from bridges.kinds.fleet import core, keep, light, memory, messages, report, signals
 from bridges.kinds.fleet.memory import RobotLimits, RobotMemory

@@ -1,31 +1,37 @@
 """A robot's decision core: one pure decision for each event.
 
+The robot's manager is the maker's system through which the daemon reaches the robot.
+
 Rules:
-FLEET-1. The last order of RMF counts. A command is sent once for each attempt; its number never
-   repeats.
-FLEET-2. A command counts as done by the place: the robot is within `arrived_m` of the goal, on the
-   goal's map. If the robot reports completed commands, it must have reported this one as well; else
-   it must stand, and look in the goal's direction. A robot that calls a command completed elsewhere
-   has not carried it out, and its word is a fault.
-FLEET-3. A command is sent again when the robot stands for `obeys_s` without being done, ever more
-   seldom. An action is sent again only if its manager refused it: an action must not be done twice.
-FLEET-4. A robot that was stopped or paused is believed only when it stands; until then the command is
-   sent again each `stops_s`. A new order replaces a stop.
-FLEET-5. RMF gets a place only with a fresh reading. A robot without one for `stale_after_s` is
-   silent.
-FLEET-6. On a map that the graph lacks, RMF gets no place. Off the graph it does, and the distance
-   is reported.
-FLEET-7. After a lift ride RMF gets no place until the robot is on the new floor's map, near the
-   place that RMF expects; then the command is done.
-FLEET-8. Docking at a charger is done when the robot, or the charger's own daemon, reports a charge;
-   if neither can report, when the robot has arrived. Without a charge for `docks_s` it docks again.
-FLEET-9. A robot that charges at another charger than that of its last goal is at the wrong station.
+FLEET-1. Only the last order of RMF counts. A command is sent once for each attempt, and a command's
+   number never repeats.
+FLEET-2. A command is done when the robot is within `arrived_m` of the goal, on the goal's map. If the
+   robot reports completed commands, it must also have reported this command. Otherwise the robot must
+   stand and face in the goal's direction. If a robot reports a command as completed at another place,
+   the command is not done, and the report is a fault.
+FLEET-3. If the robot stands for `obeys_s` and the command is not done, the command is sent again. The
+   pauses between attempts grow. An action is sent again only if its manager refused it, because an
+   action must not be done twice.
+FLEET-4. After a stop or pause, the robot must be seen to stand. Until then the command is sent again
+   every `stops_s`. A new order replaces a stop.
+FLEET-5. RMF gets the robot's place only from a fresh reading. After `stale_after_s` without a reading
+   the robot is silent.
+FLEET-6. If the robot is on a map that the graph lacks, RMF gets no place. If the robot is on the map
+   but off the graph, RMF gets its place, and the distance from the graph is reported as a fault.
+FLEET-7. After a lift ride RMF gets no place until the robot is on the new floor's map, near the place
+   that RMF expects. The command `localize` is then done.
+FLEET-8. Docking at a charger is done when the robot, or the charger's own daemon, reports a charge. If
+   neither can report a charge, docking is done when the robot has arrived. If no charge comes for
+   `docks_s`, the robot is sent to dock again.
+FLEET-9. A robot is at the wrong station if it charges at another charger than the one it was last sent
+   to.
 FLEET-10. A robot gets no new task while it reports a fault, takes no orders, is silent, is on an
-   unknown map, or has let `attempts` attempts of one command pass. It gets tasks again when that is
-   over.
-FLEET-11. An activity that RMF has given up is stopped.
-FLEET-12. An operator's reset begins the attempts anew.
-`light.py` has the rules of a robot that RMF can only pause.
+   unknown map, or has not carried out a command after `attempts` attempts. When this is over, the robot
+   gets tasks again.
+FLEET-11. If RMF has given up an activity, the activity is stopped.
+FLEET-12. After an operator's reset, the attempts are counted from the beginning.
+
+`light.py` has the rules for a robot that RMF can only pause.
 """
 
 from collections.abc import Iterator
@@ -52,20 +58,23 @@ from bridges.kinds.shared.decision import Decision, IoFailed, OperatorReset, Sam
 from bridges.kinds.shared.durations import NEVER
 
 MOST_PAUSES = 6
-"""The longest pause between two attempts is so many times `obeys_s`."""
+"""The longest pause between two attempts, as a multiple of `obeys_s`."""
 RELOCALISED_M = 3.0
-"""In a car the estimate of RMF is its waypoint, and a robot may stand anywhere in the car."""
+"""The greatest distance (m) from the expected place at which a robot counts as located after a lift
+ride. It is large, because RMF expects the robot at the lift's waypoint, but the robot may stand
+anywhere in the lift car."""
 
 FleetDecision = Decision[RobotMemory, RobotOutputs, RobotReport]
 
 
 def initial(limits: RobotLimits, now: float) -> RobotMemory:
-    """Return the memory at start: nothing is known, and the robot is left alone."""
+    """Return the memory at start, before any reading. The robot gets no command."""
     return RobotMemory(started_at=now)
 
 
 def decide(memory: RobotMemory, event: Event, now: float, limits: RobotLimits) -> FleetDecision:
-    """Decide one scan. `now`: monotonic s, never earlier than in the last scan. Never raises."""
+    """Apply one event and decide. `now`: monotonic s, never earlier than in the last call. Never
+    raises."""
     memory = _hear(memory, event, now, limits)
     if limits.light:
         memory = light.follow(memory, now, limits)
@@ -131,7 +140,8 @@ def _charger(goal: Goal, limits: RobotLimits) -> str:
 
 
 def _advance(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotMemory:
-    """End a command that is done, or begin the next attempt."""
+    """Clear the command if the robot has carried it out. Otherwise begin the next attempt if its time
+    has come."""
     command = memory.command
     if command is None or not memory.fresh:
         return memory

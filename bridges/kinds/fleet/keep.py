@@ -1,4 +1,5 @@
-"""The memory on disk of one robot: have we paused it? A robot without this memory is not resumed."""
+"""The part of one robot's memory that is saved to disk: whether we have paused the robot. If this
+memory is lost, the robot is not resumed."""
 
 from typing import Final
 
@@ -12,13 +13,13 @@ VERSION: Final = 1
 
 
 class KeptRobot(keep.Kept, frozen=True, forbid_unknown_fields=True):
-    """The part of RobotMemory that is kept."""
+    """The part of RobotMemory that is saved to disk."""
 
     held: bool
 
 
 def restore(kept: bytes, now: float) -> RobotMemory:
-    """Decode the memory. Raises ValueError for other bytes."""
+    """Decode the memory. Raises ValueError for bytes that are no such memory."""
     found = keep.read(kept, KeptRobot, VERSION, "the memory of a robot")
     return RobotMemory(light=LightMemory(held=found.held), started_at=now)
 

@@ -1,19 +1,24 @@
-"""A robot that RMF can only pause: its own manager sends it, and RMF's traffic light lets it go on.
+"""A robot that RMF can only pause. The robot's own manager (the maker's system) sends it to its goals,
+and RMF's traffic light allows it to go on.
 
-RMF knows the robot's path as checkpoints. It reserves them one after the other, and answers each
-question about the robot's progress (`signals.LightAnswer`).
+RMF knows the robot's path as a row of checkpoints. RMF reserves the checkpoints one after the other,
+and answers each question about the robot's progress (`signals.LightAnswer`).
 
-FLEET-LIGHT-1. RMF gets the path that the manager tells, from the robot's own place on. A path is new
-   if it is not the rest of the last one. It is over when the robot reaches its last checkpoint.
-FLEET-LIGHT-2. A robot may drive only to the checkpoint that RMF has granted, so without an answer it
-   is paused. It is paused `pauses_m` before that checkpoint, and at once if RMF says so, if the robot
-   is silent, or if it drives on against a pause. At the path's end it stands by itself.
-FLEET-LIGHT-3. A robot that stands less than `pauses_m` before a granted checkpoint counts as standing
-   there. RMF is never told of a checkpoint that it has not granted, unless the robot has passed it.
-FLEET-LIGHT-4. A robot is resumed only if we have paused it (a person may have paused it too), and only
-   if RMF says so or its path is over. An operator's reset takes a paused robot as paused by us.
-   `keep.py` keeps on disk which robots we have paused.
-FLEET-LIGHT-5. A standing robot to which RMF answers with an error gets its path anew from its place.
+FLEET-LIGHT-1. RMF gets the path that the manager reports, beginning at the robot's own place. A path is
+   new if it is not the rest of the last path. A path is over when the robot reaches its last
+   checkpoint.
+FLEET-LIGHT-2. A robot may drive only to the checkpoint that RMF has granted. So a robot for which RMF
+   has not answered is paused. The robot is paused `pauses_m` before the granted checkpoint. It is
+   paused at once if RMF says so, if the robot is silent, or if the robot drives on against a pause. At
+   the path's end the robot stops by itself.
+FLEET-LIGHT-3. If a robot stands less than `pauses_m` before a granted checkpoint, it counts as standing
+   at that checkpoint. RMF never hears that the robot has reached a checkpoint that RMF has not granted,
+   unless the robot has really passed it.
+FLEET-LIGHT-4. A robot is resumed only if we have paused it, because a person may have paused it too. It
+   is resumed only if RMF says so or if its path is over. After an operator's reset, a paused robot
+   counts as paused by us. `keep.py` saves on disk which robots we have paused.
+FLEET-LIGHT-5. If RMF answers with an error and the robot stands, RMF gets the path again, beginning at
+   the robot's present place.
 """
 
 from collections.abc import Iterator, Sequence
@@ -29,16 +34,18 @@ from bridges.kinds.fleet.sensing import apart, on_other_map, stands
 from bridges.kinds.fleet.signals import LightAnswer, Pose, RobotCommand
 
 SAME_M = 0.05
-"""Places on a path that are nearer to each other are one place."""
+"""The distance (m) within which two places on a path count as one place."""
 GRANTS = {"continue": 2, "wait": 1, "resume": 1}
-"""The answers that let the robot drive, and how many checkpoints beyond the one asked about."""
+"""The answers of RMF that let the robot drive. Each has a number: RMF asked about one checkpoint, and
+grants this many checkpoints after it."""
 
 
 class LightQuestion(msgspec.Struct, frozen=True):
     """A robot's progress, as RMF's traffic light asks for it. All places are on RMF's map.
 
-    `checkpoint`: the last one that was reached. `stands`: the robot moves, stands at that checkpoint,
-    or stands after it. `path`: () for a robot that goes nowhere. `held`: it is paused by us.
+    `checkpoint`: the last checkpoint that the robot has reached. `stands`: whether the robot is moving,
+    stands at that checkpoint, or stands after it. `path`: () for a robot without a path. `held`: we
+    have paused the robot.
     """
 
     path: tuple[Pose, ...]
@@ -50,7 +57,7 @@ class LightQuestion(msgspec.Struct, frozen=True):
 
 
 def hear(memory: RobotMemory, answer: LightAnswer) -> RobotMemory:
-    """Take an answer of RMF. Answers about earlier paths do not count."""
+    """Apply an answer of RMF's traffic light. An answer about an earlier path has no effect."""
     light = memory.light
     if answer.path != light.number or not light.path:
         return memory
@@ -60,7 +67,7 @@ def hear(memory: RobotMemory, answer: LightAnswer) -> RobotMemory:
 
 
 def follow(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotMemory:
-    """Compare the last reading with the path."""
+    """Update the path, and the last reached checkpoint, from the last reading."""
     reading = memory.reading
     if reading is None or not memory.fresh or on_other_map(memory, limits):
         return memory
@@ -78,7 +85,8 @@ def follow(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotMemory:
 def _told(
     light: LightMemory, told: tuple[Pose, ...], here: Pose, limits: RobotLimits, *, anew: bool
 ) -> LightMemory:
-    """Take the path that the manager tells."""
+    """Apply the path that the manager reports. If it is not the rest of the present path, begin a new
+    path."""
     ahead = _ahead([limits.site.on_rmfs_map(at) for at in told], here, limits.t.arrived_m)
     rest = light.path[light.passed + 1 :][-len(ahead) :]
     is_rest = bool(ahead) and len(rest) == len(ahead) and all(map(_is_same, rest, ahead))
@@ -89,7 +97,8 @@ def _told(
 
 
 def _ahead(places: Sequence[Pose], here: Pose, near_m: float) -> list[Pose]:
-    """Return the places that are still ahead of the robot, each once."""
+    """Return the places that are still ahead of the robot. Leave out a place that is the same as the
+    place before it."""
     for number, (start, end) in enumerate(pairwise(places)):
         if _off_m(start, end, here) <= near_m:
             places = places[number + 1 :]
@@ -110,7 +119,8 @@ def _passed(light: LightMemory, here: Pose, limits: RobotLimits, *, still: bool)
 
 
 def _reached(light: LightMemory, here: Pose, near_m: float) -> Iterator[int]:
-    """Yield the checkpoints that the robot is near to, or beyond: it is nearer to the path after it."""
+    """Yield the checkpoints that the robot has reached: it is near them, or nearer to the path after
+    them than to the path before them."""
     path = light.path
     for number in range(light.passed + 1, len(path)):
         before = _off_m(path[number - 1], path[number], here)
@@ -121,7 +131,7 @@ def _reached(light: LightMemory, here: Pose, near_m: float) -> Iterator[int]:
 
 
 def _way_m(path: Sequence[Pose], passed: int, here: Pose, to: int) -> float:
-    """Return the way from here to a later checkpoint."""
+    """Return the length of the way from `here` along the path to the checkpoint `to`."""
     places = [here, *path[passed + 1 : to + 1]]
     return sum(_apart(a, b) for a, b in pairwise(places))
 
@@ -135,14 +145,15 @@ def _apart(one: Pose, other: Pose) -> float:
 
 
 def _off_m(start: Pose, end: Pose, here: Pose) -> float:
-    """Return the distance from a part of the path; from its end on this floor, if it changes floors."""
+    """Return the robot's distance from the part of the path between `start` and `end`. If that part
+    leads to another floor, return the distance from its end on the robot's floor."""
     if start.map == end.map == here.map:
         return off_line_m(start, end, here)
     return min(_apart(start, here), _apart(end, here))
 
 
 def must_stand(memory: RobotMemory, now: float, limits: RobotLimits) -> bool:
-    """Must the robot pause?"""
+    """Return whether the robot must pause now."""
     light = memory.light
     if not light.path:
         return False
@@ -158,7 +169,7 @@ def must_stand(memory: RobotMemory, now: float, limits: RobotLimits) -> bool:
 
 
 def steer(memory: RobotMemory, now: float, limits: RobotLimits) -> RobotMemory:
-    """Begin a pause or a resume, if it is time."""
+    """Begin a pause or a resume if one is due."""
     light, command, still = memory.light, memory.command, stands(memory, now)
     doing = command.doing if command else ""
     by_others = memory.reading is not None and memory.reading.paused is True
@@ -180,7 +191,11 @@ def _begin(memory: RobotMemory, doing: Literal["pause", "resume"], now: float) -
 
 
 def resumed(memory: RobotMemory, now: float, limits: RobotLimits) -> bool:
-    """Has the robot obeyed a resume? A robot without a path does not show it."""
+    """Return whether the robot has obeyed a resume.
+
+    If a robot does not report whether it is paused, it must be seen to move. A robot without a path has
+    no reason to move, so for this robot the time `stops_s` is enough.
+    """
     assert memory.reading is not None
     if memory.reading.paused is not None:
         return not memory.reading.paused
@@ -189,7 +204,8 @@ def resumed(memory: RobotMemory, now: float, limits: RobotLimits) -> bool:
 
 
 def question(memory: RobotMemory, now: float, limits: RobotLimits) -> LightQuestion | None:
-    """Return the question for RMF; None without a fresh place."""
+    """Return the robot's progress for RMF's traffic light. Return None if the last reading gave no
+    place on RMF's map."""
     light = memory.light
     if memory.reading is None or not memory.fresh or on_other_map(memory, limits):
         return None

@@ -1,4 +1,5 @@
-"""The memory of a robot's core from scan to scan, and its limits."""
+"""The values that a robot's core keeps from one scan to the next, and the settings that it needs (its
+limits)."""
 
 from collections.abc import Mapping
 
@@ -11,8 +12,8 @@ from bridges.kinds.shared.durations import AGES_AGO
 
 
 class RobotLimits(msgspec.Struct, frozen=True):
-    """The settings that the core needs. `t`: durations and distances. `light`: RMF can only pause the
-    robot."""
+    """The settings that the core needs. `t`: durations and distances. `light`: RMF's traffic light can
+    pause the robot, but not send it to goals."""
 
     t: RobotDurations = RobotDurations()
     site: RobotSite = RobotSite()
@@ -20,24 +21,26 @@ class RobotLimits(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, settings: FleetRobotSettings, debounce: Mapping[str, float]) -> "RobotLimits":
-        """Make the limits from the YAML; the site comes from RMF's files."""
+        """Make the limits from the YAML. Their `site` stays empty here, because it comes from RMF's
+        files."""
         return cls(settings.limits)
 
 
 class Pad(msgspec.Struct, frozen=True):
-    """A charger's last state that names this robot, heard at `at`."""
+    """The last state of a charger that names this robot, heard at `at`."""
 
     state: PadHeard
     at: float
 
 
 class LightMemory(msgspec.Struct, frozen=True):
-    """The path of a robot that RMF can only pause. RMF knows the path by the same number.
+    """The path of a robot that RMF can only pause. `number`: the path's number, which RMF uses too.
 
-    `told`: the path as its manager last told it. `path`: the checkpoints on RMF's map, from the place
-    where the robot was; () without a path. `passed`: the last checkpoint that it has reached.
-    `answer`: RMF's last answer about this path. `granted`: the checkpoint to which RMF lets the robot
-    drive. `held`: we have paused it. `orders`: the number of pauses and resumes.
+    `told`: the path as the robot's manager last reported it. `path`: the checkpoints on RMF's map,
+    beginning where the robot was when the path came; () without a path. `passed`: the last checkpoint
+    that the robot has reached. `answer`: RMF's last answer about this path. `granted`: the checkpoint
+    to which RMF lets the robot drive. `held`: we have paused the robot. `orders`: the number of pauses
+    and resumes.
     """
 
     told: tuple[Pose, ...] = ()
@@ -51,20 +54,20 @@ class LightMemory(msgspec.Struct, frozen=True):
 
 
 class RobotMemory(msgspec.Struct, frozen=True):
-    """Everything that the next decision needs to know of the past. Times are monotonic seconds.
+    """The facts of the past that the next decision needs. Times are monotonic seconds.
 
-    `reading`: the last good reading, taken at `read_at`. `fresh`: the last event was that reading, so
-    RMF may have it. `unread`: why there is no newer one. `stood_at`, `moved_at`: the place where the
-    robot last began to stand, and the time when it was last seen to leave such a place. `said_at`,
-    `said_new_at`: the robot's own time of its last reading, and when it last advanced. `off_m`: the
-    distance from the graph, taken at `off_at`.
+    `reading`: the last good reading, taken at `read_at`. `fresh`: the last event brought that reading,
+    so RMF may get its place. `unread`: the reason why there is no newer reading. `stood_at`: the place
+    where the robot last began to stand. `moved_at`: the time when the robot was last seen to move from
+    such a place. `said_at`: the robot's own time in its last reading. `said_new_at`: our time when the
+    robot's own time last advanced. `off_m`: the distance from the graph, measured at the place
+    `off_at`.
 
-    `command`: the command that the robot shall carry out. `asked_at`: the time of its last attempt.
-    `tries`: its attempts since its begin or since an operator's reset.
-    `arrived_at`: since when a docking robot has been at its dock. `finished`: the number of the last
-    command that was carried out; 0 for none. `charges_at`: the last charger that the robot was sent to.
-    `pads`: charger -> its last state that names this robot. `light`: for a robot that RMF can only
-    pause.
+    `command`: the command that the robot must carry out. `asked_at`: the time of the last attempt.
+    `tries`: the number of attempts since the command began, or since an operator's reset. `arrived_at`:
+    a docking robot has been at its dock since this time. `finished`: the number of the last command
+    that was carried out; 0 for none. `charges_at`: the last charger that the robot was sent to. `pads`:
+    charger -> its last state that names this robot. `light`: for a robot that RMF can only pause.
     """
 
     reading: RobotSample | None = None

@@ -1,4 +1,5 @@
-"""RMF's messages about a robot: its state as our node would publish it, and chargers that name it."""
+"""RMF's messages about a robot: the robot's state as our node would publish it, and the states of
+chargers that name the robot."""
 
 from collections.abc import Mapping
 
@@ -24,7 +25,7 @@ def robot_of(message: ChargerState | FleetState) -> str:
 
 
 def accept(message: ChargerState, settings: FleetRobotSettings) -> PadHeard:
-    """Make an event of a charger's state that names this robot. No state is refused."""
+    """Turn a charger's state that names this robot into an event. No such state is refused."""
     charging = message.state in CHARGES
     return PadHeard(message.charger_name, charging, message.error_message)
 
@@ -32,9 +33,11 @@ def accept(message: ChargerState, settings: FleetRobotSettings) -> PadHeard:
 def state_message(
     name: str, settings: FleetRobotSettings, report: RobotReport, stamp: Time
 ) -> FleetState:
-    """Return the robot's state in RMF's form. RMF's adapter publishes the states of robots that it
-    controls, but none of a robot behind its traffic light (EasyTrafficLight.cpp makes the message and
-    drops it)."""
+    """Return the robot's state in RMF's form.
+
+    RMF's adapter publishes the states of the robots that it controls. For a robot with a traffic light
+    it publishes no state, because EasyTrafficLight.cpp makes the message and drops it.
+    """
     at = report.light.here if report.light else report.at
     place = Location(t=stamp, x=at.x, y=at.y, yaw=at.yaw, level_name=at.map) if at else Location()
     moves = report.light.stands == "moving" if report.light else report.activity
@@ -51,7 +54,7 @@ def state_message(
 
 
 def summary(report: RobotReport) -> Mapping[str, str]:
-    """Return the robot's line in the log, the status file and `watch`."""
+    """Return the robot's state as keys and values for the log, the status file and `watch`."""
     return {
         "at": report.where,
         "doing": report.doing,

@@ -28,7 +28,8 @@ class Vertex(Struct, frozen=True):
 
 
 class Lane(Struct, frozen=True):
-    """A lane from one vertex to another, by their numbers in the graph. `dock`: its dock's name."""
+    """A lane from one vertex to another, by their numbers in the graph. `dock`: the name of the dock at
+    the lane's end; "" without a dock."""
 
     start: int
     end: int
@@ -74,7 +75,8 @@ def _apart(vertex: Vertex, at: Pose) -> float:
 
 
 def off_line_m(a: Pose | Vertex, b: Pose | Vertex, place: Pose) -> float:
-    """Return the distance of a place from the line between two others on its map (m)."""
+    """Return the distance of `place` from the line between `a` and `b` (m). All three must be on the
+    same map."""
     start, at = complex(a.x, a.y), complex(place.x, place.y)
     along = complex(b.x, b.y) - start
     if not along:
@@ -84,9 +86,10 @@ def off_line_m(a: Pose | Vertex, b: Pose | Vertex, place: Pose) -> float:
 
 
 class RobotSite(Struct, frozen=True):
-    """The facts of RMF's two files about one robot.
+    """The facts about one robot from RMF's two files, the graph and `config.yaml`.
 
-    `transforms`: level -> from RMF's map to the robot's map. `charger`: its charger in `config.yaml`.
+    `transforms` maps a level to the transform from RMF's map to the robot's map. `charger`: the robot's
+    charger in `config.yaml`.
     """
 
     graph: NavGraph = NavGraph()
@@ -94,7 +97,7 @@ class RobotSite(Struct, frozen=True):
     charger: str = ""
 
     def on_rmfs_map(self, at: Pose) -> Pose:
-        """Return a place of the robot's map on RMF's map."""
+        """Convert a place on the robot's map to the same place on RMF's map."""
         found = self._transform(at.map)
         if found is None:
             return at
@@ -102,7 +105,7 @@ class RobotSite(Struct, frozen=True):
         return Pose(at.map, x, y, at.yaw - found.rotation)
 
     def on_robots_map(self, at: Pose) -> Pose:
-        """Return a place of RMF's map on the robot's map."""
+        """Convert a place on RMF's map to the same place on the robot's map."""
         found = self._transform(at.map)
         if found is None:
             return at
@@ -110,7 +113,7 @@ class RobotSite(Struct, frozen=True):
         return Pose(at.map, x, y, at.yaw + found.rotation)
 
     def metre(self, level: str) -> float:
-        """Return the length of RMF's metre in units of the robot's map."""
+        """Return the length of one metre of RMF's map in units of the robot's map."""
         found = self._transform(level)
         return 1.0 if found is None else found.scale
 

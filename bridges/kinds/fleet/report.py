@@ -12,18 +12,18 @@ from bridges.kinds.shared.decision import Fault
 from bridges.kinds.shared.durations import SILENT_S
 
 NEAR_M = 1.0
-"""A robot stands at the nearest waypoint within this distance."""
+"""The distance (m) within which a robot counts as standing at a waypoint."""
 UNFIT = frozenset(
     ("ROBOT_SILENT", "ROBOT_FAULT", "ROBOT_TAKEN_OUT", "ROBOT_ON_OTHER_MAP", "ROBOT_NOT_OBEYING")
 )
-"""Faults with which a robot gets no new task."""
+"""The faults that keep a robot from getting a new task."""
 
 
 class RobotReport(msgspec.Struct, frozen=True):
-    """The levels for RMF's adapter. `at`: a place of a fresh reading, on the robot's map; None if RMF
-    must get no place. `battery`: a fraction of 1. `activity`: the number of the command under way; 0
-    without one. `finished`: the number of the last command that was carried out. `fit`: may the robot
-    get new tasks? `light`: for a robot that RMF can only pause.
+    """The values for RMF's adapter. `at`: the robot's place on its own map, from a fresh reading; None
+    if RMF must get no place. `battery`: a fraction of 1. `activity`: the number of the present
+    command; 0 without a command. `finished`: the number of the last command that was carried out.
+    `fit`: whether the robot may get new tasks. `light`: for a robot that RMF can only pause.
 
     `where`: the nearest waypoint, for people. `doing`: the command, for people.
     """
@@ -68,7 +68,7 @@ def _place(memory: RobotMemory, limits: RobotLimits) -> Pose | None:
         return None
     command = memory.command
     if command and command.doing == "localize" and command.goal:
-        return None  # the car is on another floor than the robot's map
+        return None  # the robot still reports the map of the floor that the lift has left
     return memory.reading.at
 
 
@@ -107,7 +107,8 @@ def _light(memory: RobotMemory, limits: RobotLimits) -> str:
 
 
 def charges(memory: RobotMemory, charger: str, now: float) -> bool | None:
-    """Does the robot charge, by its own word or that of the charger? None if neither has ever told."""
+    """Return whether the robot charges, as the robot itself or the charger reports. Return None if
+    neither has ever reported a charge or its absence."""
     pad = memory.pads.get(charger)
     own = memory.reading.charging if memory.reading else None
     if pad is None and own is None:
@@ -116,7 +117,8 @@ def charges(memory: RobotMemory, charger: str, now: float) -> bool | None:
 
 
 def faults(memory: RobotMemory, now: float, limits: RobotLimits) -> Iterator[Fault]:
-    """Yield all present faults, most serious first. No text has a running number."""
+    """Yield all present faults, most serious first. No text contains a number that changes all the
+    time."""
     if now >= silent_at(memory, limits):
         yield Fault("ROBOT_SILENT", memory.unread or f"no reading for {limits.t.stale_after_s} s")
     elif memory.unread and not memory.fresh:
@@ -149,7 +151,7 @@ def _of_place(memory: RobotMemory, limits: RobotLimits) -> Iterator[Fault]:
     assert memory.reading is not None
     if on_other_map(memory, limits):
         known = ", ".join(limits.site.graph.levels())
-        text = f"it is on '{memory.reading.at.map}', and the graph has {known}"
+        text = f"it is on the map '{memory.reading.at.map}', but the graph has {known}"
         yield Fault("ROBOT_ON_OTHER_MAP", text)
     elif memory.off_m > limits.t.off_graph_m:
         yield Fault("ROBOT_OFF_GRAPH", f"{memory.off_m:.0f} m from the nearest lane")
@@ -177,13 +179,13 @@ def _of_command(memory: RobotMemory, now: float, limits: RobotLimits) -> Iterato
     if reading.refused:
         yield Fault("ROBOT_REFUSES", reading.refused)
     if reading.unanswered and command.doing == "act":
-        text = f"nobody knows whether {command.activity} has begun: it is sent again after a reset"
+        text = f"nobody knows whether {command.activity} has begun: a reset sends it again"
         yield Fault("ROBOT_ACTION_UNANSWERED", text)
     if command.goal and reading.completed == str(command.id):
         off_m = off_goal_m(memory, command.goal, limits)
         if off_m > limits.t.arrived_m:
-            far = "on another map" if off_m == float("inf") else f"{off_m:.0f} m away"
-            yield Fault("ROBOT_NOT_THERE", f"it reports arrival, {far} from its goal")
+            far = "on another map than" if off_m == float("inf") else f"{off_m:.0f} m from"
+            yield Fault("ROBOT_NOT_THERE", f"it reports arrival, but is {far} its goal")
     if memory.arrived_at is not None and command.goal:
         yield Fault("ROBOT_NOT_CHARGING", f"docked at {command.goal.dock} without a charge")
     if memory.tries > limits.t.attempts:

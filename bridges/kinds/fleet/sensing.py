@@ -1,13 +1,15 @@
-"""Judges a robot's readings: may RMF have this place, does the robot stand, has it arrived?
+"""Judges a robot's readings: whether RMF may get the place, whether the robot stands, and how far it is
+from its goal.
 
-FLEET-SENSING-1. A reading counts only if all its numbers are finite and the battery is between 0
-   and 1 (RMF's adapter ignores a battery beyond that, and plans with one that is no number). A
-   battery up to 2 % above full is full.
-FLEET-SENSING-2. A reading whose own time is not newer than that of the last reading is old: a
-   manager repeats what it last heard of a lost robot. After `stale_after_s` of times that go back,
-   the robot's clock was set back, and the readings count again.
-FLEET-SENSING-3. A robot stands if it says so, or, without a word from it, if it has moved less than
-   3 cm and 3° for a second.
+FLEET-SENSING-1. A reading counts only if all its numbers are finite and the battery is between 0 and 1.
+   RMF's adapter ignores a battery outside this range, and it plans with a battery that is not a number.
+   A battery up to 2 % above full counts as full.
+FLEET-SENSING-2. A reading is old if its own time is not newer than the time of the last reading. A
+   manager sends such readings because it repeats the last reading of a robot that it has lost. If
+   earlier times keep coming for `stale_after_s`, the robot's clock was set back, and the readings count
+   again.
+FLEET-SENSING-3. A robot stands if it reports that it stands. If it does not report this, it stands if
+   it has moved less than 3 cm and 3° for a second.
 """
 
 import math
@@ -23,7 +25,8 @@ STANDS_M = 0.03
 STANDS_RAD = math.radians(3)
 ABOVE_FULL = 1.02
 LOOKS_AGAIN_M = 0.1
-"""A robot that has moved less has not changed its distance from the graph by much."""
+"""The least distance (m) that a robot must move before its distance from the graph is measured
+again."""
 
 
 def implausible(sample: RobotSample) -> str:
@@ -81,13 +84,14 @@ def _known(at: Pose, limits: RobotLimits) -> bool:
 
 
 def on_other_map(memory: RobotMemory, limits: RobotLimits) -> bool:
-    """Is the robot on a map that RMF's graph lacks? Without a graph every map is known."""
+    """Return whether the robot is on a map that RMF's graph lacks. Without a graph every map counts as
+    known."""
     graph = limits.site.graph
     return bool(memory.reading and graph.vertices) and not _known(memory.reading.at, limits)  # type: ignore[union-attr]
 
 
 def stands(memory: RobotMemory, now: float) -> bool:
-    """Does the robot stand, by a fresh reading?"""
+    """Return whether a fresh reading shows that the robot stands."""
     if memory.reading is None or not memory.fresh:
         return False
     if memory.reading.moving is not None:
@@ -104,7 +108,7 @@ def off_goal_m(memory: RobotMemory, goal: Goal, limits: RobotLimits) -> float:
 
 
 def faces(memory: RobotMemory, goal: Goal, limits: RobotLimits) -> bool:
-    """Does the robot look in its goal's direction?"""
+    """Return whether the robot faces in its goal's direction."""
     assert memory.reading is not None
     turned = turned_rad(memory.reading.at.yaw, goal.at.yaw)
     return turned <= math.radians(limits.t.arrived_deg)

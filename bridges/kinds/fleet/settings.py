@@ -1,4 +1,4 @@
-"""The part of a fleet's YAML that does not depend on the way to its robots."""
+"""The part of a fleet's YAML that does not depend on the interface to its robots."""
 
 from collections.abc import Collection
 from typing import Annotated, Literal
@@ -15,22 +15,23 @@ Silence = Annotated[float, Meta(ge=0.5, le=300, extra={"unit": "s"})]
 Distance = Annotated[float, Meta(ge=0.05, le=50, extra={"unit": "m"})]
 Angle = Annotated[float, Meta(ge=1, le=180, extra={"unit": "°"})]
 FilePath = Annotated[str, Meta(min_length=1, max_length=4096, pattern=r"^[^\x00-\x1f\x7f]*$(?!\n)")]
-"""The path of a file, from the root or from the YAML's own folder."""
+"""The path of a file: absolute, or relative to the folder of the YAML."""
 
 
 class FleetFiles(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """RMF's own two files about the fleet, and its power over the robots."""
+    """The two files that RMF itself has about the fleet, and whether RMF sends the robots or only
+    pauses them."""
 
     config: Annotated[
         FilePath,
-        tells("""the fleet adapter's `config.yaml`, as RMF's tutorial has it: a path from the root, or
-        from this file's folder."""),
+        tells("""the fleet adapter's `config.yaml`, in the form of RMF's tutorial. The path is
+        absolute, or relative to this file's folder."""),
     ]
     graph: Annotated[FilePath, tells("the fleet's navigation graph, made by RMF's traffic editor.")]
     control: Annotated[
         Literal["full", "traffic_light"],
-        tells("""`full`: RMF sends the robots to their goals. `traffic_light`: their own manager sends
-        them, and RMF only lets them pause and go on."""),
+        tells("""`full`: RMF sends the robots to their goals. `traffic_light`: the robots' own
+        manager sends them, and RMF can only pause and resume them."""),
     ] = "full"
     server_uri: Annotated[
         Name | None,
@@ -43,8 +44,8 @@ class RobotDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 
     stale_after_s: Annotated[
         Silence,
-        tells("""after so long without a good reading the robot counts as silent and gets no new task;
-        a place that was not read is never sent to RMF."""),
+        tells("""the time without a good reading after which the robot counts as silent and gets no
+        new task. RMF never gets a place that was not read."""),
     ] = 5.0
     obeys_s: Annotated[
         Timeout,
@@ -59,8 +60,8 @@ class RobotDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     ] = 60.0
     attempts: Annotated[
         Annotated[int, Meta(ge=1, le=20)],
-        tells("""after so many vain attempts of one command the robot gets no new task. The attempts go
-        on."""),
+        tells("""the number of failed attempts of one command after which the robot gets no new
+        task. The daemon still sends the command again."""),
     ] = 3
     arrived_m: Annotated[
         Distance, tells("the greatest distance from its goal at which a robot counts as arrived.")
@@ -72,8 +73,8 @@ class RobotDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     ] = 20.0
     pauses_m: Annotated[
         Distance,
-        tells("""with `control: traffic_light`: the longest way of a robot from the order to pause until
-        it stands, with the network's delay."""),
+        tells("""with `control: traffic_light`: the longest distance that a robot still drives
+        after an order to pause. It includes the way during the network's delay."""),
     ] = 1.0
     off_graph_m: Annotated[
         Distance,
@@ -82,32 +83,35 @@ class RobotDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 
 
 class FleetRobotSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One robot, except the way to it. Its name is that of `config.yaml`."""
+    """The settings of one robot, except its interface. Its key is the robot's name in `config.yaml`."""
 
     known_as: Annotated[
         Name | None, tells("the robot's name or id at its manager, if it differs.")
     ] = None
     maps: Annotated[
         dict[Name, Name],
-        tells("level of RMF's graph -> the robot's name of that map, if different."),
+        tells("""level of RMF's graph -> the name that the robot has for the map of this level, if
+        different."""),
     ] = msgspec.field(default_factory=dict)
     limits: Annotated[
         RobotDurations, tells("the durations and distances that differ from their defaults.")
     ] = RobotDurations()
     on_death: Annotated[
         Literal["finish", "stop", "pause"],
-        tells("""`finish`: when the daemon ends, a robot drives on to its last goal, as RMF has planned
-        and as robots with any fleet adapter do. `stop`, `pause`: the robot is stopped or paused,
-        wherever it is."""),
+        tells("""what a robot does when the daemon ends. `finish`: it drives on to its last goal,
+        as RMF has planned. With any other fleet adapter, robots do the same. `stop`, `pause`: it
+        is stopped or paused, wherever it is."""),
     ] = "finish"
 
     def level_of(self, at: Pose) -> Pose:
-        """Return a place on the robot's map under the level's name."""
+        """Return the same place under RMF's name of the level, in place of the robot's name of that
+        map."""
         levels = {theirs: level for level, theirs in self.maps.items()}
         return replace(at, map=levels.get(at.map, at.map)) if levels else at
 
     def theirs(self, command: RobotCommand) -> RobotCommand:
-        """Return a command under the robot's own name of the map."""
+        """Return the same command under the robot's name of the map, in place of RMF's name of that
+        level."""
         if command.goal is None or not self.maps:
             return command
         at = command.goal.at
@@ -115,7 +119,7 @@ class FleetRobotSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unkno
         return replace(command, goal=replace(command.goal, at=at))
 
     def lacks(self, control: str) -> str:
-        """Return why RMF cannot control this robot in this way; "" if it can."""
+        """Return the reason why RMF cannot control this robot with this `control`; "" if it can."""
         return ""
 
     def known_actions(self) -> Collection[str]:
@@ -127,7 +131,7 @@ class FleetRobotSettings(DeviceSettings, frozen=True, kw_only=True, forbid_unkno
         return self.limits.stale_after_s
 
     def problems(self) -> Remarks:
-        """Yield contradictions between fields."""
+        """Yield the fields that contradict each other."""
         if len(set(self.maps.values())) < len(self.maps):
             yield ("maps",), "two levels have the same map: RMF could not tell them apart"
         if self.limits.arrived_m > self.limits.off_graph_m:

@@ -1,7 +1,7 @@
 """The inputs and outputs of a robot's core.
 
-All places here are on the robot's own map: metres, and radians counterclockwise. RMF gives its goals
-on that map too, after the transform of `reference_coordinates`.
+All places here are on the robot's own map, in metres and radians counterclockwise. RMF's adapter
+transforms its goals to that map too (`reference_coordinates`).
 """
 
 from typing import Literal, Union
@@ -29,8 +29,9 @@ class Pose(msgspec.Struct, frozen=True):
 
 
 class Goal(msgspec.Struct, frozen=True):
-    """A destination of RMF. `name`: its waypoint, if that has a name. `dock`: the dock's name of a lane
-    that ends in docking. `speed_limit`: m/s. `lift`: the lift in which the goal is."""
+    """A destination of RMF. `name`: the name of its waypoint, "" without a name. `dock`: the name of
+    the dock, if the lane to the goal ends in docking. `speed_limit`: m/s. `lift`: the name of the
+    lift, if the goal is in a lift."""
 
     at: Pose
     name: str = ""
@@ -40,21 +41,22 @@ class Goal(msgspec.Struct, frozen=True):
 
 
 class Navigate(msgspec.Struct, frozen=True):
-    """RMF's navigate: drive to this goal. `id`: our number of the command, which never repeats."""
+    """RMF's order `navigate`: drive to this goal. `id`: our number of the command, which never
+    repeats."""
 
     id: int
     goal: Goal
 
 
 class Localize(msgspec.Struct, frozen=True):
-    """RMF's localize: the robot left a lift at another floor, about here."""
+    """RMF's order `localize`: the robot has left a lift at another floor, near this goal."""
 
     id: int
     goal: Goal
 
 
 class Act(msgspec.Struct, frozen=True):
-    """RMF's execute_action. `description`: its JSON object, as text."""
+    """RMF's order `execute_action`. `description`: the action's JSON object, as text."""
 
     id: int
     category: str
@@ -62,7 +64,8 @@ class Act(msgspec.Struct, frozen=True):
 
 
 class Stop(msgspec.Struct, frozen=True):
-    """RMF's stop, or the end of an activity that RMF has given up. `of`: the command's number."""
+    """RMF's order `stop`, or the end of an activity that RMF has given up. `of`: the number of the
+    command to stop."""
 
     id: int
     of: int
@@ -74,9 +77,10 @@ Says = Literal["continue", "wait", "pause", "resume", "stay", "error"]
 class LightAnswer(msgspec.Struct, frozen=True):
     """An answer of RMF's traffic light about this path and checkpoint.
 
-    `continue`, `wait`: the moving robot may pass its next checkpoint, or must wait there. `pause`: it
-    must stand at once. `resume`, `stay`: the standing robot may go on, or must stay. `error`: the
-    robot is where RMF has not let it go. Source: EasyTrafficLight.hpp of open-rmf/rmf_ros2.
+    For a moving robot: `continue`: it may pass its next checkpoint. `wait`: it must wait there.
+    `pause`: it must stop at once. For a standing robot: `resume`: it may go on. `stay`: it must stay.
+    For any robot: `error`: it is at a place to which RMF has not let it go. Source:
+    EasyTrafficLight.hpp of open-rmf/rmf_ros2.
     """
 
     path: int
@@ -85,7 +89,7 @@ class LightAnswer(msgspec.Struct, frozen=True):
 
 
 class PadHeard(msgspec.Struct, frozen=True):
-    """A charger's state names this robot. `error`: its error text; "" without an error."""
+    """A charger's state that names this robot. `error`: the state's error text; "" without an error."""
 
     charger: str
     charging: bool
@@ -93,14 +97,14 @@ class PadHeard(msgspec.Struct, frozen=True):
 
 
 class RobotSample(msgspec.Struct, frozen=True):
-    """One reading of a robot. None: the maker's interface does not tell.
+    """One reading of a robot. A value is None if the maker's interface does not report it.
 
-    `battery`: a fraction of 1, as it was read. `completed`: the command that the robot calls
-    completed; "" for none. `fault`: the robot's own fault. `taken_out`: the reason why it takes no
-    orders (manual mode, teaching). `said_at`: the robot's own time or counter of this reading.
-    `refused`: the manager's refusal of the last command. `unanswered`: the last command was an
-    action, and nobody knows whether it has begun. `path`: the places that its own manager sends it to,
-    in turn. `paused`: it waits for a resume.
+    `battery`: a fraction of 1, as it was read. `completed`: the command that the robot reports as
+    completed; "" for none. `fault`: the robot's own fault. `taken_out`: the reason why the robot takes
+    no orders (manual mode, teaching). `said_at`: the robot's own time or counter of this reading.
+    `refused`: the manager's refusal of the last command. `unanswered`: the last command was an action,
+    and nobody knows whether it has begun. `path`: the places to which the robot's own manager sends it,
+    in turn. `paused`: the robot is paused and waits for a resume.
     """
 
     at: Pose
@@ -123,7 +127,8 @@ Doing = Literal["navigate", "dock", "localize", "act", "stop", "pause", "resume"
 class RobotCommand(msgspec.Struct, frozen=True):
     """A command to the robot. A driver sends it once for each (`id`, `attempt`).
 
-    `of`: for a stop, the number of the stopped command. `activity`, `description`: for an act.
+    `of`: the number of the stopped command, if `doing` is `stop`. `activity`, `description`: the
+    action, if `doing` is `act`.
     """
 
     id: int
@@ -136,7 +141,7 @@ class RobotCommand(msgspec.Struct, frozen=True):
 
 
 class RobotOutputs(msgspec.Struct, frozen=True):
-    """The command that the robot shall carry out; None leaves the robot alone."""
+    """The command that the robot must carry out. With None the driver sends nothing."""
 
     command: RobotCommand | None = None
 

@@ -1,4 +1,5 @@
-"""Ingestors, which take what a robot brings. The code is a dispenser's; only the messages differ."""
+"""Ingestors, which take what a robot brings. An ingestor uses the code of a dispenser, because only the
+messages differ."""
 
 from msgspec.structs import replace
 

@@ -1,18 +1,22 @@
-"""The lift's decision core: its session, its outputs, and its report to RMF.
+"""The lift's decision core. It decides on sessions, on the outputs, and on the report to RMF.
+
+A session is the use of the lift by one robot, from its first request to its END. In AGV mode the lift's
+controller obeys our calls and door commands. The hold is the output that keeps the door open. A latch
+is a state that only an operator's reset ends.
 
 Rules, in the order in which they are applied:
-LIFT-1. The first request at a free lift gets a session. Under an obstacle (LIFT-4) no request gets one.
-   Later requests of that session refresh the session, and requests of other sessions are refused. Only
-   the session's own END ends the session. No hazard, fault or timeout ends the session. A session in
-   HUMAN mode has no outputs.
+LIFT-1. The first request at a free lift gets a session. While an obstacle (LIFT-4) is present, no
+   request gets one. Later requests of that session refresh the session, and requests of other sessions
+   are refused. Only the session's own END ends the session. No hazard, fault or timeout ends the
+   session. A session in HUMAN mode has no outputs.
 LIFT-2. An END ends the session at once. An END that is older than the session does not count. For
    `release_grace_s` after END (the grace), AGV mode and the door's hold may stay on. During the grace
    only the ended session is granted again, even in a fire. The reason is a restarted supervisor: it
    sends END for a robot that is still inside and must get out. For the same reason
    (`bridges/kinds/lift/forgotten.py`):
-   - An END on `lift_requests` does not end the session of a robot that may be inside and goes on
-     asking. Such a session ends at the robot's own END, at a person's END, or after the robot's
-     silence.
+   - An END on `lift_requests` does not end the session of a robot that may be inside and continues to
+     send requests. Such a session ends at the robot's own END, at a person's END, or when the robot is
+     silent.
    - If RMF's supervisor asks for another session, or has ended the present session, this node listens
      to the session's robot directly. The requests and the END of the robot's own fleet adapter then
      count too.
@@ -21,13 +25,13 @@ LIFT-2. An END ends the session at once. An END that is older than the session d
 LIFT-3. A request sets the destination and the mode. If the door is held, a request for another
    destination may have to wait (`bridges/kinds/lift/replayed.py`). `bridges/kinds/lift/drive.py` has
    the rules for the outputs.
-LIFT-4. An obstacle switches every output off and never changes the session. The obstacles are:
-   - fire, and a fire's latch that an operator must reset;
+LIFT-4. An obstacle switches every output off and never changes the session. The obstacles are the
+   following. Overload is none, because it only delays the ride.
+   - fire, and the latch after a fire;
    - code blue, earthquake, emergency, out of service, manual mode;
    - a second node for this lift;
    - inputs that cannot be believed, outputs that cannot be written. A gap in reading or writing that is
      shorter than `stale_after_s` is no obstacle.
-   Overload is no obstacle, because overload only delays the ride.
 LIFT-5. The report says OPEN when fresh inputs show that the car stands at a known floor with its door
    open. Some doors are open and not shown OPEN:
    - A session's robot is outside until OPEN has been published at the session's destination. Until then
@@ -37,10 +41,9 @@ LIFT-5. The report says OPEN when fresh inputs show that the car stands at a kno
      mode.
    - A door is not shown OPEN if its hold is wanted but the relay must rest first. Such a door may close
      by itself while a robot drives through.
-   - An open door that nobody holds is not shown OPEN at the floor that the robot itself last requested,
-     if the session is about to send the car away. RMF's supervisor may be passing on an earlier ride,
-     and the robot would drive in.
-
+   - An open door that nobody holds is not shown OPEN under two conditions: the robot itself last
+     requested this floor, and the session is about to send the car away. The reason is that RMF's
+     supervisor may be repeating a request of an earlier ride. The robot would then drive in.
 """
 
 from msgspec.structs import replace
@@ -120,7 +123,8 @@ def published(memory: LiftMemory, shown: LiftReport) -> LiftMemory:
 
 
 def repeated(memory: LiftMemory, now: float) -> LiftMemory:
-    """Return the memory after the last reading was read once more, if only its times move on."""
+    """Return the memory after the same reading came once more. The caller has checked that only the
+    times of the reading differ."""
     return replace(memory, senses=sensing.read_again(memory.senses, now))
 
 
@@ -150,7 +154,8 @@ def _unwritten_at(memory: LiftMemory, limits: LiftLimits) -> float:
 def _drive(
     memory: LiftMemory, view: BelievedLift, allowed: bool, now: float, limits: LiftLimits
 ) -> tuple[LiftMemory, LiftOutputs]:
-    """Move the relays to their next state. Also return the wanted outputs."""
+    """Switch each relay towards its wanted state, as far as the relay's limits allow now. Also return
+    the wanted outputs."""
     session, grace, relays = memory.session, memory.grace, memory.relays
     outputs = LiftOutputs()
     if session and drive.serves(session, allowed, now, limits):
@@ -205,7 +210,8 @@ def _read(memory: LiftMemory, sample: LiftSample, now: float, limits: LiftLimits
 
 
 def _why_not(memory: LiftMemory, now: float, limits: LiftLimits) -> str:
-    """Return the obstacle that forbids a grant of the free lift; "" if no obstacle is present."""
+    """Return the obstacle because of which the free lift must not be granted; "" if no obstacle is
+    present."""
     view = look(memory.senses, now, limits)
     why_not = obstacles(memory, view, now, limits)
     if not why_not:
@@ -220,8 +226,8 @@ def _reset(memory: LiftMemory, now: float, limits: LiftLimits) -> LiftMemory:
     session = memory.session
     if session and session.fault:
         session = replace(drive.paused(session), tries=0, retry_at=None, fault=None)
-    # Fresh inputs clear the latch of a fire. A fire that is still present latches again in this same
-    # decision. Stale inputs may hide a fire, so the latch stays.
+    # If the inputs are fresh, clear the latch of a fire. If the fire is still present, it latches again
+    # in this same decision. If the inputs are stale, they may hide a fire, so the latch stays.
     unseen = not look(memory.senses, now, limits).fresh
     return replace(
         memory,
@@ -233,7 +239,7 @@ def _reset(memory: LiftMemory, now: float, limits: LiftLimits) -> LiftMemory:
 
 def _latch(memory: LiftMemory, view: BelievedLift, now: float, limits: LiftLimits) -> LiftMemory:
     """Latch a fire if `fire_reset` is `manual`. Forget a rival, which is a second node for this lift,
-    after its silence of RIVAL_QUIET_S."""
+    when it has been silent for RIVAL_QUIET_S."""
     burning = Hazard.FIRE in view.hazards
     manual = limits.fire_reset == "manual"
     rival_at = memory.rival_at
@@ -263,8 +269,8 @@ def _faults(
 
 
 def _faults_of_rmf(session: LiftSession, now: float, limits: LiftLimits) -> list[Fault]:
-    """List the faults on RMF's side. A forgotten session has no fault RMF_SILENT, because the
-    supervisor's fault explains the silence."""
+    """List the faults on RMF's side. If RMF's supervisor has forgotten the session, its fault explains
+    the silence. So such a session has no fault RMF_SILENT."""
     if session.forgotten:
         fault = forgotten.fault(session, now)
         return [fault] if fault else []

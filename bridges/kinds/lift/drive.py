@@ -1,5 +1,8 @@
 """The outputs for a session, derived from its request and the inputs.
 
+In AGV mode the lift's controller obeys our calls and door commands. The hold is the door command that
+keeps the door open.
+
 Rules:
 LIFT-DRIVE-1. Without a session no output is switched on. All outputs are off under an obstacle
    (`core.py`), for a session in HUMAN mode, and between the tries after a fault. The outputs are also
@@ -8,22 +11,21 @@ LIFT-DRIVE-1. Without a session no output is switched on. All outputs are off un
 LIFT-DRIVE-2. AGV mode comes first, then the call to the destination. The door's hold follows when the
    car stands at the destination. With `by_call` a call switches AGV mode on. The call then comes first,
    even if the car already stands at the destination.
-LIFT-DRIVE-3. A call is given only away from the destination and without overload. Except with
-   `by_call`, a call also needs AGV mode. A door command is given only in AGV mode, when the car stands
-   at the destination's landing. A call and a door command are never on together. A call or a door
-   command comes on only after all calls and door commands have been off for `dead_time_s`.
+LIFT-DRIVE-3. A call is given only if the car is not at the destination, and only without overload.
+   Except with `by_call`, a call also needs AGV mode. A door command is given only in AGV mode, when the
+   car stands at the destination's landing. A call and a door command are never on together. A call or a
+   door command comes on only after all calls and door commands have been off for `dead_time_s`.
 LIFT-DRIVE-4. A call is held until the car stands at its destination. With `call_pulse_s` a call is a
    pulse. The call is given again after every interruption. The call is also given again if the car had
    arrived and is later seen at another floor. No new call is given during a change of the floor code,
    because the car may be arriving at that moment.
 LIFT-DRIVE-5. AGV mode, the arrival and the open door each have a timeout. When a timeout ends, the
    outputs go off and a fault is shown. Three retries follow, after 10, 30 and 60 s. If the last retry
-   fails, the fault latches. An end of AGV mode during the ride is such a fault too. With `by_call` AGV
-   mode may end between two destinations, when the call and the hold are off. During an overload no
-   timeout runs.
+   fails, the fault latches, which means that only an operator can clear it. If AGV mode ends during the
+   ride, that is such a fault too. With `by_call` AGV mode may end between two destinations, when the
+   call and the hold are off. During an overload no timeout runs.
 LIFT-DRIVE-6. Switching off is immediate. A relay is switched on only after it has been off for
    `min_off_s`, and at most `max_cycles_per_min` times a minute (`Channel` in `relays.py`).
-
 """
 
 from msgspec.structs import replace
@@ -54,8 +56,7 @@ def silent(session: LiftSession, now: float, limits: LiftLimits) -> bool:
 
 
 def serves(session: LiftSession, allowed: bool, now: float, limits: LiftLimits) -> bool:
-    """Return whether any output may be energised for this session. `allowed` means that no obstacle is
-    present."""
+    """Return whether this session may have any output on. `allowed`: no obstacle is present."""
     outside_and_gone = silent(session, now, limits) and not session.boarded
     return allowed and session.agv and not outside_and_gone
 
@@ -112,7 +113,7 @@ def wanted(session: LiftSession, view: BelievedLift, now: float, limits: LiftLim
 def stays_on(
     grace: Grace, relays: Relays, view: BelievedLift, now: float, limits: LiftLimits
 ) -> LiftOutputs:
-    """Choose the outputs for the time after END (the grace)."""
+    """Choose the outputs for the grace, which is the time after END in which outputs may stay on."""
     if now >= grace.off_at:
         return LiftOutputs()
     standing = agv_ok(view) and at_destination(grace.session, view, limits)

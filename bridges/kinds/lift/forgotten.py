@@ -1,4 +1,4 @@
-"""Sessions that RMF's lift supervisor forgets or ends, although their robot goes on asking.
+"""Sessions that RMF's lift supervisor forgets or ends, although their robot continues to send requests.
 
 A supervisor that restarts, or that has missed an END, may serve another robot than the robot in the
 car. From then on the supervisor drops the requests and the END of the robot in the car (rmf_ros2,
@@ -7,14 +7,15 @@ never get out. A restarted supervisor also sends END for any session that the li
 session's robot goes on asking.
 
 Rules:
-1. A session is forgotten if the last request on `lift_requests` was for another session. The mark ends
-   when `lift_requests` has a request for the forgotten session, or the END of that other session.
+1. A session is marked as forgotten if the last request on `lift_requests` was for another session. The
+   mark is removed when `lift_requests` has a request for the forgotten session, or the END of that
+   other session.
 2. An END on `lift_requests` does not end the session of a robot that may be inside and goes on asking.
    A robot goes on asking under three conditions. Its last request is at most ASKS_S old. It has sent no
-   END after that request. Its last END is older than FORWARDED_S, because the supervisor may be passing
-   on a younger END. The session is then disowned until `lift_requests` has a request for the session. A
-   disowned session ends when its robot sends END, or is silent for ASKS_S. A person's END always ends
-   the session.
+   END after that request. Its last END is older than FORWARDED_S. The last condition is needed because
+   the supervisor may only pass on a younger END of the robot. The session is then disowned until
+   `lift_requests` has a request for the session. A disowned session ends when its robot sends END, or
+   is silent for ASKS_S. A person's END always ends the session.
 3. Requests of the session's own robot on `adapter_lift_requests` count only if the session is forgotten
    or disowned. They then count as if the supervisor had passed them on: they set mode and destination,
    and show that RMF is alive. A request on `adapter_lift_requests` grants no session. But during the
@@ -31,7 +32,6 @@ Rules:
    session. An old END counts only after it has been repeated for a second, because its sender's clock
    may differ.
 7. If the mark lasts for NAMED_AFTER_S, a fault names the session for which the supervisor asks.
-
 """
 
 from typing import Final
@@ -45,8 +45,8 @@ from bridges.kinds.shared.durations import AGES_AGO, NEVER
 from bridges.kinds.shared.freshness import SECOND_NS, Requester, Rules
 
 NAMED_AFTER_S: Final = 3.0
-"""The delay (s) of the fault. In a normal handover the supervisor asks for the next robot for less
-time."""
+"""The time (s) after which a forgotten session is shown as a fault. In a normal handover the supervisor
+asks for the next robot for less time."""
 ASKS_S: Final = 5.0
 """The longest silence (s) of a robot that goes on asking: five missing repeats. A LiftState goes out
 each second, and a fleet adapter repeats its request at each LiftState (RobotContext.cpp,
@@ -58,7 +58,7 @@ FORWARDED_S: Final = 3.0
 """The longest time (s) from an END on `adapter_lift_requests` to the same END on `lift_requests`. A
 supervisor passes an END on at once."""
 CLOSE_S: Final = 1e-6
-"""The accuracy (s) with which a float holds a stamp of today's date."""
+"""The accuracy (s) of a present-day stamp that is held as a float."""
 CODE: Final = "FORGOTTEN_BY_SUPERVISOR"
 
 
@@ -69,8 +69,8 @@ def overruled(session: LiftSession, other: str, now: float) -> LiftSession:
 
 
 def remembered(session: LiftSession, other: str) -> LiftSession:
-    """Clear the mark after the END of the other session on `lift_requests`. A disowned session stays
-    marked."""
+    """Clear the mark of a forgotten session, because `lift_requests` has the END of the other session.
+    A disowned session stays marked."""
     forgotten = session.forgotten
     if forgotten is None or forgotten.by != other:
         return session
@@ -103,9 +103,11 @@ def in_car_until(session: LiftSession, now: float) -> float:
     """Return the time until which the lift waits for a robot in the car, if its session ends now;
     AGES_AGO for no wait.
 
-    The lift waits if OPEN was not shown at the robot's destination. The lift also waits after a silence
-    of the robot's adapter. In that case the END comes from a restarted adapter, and no adapter has made
-    the robot leave. The lift never waits for a robot that was not heard on `adapter_lift_requests`.
+    The lift does not wait if the robot's adapter knows that the robot can get out. It knows this if it
+    has sent a request after OPEN was shown at its destination. But if that adapter was silent before
+    the END, the lift waits all the same. In that case the END comes from a restarted adapter, and no
+    adapter has told the robot to leave. The lift never waits for a robot that was not heard on
+    `adapter_lift_requests`.
     """
     robot = session.robot
     rides = robot.asked_at > AGES_AGO and not (robot.told and _has_just_asked(robot, now))
@@ -115,13 +117,13 @@ def in_car_until(session: LiftSession, now: float) -> float:
 
 
 def _has_just_asked(robot: OwnWords, now: float) -> bool:
-    """Return whether the robot went on asking until now, or until its END."""
+    """Return whether the robot sent a request in the last ASKS_S before now, or before its END."""
     until = now if robot.ended_at < robot.asked_at else robot.ended_at
     return until < robot.asked_at + ASKS_S
 
 
 def granted(session: LiftSession, stamp: int) -> LiftSession:
-    """Note the stamp of the request that granted the session."""
+    """Note the stamp of the request that got the session. An earlier END is old."""
     since = stamp / SECOND_NS - CLOSE_S if stamp else AGES_AGO
     return replace(session, ends=Requester(newest=since, newest_end=since))
 

@@ -1,4 +1,5 @@
-"""The lift core's memory from scan to scan, and its limits."""
+"""The values that the lift core keeps from one scan to the next, and the settings that it needs (its
+limits)."""
 
 from collections.abc import Mapping
 from functools import cached_property
@@ -20,9 +21,9 @@ Waiting = Literal["agv", "floor", "door"]
 class LiftLimits(msgspec.Struct, frozen=True, dict=True):
     """The settings of a lift that its core needs.
 
-    `stops` maps RMF's floor name to landing and door, from the lowest up. `t`: the durations.
-    `debounce` maps a signal to its debounce (s). `alarm_on`: the hazards that raise the fleets' alarm.
-    `by_call`: a call switches AGV mode on.
+    `stops` maps RMF's name of each floor to its landing and door. The lowest floor is first. `t`: the
+    durations. `debounce` maps a signal to its debounce (s). `alarm_on`: the hazards that raise the
+    fleets' alarm. `by_call`: AGV mode, in which the controller obeys us, is switched on by a call.
     """
 
     stops: Mapping[str, Stop]
@@ -34,7 +35,8 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
 
     @classmethod
     def of(cls, settings: LiftSettings, debounce: Mapping[str, float]) -> "LiftLimits":
-        """Make the limits from the YAML and the wiring table's debounce (signal -> s)."""
+        """Make the limits from the YAML and from `debounce`, which maps each wired signal to its
+        debounce (s)."""
         return cls(
             settings.stops(),
             settings.limits,
@@ -50,7 +52,7 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
 
     @cached_property
     def levels(self) -> Mapping[str, int]:
-        """Each landing's place in the shaft, 0 for the lowest."""
+        """The number of each landing from the bottom of the shaft, 0 for the lowest."""
         landings = dict.fromkeys(stop.level for stop in self.stops.values())
         return {level: place for place, level in enumerate(landings)}
 
@@ -59,8 +61,8 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
         return abs(self.levels[level] - self.levels[other]) - 1
 
     def floor_name(self, level: str, preferred: str) -> str:
-        """Return RMF's name for a landing. The name is `preferred` if the landing has that name, else
-        the landing's first name."""
+        """Return RMF's name for a landing. A landing may have several names. Return `preferred` if it
+        is one of them, else the first of them."""
         if preferred in self.stops and self.stops[preferred].level == level:
             return preferred
         return next(name for name, stop in self.stops.items() if stop.level == level)
@@ -71,7 +73,7 @@ class LiftLimits(msgspec.Struct, frozen=True, dict=True):
 
 
 class CarPosition(msgspec.Struct, frozen=True):
-    """The car's position, as far as the floor code is believed.
+    """The car's position, as far as the core believes the floor code.
 
     `trusted`: the last landing that was believed. `seen_at`: the time when the car was last seen at
     that landing. `suspect`: a landing that the floor code shows, but that the car cannot have reached.
@@ -100,7 +102,8 @@ class LiftSenses(msgspec.Struct, frozen=True):
 
 
 class ForgottenSession(msgspec.Struct, frozen=True):
-    """The mark of a forgotten or disowned session (`bridges/kinds/lift/forgotten.py`).
+    """The mark that RMF's supervisor has forgotten or ended a session
+    (`bridges/kinds/lift/forgotten.py`).
 
     `by`: the other session for which the supervisor asks; "" if there is none. `since`: the time of the
     mark. `ended`: the robot's own END was heard once. `disowned`: the supervisor has ended this
@@ -119,7 +122,7 @@ class OwnWords(msgspec.Struct, frozen=True):
     `stamp`: the newest stamp (ns), by the adapter's clock. `asked_at`: the time of the last request for
     the lift. `ended_at`: the time of the first END after that request. `floor`: the destination of that
     request. `opened`: since that request, OPEN has been published at `floor`. `told`: the adapter has
-    sent a request after that OPEN.
+    sent a request after that OPEN, so it knows of the open door.
     """
 
     stamp: int = 0
@@ -131,8 +134,8 @@ class OwnWords(msgspec.Struct, frozen=True):
 
 
 class Doubted(msgspec.Struct, frozen=True):
-    """A requested destination that may belong to an earlier ride (`bridges/kinds/lift/replayed.py`).
-    `since`: the time of its first request."""
+    """A requested destination that does not count yet, because it may belong to an earlier ride
+    (`bridges/kinds/lift/replayed.py`). `since`: the time of its first request."""
 
     destination: str
     since: float
@@ -147,7 +150,8 @@ class LiftSession(msgspec.Struct, frozen=True):
     start of that wait. `tries`: how often that step has failed. `retry_at`: the outputs stay off until
     this time; inf means that the fault has latched. `forgotten`: the mark of a session that RMF's
     supervisor has forgotten or ended. `robot`: the messages of the robot's own adapter. `doubted`: a
-    destination that does not count yet. `ends`: the check that an END is not older than the session.
+    destination that does not count yet. `ends`: the stamps that show whether an END is older than the
+    session.
     """
 
     id: str

@@ -59,8 +59,8 @@ def accept_adapters(request: LiftRequest, settings: LiftSettings) -> FromAdapter
 
 
 def _stamp(request: LiftRequest) -> int:
-    """Return the request_time (ns); 0 for an impossible time, because an END counts even without a
-    time."""
+    """Return the request_time (ns). Return 0 for an impossible time, because an END with such a time
+    must count too."""
     try:
         return in_ns(request.request_time)
     except RequestRefused:

@@ -1,5 +1,6 @@
-"""The lift's relays from scan to scan. A relay rests after it was switched off, and has a greatest
-number of cycles per minute. Calls and door commands exclude each other. Switching off never waits."""
+"""The lift's relays from scan to scan. After it was switched off, a relay stays off for a minimum time.
+It is switched on at most a certain number of times per minute. Calls and door commands exclude each
+other. Switching off never waits."""
 
 import math
 from collections.abc import Iterator
@@ -27,8 +28,9 @@ class Channel(msgspec.Struct, Generic[T], frozen=True):
     ons: tuple[float, ...] = ()
 
     def step(self, wanted: T | None, now: float, ready_at: float, t: LiftDurations) -> "Channel[T]":
-        """Return the next state. Switching off is immediate. Switching on waits for the relay's rest
-        and for `ready_at`. A change to another output of the group waits too."""
+        """Return the next state. Switching off is immediate. Switching on waits until the relay has
+        been off for long enough, and until `ready_at`. A change to another output of the group waits
+        too."""
         if self.on is not None:
             return self if wanted == self.on else replace(self, on=None, off_at=now)
         if wanted is None or now < self.may_switch_on_at(now, ready_at, t):
@@ -48,7 +50,8 @@ class Channel(msgspec.Struct, Generic[T], frozen=True):
 
 
 class Relays(msgspec.Struct, frozen=True):
-    """Every output, with its past. A call and a door command are never on together."""
+    """Every output, with the times at which it was switched. A call and a door command are never on
+    together."""
 
     agv: Channel[bool] = Channel()
     call: Channel[str] = Channel()
@@ -88,7 +91,7 @@ class Relays(msgspec.Struct, frozen=True):
     ) -> Iterator[tuple[str, Channel[Any], float]]:
         """Yield (name, channel, ready_at) of each wanted output that is off.
 
-        `ready_at`: the time from which the other outputs allow this output.
+        `ready_at`: this output may come on from this time, as far as the other outputs are concerned.
         """
         agv_at = now if self.agv.on else self.agv.may_switch_on_at(now, AGES_AGO, t)
         ready_at = max(agv_at, self._rested_at(t))

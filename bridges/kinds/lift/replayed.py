@@ -3,17 +3,17 @@
 A fleet adapter retains its last 100 requests. When RMF's supervisor restarts, or reaches a cut-off
 adapter again, the supervisor hears all these requests once more. The supervisor passes each request on
 with a new stamp (rmf_ros2, lift_supervisor/Node.cpp). Requests of earlier rides would release the door
-before the present request arrives. On `adapter_lift_requests` this node hears no replays, but only the
-requests that each robot sends now.
-Rules:
-LIFT-REPLAYED-1. While the door is held, a request for another destination is doubted if the robot's own
-   last request was for the present destination. That own request may be older than the session, because
-   the robot may have lost its connection after that request.
-LIFT-REPLAYED-2. The doubted request counts when the robot itself asks for that destination too. It also
-   counts when LASTS_S have passed and no other destination was requested in that time.
-LIFT-REPLAYED-3. An END is never doubted. A request within the grace first restores the session as it
-   was. After that LIFT-REPLAYED-1 judges the request.
+before the supervisor passes on the request of the present ride. On `adapter_lift_requests` this node
+hears no replays, but only the requests that each robot sends now.
 
+Rules:
+LIFT-REPLAYED-1. While the door is held, a request for another destination is in doubt (it does not
+   count yet) if the robot's own last request was for the present destination. That own request may be
+   older than the session, because the robot may have lost its connection after that request.
+LIFT-REPLAYED-2. The request in doubt counts when the robot itself asks for that destination too. It
+   also counts when LASTS_S have passed and no other destination was requested in that time.
+LIFT-REPLAYED-3. An END is never in doubt. A request within the grace (the time after END) first
+   restores the session as it was. After that LIFT-REPLAYED-1 judges the request.
 """
 
 from collections.abc import Mapping
@@ -23,11 +23,11 @@ from bridges.kinds.lift.memory import Doubted, LiftSession
 from bridges.kinds.lift.signals import EndRequested, LiftRequested
 
 LASTS_S: Final = 3.0
-"""The time (s) after which a request is no replay. A replay is over within a second, and the robot
-repeats its own request at 1 Hz."""
+"""The time (s) for which a request must be repeated. After this time it cannot be a replay, because a
+replay is over within a second, and the robot repeats its own request at 1 Hz."""
 MOST: Final = 100
-"""The greatest number of robots in the table; no site has more. One more robot displaces the robot that
-was silent for longest."""
+"""The greatest number of robots in the table. It is more than the robots of any site. If a further
+robot comes, the robot that was silent for longest is dropped."""
 
 
 def noted(own: Mapping[str, str], asked: LiftRequested | EndRequested) -> Mapping[str, str]:
@@ -44,7 +44,7 @@ def noted(own: Mapping[str, str], asked: LiftRequested | EndRequested) -> Mappin
 def doubt(
     session: LiftSession, request: LiftRequested, own: str, held_open: bool, now: float
 ) -> Doubted | None:
-    """Return the doubt about a request of this session; None if the request counts.
+    """Return a mark if this session's request does not count yet. Return None if the request counts.
 
     `own`: the destination that the robot itself last requested.
     """

@@ -132,10 +132,11 @@ def _may_enter(
 
     - The door is not shown OPEN if the hold is wanted and its relay must rest. Nothing holds such a
       door, so it would close on the robot.
-    - The door is not shown OPEN if a served session is about to send the car away from the floor that
-      its robot itself last requested. RMF's supervisor may be passing on an earlier ride.
-    - Before a robot has boarded, the lift must also serve the robot's session in AGV mode, without a
-      fault. The fault FORGOTTEN_BY_SUPERVISOR does not matter.
+    - The door is not shown OPEN if the lift is about to send the car away from the floor that the
+      session's robot itself last requested. RMF's supervisor may be repeating a request of an earlier
+      ride.
+    - Before a robot has boarded, OPEN is shown only if the lift serves the session in AGV mode, without
+      a fault. The fault FORGOTTEN_BY_SUPERVISOR does not matter.
     """
     session, held = memory.session, memory.relays.hold.on is not None
     if wanted.hold_door is not None and not held:
@@ -150,8 +151,8 @@ def _may_enter(
 
 
 def _mode(view: BelievedLift, faults: tuple[Fault, ...], relays: Relays) -> LiftMode:
-    """Return RMF's mode. If no status line for AGV mode is wired, our own request counts as the
-    status."""
+    """Return RMF's mode. If no status line for AGV mode is wired, the lift counts as in AGV mode while
+    our output requests this mode."""
     codes = {fault.code for fault in faults}
     if codes & {"FIRE", "FIRE_LATCHED"}:
         return LiftMode.MODE_FIRE

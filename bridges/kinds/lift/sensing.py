@@ -1,23 +1,22 @@
-"""Judgement of a lift's inputs: debounce, age, and contradictions.
+"""The core's belief about a lift's inputs: debounce, age, and contradictions.
 
 Rules:
 LIFT-SENSING-1. A change of an input counts when it has lasted for the signal's debounce. The end of a
    hazard counts when it has lasted for `hazard_clear_s`. All inputs are unknown until every input has
-   settled once. All inputs are unknown again while any input changes for longer than its debounce and
-   `RESTLESS_S`. Settling after the start is no fault.
+   settled once. At the start this is no fault. Later, an input may keep changing and not settle within
+   its debounce and `RESTLESS_S`. All inputs are then unknown again.
 LIFT-SENSING-2. After `stale_after_s` without a reading all inputs are unknown, because the car may be
    anywhere. After a shorter gap the values stay, and a running debounce starts again.
 LIFT-SENSING-3. A floor code is believed only if the car can have reached that floor. The code is
    rejected if it skips floors faster than a car travels. With motion lines the code is also rejected if
    it changes while the car stands. After a rejection the position is unknown until the code shows the
    last trusted floor or another reachable floor, or until an operator resets the lift.
-LIFT-SENSING-4. If the floor code is invalid (`valid_when`) for longer than its debounce, the car may go
-   anywhere unseen. Therefore the next valid floor code is believed.
+LIFT-SENSING-4. If the floor code is invalid (`valid_when`) for longer than its debounce, the car may
+   move to any floor without being seen. Therefore the next valid floor code is believed.
 LIFT-SENSING-5. A door is open when its contact for the open door says so. If a door has only one
    contact, its other end position is estimated from the door's travel time, and marked as an estimate.
 LIFT-SENSING-6. A car stands when the motion lines say so. Without motion lines the car always counts as
    standing.
-
 """
 
 from collections.abc import Iterator, Sequence
@@ -37,14 +36,16 @@ MOTION_MEMORY_S = 2.0
 """The time (s) after the car's last motion during which a new floor code is believed."""
 
 RESTLESS_S = 2.0
-"""The longest time (s), on top of the debounce, that an input may take to settle. A slower input is
-restless. The cause is a loose wire or interference."""
+"""The longest time (s), on top of the debounce, that an input may take to settle. An input that takes
+longer counts as restless, because of a loose wire or interference."""
 
 
 class DoorSeen(msgspec.Struct, frozen=True):
-    """The judged state of one door. A door that is neither `open` nor `closed` moves.
+    """One door's state as the core believes it. If neither `open` nor `closed` is True, the door counts
+    as moving.
 
-    `estimated`: no contact proves the state. `settles_at`: the time (s) when an estimate begins.
+    `estimated`: no contact proves the state. `settles_at`: the time (s) from which the door counts as
+    arrived at the end position that has no contact.
     """
 
     open: bool
@@ -54,12 +55,12 @@ class DoorSeen(msgspec.Struct, frozen=True):
 
 
 class BelievedLift(msgspec.Struct, frozen=True):
-    """The judged inputs at one instant.
+    """The inputs as the core believes them at one instant.
 
-    `blind`: the reason why no input is believed, "" if all inputs are believed. `settling`: inputs
-    settle after the start, and no input is restless. `level`: the landing, None when unknown.
+    `blind`: the reason why no input is believed, "" if all inputs are believed. `settling`: some inputs
+    have not settled since the start, and no input is restless. `level`: the landing, None when unknown.
     `level_settles`: the floor code is changing. `agv`: None if not wired. `changes_at`: the next time
-    (s) when these judgements may change without a reading.
+    (s) when these values may change without a reading.
     """
 
     blind: str
@@ -111,7 +112,7 @@ def take(senses: LiftSenses, sample: LiftSample, now: float, limits: LiftLimits)
 
 
 def read_again(senses: LiftSenses, now: float) -> LiftSenses:
-    """Move on the times of the last reading, because the same reading came again."""
+    """Set the times of the last reading to `now`, because the same reading came again."""
     at, position = senses.read_at, senses.position
     seen_at = now if position.seen_at == at else position.seen_at
     moved_at = now if position.moved_at == at else position.moved_at
@@ -147,7 +148,7 @@ def trust(senses: LiftSenses) -> LiftSenses:
 
 
 def look(senses: LiftSenses, now: float, limits: LiftLimits) -> BelievedLift:
-    """Judge the inputs now."""
+    """Decide which inputs to believe now."""
     stale = now >= stale_at(senses, limits)
     motion = senses.motion.value if senses.motion else None
     front = _door(senses.doors[0], now, limits)
@@ -256,7 +257,7 @@ class Unsettled(msgspec.Struct, frozen=True):
     """An input that is changing, or has never settled (`new`).
 
     `due_at`: the time (s) when the input settles if it does not change again. `torn_at`: the time (s)
-    when the input counts as restless.
+    when the input counts as restless, because it has kept changing.
     """
 
     name: str
@@ -303,7 +304,7 @@ def _blind(
 
 
 def _settling(unsettled: Sequence[Unsettled], now: float) -> bool:
-    """Return whether an input still settles after the start, and no input is restless."""
+    """Return whether some input has not settled since the start, and no input is restless."""
     first = any(wait.new for wait in unsettled)
     return first and not any(now >= wait.torn_at for wait in unsettled)
 
@@ -324,7 +325,12 @@ def _faults(senses: LiftSenses) -> tuple[Fault, ...]:
         if seen and seen.value is DoorReading.BOTH:
             found.append(Fault("DOOR_CONTACTS_CONTRADICT", f"{name} reads open and closed"))
         if seen and seen.value is DoorReading.UNKNOWN:
-            found.append(Fault("DOOR_CODE_ILLEGAL", f"the YAML does not list the {name}'s number"))
+            found.append(
+                Fault(
+                    "DOOR_CODE_ILLEGAL",
+                    f"the YAML does not list the number of the {name}'s position",
+                )
+            )
     if senses.motion and senses.motion.value is Motion.CONTRADICTORY:
         found.append(Fault("MOTION_CONTRADICTORY", "the motion lines cannot all be true"))
     return tuple(found)

@@ -57,10 +57,10 @@ def _heed(
 def hear_adapter(
     memory: LiftMemory, asked: LiftRequested | EndRequested, now: float, limits: LiftLimits
 ) -> LiftMemory:
-    """Apply a robot's own request. The request counts in three cases:
+    """Apply a request that a robot's own fleet adapter sent. The request counts in three cases:
 
-    - The robot has the lift, and its session is forgotten or disowned.
-    - The request confirms a doubted destination of the session.
+    - The robot has the lift, and RMF's supervisor has forgotten or disowned its session.
+    - The request confirms a destination of the session that was in doubt.
     - The robot was left in the car.
     """
     held = memory.session
@@ -78,8 +78,8 @@ def hear_adapter(
 
 
 def _come_back(memory: LiftMemory, asked: LiftRequested | EndRequested, now: float) -> LiftMemory:
-    """Restore the session of a robot that may have been left in the car, if the robot asks within the
-    grace."""
+    """Restore the session of a robot that may have been left in the car. The robot must ask before the
+    grace, which is the time after END, is over."""
     grace = memory.grace
     if grace is None or not grace.in_car or now >= grace.until:
         return memory
@@ -102,7 +102,7 @@ def _refresh(session: LiftSession, request: LiftRequested, now: float) -> LiftSe
 
 
 def _anew(session: LiftSession, now: float) -> LiftSession:
-    """Return the session as if it were granted now. The facts about its robot stay."""
+    """Return the session as if it were granted now. Keep what is known about its robot."""
     return LiftSession(
         session.id,
         session.agv,
@@ -135,7 +135,7 @@ def end(
 
 
 def lapse(memory: LiftMemory, now: float, limits: LiftLimits) -> LiftMemory:
-    """End a disowned session whose robot has fallen silent."""
+    """End a session that RMF's supervisor has ended (disowned), because its robot is now silent too."""
     held = memory.session
     if held is None or now < forgotten.lapses_at(held):
         return memory

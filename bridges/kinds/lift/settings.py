@@ -28,7 +28,8 @@ Pulse = Annotated[float, Meta(ge=0.05, le=60, extra={"unit": "s"})]
 
 
 class Floor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A floor that the rear door serves, or whose landing has another name."""
+    """A floor of a mapping `floors`. It is needed if the rear door serves the floor, or if the floor
+    code has another name for its landing."""
 
     level: Annotated[
         Name | None, tells("the landing's name in the floor code; when absent, the floor's name.")
@@ -58,13 +59,13 @@ class LiftDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     ] = 600.0
     floor_timeout_s: Annotated[
         Timeout,
-        tells("""how long the ride to a floor may take. The end of this time has the same effects
-        as the end of `agv_timeout_s`."""),
+        tells("""how long the ride to a floor may take. After that the same happens as after
+        `agv_timeout_s`: outputs off, a fault, and retries."""),
     ] = 120.0
     door_timeout_s: Annotated[
         Timeout,
-        tells("""how long the door may take to open. The end of this time has the same effects as
-        the end of `agv_timeout_s`."""),
+        tells("""how long the door may take to open. After that the same happens as after
+        `agv_timeout_s`: outputs off, a fault, and retries."""),
     ] = 10.0
     request_timeout_s: Annotated[
         Patience,
@@ -91,9 +92,8 @@ class LiftDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     ] = 0.3
     min_off_s: Annotated[
         Brief,
-        tells(
-            "the least time for which a relay stays off, to spare the relay. Off is never delayed."
-        ),
+        tells("""the least time for which a relay stays off before it may switch on again, to spare
+        the relay. Switching off is never delayed."""),
     ] = 0.5
     max_cycles_per_min: Annotated[
         int,
@@ -102,7 +102,7 @@ class LiftDurations(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     ] = 20
 
     def problems(self) -> Remarks:
-        """Yield a problem for limits that no ride can keep."""
+        """Yield a problem for limits that are too short for any ride."""
         least_s = self.floor_travel_min_s
         if self.floor_timeout_s <= least_s:
             text = (
@@ -121,8 +121,9 @@ class LiftSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
     ]
     agv_mode: Annotated[
         Literal["requested", "by_call"],
-        tells("""how AGV mode is switched on. `requested`: by an output that is held. `by_call`: by
-        a call. AGV mode then stays on while the call is served, and while the door is held."""),
+        tells("""how AGV mode is switched on. `requested`: by a separate output that stays on.
+        `by_call`: by a call to a floor. AGV mode then stays on while the call is served, and while
+        the door is held."""),
     ] = "requested"
     limits: Annotated[LiftDurations, tells("the limits that differ from their defaults.")] = (
         LiftDurations()
@@ -139,7 +140,7 @@ class LiftSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
     ] = msgspec.field(default_factory=lambda: ["fire_alarm"])
 
     def stale_after(self) -> float:
-        """Return the limits' `stale_after_s`."""
+        """Return `stale_after_s` of the limits."""
         return self.limits.stale_after_s
 
     def on_map(self) -> list[Place]:
@@ -149,7 +150,7 @@ class LiftSettings(AlarmingSettings, frozen=True, kw_only=True, forbid_unknown_f
         return [(("floors", name), FLOOR, name) for name in self.floors]
 
     def stops(self) -> Mapping[str, Stop]:
-        """Map RMF's floor name to landing and door, from the lowest up."""
+        """Map RMF's name of each floor to its landing and door. The lowest floor is first."""
         if isinstance(self.floors, list):
             return {name: Stop(name) for name in self.floors}
         return {name: Stop(f.level or name, f.side) for name, f in self.floors.items()}

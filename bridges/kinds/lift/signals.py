@@ -1,4 +1,4 @@
-"""A lift's sample, outputs and events: the interface of its core."""
+"""A lift's readings (samples), outputs and events, which are the interface of its decision core."""
 
 from enum import Enum, StrEnum
 
@@ -11,8 +11,8 @@ class DoorReading(Enum):
     """The reading of the door contacts at one instant.
 
     With two contacts: OPEN, CLOSED, BETWEEN or BOTH (a fault). With only the contact for open: OPEN or
-    NOT_OPEN. With only the contact for closed: CLOSED or NOT_CLOSED. A door may also be read as a
-    number; UNKNOWN (a fault) means that the YAML does not list the number.
+    NOT_OPEN. With only the contact for closed: CLOSED or NOT_CLOSED. Some doors are read as a number in
+    place of contacts. UNKNOWN (a fault) means that the YAML does not list the number.
     """
 
     OPEN = "open"
@@ -52,9 +52,9 @@ class LiftSample(msgspec.Struct, frozen=True):
 
     `level`: the landing that the floor code names; None if there is no code (between floors).
     `code_fault`: the reason why the code is illegal; "" if it is legal. A code is illegal if it is not
-    listed, if its parity is wrong, or if two lines of a one-hot code are on. `floor_valid` is False
-    while the code is invalid; the car may then go anywhere unseen. `motion`, `agv`, `rear_door`: None
-    if not wired. `agv` is also None when its line is not valid.
+    listed, if its parity is wrong, or if two lines of a one-hot code are on. `floor_valid`: False while
+    the lift marks the code as invalid; the car may then move to any floor without being seen. `motion`,
+    `agv`, `rear_door`: None if not wired. `agv` is also None while the lift marks its line as invalid.
     """
 
     level: str | None
@@ -75,7 +75,8 @@ class Side(Enum):
 
 
 class Stop(msgspec.Struct, frozen=True):
-    """One of this lift's floors: its landing's name in the floor code, and the side of its door."""
+    """One of this lift's floors. `level`: the name of its landing in the floor code. `side`: the side
+    of the door that serves it."""
 
     level: str
     side: Side = Side.FRONT
@@ -122,6 +123,6 @@ class FromAdapter(msgspec.Struct, frozen=True):
 
 
 Asked = LiftRequested | EndRequested | FromAdapter
-"""The events that requests become."""
+"""The events that are made from requests."""
 
 Event = Sampled[LiftSample] | IoFailed | RivalSeen | OperatorReset | Asked

@@ -1,4 +1,5 @@
-"""The lift supervisor between the fleet adapters and all lifts. This supervisor replaces RMF's."""
+"""The lift supervisor between the fleet adapters and all lifts. It replaces the lift supervisor of
+RMF."""
 
 from bridges.kinds.lift_supervisor import core, memory, messages, report, signals
 from bridges.kinds.lift_supervisor.memory import LiftSupervisorLimits, SupervisedLift

@@ -2,13 +2,13 @@
 
 This supervisor replaces RMF's supervisor (rmf_ros2, lift_supervisor/Node.cpp). Fleet adapters send
 their requests on `adapter_lift_requests`. The supervisor passes on the requests of one session at a
-time, on `lift_requests`, until the lift's states show that the lift's node has obeyed.
-`bridges/kinds/shared/freshness.py` rejects stale requests.
+time, on `lift_requests`, until the lift's states show that the lift's node has obeyed. This session has
+its turn, and is called the holder. `bridges/kinds/shared/freshness.py` rejects stale requests.
 
 Rules:
 LIFT-SUPERVISOR-1. Sessions are served in the order of their first requests. A session leaves the queue
-   at its END, or after `silent_after_s` without a request. This time stands still while the lift is
-   silent, because adapters repeat their requests only when the lift's states come.
+   at its END, or after `silent_after_s` without a request. While the lift is silent this time does not
+   run, because adapters repeat their requests only when the lift's states come.
 LIFT-SUPERVISOR-2. The lift's states name the session that has the lift. This session is served before
    the queue if its robot still requests it. If nobody has requested the session for `orphan_after_s`,
    the supervisor ends the session.
@@ -24,9 +24,9 @@ LIFT-SUPERVISOR-4. Only END ends a turn. Usually the holder sends END, wherever 
 LIFT-SUPERVISOR-5. While the lift is in fire, emergency or offline mode, no robot is sent to the lift
    and the queue waits. The supervisor still passes on END. It also passes on requests for HUMAN mode,
    because they call no robot to the lift.
-LIFT-SUPERVISOR-6. During the quiet start, and whenever another supervisor publishes, our supervisor
-   only listens. After that it begins with the states and requests that it has heard in the meantime.
-   Therefore a restart ends no ride.
+LIFT-SUPERVISOR-6. During the quiet start (the first `quiet_start_s`), and whenever another supervisor
+   publishes, our supervisor only listens. After that it continues from the states and requests that it
+   has heard in the meantime. Therefore a restart ends no ride.
 LIFT-SUPERVISOR-7. Two messages are at least GAP_S apart. An unchanged message is repeated after
    REPEAT_S at the earliest.
 """
@@ -60,17 +60,17 @@ Decided = Decision[SupervisedLift, None, SupervisorReport]
 
 
 def initial(lift: str, started_at: float) -> SupervisedLift:
-    """Return the memory at start: nothing has been heard, and we may not publish yet."""
+    """Return the memory at start, before any message was heard. We may not publish yet."""
     return SupervisedLift(lift, started_at)
 
 
 def idle(memory: SupervisedLift, now: float) -> bool:
     """Return whether the memory of this lift may be dropped, after a long silence.
 
-    A lift without claims is dropped after FORGOTTEN_S. If the lift comes back, its states show any
-    session that must still end. A lift for which robots only wait is dropped after 10 times
-    FORGOTTEN_S. These robots request again when the lift is back. A lift that has claims and shows a
-    session is never dropped.
+    A claim is a session that wants the lift. A lift without claims is dropped after FORGOTTEN_S. If the
+    lift comes back, its states show whether a session is left that must still be ended. A lift for
+    which robots only wait is dropped after 10 times FORGOTTEN_S. These robots request again when the
+    lift is back. A lift that has claims and shows a session is never dropped.
     """
     heard_at = max(memory.heard_at, memory.shown_at)
     has_it = memory.session_shown or (memory.turn and memory.turn.seen)
@@ -81,7 +81,7 @@ def idle(memory: SupervisedLift, now: float) -> bool:
 def decide(
     memory: SupervisedLift, event: Event, now: float, limits: LiftSupervisorLimits
 ) -> Decided:
-    """Apply the event, choose the session with the turn, and publish a request that is due."""
+    """Apply the event, choose the session that has its turn, and publish a request that is due."""
     memory, refused = _take(memory, event, now, limits)
     memory = _forget_silent(memory, now, limits)
     memory = _take_turns(memory, now, limits)
@@ -100,7 +100,7 @@ def decide(
     )
 
 
-# --- messages in -------------------------------------------------------------------------------
+# --- events that come in ------------------------------------------------------------------------
 
 
 def _take(
@@ -128,7 +128,8 @@ def _listen(
     now: float,
     limits: LiftSupervisorLimits,
 ) -> tuple[SupervisedLift, str]:
-    """Note the request's stamp. Also return the reason for a refusal, "" if the request counts."""
+    """Note the request's stamp. Also return the reason for a refusal, "" if the stamp is fresh
+    enough."""
     requesters, refused = hear(
         memory.requesters,
         event.session,
@@ -171,7 +172,7 @@ def _with(
 
 
 def _end(memory: SupervisedLift, ended: RideEnded, now: float) -> SupervisedLift:
-    """Remove the session from the queue. If the session has the lift or the turn, send END to the
+    """Remove the session from the queue. If the session has the lift, or has its turn, send END to the
     lift's node."""
     session = ended.session
     memory, turn = _without(memory, session), memory.turn
@@ -186,8 +187,8 @@ def _without(memory: SupervisedLift, session: str) -> SupervisedLift:
 
 
 def _see(memory: SupervisedLift, shown: LiftStateHeard, now: float) -> SupervisedLift:
-    """Apply a state of the lift. The state may confirm an END, call for a repeat, or show another
-    session."""
+    """Apply a state of the lift. The state may confirm an END, make a repeat of the request necessary,
+    or show another session."""
     flowed = now <= memory.shown_at + SILENT_S
     same = flowed and shown.session == memory.session_shown
     turn, prompted = memory.turn, memory.prompted
@@ -211,7 +212,8 @@ def _see(memory: SupervisedLift, shown: LiftStateHeard, now: float) -> Supervise
 
 
 def _speak(memory: SupervisedLift, yes: bool, passive: str) -> SupervisedLift:
-    """Forget the turn if we may not publish. Later the lift's states show the holder again."""
+    """Apply the permission to publish. If we may not publish, no session has its turn. When we may
+    publish again, the lift's states show which session has the lift."""
     turn = memory.turn if yes else None
     return replace(memory, may_speak=yes, passive=passive, turn=turn)
 
@@ -222,8 +224,8 @@ def _speak(memory: SupervisedLift, yes: bool, passive: str) -> SupervisedLift:
 def _forget_silent(
     memory: SupervisedLift, now: float, limits: LiftSupervisorLimits
 ) -> SupervisedLift:
-    """Drop the claims of waiting sessions that are silent. A holder's claim is dropped only at its
-    END."""
+    """Drop the claims of waiting sessions that are silent. The claim of the session that has its turn
+    is dropped only at its END."""
     holder = memory.turn.session if memory.turn and not memory.turn.ends else ""
     staying = tuple(
         claim
@@ -275,7 +277,7 @@ def _let_go(
     return _begin(_without(memory, turn.session), Turn(turn.session, now, ends=True))
 
 
-# --- messages out ------------------------------------------------------------------------------
+# --- messages that go out -----------------------------------------------------------------------
 
 
 def wanted(memory: SupervisedLift) -> LiftRequest | None:
@@ -309,7 +311,7 @@ def _due_at(memory: SupervisedLift, message: LiftRequest | None) -> float:
     if message is None:
         return NEVER
     new = memory.sent is None or (message != memory.sent and message.request_type != END)
-    said = memory.sent is None and message == memory.last_sent  # sent in an earlier turn already
+    said = memory.sent is None and message == memory.last_sent  # sent in an earlier turn
     return due_at(memory.sent_at, new=new and not said, again=memory.prompted or said)
 
 

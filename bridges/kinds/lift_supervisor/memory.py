@@ -1,4 +1,5 @@
-"""The lift supervisor's memory of one lift, and its limits."""
+"""The values that the lift supervisor keeps for one lift, and the settings that it needs (its
+limits)."""
 
 from typing import Final
 
@@ -65,13 +66,13 @@ class Turn(msgspec.Struct, frozen=True):
 class SupervisedLift(msgspec.Struct, frozen=True):
     """The memory of one lift from event to event.
 
-    `passive`: if we may not publish, the reason why requesters must wait. `claims`: the waiting
-    sessions and the holder, in the order of their first requests. `heard_at`: the time of the last
-    adapter request. `requesters`: the record of each session's stamps. `shown`: the latest state.
-    `shown_at`: the time of the latest state. `session_since`: the states have shown the present session
-    since this time. `flowing_since`: states have come without a gap since this time. `sent`: the last
-    request of this turn. `last_sent`: the last request of any turn, sent at `sent_at`. `prompted`: the
-    request must be repeated.
+    `passive`: if we may not publish, the reason why requesters must wait. `claims`: the sessions that
+    wait for the lift and the session that has its turn (the holder), in the order of their first
+    requests. `heard_at`: the time of the last adapter request. `requesters`: the record of each
+    session's stamps. `shown`: the latest state. `shown_at`: the time of the latest state.
+    `session_since`: the states have shown the present session since this time. `flowing_since`: states
+    have come without a gap since this time. `sent`: the last request of this turn. `last_sent`: the
+    last request of any turn, sent at `sent_at`. `prompted`: the request must be repeated.
     """
 
     lift: str

@@ -28,7 +28,7 @@ def accept_request(
     """Turn an adapter's request into an event. Raises RequestRefused. `wall`: our clock (s since the
     epoch).
 
-    Only the session of an END_SESSION counts, because fleet adapters send END_SESSION without a floor
+    Of an END_SESSION only the session is read, because fleet adapters send END_SESSION without a floor
     (rmf_fleet_adapter RobotContext.cpp).
     """
     check_listed("lift", request.lift_name, settings.lifts)

@@ -12,7 +12,7 @@ from bridges.messages.definitions import LiftMode
 
 SILENT: Final = "LIFT_SILENT"
 OVERDUE_S: Final = 30.0
-"""The time (s) within which a lift must obey. After that a fault is shown."""
+"""The time (s) within which a lift must take or release a session. After that a fault is shown."""
 
 
 class SupervisorReport(msgspec.Struct, frozen=True):
@@ -59,8 +59,8 @@ def report(memory: SupervisedLift, faults: Iterable[Fault]) -> SupervisorReport:
 
 
 def _waits(memory: SupervisedLift, faults: tuple[Fault, ...], *, queued: bool) -> str:
-    """Return the reason why the first session in the queue waits. Without a queue, return the reason of
-    the session with the turn."""
+    """Return the reason why the first session in the queue waits. Without a queue, return the reason
+    why the session that has its turn waits."""
     turn, shown = memory.turn, memory.session_shown
     if not memory.claims:
         return ""
@@ -71,7 +71,7 @@ def _waits(memory: SupervisedLift, faults: tuple[Fault, ...], *, queued: bool) -
     if turn and turn.ends:
         return f"for the lift to release {turn.session}"
     if shown and (turn is None or turn.session != shown):
-        return f"for a request or the end of {shown}, which the lift shows"
+        return f"for a request or the END of {shown}, because the lift shows it"
     if memory.shown and memory.nobody_is_sent:
         mode = LiftMode(memory.shown.mode).name.removeprefix("MODE_")
         return f"for the end of the lift's {mode} mode"
@@ -83,7 +83,7 @@ def _waits(memory: SupervisedLift, faults: tuple[Fault, ...], *, queued: bool) -
 def alarms(
     memory: SupervisedLift, now: float, limits: LiftSupervisorLimits
 ) -> Iterator[tuple[float, Fault]]:
-    """Yield each possible fault, with the time when the fault comes if nothing changes."""
+    """Yield pairs of a time and a fault. If nothing changes, the fault begins at that time."""
     turn = memory.turn
     if not memory.flows(now):
         if turn or memory.claims:

@@ -28,7 +28,9 @@ class LiftSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
         Fleet adapters repeat their requests at every LiftState."""),
     ] = 10.0
     holder_alarm_s: Annotated[
-        Patience, tells("how long the holder may be silent before a fault is shown.")
+        Patience,
+        tells("""how long the session that has its turn (the holder) may be silent before a fault
+        is shown."""),
     ] = 60.0
     holder_ttl_s: Annotated[
         Patience | None,
@@ -37,14 +39,14 @@ class LiftSupervisorSettings(GraphSettings, frozen=True, kw_only=True, forbid_un
     ] = None
     clock_synchronised: Annotated[
         bool,
-        tells("""whether this machine's clock and the fleet adapters' clocks agree (NTP). If they agree,
-        the age of a request is judged. Otherwise only the stamps of one requester are compared."""),
+        tells("""whether this machine's clock and the fleet adapters' clocks agree (NTP). If they
+        agree, the supervisor can reject a request because of its age. Otherwise it only compares
+        the stamps of the same requester."""),
     ] = False
     max_request_age_s: Annotated[
         Seconds,
-        tells(
-            "with `clock_synchronised`, a request older than this counts only if it is repeated."
-        ),
+        tells("""with `clock_synchronised`: the greatest age of a request. An older request is
+        obeyed only if it is repeated."""),
     ] = 10.0
 
     def problems(self) -> Remarks:

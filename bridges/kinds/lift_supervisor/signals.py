@@ -47,7 +47,8 @@ class LiftStateHeard(msgspec.Struct, frozen=True):
     floors: tuple[str, ...] = ()
 
     def satisfies(self, session: str, target: Target) -> bool:
-        """Return whether the state fulfils the request. The rule is that of rmf_lift_supervisor."""
+        """Return whether the state fulfils the request. RMF's rmf_lift_supervisor uses the same
+        rule."""
         there = target.floor == self.floor and not self.destination
         return (
             (target.floor == self.destination or there)

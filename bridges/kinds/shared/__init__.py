@@ -1,1 +1,2 @@
-"""Common parts of all kinds: decisions, debounce, the records of kinds, the fields of a YAML."""
+"""Common parts of all kinds: decisions, debounce, the structs that describe a kind, the fields of a
+YAML."""

@@ -22,8 +22,8 @@ TOPICS: Final[Mapping[str, Topic[Message]]] = {
     topic.name: topic for topic in (FIRE_ALARM_TRIGGER, EMERGENCY_SIGNAL)
 }
 STATE, FLEETS, CAUSES, SINCE = "alarm state", "alarm fleets", "alarm causes", "alarm since"
-"""The keys of a daemon's statement on `/diagnostics`. The status file has the same words below
-`alarm`."""
+"""The keys with which a daemon states its alarm on `/diagnostics`. The status file has the same words
+below `alarm`."""
 RAISED: Final = frozenset({"alarm", "drill"})
 
 
@@ -73,8 +73,9 @@ def alarm_problems(settings: AlarmingSettings) -> Remarks:
 
 
 def alarm_limits(devices: Mapping[str, AlarmingSettings]) -> FleetAlarmLimits | None:
-    """Return the limits of a file's alarm; None if no device tells the fleets. `disagreements` has
-    ensured that the devices agree on the topic and the fleets."""
+    """Return the settings of the one alarm that all devices of a file raise; None if no device tells
+    the fleets. The loader has already checked with `disagreements` that the devices agree on the
+    topic and the fleets."""
     alarming = {name: one for name, one in devices.items() if one.alarm != "none"}
     if not alarming:
         return None
@@ -94,7 +95,7 @@ def disagreements(devices: Mapping[str, AlarmingSettings]) -> Iterator[tuple[str
             first.without_fleets,
         ):
             text = (
-                f"the devices of a file raise one alarm, but '{alarming[0][0]}' tells other fleets"
+                f"all devices of a file share one alarm, but '{alarming[0][0]}' has another alarm"
             )
             yield name, f"{text}: give both the same alarm and fleets, or put them into two files"
 
@@ -116,20 +117,23 @@ def heard(message: Message, senders: Iterable[str]) -> AlarmHeard:
 
 
 def statement(report: FleetAlarmReport, fleets: Fleets) -> dict[str, str]:
-    """Return the keys and texts of the daemon's statement, for the status file and `/diagnostics`."""
+    """Return the keys and texts with which the daemon states its alarm, for the status file and
+    `/diagnostics`."""
     causes = ", ".join(map(str, report.causes))
     told = msgspec.json.encode(sorted(fleets)).decode()
     return {"state": report.state, "fleets": told, "causes": causes or "-"}
 
 
 def stated(message: DiagnosticArray) -> Iterator[AlarmStated]:
-    """Yield the statements of our daemons in a message of `/diagnostics`. A message may have none."""
+    """Yield what our daemons state about their alarms in a message of `/diagnostics`. A message may
+    have no such statement."""
     for node, state, fleets in statements(message):
         yield AlarmStated(node, state in RAISED, fleets)
 
 
 def statements(message: DiagnosticArray) -> Iterator[tuple[str, str, Fleets]]:
-    """Yield the node, the state and the fleets of each statement in a message of `/diagnostics`."""
+    """Yield the node, the state and the fleets of each alarm that a message of `/diagnostics`
+    states."""
     for status in message.status:
         values = {pair.key: pair.value for pair in status.values}
         if STATE in values:
@@ -138,7 +142,8 @@ def statements(message: DiagnosticArray) -> Iterator[tuple[str, str, Fleets]]:
 
 
 def fleets_in(text: str) -> Fleets:
-    """Return the fleets in a statement. A text that `statement` did not make means all fleets."""
+    """Return the fleets in the text of a statement. If `statement` did not write the text, return the
+    empty set, which means all fleets."""
     try:
         return frozenset(msgspec.json.decode(text, type=list[str]))
     except msgspec.MsgspecError:
@@ -146,10 +151,10 @@ def fleets_in(text: str) -> Fleets:
 
 
 def alarm_notes(settings: AlarmingSettings) -> Remarks:
-    """Yield the effects of the alarm that the site should know."""
+    """Yield a note for each effect of the alarm that the site should know."""
     if settings.alarm != "none" and not settings.fleets:
         text = "an alarm stops the robots of every fleet on this graph, in every building of it"
-        yield ("alarm",), f"{text}; emergency_signal with fleets names fewer"
+        yield ("alarm",), f"{text}; to stop fewer fleets, write alarm: emergency_signal and fleets"
     if settings.without_fleets == "tell_all":
         yield (
             ("without_fleets",),

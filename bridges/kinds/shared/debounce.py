@@ -1,7 +1,7 @@
-"""Debounce: a value counts after it has stayed unchanged for long enough.
+"""Debounce: a value is accepted (it counts) after it has stayed unchanged for long enough.
 
-The rule is pure and works on samples, so GPIO pins and polled Modbus inputs share it. gpiozero's own
-debounce is not used, because it drops edges and gpiozero's mock pins lack it.
+The functions are pure and work on readings. So GPIO pins and polled Modbus inputs use the same
+functions. gpiozero's own debounce is not used, because it drops edges and gpiozero's mock pins lack it.
 """
 
 from typing import Generic, TypeVar, cast
@@ -18,10 +18,10 @@ T_co = TypeVar("T_co", covariant=True)
 class Settled(msgspec.Struct, Generic[T_co], frozen=True):
     """A debounced input.
 
-    `value`: the value that counts. `candidate`: the value that has been read since `since` (s), and may
-    become `value`. `steady_at`: the time when `value` was last confirmed; None before the first
-    confirmation. `torn_since`: the time since which readings have been unsteady; None if they are
-    steady.
+    `value`: the accepted value, which counts. `candidate`: the value that has been read since `since`
+    (s). It becomes `value` if it lasts. `steady_at`: the time when `value` was last confirmed; None
+    before the first confirmation. `torn_since`: the time since which readings have kept changing; None
+    if they are steady.
     """
 
     value: T_co | None
@@ -36,8 +36,8 @@ class Settled(msgspec.Struct, Generic[T_co], frozen=True):
 
 
 def settle(before: "Settled[T] | None", seen: T, now: float, hold_s: float) -> "Settled[T]":
-    """Add one sample. A value counts after it was seen for `hold_s` seconds. With `hold_s` 0 it counts
-    at once."""
+    """Add one reading. A value counts after it was read for `hold_s` seconds. With `hold_s` 0 every
+    value counts at once."""
     if before is None:
         before = Settled(None, seen, now, torn_since=now)
     elif seen != before.candidate:

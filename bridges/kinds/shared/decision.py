@@ -61,7 +61,8 @@ class RivalSeen(msgspec.Struct, frozen=True):
 
 
 class Attended(msgspec.Struct, frozen=True):
-    """The news whether any node publishes the requests that this device obeys."""
+    """A change in the publishers of the requests that this device obeys. `yes`: at least one node
+    publishes them."""
 
     yes: bool
 
@@ -71,8 +72,8 @@ class OperatorReset(msgspec.Struct, frozen=True):
 
 
 class AlarmInputs(msgspec.Struct, frozen=True):
-    """The causes of an alarm that one device sees (`bridges/kinds/shared/fleet_alarm.py` tells the
-    fleets).
+    """The causes of an alarm that one device sees. `bridges/kinds/shared/fleet_alarm.py` tells the
+    fleets about them.
 
     `present`: the causes that are seen now. `seen`: the inputs are read, so a cause that is not in
     `present` is over. `drill`: the device asks for a drill.
@@ -84,7 +85,8 @@ class AlarmInputs(msgspec.Struct, frozen=True):
 
 
 class MemoryKept(msgspec.Struct, frozen=True):
-    """The memory, as it was before this event, is on disk and outlives the daemon."""
+    """The memory was written to disk, so it outlives the daemon. It is the memory that the core had
+    before this event."""
 
 
 class MemoryNotKept(msgspec.Struct, frozen=True):
@@ -97,7 +99,8 @@ class DecidedByPerson(msgspec.Struct, frozen=True):
     """A person has decided the outcome of a request with `rmf-bridge workcell`, because the daemon does
     not know that outcome.
 
-    `request`: the request's guid; "" for every request in doubt, and for a lost memory.
+    `request`: the request's guid. "" means every request in doubt. With "", the person also accepts
+    that the memory of earlier requests is lost.
     """
 
     verdict: Literal["done", "again", "failed"]
@@ -105,14 +108,14 @@ class DecidedByPerson(msgspec.Struct, frozen=True):
 
 
 class DrillOrdered(msgspec.Struct, frozen=True):
-    """A person has run `rmf-bridge drill`. `for_s`: the duration of the drill (s); 0 ends the ordered
-    drill."""
+    """A person has run `rmf-bridge drill`. `for_s`: the duration of the drill (s); 0 ends a drill that
+    a person has ordered."""
 
     for_s: float
 
 
 OrderedByPerson = OperatorReset | DecidedByPerson | DrillOrdered
-"""The orders of a person to a running daemon."""
+"""The orders that a person can give to a running daemon."""
 
 
 class Report(Protocol):
@@ -127,16 +130,17 @@ class Report(Protocol):
         """All present faults, most serious first."""
 
     def news(self) -> object:
-        """Return the part whose change is published at once: everything except the age."""
+        """Return the part of the report whose change is published at once. This is everything except
+        the age."""
 
 
 class Decision(msgspec.Struct, Generic[M, O, R], frozen=True):
     """The result of one scan.
 
-    `outputs`: the wanted levels of all outputs. `wake_at`: the latest time of the next decision
+    `outputs`: the wanted levels of all outputs. `wake_at`: the time by which the core must decide again
     (monotonic seconds); `inf` if only an event can change anything. `refused`: the reason for a
     refusal, as `kind` or `kind: detail`; "" if the event was obeyed. The daemon counts refusals by
-    their `kind`, which is a short fixed name. `publish`: further messages beside the state, each sent
+    their `kind`, which is a short fixed name. `publish`: messages in addition to the state, each sent
     once.
     """
 

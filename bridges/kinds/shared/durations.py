@@ -1,4 +1,5 @@
-"""Durations (s) shared by several kinds, and the time of the next request to a device."""
+"""Durations (s) shared by several kinds, and the function that finds the time of a supervisor's next
+request."""
 
 import math
 from typing import Final
@@ -7,10 +8,11 @@ NEVER: Final = math.inf
 AGES_AGO: Final = -math.inf
 
 RIVAL_QUIET_S: Final = 5.0
-"""The silence (s) after which another node for the same device no longer counts as a rival. Nodes
-publish states at 1 Hz."""
+"""The silence (s) after which another node for the same device no longer counts as a rival. It is
+enough because nodes publish states at 1 Hz."""
 SILENT_S: Final = 3.0
-"""The time (s) without a state after which a lift or door counts as silent. States come at 1 Hz."""
+"""The time (s) without a state after which a lift or door counts as silent. It is enough because states
+come at 1 Hz."""
 FORGOTTEN_S: Final = 60.0
 """The time (s) without a message after which a device or requester is forgotten, unless it belongs to a
 session."""

@@ -3,7 +3,8 @@
 `bridges/settings/load.py` reads a file into these types. The kinds and drivers derive their own structs
 from them. A struct may have a method `problems() -> Remarks` that checks several fields together. The
 method yields pairs: a path below the struct, and a text with the remedy. The loader calls `problems`
-when every field is present and has the right type, even if a struct below has problems of its own.
+when every field is present and has the right type. It does so even if `problems` of a nested struct has
+yielded something.
 """
 
 from typing import Annotated
@@ -48,7 +49,7 @@ Patience = Annotated[
         le=86400,
         extra={
             "unit": "s",
-            "least": "RMF repeats itself once a second, and two repeats may be lost",
+            "least": "RMF repeats its messages once a second, and two repeats may be lost",
         },
     ),
 ]
@@ -62,7 +63,7 @@ def tells(text: str) -> Meta:
 
 
 class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Settings of every device with any driver."""
+    """Settings that every device has, whatever its driver."""
 
     bus: Annotated[
         Name | None, tells("the device's bus; not needed if the file has only one bus.")
@@ -78,13 +79,14 @@ class DeviceSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     ] = {}
 
     def off_after(self) -> tuple[float, tuple[str, ...]] | None:
-        """Return the time (s) without a new command after which the outputs switch themselves off, and
-        the path of that setting. Return None for outputs that stay on."""
+        """Return a time (s) and the path of the setting that gives it. If the device gets no new
+        command for this time, it switches its outputs off by itself. Return None if its outputs stay
+        on."""
         return None
 
     def stale_after(self) -> float | None:
-        """Return the time (s) without a reading after which the device is out of service; None if it
-        has no such limit."""
+        """Return the time (s) without a reading after which the device is out of service. Return None
+        for a device without such a limit."""
         return None
 
 

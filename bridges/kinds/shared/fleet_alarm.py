@@ -1,8 +1,10 @@
-"""One alarm for the fleets of a graph: what one daemon publishes about the causes that its devices see.
+"""One alarm for the fleets of a graph: the messages that one daemon publishes about the causes that its
+devices see.
 
 Lifts, doors and panels report their present causes, such as a fire contact that is on. Fleet adapters
-stop their robots at a `true`, and resume at any `false`, whoever sent it. So all sources of a graph
-together make one alarm.
+stop their robots at a `true`, and resume at any `false`, whoever sent it. So the alarms of all nodes on
+the graph act like one alarm. An alarm of another node stands as long as our daemon counts it as not
+over.
 
 Rules:
 FLEET-ALARM-1. A cause that is present latches, and the daemon's alarm is raised as long as a cause is
@@ -15,26 +17,27 @@ FLEET-ALARM-3. A daemon publishes `false` only under three conditions: it has pu
    ends when every cause has ended and every daemon that saw a cause was reset. Each of these daemons
    publishes its own `false`, because the `true` that it retains would stop a fleet adapter that starts
    later.
-FLEET-ALARM-4. Another node's alarm stands from its `true`, or from the statement of one of our nodes on
-   `/diagnostics`. It stands until that node publishes `false` or states that its alarm is over. Silence
-   ends no alarm, because the alarm's source may have died in the fire. A `false` of any node also ends
-   all standing alarms, except the alarms of our nodes that still make statements. The reason is that
-   RMF has obeyed the `false`, so the robots already drive. In the quiet start such a `false` may be an
-   old, retained one, and ends only its sender's alarm.
+FLEET-ALARM-4. Another node's alarm stands from its `true` on. It also stands if one of our nodes states
+   on `/diagnostics` that its alarm is raised. It stands until that node publishes `false` or states
+   that its alarm is over. Silence ends no alarm, because the alarm's source may have died in the fire.
+   A `false` of any node also ends all standing alarms, except the alarms of our nodes that still make
+   statements. The reason is that RMF has obeyed the `false`, so the robots already drive. In the quiet
+   start (the first seconds, in which the daemon only listens) such a `false` may be an old, retained
+   one. It then ends only its sender's alarm.
 FLEET-ALARM-5. If another node publishes `false` during a raised alarm, `true` is published again, but
    no more often than each AGAIN_S. The contradiction is a fault.
 FLEET-ALARM-6. Latched causes, the published `true` and other nodes' alarms survive a restart. After a
-   restart a raised alarm is published again, because the earlier process took its retained `true` with
-   it. In the quiet start no `false` is published, because other nodes state their alarms each second. A
-   daemon that ends publishes nothing.
+   restart a raised alarm is published again, because the retained `true` of the earlier process is
+   gone. In the quiet start no `false` is published, because other nodes state their alarms each second.
+   A daemon that ends publishes nothing.
 FLEET-ALARM-7. A drill raises the alarm without latching, and its end needs no reset. A device asks for
    the drill, or a person orders it for a duration. If a cause comes during a drill, the alarm becomes a
    real alarm, which ends the ordered drill. No drill is ordered during an alarm for one of the same
-   fleets, or in the quiet start, in which such an alarm may not have been heard yet. A restart ends the
-   ordered drill.
-FLEET-ALARM-8. If the wire hides a message's sender, any present publisher that is not one of our nodes
-   may have sent the message. Until discovery names the sender, its alarm stands as that of an unknown
-   node.
+   fleets. No drill is ordered in the quiet start either, because such an alarm may not have been heard
+   yet. A restart ends the ordered drill.
+FLEET-ALARM-8. Some transports do not name the sender of a message. Any publisher that is present and is
+   not one of our nodes may then have sent it. Until discovery names the sender, the alarm stands under
+   the name of an unknown node.
 """
 
 from collections.abc import Collection
@@ -69,16 +72,17 @@ from bridges.messages.definitions import Bool, EmergencySignal, Message
 from bridges.messages.topics import EMERGENCY_SIGNAL, Topic
 
 AGAIN_S: Final = 0.2
-"""The least time (s) between two `true`, because another node may publish `false` without end."""
+"""The least time (s) between two messages `true`. It is needed because another node may publish `false`
+without end."""
 RENEW_S: Final = 5.0
-"""The time (s) after which a retained `false` is withdrawn, when every node has heard it. Otherwise a
-fleet adapter that starts in a later alarm might hear the old `false` last."""
+"""The time (s) after which a retained `false` is withdrawn. By then every node has heard it. Otherwise
+a fleet adapter that starts in a later alarm might hear the old `false` last."""
 MOST_OTHERS: Final = 200
 """The greatest number of other nodes whose alarms are remembered. A site has some dozens of daemons."""
 UNKNOWN: Final = "unknown node"
-"""The beginning of the provisional name of a node that discovery has not named yet."""
+"""The beginning of the name that a node has until discovery has named it."""
 OR: Final = " or "
-"""The word between the names of several nodes. One of these nodes has sent a message."""
+"""The word between the names of nodes if one of several nodes has sent a message."""
 
 
 def initial() -> FleetAlarmMemory:
@@ -89,7 +93,7 @@ def initial() -> FleetAlarmMemory:
 def decide(
     memory: FleetAlarmMemory, event: FleetAlarmEvent, now: float, limits: FleetAlarmLimits
 ) -> Decision[FleetAlarmMemory, None, FleetAlarmReport]:
-    """Take the event, latch the present causes, and publish what the rules ask for."""
+    """Apply the event, latch the present causes, and publish the messages that the rules require."""
     if AGES_AGO < memory.drill_until <= now:
         memory = replace(memory, drill_until=AGES_AGO)
     memory, refused = _take(memory, event, now, limits)
@@ -133,7 +137,7 @@ def _hear_true(
 ) -> FleetAlarmMemory:
     strangers = sorted(node for node in senders if node not in memory.ours)
     if len(senders) > 1 and not strangers:
-        return memory  # one of our nodes, which will state its alarm within a second
+        return memory  # the sender is one of our nodes, and will state its alarm within a second
     return _stands(memory, OR.join(strangers if len(senders) > 1 else senders), fleets)
 
 
@@ -243,12 +247,12 @@ def _message(topic: Topic[Message], fleets: Fleets, *, on: bool) -> Said:
 
 
 def _waits(memory: FleetAlarmMemory) -> tuple[str, ...]:
-    """Return the nodes whose alarms stand for one of the fleets that we have told."""
+    """Return the nodes whose alarms are not over, for one of the fleets that we have told."""
     return () if memory.told is None else _standing(memory, memory.told)
 
 
 def _standing(memory: FleetAlarmMemory, told: Fleets) -> tuple[str, ...]:
-    """Return the other nodes whose alarms stand for one of these fleets."""
+    """Return the other nodes whose alarms for one of these fleets are not over."""
     return tuple(sorted(node for node, fleets in memory.others.items() if overlap(told, fleets)))
 
 
@@ -262,15 +266,21 @@ def _faults(memory: FleetAlarmMemory, waits: tuple[str, ...], now: float) -> lis
     found = []
     by, at = memory.contradicted
     if memory.raised and now < at + RIVAL_QUIET_S:
-        found.append(Fault("ALARM_CONTRADICTED", f"{by} publishes false: robots hear both"))
+        found.append(
+            Fault("ALARM_CONTRADICTED", f"{by} publishes false, while this daemon publishes true")
+        )
     if memory.drill:
-        found.append(Fault("ALARM_DRILL", "the robots stand for a drill, which ends by itself"))
+        found.append(
+            Fault("ALARM_DRILL", "the robots are stopped for a drill, which ends by itself")
+        )
     elif memory.latched:
         causes = ", ".join(map(str, memory.latched))
-        found.append(Fault("ALARM_RAISED", f"the robots stand: {causes}"))
+        found.append(Fault("ALARM_RAISED", f"the robots are stopped: {causes}"))
     elif memory.told is not None:
         stands = (
-            f"the alarm of {', '.join(waits)} stands" if waits else "this daemon has just started"
+            f"the alarm of {', '.join(waits)} is not over"
+            if waits
+            else "this daemon has just started"
         )
         found.append(Fault("ALARM_WAITS", f"reset here, but {stands}"))
     return found

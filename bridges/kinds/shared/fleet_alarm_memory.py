@@ -33,7 +33,8 @@ class AlarmHeard(msgspec.Struct, frozen=True):
 
 
 class AlarmNamed(msgspec.Struct, frozen=True):
-    """The nodes that may have sent the messages that were heard from `unknown`."""
+    """The nodes that may have sent the messages of an unknown node. `unknown`: the name under which
+    these messages were noted."""
 
     unknown: str
     senders: frozenset[str]
@@ -60,7 +61,7 @@ FleetAlarmEvent = (
 
 
 class AlarmCause(msgspec.Struct, frozen=True, order=True):
-    """A device and its signal."""
+    """A cause of an alarm: a device and its signal."""
 
     device: str
     signal: str
@@ -80,13 +81,14 @@ class FleetAlarmLimits(msgspec.Struct, frozen=True):
 class FleetAlarmMemory(msgspec.Struct, frozen=True):
     """The memory of one daemon's alarm.
 
-    `told`: the fleets that our `true` went to; None if we have published no `true` since our last
-    `false`. `told_at`, `ended_at`: the times of our last `true` and `false`. `owed`: our `true` no
-    longer counts, so a raised alarm must be published again. `others`: the fleets of each other node's
-    standing alarm. `ours`: the time of the last statement of each other node of ours. `may_end`: the
-    quiet start is over. `contradicted`: the nodes that published `false` against our alarm, and the
-    time. `drill_until`: the end of the drill that a person has ordered. `shown`: the last decision's
-    `state`. `since`: the time when that state began; None if it began before the daemon's start.
+    `told`: the fleets to which we have published `true`; None if we have published no `true` since our
+    last `false`. `told_at`, `ended_at`: the times of our last `true` and `false`. `owed`: our `true` no
+    longer has an effect, so a raised alarm must be published again. `others`: for each other node whose
+    alarm is not over, the fleets of that alarm. `ours`: for each other node of this project, the time
+    of its last statement. `may_end`: the quiet start is over. `contradicted`: the nodes that published
+    `false` against our alarm, and the time. `drill_until`: the end of the drill that a person has
+    ordered. `shown`: the last decision's `state`. `since`: the time when that state began; None if it
+    began before the daemon's start.
     """
 
     inputs: Mapping[str, AlarmInputs] = {}
@@ -111,21 +113,22 @@ class FleetAlarmMemory(msgspec.Struct, frozen=True):
 
     @property
     def raised(self) -> bool:
-        """Return whether the robots of our fleets must stand for a cause or a drill of our own."""
+        """Return whether the robots of our fleets must be stopped, because of a cause or drill of this
+        daemon."""
         return bool(self.latched) or self.drill
 
     @property
     def state(self) -> str:
-        """Return `quiet`, `alarm`, `drill`, or `reset` if our `true` waits for the end of other
-        alarms."""
+        """Return `quiet`, `alarm`, `drill` or `reset`. In `reset`, our causes were reset, but our
+        `false` must wait until the alarms of other nodes end."""
         if self.raised:
             return "drill" if self.drill else "alarm"
         return "quiet" if self.told is None else "reset"
 
 
 class FleetAlarmReport(msgspec.Struct, frozen=True):
-    """The daemon's statement. `state` and `since`: see `FleetAlarmMemory`. `waits`: the nodes whose
-    alarms our `true` waits for."""
+    """The state of the daemon's alarm, for the status file and `/diagnostics`. `state` and `since`: see
+    `FleetAlarmMemory`. `waits`: the nodes whose alarms must end before we publish `false`."""
 
     state: str
     causes: tuple[AlarmCause, ...] = ()
@@ -135,10 +138,10 @@ class FleetAlarmReport(msgspec.Struct, frozen=True):
     read_at: float | None = None
 
     def news(self) -> object:
-        """Return everything."""
+        """Return all fields whose change is published at once."""
         return self.state, self.causes, self.waits, self.faults
 
 
 def overlap(one: Fleets, other: Fleets) -> bool:
-    """Return whether both sets tell the same fleet. An empty set means all fleets."""
+    """Return whether a fleet is in both sets. An empty set means all fleets."""
     return not one or not other or bool(one & other)

@@ -1,4 +1,4 @@
-"""Decides whether an adapter's request counts, or is a replay of an old request.
+"""Decides whether an adapter's request counts (is obeyed), or is a replay of an old request.
 
 A stamp comes from the requester's clock, which may disagree with our clock. Therefore a stamp is first
 compared with the earlier stamps of the same requester.
@@ -10,19 +10,20 @@ FRESHNESS-1. A request counts if its stamp is newer than the stamps of all reque
 FRESHNESS-2. A retained topic (`adapter_lift_requests`) replays up to 100 old requests of every adapter
    to each new subscriber. The replay comes again when an adapter's network comes back. On such a topic
    an equal stamp is a replay. A requester's first request counts only if it was sent after our own
-   start. Later requests are compared only with the requester's own stamps. With `clock_synchronised`
-   the age of every request is judged too.
+   start. Later requests are compared only with the requester's own stamps. If the YAML sets
+   `clock_synchronised`, the age of every request is judged too.
 FRESHNESS-3. On a topic that is not retained (`adapter_door_requests`) an old request was delayed or
    arrived twice. On such a topic an equal stamp counts, because a requester without a clock always
    sends 0. A requester's first request counts. A requester that holds no door is forgotten after a
    silence of FORGOTTEN_S. Its next request then counts as its first.
-FRESHNESS-4. During the quiet start on a retained topic a stamp from the future does not count. The
-   reason is that every replayed request looks new if our clock is not set yet.
+FRESHNESS-4. During the quiet start (the first seconds, in which the node only listens) a stamp from the
+   future does not count on a retained topic. The reason is that every replayed request looks new if our
+   clock is not set yet.
 FRESHNESS-5. A rejected request may come from a live requester whose clock is wrong or was set back.
-   Such a request counts when the requester has repeated it for long enough. On retained topics that is
-   REPLAY_S, longer than a replay lasts. On other topics it is LATE_S, longer than a message can be
-   late. The repeats' stamps must rise, or all be 0. A pause of BROKEN_OFF_S, or a stamp that does not
-   rise, restarts that time.
+   Such a request counts when the requester has repeated it for long enough. On retained topics that
+   time is REPLAY_S, because a replay is shorter. On other topics it is LATE_S, because no message is
+   later. The stamps of the repeats must rise, or all be 0. A pause of BROKEN_OFF_S, or a stamp that
+   does not rise, restarts that time.
 """
 
 from collections.abc import Collection, Mapping
@@ -72,8 +73,8 @@ class Requester(msgspec.Struct, frozen=True):
 
     `newest`: the newest stamp that counted. `newest_end`: the newest stamp of an END that counted.
     `heard_at`: the time when a request last counted. `doubted`: the stamp of the last request that did
-    not count. `doubted_since`, `doubted_at`: the times of the first and the last request in the present
-    row of requests that did not count. Names in `_at` or `_since` are times (s) by our clock.
+    not count. `doubted_since`, `doubted_at`: if the latest requests in a row did not count, the times
+    of the first and the last of them. Names in `_at` or `_since` are times (s) by our clock.
     """
 
     newest: float = AGES_AGO

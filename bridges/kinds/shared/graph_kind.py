@@ -1,8 +1,9 @@
-"""The record of a kind without hardware: the topics that it hears and publishes, and its core.
+"""The struct that describes a kind without hardware: the topics that it hears and publishes, and its
+core.
 
 A supervisor or coordinator has no driver and no bus. It learns of its subjects (lifts, doors) from
-messages, and keeps one core memory for each subject. `bridges/kinds/<kind>/__init__.py` holds the
-record `KIND`, and `bridges/runtime/graph_node.py` runs the kind.
+messages, and keeps one memory of its decision core for each subject. `bridges/kinds/<kind>/__init__.py`
+holds this struct as `KIND`, and `bridges/runtime/graph_node.py` runs the kind.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -123,4 +124,5 @@ class GraphKind(Struct, Generic[S, L, M, E, R], frozen=True):
 
 AnyGraphKind = GraphKind[Any, Any, Any, Any, Any]
 AnyKind = AnyDeviceKind | AnyGraphKind
-"""A kind that was found by its name, so its types are unknown."""
+"""A kind of any sort. Code that finds a kind by its name does not know the types of its settings and
+memory."""

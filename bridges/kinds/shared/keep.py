@@ -1,5 +1,5 @@
-"""A kind's memory on disk, for a restart. The file is JSON with a version. A damaged file is refused as
-a whole."""
+"""The file on disk in which a kind keeps its memory for a restart. The file is JSON with a version. If
+any part of the file is damaged, the whole file is refused."""
 
 from typing import Annotated, TypeVar
 
@@ -19,8 +19,8 @@ R = TypeVar("R", bound=Kept)
 
 
 def read(kept: bytes, record: type[R], version: int, what: str) -> R:
-    """Decode the record. Raises ValueError for other bytes or another version. The error's text names
-    `what`, the expected content."""
+    """Decode the record. Raises ValueError for bytes that are no such record, and for another version.
+    The error's text names `what`, the expected content."""
     try:
         found = msgspec.json.decode(kept, type=record)
     except msgspec.MsgspecError as error:

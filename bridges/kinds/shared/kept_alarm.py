@@ -15,7 +15,8 @@ VERSION: Final = 1
 
 
 class KeptAlarm(keep.Kept, frozen=True, forbid_unknown_fields=True):
-    """The parts of the memory that are kept. `latched`: the device and the signal of each cause."""
+    """The parts of the memory that are saved to disk. `latched`: the device and the signal of each
+    cause."""
 
     latched: list[tuple[str, str]]
     told: list[str] | None
@@ -23,7 +24,7 @@ class KeptAlarm(keep.Kept, frozen=True, forbid_unknown_fields=True):
 
 
 def persist(memory: FleetAlarmMemory) -> bytes:
-    """Encode the memory for the next start. The bytes change only when a kept part changes."""
+    """Encode the memory for the next start. The bytes change only when a part that is saved changes."""
     return msgspec.json.encode(
         KeptAlarm(
             VERSION,
@@ -32,7 +33,7 @@ def persist(memory: FleetAlarmMemory) -> bytes:
             {
                 node: sorted(fleets)
                 for node, fleets in sorted(memory.others.items())
-                if not node.startswith(UNKNOWN)  # its retained message comes again
+                if not node.startswith(UNKNOWN)  # its retained message comes again after a restart
             },
         )
     )

@@ -1,7 +1,7 @@
-"""The record of a kind of device: its topics, and the pure functions of its folder.
+"""The struct that describes a kind of device: its topics, and the pure functions of its folder.
 
-`bridges/kinds/<kind>/__init__.py` holds one record `KIND`. The daemon's loop knows a kind only by this
-record. Each `KIND` states its types, so mypy proves that its functions fit together.
+`bridges/kinds/<kind>/__init__.py` holds one such struct, `KIND`. The daemon's loop knows nothing of a
+kind but this struct. Each `KIND` states its types, so mypy proves that its functions fit together.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -36,7 +36,7 @@ DeviceEvent = Union[Sampled[X], IoFailed, RivalSeen, OperatorReset, E]  # noqa: 
 """All events of a device's core."""
 
 FLOOR, LIFT, DOOR, CHARGER, WAYPOINT = "floor", "lift", "door", "charger", "waypoint"
-"""Kinds of names on RMF's map."""
+"""The kinds of things that have a name on RMF's map."""
 
 Place = tuple[tuple[str, ...], str, str]
 """A setting with a name on RMF's map: the setting's path, the kind of name (`FLOOR`, …), and the
@@ -55,9 +55,9 @@ class Keeping(Struct, Generic[M], frozen=True):
     """The part of a device's memory that must survive a restart.
 
     `part(memory)`: this part, compared by value. `persist(memory)`: the bytes of this part.
-    `restore(kept, now)`: the memory from these bytes. It raises ValueError for other bytes.
-    `lost(reason)`: the memory of a daemon that finds no bytes, or wrong bytes, although earlier bytes
-    may have existed.
+    `restore(kept, now)`: the memory from these bytes. `restore` raises ValueError for bytes that
+    `persist` did not make. `lost(reason)`: the memory for a start at which the bytes are missing or
+    wrong, although an earlier run may have saved some.
 
     The core also gets the event `MemoryKept` or `MemoryNotKept` for each attempt to write, before
     outputs and messages go out. It also gets the event `DecidedByPerson`.
@@ -72,7 +72,7 @@ class Keeping(Struct, Generic[M], frozen=True):
 class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     """One kind of device: its settings, limits, memory, sample, requests, outputs and report.
 
-    Messages. A kind about which RMF has no messages leaves them out:
+    Messages (left out by a kind about which RMF has no messages):
     - `states`: the topic of the devices' states.
     - `state_message(name, settings, report, stamp)`: the report as RMF's message.
     - `requests`: each topic that a device obeys, with `accept(message, settings) -> event`. `accept`
@@ -80,7 +80,7 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     - `device_name`: the device named in a message (request or state).
     - `sender`: the requester behind a request. If several requests wait for the next scan, only the
       last request of each sender counts.
-    - `publishes(settings)`: the topics on which a device publishes beside its states.
+    - `publishes(settings)`: the topics on which a device publishes in addition to its states.
     - `answer(name, request, reason, report)`: the published answer to a refused request; None for no
       answer. `request`: the message if it is malformed, else the event.
     - `results(name, report)`: messages that go out right after the state of this report. While there
@@ -97,11 +97,13 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
     - `decide`: the core.
     - `summary(report)`: key -> value for the log line, the status file and `watch`.
     - `published(memory, report)`: the memory after this report has gone out to RMF.
-    - `repeated(memory, now)`: the memory after the last reading came once more, at `now`, if only the
-      times of that reading move on. Without this function the core decides on every reading.
+    - `repeated(memory, now)`: the memory after the same reading came once more, at `now`. The loop
+      calls this function in place of `decide` if only the times of the reading differ. Without this
+      function the core decides on every reading.
     - `alarm_inputs(report)`: the causes of a fleet alarm that the device sees
       (`bridges/kinds/shared/fleet_alarm.py`); None for a kind without alarms.
-    - `keeping`: for a memory that must survive a restart.
+    - `keeping`: the functions that save and restore a memory that must survive a restart; None for a
+      kind without such a memory.
 
     Settings:
     - `devices_key`: the section of the devices in the YAML.
@@ -145,4 +147,5 @@ class Kind(Struct, Generic[S, L, M, X, E, O, R], frozen=True):
 
 
 AnyDeviceKind = Kind[Any, Any, Any, Any, Any, Any, Any]
-"""A kind that was found by its name; its types are unknown."""
+"""A kind of device of any sort. Code that finds a kind by its name does not know the types of its
+settings and memory."""

@@ -1,5 +1,6 @@
-"""The names of values in rings and recordings. A recorded name never changes, even if its class moves
-or is renamed. Therefore every version of the daemon reads the files of all earlier versions.
+"""The names under which values of a core are stored in rings and recordings. A recorded name never
+changes, even if its class moves or is renamed. Therefore every version of the daemon reads the files
+of all earlier versions.
 
 `RECORDED` in each kind's folder has the values of that kind. `SHARED` has the values that all kinds
 share.
@@ -46,5 +47,5 @@ SHARED: Final[Recorded] = {
     "rmf.constants.RobotModeValue": constants.RobotModeValue,
     "rmf.constants.WorkcellMode": constants.WorkcellMode,
     "rmf.constants.WorkcellStatus": constants.WorkcellStatus,
-    **{f"rmf.definitions.{message.__name__}": message for message in PACKAGES},  # ROS's own names
+    **{f"rmf.definitions.{message.__name__}": message for message in PACKAGES},  # named as in ROS
 }

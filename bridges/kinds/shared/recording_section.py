@@ -1,4 +1,5 @@
-"""The `recording:` section of a YAML: the extent of the recording, and its space on the disk."""
+"""The `recording:` section of a YAML: what is recorded, and how much space the files may take on the
+disk."""
 
 from typing import Annotated, Literal
 
@@ -14,8 +15,8 @@ Patience = Annotated[float, Meta(ge=10, le=86400, extra={"unit": "s"})]
 
 
 class RecordingSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The recording of the daemon's work. With `ring`, nothing is written to a disk while all is
-    well."""
+    """Settings for the recording of the daemon's messages and decisions. With `ring`, nothing is
+    written to a disk while all is well."""
 
     keep: Annotated[
         Literal["nothing", "ring", "continuous"],
@@ -28,12 +29,13 @@ class RecordingSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
     ] = 1.0
     files: Annotated[
         Files,
-        tells("""how many files the recorder keeps, of all daemons of the machine together. If their
-        YAMLs differ, the largest number counts."""),
+        tells("""how many files the recorder keeps, of all daemons of the machine together. If the
+        YAMLs of these daemons differ, the recorder uses the largest number."""),
     ] = 400
     files_mb: Annotated[
         Space,
-        tells("how large these files may be together. The largest number of all YAMLs counts."),
+        tells("""how large these files may be together. If the YAMLs differ, the recorder uses the
+        largest number."""),
     ] = 200.0
     waiting_s: Annotated[
         Patience, tells("how long a requester may wait; after that the recorder makes a file.")

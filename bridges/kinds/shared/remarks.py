@@ -1,4 +1,4 @@
-"""Remarks that a struct, kind or driver makes on its settings in the YAML."""
+"""Remarks about settings in the YAML. A struct, kind or driver makes them about its own settings."""
 
 from collections.abc import Iterable
 

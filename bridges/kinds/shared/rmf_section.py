@@ -28,7 +28,7 @@ class ZenohTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     ca: Annotated[
         AbsolutePath | None,
         tells("""a file with the certificate of the authority that signed the router's certificate.
-        When absent, the public authorities count."""),
+        When absent, the public authorities are trusted."""),
     ] = None
     certificate: Annotated[
         AbsolutePath | None,
@@ -61,9 +61,10 @@ class Zenoh(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     ] = ("tcp/localhost:7447",)
     mode: Annotated[
         Literal["auto", "peer", "client"],
-        tells("""`client`: the node speaks only to a router. `peer`: the node also speaks to other nodes
-        directly. `auto` is `peer` if there is one router, and this router is on this machine or
-        `listen` is open to other machines. Else `auto` is `client`."""),
+        tells("""`client`: the node speaks only to a router. `peer`: the node also speaks to other
+        nodes directly. `auto` is `peer` under two conditions: there is only one router, and either
+        this router is on this machine or `listen` is open to other machines. Otherwise `auto` is
+        `client`."""),
     ] = "auto"
     listen: Annotated[
         tuple[Endpoint, ...],
@@ -101,7 +102,8 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     ] = "auto"
     domain_id: Annotated[
         Annotated[int, Meta(ge=0, le=232)] | None,
-        tells("the ROS domain. When absent, the environment's ROS_DOMAIN_ID counts, or else 0."),
+        tells("""the ROS domain. When absent, it is ROS_DOMAIN_ID of the environment; without that
+        variable it is 0."""),
     ] = None
     network: Annotated[
         Literal["subnet", "localhost"],
@@ -109,9 +111,9 @@ class Rmf(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     ] = "subnet"
     ros_setup: Annotated[
         AbsolutePath | None,
-        tells("""ROS's setup file. The daemon sources the file before it starts, because no shell does
-        so for a service. With `dds` and `zenoh` the key has no effect. If the file is missing,
-        `auto` logs this and continues."""),
+        tells("""ROS's setup file. The daemon sources the file before it starts, because a service
+        has no shell that sources it. With `dds` and `zenoh` the key has no effect. With `auto`, a
+        missing file is only logged."""),
     ] = None
     diagnostics: Annotated[
         bool,
@@ -151,7 +153,7 @@ def warnings(rmf: Rmf) -> Remarks:
     if release and release[1] not in ROS_RELEASES:
         yield ("ros_setup",), f"{release[1]} is no release of ROS 2: {', '.join(ROS_RELEASES)}"
     elif rmf.ros_setup and Path("/opt/ros").is_dir() and not Path(rmf.ros_setup).is_file():
-        text = "does not exist on this machine, which has ROS: install it, or correct the path"
+        text = "does not exist, but this machine has ROS: install that release, or correct the path"
         yield ("ros_setup",), f"{rmf.ros_setup} {text}"
 
 

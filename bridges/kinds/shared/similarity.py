@@ -51,7 +51,8 @@ class Similarity(Struct, frozen=True):
 
 
 def estimate(these: Sequence[Point], those: Sequence[Point]) -> Similarity:
-    """Estimate the transform from `these` to `those`, pair by pair. Raises ValueError."""
+    """Estimate the transform from pairs of points: each point of `these`, and the point of `those` at
+    the same index. Raises ValueError."""
     if len(these) != len(those):
         raise ValueError(f"{len(these)} points and {len(those)} points do not make pairs")
     if len(these) < 2:

@@ -1,5 +1,5 @@
-"""A table that a person compares with a controller. `check` prints the table. The printed sheet has
-boxes to tick."""
+"""A table of settings, which a person compares with the settings of a lift or door controller. `check`
+prints the table. The printed sheet has boxes to tick."""
 
 from msgspec import Struct
 

@@ -1,1 +1,1 @@
-"""A fleet in service. RMF's adapter is on one side, and the robots' buses are on the other side."""
+"""The service of a fleet. It connects RMF's fleet adapter with the buses of the robots."""

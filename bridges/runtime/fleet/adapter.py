@@ -1,14 +1,14 @@
 """RMF's own fleet adapter, `rmf_adapter`. Only this module imports `rmf_adapter`.
 
-Debian's package is ros-jazzy-rmf-fleet-adapter-python. RMF's adapter does the tasks, the traffic and
-the negotiation. It calls our callbacks on its own threads, and `robot.py` and `light.py` turn each call
-into an order.
+Debian's package is ros-jazzy-rmf-fleet-adapter-python. RMF's adapter plans the tasks and the traffic,
+and negotiates with other fleets. It calls our callbacks on its own threads, and `robot.py` and
+`light.py` turn each call into an order.
 
 The source for its interface: open-rmf/rmf_ros2, branch jazzy, rmf_fleet_adapter_python/src/adapter.cpp,
 and EasyFullControl.cpp of rmf_fleet_adapter.
 
 `Adapter.make` waits for RMF's schedule node. The whole process waits too, because the binding does not
-release Python's lock. So one attempt waits at most MAKE_S.
+release Python's global lock. Therefore one attempt waits at most MAKE_S.
 """
 
 import datetime
@@ -41,10 +41,11 @@ def installed() -> ModuleType:
 
 class FleetAdapter:
     """RMF's adapter for one fleet, with `EasyFullControl` or with an `EasyTrafficLight` for each robot.
-    `orders(robot, order)` receives RMF's orders and answers.
 
-    For each robot, only one thread calls `update`. `failed`: for each robot, the reason why RMF did not
-    take it, or "".
+    `orders(robot, order)` is a callback for RMF's orders, and for its answers to our questions.
+    `failed` maps each robot to the reason why RMF did not accept it, or to "".
+
+    For each robot, only one thread calls `update`.
     """
 
     def __init__(
@@ -69,7 +70,7 @@ class FleetAdapter:
     def connect(self) -> bool:
         """Join RMF. Return False if RMF has no schedule node. The whole process waits for up to MAKE_S.
 
-        Raises TransportError if RMF's adapter refuses the fleet's files.
+        Raises TransportError if RMF's adapter refuses the fleet's configuration or navigation graph.
         """
         easy = self._rmf.easy_full_control
         files = self._site.config_file, self._site.graph_file
@@ -94,7 +95,8 @@ class FleetAdapter:
         return True
 
     def update(self, name: str, report: RobotReport) -> None:
-        """Pass a robot's report to RMF: first the robot's place, and then the end of its command."""
+        """Pass a robot's report to RMF: first the robot's position, and then whether its command has
+        ended."""
         if self._fleet is None:
             return
         if name not in self._robots:

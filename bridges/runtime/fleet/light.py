@@ -1,10 +1,15 @@
-"""One robot at RMF's traffic light: its path is told, and RMF's answers go to the robot's core.
+"""One robot that RMF controls with a traffic light. We tell RMF the robot's path, and pass RMF's
+answers to the robot's core.
 
-Two facts of RMF's EasyTrafficLight shape this file (open-rmf/rmf_ros2, EasyTrafficLight.cpp, jazzy and
-main). Its Python binding keeps Python's lock while a question waits for the light's own lock, and RMF
-may hold that one while it waits for Python's, to call `pause`. Then the whole process stands, until
-systemd's watchdog ends it. So RMF is asked seldom. And RMF never calls `resume`, nor its callback for
-deadlocks: the answers to our questions are all that it says.
+Two facts about RMF's EasyTrafficLight shape this file (open-rmf/rmf_ros2, EasyTrafficLight.cpp, jazzy
+and main):
+
+- A question to RMF may block the whole process, because two locks can block each other. The Python
+  binding holds Python's global lock while a question waits for the light's lock. RMF may hold the
+  light's lock while it waits for Python's lock to call `pause`. Then the process stands still until
+  systemd's watchdog ends it. Therefore we seldom ask.
+- RMF never calls `resume`, and never calls its callback for deadlocks. Therefore only the answers to
+  our questions tell us when the robot may go on.
 """
 
 import datetime
@@ -18,10 +23,11 @@ from bridges.kinds.fleet.signals import LightAnswer, Pose, Says
 from bridges.runtime.fleet.robot import AGAIN_S, Put
 
 ASKS_S: Final = 0.5
-"""The pause (s) between two questions about unchanged progress."""
-NO_LIGHT: Final = "RMF's schedule has given it no traffic light yet"
+"""The pause (s) between two questions while the robot's progress is unchanged."""
+NO_LIGHT: Final = "RMF's schedule has not given the robot a traffic light yet"
 TAKES_S: Final = 3.0
-"""The time (s) that RMF may need to take a path. Until then it answers with an error."""
+"""The time (s) that RMF may need to accept a path. Before it has accepted the path, RMF answers with an
+error."""
 ANSWERS: Final[Mapping[str, Says]] = {
     "ContinueAtNextCheckpoint": "continue",
     "WaitAtNextCheckpoint": "wait",
@@ -35,7 +41,7 @@ NO_DELAY: Final = datetime.timedelta()
 
 
 class RmfLight:
-    """One robot at RMF: its traffic light, and the last answer."""
+    """One robot that RMF controls with a traffic light, and RMF's last answer."""
 
     def __init__(self, name: str, rmf: Any, answers: Put, fleet: str) -> None:
         self.handle: Any = None
@@ -47,7 +53,8 @@ class RmfLight:
         self._said: LightAnswer | None = None
 
     def add(self, adapter: Any, configuration: Any, report: RobotReport) -> str:
-        """Ask for a traffic light; return why there is none for long, or ""."""
+        """Ask for a traffic light. Return an explanation if RMF has not given one for AGAIN_S,
+        otherwise ""."""
         now = time.monotonic()
         if self._asked_for_at is None:
             self._asked_for_at = now
@@ -58,7 +65,8 @@ class RmfLight:
         return NO_LIGHT if now >= self._asked_for_at + AGAIN_S else ""
 
     def update(self, report: RobotReport) -> None:
-        """Ask RMF about the robot's progress, if it is time."""
+        """Tell RMF the robot's progress, and pass on its answer. Do nothing if no progress was made and
+        ASKS_S has not passed."""
         asks = report.light
         if asks is None:
             return
@@ -69,7 +77,7 @@ class RmfLight:
         if not asks.path:
             self._path = 0
             self.handle.update_idle_location(asks.here.map, _vector(asks.here))
-        elif asks.number != self._path:  # RMF takes a path later, on a thread of its own
+        elif asks.number != self._path:  # RMF accepts the path later, on its own thread
             self._path, self._said, self._taken_at = asks.number, None, now + TAKES_S
             self.handle.follow_new_path([self._waypoint(at) for at in asks.path])
         else:
@@ -95,13 +103,14 @@ class RmfLight:
         self.handle = handle
 
     def _pause(self) -> None:
-        """Take RMF's call, on RMF's thread: the last answer has changed to `pause`."""
+        """Pass on that the robot must pause. RMF calls this method on its own thread, between two
+        questions."""
         if (last := self._said) is not None:
             self._tell(LightAnswer(last.path, last.checkpoint, "pause"))
 
 
 def _ignore() -> None:
-    """Take RMF's resume, which is not needed: a resume comes as an answer."""
+    """Ignore RMF's call of `resume`, because RMF's answers already say when the robot may go on."""
 
 
 def _vector(at: Pose) -> list[float]:

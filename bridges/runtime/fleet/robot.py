@@ -1,4 +1,6 @@
-"""One robot at RMF's adapter: its handle, its present execution, its commission and its issues.
+"""One robot in RMF's adapter. This module keeps the adapter's handle for the robot, and the activity
+that the robot now executes. It also reports the robot's issues, and whether the robot accepts tasks
+(its commission).
 
 RMF's adapter calls our callbacks on its own threads. A callback only puts an order into the inbox of
 the robot's bus.
@@ -14,8 +16,8 @@ from bridges.kinds.fleet.report import RobotReport
 from bridges.kinds.fleet.signals import Act, Goal, Localize, Navigate, Order, Pose, Stop
 
 GIVEN_UP_S: Final = 2.0
-"""The time (s) between RMF's end of an activity and our stop of the robot. RMF often orders the next
-activity a moment later, and then the robot must not stop."""
+"""The time (s) for which the robot may go on after RMF has ended its activity. Often RMF orders the
+next activity a moment later, and then the robot must not stop."""
 AGAIN_S: Final = 10.0
 """The pause (s) before the next attempt, after RMF has not taken a robot."""
 NOT_TAKEN: Final = "RMF does not take the robot: is it near a lane, on a level of the graph?"
@@ -23,7 +25,7 @@ Put = Callable[[str, Order], None]
 
 
 class RmfRobot:
-    """One robot at RMF's adapter: its handle, its present execution, and its issues."""
+    """One robot in RMF's adapter."""
 
     def __init__(self, name: str, rmf: Any, orders: Put, numbers: Iterator[int]) -> None:
         self.handle: Any = None
@@ -37,7 +39,8 @@ class RmfRobot:
         self._again_at = 0.0
 
     def add(self, fleet: Any, configuration: Any, report: RobotReport) -> str:
-        """Add the robot at its first place. Return the reason why RMF did not take the robot, or ""."""
+        """Add the robot to RMF at its first known position. Return the reason why RMF did not accept
+        the robot, or ""."""
         if report.at is None or time.monotonic() < self._again_at:
             return "" if report.at is None else NOT_TAKEN
         self._again_at = time.monotonic() + AGAIN_S
@@ -87,7 +90,7 @@ class RmfRobot:
         if fit == self._fit:
             return
         self._fit = fit
-        if fit:  # as before the fault: somebody else may have decommissioned the robot
+        if fit:  # restore: somebody may have decommissioned the robot before the fault
             more.set_commission(self._commissioned)
             return
         self._commissioned, none = more.commission(), more.commission()

@@ -1,5 +1,5 @@
-"""The service of a fleet. The robots are on buses, as devices are. RMF's adapter takes the place of
-topics."""
+"""The service of a fleet. The robots are on buses, as other devices are. RMF's fleet adapter, and not
+ROS topics, brings the requests."""
 
 import itertools
 import logging
@@ -40,8 +40,11 @@ LOOK_S: Final = 0.5
 
 
 class RobotNode(Node[Any, Any, Any, Any, Any, Any, RobotReport]):
-    """The node of one robot. The robot's report goes to RMF's adapter. `told`: the last states of the
-    fleet's robots, if RMF's adapter publishes none. `tell()` publishes them."""
+    """The node of one robot. The robot's report goes to RMF's adapter.
+
+    With a traffic light RMF's adapter publishes no states of the fleet, so the nodes do this. `told`
+    has the last state of each robot, and `tell()` publishes these states.
+    """
 
     adapter: FleetAdapter
     told: dict[str, RobotState]
@@ -60,7 +63,7 @@ class RobotNode(Node[Any, Any, Any, Any, Any, Any, RobotReport]):
 
 
 class Joining:
-    """The thread that joins RMF. It tries again until RMF's schedule node is there."""
+    """The thread that joins RMF. It tries again until RMF's schedule node answers."""
 
     name = "rmf-adapter"
 
@@ -75,7 +78,7 @@ class Joining:
         self._again_at = AGES_AGO
 
     def round(self) -> None:
-        """Join RMF, if an attempt is due. The daemon is ready without RMF."""
+        """Join RMF, if an attempt is due. The daemon starts to serve even if RMF cannot be joined."""
         now = self._clock.monotonic()
         self.wake_at = now + LOOK_S
         if self.joined or now < self._again_at:
@@ -114,8 +117,8 @@ class FleetDevices(Devices):
         *,
         rmf: Any,
     ) -> None:
-        """Prepare the service. `rmf`: an object that stands in for the module `rmf_adapter`, or None
-        for that module.
+        """Prepare the service. `rmf`: an object that replaces the module `rmf_adapter` in a simulation.
+        If it is None, the real module is used.
 
         Raises SettingsError for an error in RMF's files, and TransportError if the module is missing.
         """

@@ -28,9 +28,10 @@ SETTINGS = ("setting", "value", "not the default")
 class Part(msgspec.Struct, frozen=True, kw_only=True):
     """One controller: its name, its bus and its tables.
 
-    `device`: the device's name, or the kind's name if the kind has no devices. `bus`: the name of the
-    device's bus, "" without a bus. `tables`: first the wires, or the commands and readings, then all
-    other tables.
+    - `device`: the device's name, or the kind's name if the kind has no devices
+    - `bus`: the name of the device's bus, or "" without a bus
+    - `tables`: the table of the wires (or of the commands and readings) first, and then all other
+      tables
     """
 
     device: str
@@ -39,7 +40,8 @@ class Part(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BusShown(msgspec.Struct, frozen=True, kw_only=True):
-    """One bus, its settings, and its own tables, such as the values written to a module's watchdog."""
+    """One bus, its settings, and its own tables. One such table has the values that are written to a
+    module's watchdog."""
 
     name: str
     type: str
@@ -48,10 +50,11 @@ class BusShown(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Findings(msgspec.Struct, frozen=True, kw_only=True):
-    """One file: its contents if the file is valid, and its errors and warnings.
+    """One file, with its errors and warnings. The other fields are filled only if the file is valid.
 
-    `sha256`: the hash of the file's bytes. A signed sheet identifies the file by this hash. `rmf`: the
-    domain, transport and release, and the names of the topics. `notes`: further facts for the user.
+    - `sha256`: the hash of the file's bytes. A signed sheet identifies the file by this hash.
+    - `rmf`: the domain, transport and release, and the names of the topics
+    - `notes`: further facts for the user
     """
 
     file: str
@@ -106,7 +109,7 @@ def _rmf(config: Config) -> dict[str, str]:
 
 
 def _published(config: Config) -> list[Topic[Message]]:
-    """List the topics on which the file's devices publish, without the state topics."""
+    """List the topics on which the file's devices publish, except the topics of their states."""
     kind = kind_called(config.kind)
     if isinstance(kind, GraphKind):
         return [*kind.publishes]
@@ -116,7 +119,7 @@ def _published(config: Config) -> list[Topic[Message]]:
 
 def _lacking(config: Config) -> list[str]:
     """Describe each message that RMF's release lacks, and its substitute."""
-    untold = {s.alarm for s in config.devices.values() if _tells_nobody(s)}  # a note says so
+    untold = {s.alarm for s in config.devices.values() if _tells_nobody(s)}  # a note tells this
     topics = (topic for topic in _published(config) if topic.name not in untold)
     lines = (fallbacks.remarks(topic, config.rmf.release) for topic in topics)
     return list(dict.fromkeys(line for topic in lines for line in topic))
@@ -169,7 +172,7 @@ def _settings(settings: object) -> Table:
 def _row(config: Config, bus: str, wire: Wire, late_s: float) -> tuple[str, ...]:
     """Return a wire's row: the bus's description of the point, the YAML's spelling, and the meaning.
 
-    `bus`: the device's own bus. `late_s`: the time (s) by which the debounce of each input is longer
+    `bus`: the device's own bus. `late_s`: the time (s) that is added to the debounce of each input
     (`Config.debounce`).
     """
     point = config.bus_type(wire.bus or bus).describe(wire.point)

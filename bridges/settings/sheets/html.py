@@ -111,7 +111,7 @@ def _table(table: Table, seen: bool = False) -> Iterator[str]:
 
 
 def _block(table: Table) -> Iterator[str]:
-    """Yield a table that stays in one column of the page."""
+    """Yield a table that is not split between two columns of the page."""
     yield "<div>"
     yield from _table(table)
     yield "</div>"

@@ -37,8 +37,8 @@ def _pairs(settings: Mapping[str, str], between: str = ", ") -> str:
 
 
 def _wiring(parts: Sequence[Part], columns: int) -> Iterator[str]:
-    """Yield the wires of all devices of a bus in one table. A second table has the messages of devices
-    without wires."""
+    """Yield one table with the wires of all devices of a bus. For devices without wires, yield a table
+    with their messages on the bus."""
     for title in (WIRES, MEANINGS):
         found = [(p.device, table) for p in parts for table in p.tables if table.title == title]
         headings = [("device", *table.headings) for _, table in found[:1]]

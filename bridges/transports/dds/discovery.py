@@ -1,8 +1,8 @@
 """Shows our endpoints as a named node on the ROS graph, through the topic `ros_discovery_info`.
 
 DDS has participants, readers and writers, but no nodes. On this topic each ROS participant publishes
-which node owns each of its readers and writers. Late joiners receive the message too. Without this
-topic `ros2 node list` shows our endpoints under `_CREATED_BY_BARE_DDS_APP_`.
+its nodes, and the readers and writers of each node. Nodes that join later receive this message too.
+Without this message `ros2 node list` shows our endpoints under `_CREATED_BY_BARE_DDS_APP_`.
 
 Source: ros2/rmw_dds_common, msg/*.msg, as rmw_cyclonedds and rmw_fastrtps publish them.
 """
@@ -51,7 +51,8 @@ class ParticipantEntitiesInfo(IdlStruct, typename=PACKAGE + "ParticipantEntities
 
 
 class NodeOnGraph:
-    """The node of a participant. Each change of its endpoints publishes the node again."""
+    """The node of a DDS participant. After each change of its endpoints, the list of its endpoints is
+    published again."""
 
     def __init__(self, participant: DomainParticipant, node_name: str) -> None:
         self._node = NodeEntitiesInfo("/", node_name, [], [])
@@ -79,7 +80,8 @@ class NodeOnGraph:
         self.writer.write(self._info)
 
     def listen(self) -> DataReader:
-        """Begin to listen for the owners of writers. Each participant's last message arrives too."""
+        """Begin to listen for the owners of writers. The last message of each participant arrives at
+        once."""
         self.reader = DataReader(self._participant, self.topic, qos=_qos(MOST_PARTICIPANTS))
         return self.reader
 

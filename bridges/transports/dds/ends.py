@@ -1,7 +1,7 @@
-"""The ends of the `dds` transport, which are its publishers and subscriptions.
+"""The ends of the `dds` transport. An end is a publisher or a subscription.
 
-An end outlives its DDS writer or reader. When the transport joins again, the end gets a new writer or
-reader.
+The transport may leave the ROS graph and join it again, for example when the network changes. The end
+remains, but its DDS writer or reader is replaced by a new one.
 """
 
 import threading
@@ -29,8 +29,8 @@ from bridges.transports.senders import Senders
 from bridges.transports.transport import Receive, TransportError
 
 WRITE_BLOCKS_NS: Final = 20_000_000
-"""The longest time (ns) for which a writer waits for a peer. The time is shorter than a scan, because
-the writer holds Python's lock."""
+"""The longest time (ns) for which a writer waits for a peer. It must be shorter than a scan, because
+the writer holds Python's global lock while it waits."""
 AT_ONCE: Final = 100
 """The maximum number of samples from one subscription before the other subscriptions have their
 turn."""
@@ -38,7 +38,8 @@ POLICIES: Final = {2: "durability", 11: "reliability", 23: "data representation"
 
 
 class DdsPublisher:
-    """The publisher of one topic. `withdraw(publisher, writer)` takes the writer off the graph."""
+    """The publisher of one topic. `withdraw(publisher, writer)` removes the writer from the ROS
+    graph."""
 
     def __init__(
         self,
@@ -66,7 +67,7 @@ class DdsPublisher:
         return self._writer
 
     def drop(self) -> None:
-        """Note that the writer and its participant are gone."""
+        """Forget the writer, because its participant has been deleted."""
         self._writer = None
 
     def send_retained(self) -> None:
@@ -96,7 +97,7 @@ class DdsPublisher:
             return 0
 
     def close(self) -> None:
-        """Take this end off the graph."""
+        """Remove this publisher from the ROS graph."""
         self._withdraw(self, self._writer)
 
     def _write(self, message: Message) -> None:
@@ -129,7 +130,7 @@ class DdsSubscription:
         self.topic = topic
         self._owners = owners
         self._senders = senders
-        self._finds_node = self._node_of  # bound once, because many messages need it
+        self._finds_node = self._node_of  # bound once, because each message needs it
         self._others_only = others_only
         self._reader: DataReader = None
         self._received = received
@@ -147,7 +148,7 @@ class DdsSubscription:
         return self._reader
 
     def drop(self) -> None:
-        """Note that the reader and its participant are gone."""
+        """Forget the reader, because its participant has been deleted."""
         self._reader = None
 
     def matched(self) -> int:
@@ -224,8 +225,8 @@ def _log_misfit(topic: AnyTopic, text: str, status: _Misfits, peers: Peers) -> N
 def _writer_qos(qos: topics.Qos, hashed: str) -> Qos:
     if qos.durability == "volatile":
         return Qos(Policy.Durability.Volatile, *_policies(qos, hashed))
-    # A late joiner gets the history of the durability service. By default this history has only the
-    # last message.
+    # A node that joins late gets its history from the durability service. By default this service keeps
+    # only the last message, so its depth is set too.
     retained = Policy.DurabilityService(0, Policy.History.KeepLast(qos.depth), -1, -1, -1)
     return Qos(Policy.Durability.TransientLocal, retained, *_policies(qos, hashed))
 

@@ -1,10 +1,11 @@
 """The types of `definitions.py` for cyclonedds. Each type has a class with the type's name and fields.
 
-cyclonedds announces these names and fields to other nodes. Its C library refuses samples that do not
-fit them.
+cyclonedds announces these names and fields to other nodes. Its C library refuses a sample that does not
+fit the announced fields.
 
-cyclonedds also calls these classes to encode and decode samples. The classes use `cdr.py`. Converting
-each message to another Python object would take five times as long.
+cyclonedds also calls these classes to encode and decode samples. The classes do this with `cdr.py`, and
+keep the decoded message. Converting the message to one of cyclonedds's own objects would take five
+times as long.
 """
 
 import types
@@ -60,8 +61,8 @@ def _make(message_type: type, release: Release) -> type[IdlSample]:
 
 
 def _calls(message_type: type, release: Release) -> dict[str, object]:
-    """Return the methods that cyclonedds calls. cyclonedds gives the encoding in `options`. The methods
-    ignore `options`, because each sample states its encoding too."""
+    """Return the methods that cyclonedds calls. cyclonedds passes the encoding in `options`, but the
+    methods do not need it, because each sample also names its encoding."""
 
     def __init__(self: IdlSample, message: Message) -> None:
         self.message = message
@@ -73,8 +74,8 @@ def _calls(message_type: type, release: Release) -> dict[str, object]:
         return cls(cdr.decode(message_type, sample, release))
 
     def deserialize_key(cls: type[IdlSample], sample: bytes, /, **options: object) -> None:
-        """Do nothing. cyclonedds calls this method when a writer has gone, but RMF's types have no
-        keys."""
+        """Do nothing. cyclonedds calls this method for the key of a sample when its writer has left.
+        RMF's types have no keys."""
 
     return {
         "__init__": __init__,

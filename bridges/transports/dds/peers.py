@@ -1,5 +1,5 @@
-"""The announcements of ends on a DDS graph. An announcement has the topic and the type. Its user data
-have the type hash."""
+"""The announcements with which DDS makes ends known. An end is a publisher or a subscription. An
+announcement has the topic, the type, and the type hash in its user data."""
 
 import re
 import threading
@@ -39,9 +39,9 @@ class BuiltinReader(builtin.BuiltinDataReader):  # type: ignore[misc] # noqa: TI
     """A reader of announcements of participants and ends. Only one thread of the process may read at a
     time.
 
-    cyclonedds reads each announced QoS into the same variables (11.0.1, qos._CQos._gc_*). If two
-    threads read at once, an end gets another end's user data. A process may have several nodes, and
-    each node has its own thread.
+    cyclonedds reads the QoS of each announcement into the same variables (11.0.1, qos._CQos._gc_*). If
+    two threads read at the same time, an end gets another end's user data. This can happen, because a
+    process may have several nodes, each with its own thread.
     """
 
     def take(self, count: int) -> list[Any]:
@@ -59,7 +59,7 @@ class DdsPeers:
         self._readers: list[tuple[bool, BuiltinReader]] = []
 
     def join(self, participant: DomainParticipant) -> list[BuiltinReader]:
-        """Make and return new readers. The caller waits for them and deletes them."""
+        """Make and return new readers. The caller waits for their data and deletes them."""
         topics = (builtin.BuiltinTopicDcpsSubscription, builtin.BuiltinTopicDcpsPublication)
         readers = [BuiltinReader(participant, topic) for topic in topics]
         self._readers = list(enumerate(readers))  # type: ignore[arg-type]

@@ -43,15 +43,15 @@ log = logging.getLogger(__name__)
 E = TypeVar("E", bound=core.Entity)
 
 CANNOT_JOIN: Final = (
-    "is a network interface up, and does CYCLONEDDS_URI, if set, name an interface that exists? "
-    "`network: localhost` needs no network. Is the clock after 1970? Cannot join DDS domain"
+    "is a network interface up? Does CYCLONEDDS_URI, if set, name an interface that exists? Is the "
+    "clock after 1970? `network: localhost` needs no network. Cannot join DDS domain"
 )
 LOOK_EVERY_NS: Final = int(LOOK_EVERY_S * 1e9)
 ANY_SAMPLE: Final = core.SampleState.Any | core.ViewState.Any | core.InstanceState.Any
 ERRORS: Final = 1 | 2
-"""The categories that Cyclone may log, which are errors and fatal errors. Anybody can send malformed
-datagrams, and Cyclone would log a warning for each. Neither its Python binding nor its configuration
-can turn warnings off."""
+"""The categories of messages that Cyclone may log, which are errors and fatal errors. Warnings are left
+out, because anybody can send malformed datagrams, and Cyclone would log a warning for each. Neither
+its Python binding nor its configuration can turn warnings off."""
 
 _domains: WeakValueDictionary[tuple[int, str], Domain] = WeakValueDictionary()
 _domains_lock = threading.Lock()
@@ -60,12 +60,13 @@ _domains_lock = threading.Lock()
 class DdsTransport(Threaded):
     """One node: a participant, its reader thread, its publishers and its subscriptions.
 
-    `loopback`: stay on this machine, even if CYCLONEDDS_URI says otherwise. `release`: the release to
-    speak, or None to follow RMF's release. Raises TransportError if the node cannot join the domain.
+    `loopback`: stay on this machine, even if CYCLONEDDS_URI says otherwise. `release`: the RMF release
+    whose messages the node uses, or None to use the release of RMF's own nodes. Raises TransportError
+    if the node cannot join the domain.
 
     The node joins the graph again when the wall clock is set back. Without `loopback` it also joins
-    again when the machine's addresses change. The ends stay the same, and publishers repeat their
-    retained messages.
+    again when the machine's addresses change. The caller keeps its publishers and subscriptions, and
+    publishers repeat their retained messages.
     """
 
     speaks = "dds"
@@ -123,8 +124,8 @@ class DdsTransport(Threaded):
         return subscription
 
     def close(self) -> None:
-        """Leave the graph at once. Delete each entity now, because the garbage collector may come too
-        late."""
+        """Leave the graph at once. Delete each DDS entity now, because the garbage collector may delete
+        it much later."""
         with self._lock:
             if self._closed:
                 return
@@ -228,8 +229,8 @@ class DdsTransport(Threaded):
     def _follow_release(self) -> None:
         """Adopt RMF's release. Join again if one of our messages differs in this release.
 
-        Meanwhile the lock keeps other threads from declaring an end. Such an end would keep its type of
-        the earlier release for ever.
+        Meanwhile the lock keeps other threads from declaring a publisher or subscription. Otherwise it
+        would keep the message type of the earlier release.
         """
         with self._lock:
             before, changed = self.release, self._peers.settle()
@@ -282,8 +283,8 @@ class DdsTransport(Threaded):
 
 
 def _shared_domain(domain_id: int, configuration: str) -> Domain:
-    """Return this process's domain with this configuration. Participants share the domain, because a
-    process can open a domain only once."""
+    """Return the domain object of this process for this configuration. All participants share the
+    object, because a process can open a domain only once."""
     key = domain_id, configuration
     with _domains_lock:
         domain = _domains.get(key)

@@ -1,7 +1,8 @@
-"""The ends of the `ros2` transport, which are its publishers and subscriptions.
+"""The ends of the `ros2` transport. An end is a publisher or a subscription.
 
-An end outlives rclpy's publisher or subscription. When the transport joins again, the end gets a new
-rclpy object. rclpy's callbacks run in the transport's thread, and only deliver the message.
+The transport may leave the ROS graph and join it again, for example when the network changes. The end
+remains, but its rclpy object is replaced by a new one. rclpy's callbacks run in the transport's thread,
+and only deliver the message.
 """
 
 import threading
@@ -31,16 +32,17 @@ from bridges.transports.ros2.types import ros_type
 from bridges.transports.transport import Receive, TransportError
 
 UNHEARD: Final = 256
-"""The maximum number of our own messages that may be on their way back to us. It is more than twice the
-depth of any topic."""
+"""The maximum number of our own messages that we have sent, but that have not yet come back to our own
+subscription. It is more than twice the depth of any topic."""
 YIELD_S: Final = 50e-6
-"""The pause (s) after a callback. The callback's message wakes another thread, which can run during
-this pause. After the pause rclpy's executor holds Python's lock for a while."""
+"""The pause (s) after a callback. The callback wakes another thread, which needs Python's global lock
+to handle the message. The pause releases this lock. Without the pause, rclpy's executor would keep
+it for a while."""
 
 
 class Ends:
-    """The ends of one node. A publisher and an `others_only` subscription of the node must not hear
-    each other."""
+    """The ends of one node. An `others_only` subscription must not receive messages of the node's own
+    publishers."""
 
     def __init__(self, release: Release) -> None:
         self.release = release
@@ -52,8 +54,8 @@ class Ends:
         yield from self.subscriptions
 
     def heard_back(self, topic: AnyTopic) -> "list[Ros2Subscription]":
-        """Return this node's subscriptions that would hear our own messages on the topic, but must not
-        hear them."""
+        """Return this node's subscriptions that must ignore our own messages on the topic, although DDS
+        delivers these messages to them."""
         return [end for end in self.subscriptions if end.others_only and end.would_hear(topic)]
 
     def unheard_publishers(self, subscription: "Ros2Subscription") -> int:
@@ -99,7 +101,7 @@ class Ros2Publisher:
             self._write(message)
 
     def drop(self) -> None:
-        """Forget rclpy's publisher, because nobody uses it any more."""
+        """Forget rclpy's publisher. Its node has already been removed."""
         with self._using:
             self._end = None
 
@@ -119,8 +121,8 @@ class Ros2Publisher:
         self._write(message)
 
     def matched(self) -> int:
-        """Return the number of subscriptions that hear this publisher, without this node's own
-        `others_only` subscriptions. Return 0 after `close`."""
+        """Return the number of subscriptions that receive this publisher's messages. Do not count this
+        node's own `others_only` subscriptions. Return 0 after `close`."""
         with self._using:
             try:
                 count = int(self._end.get_subscription_count()) if self._end else 0
@@ -129,7 +131,7 @@ class Ros2Publisher:
         return max(0, count - len(self._ends.heard_back(self.topic)))
 
     def close(self) -> None:
-        """Take this end off the graph."""
+        """Remove this publisher from the ROS graph."""
         self._withdraw(self)
 
     def _write(self, message: Message) -> None:
@@ -148,9 +150,9 @@ class Ros2Publisher:
 class Ros2Subscription:
     """The subscription of one topic. `dropped`: the number of invalid samples, by the topic's name.
 
-    `said`: this node's own messages that have not come back yet, for an `others_only` subscription.
-    When such a message comes back, it is skipped. rclpy (Jazzy) has no option for this, and does not
-    tell who sent a sample.
+    `said`: the messages that this node has published itself, and that DDS has not yet delivered to this
+    subscription. An `others_only` subscription skips such a message when it arrives. rclpy (Jazzy) has
+    no option for this, and does not name the sender of a sample.
     """
 
     def __init__(
@@ -189,7 +191,7 @@ class Ros2Subscription:
             self._end, self._node = made, node
 
     def drop(self) -> None:
-        """Forget rclpy's subscription, because nobody uses it any more."""
+        """Forget rclpy's subscription. Its node has already been removed."""
         with self._using:
             self._end = self._node = None
 

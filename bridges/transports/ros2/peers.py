@@ -1,4 +1,5 @@
-"""The types and type hashes of other nodes' ends on our topics, as rclpy reports them."""
+"""The types and type hashes with which other nodes publish or subscribe to our topics, as rclpy reports
+them."""
 
 from collections.abc import Iterable, Sequence
 from typing import Protocol

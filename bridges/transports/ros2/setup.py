@@ -3,8 +3,8 @@
 rclpy needs the paths that the setup file sets. Without these paths, `transport: auto` would choose
 another transport under systemd than in a shell.
 
-The daemon's process becomes a shell. The shell sources the file, and then becomes the daemon again. So
-the process id stays the same, which systemd knows.
+The daemon's process executes a shell in its place. The shell sources the file, and then executes the
+daemon again. So the process id stays the same, and systemd still watches the right process.
 """
 
 import logging
@@ -23,8 +23,8 @@ SHELL = 'setup=$1; shift; ours=("$@"); set --; . "$setup"; exec "${ours[@]}"'
 
 
 def sourcing(rmf: Rmf, environ: Mapping[str, str], argv: Sequence[str]) -> list[str]:
-    """Return the command that this process must become. Return an empty list if there is no file to
-    source.
+    """Return the shell command that this process must execute. Return an empty list if no setup file
+    must be sourced.
 
     `argv`: `sys.orig_argv`. Raises TransportError for a missing file, if the YAML says `transport:
     ros2`.

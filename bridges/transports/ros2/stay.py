@@ -1,8 +1,8 @@
-"""One stay of a node on ROS 2's graph. A stay has rclpy's context, node and executor until the node
-leaves.
+"""One stay of a node on the ROS graph, from joining to leaving. A stay owns rclpy's context, node and
+executor.
 
-An RMW reads the machine's network only when a context's node joins. So after a change of address the
-transport leaves the graph, and joins again with a new stay.
+ROS's middleware (RMW) reads the machine's network only when a node joins. Therefore, after a change of
+the machine's address, the transport leaves the graph and joins again with a new stay.
 """
 
 import os
@@ -29,16 +29,17 @@ FAST_DDS_SPEAKS: Final = "FASTDDS_BUILTIN_TRANSPORTS"
 """The environment variable for Fast DDS's transports. Its value UDPv4 excludes shared memory. Over
 shared memory, nodes of two users or containers find each other, but do not hear each other.
 
-`LOCALHOST` brings shared memory back (rmw_fastrtps, participant.cpp). A profile that names transports
-takes precedence over this variable.
+ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST adds shared memory again (rmw_fastrtps, participant.cpp). A Fast
+DDS profile that names transports takes precedence over this variable.
 """
 REFUSALS: Final = (RuntimeError, NameValidationException)
-"""rclpy's exceptions for a refusal. RCLError and InvalidHandle are RuntimeErrors too."""
+"""The exceptions with which rclpy refuses a request. RCLError and InvalidHandle are RuntimeErrors
+too."""
 
 
 class Stay:
-    """A node on the graph. If the node cannot join, the constructor removes it and raises one of
-    REFUSALS."""
+    """A node on the ROS graph. If the node cannot join, the constructor removes what it has made, and
+    raises one of REFUSALS."""
 
     def __init__(
         self, name: str, domain_id: int, *, loopback: bool, ros_args: Sequence[str]
@@ -80,7 +81,7 @@ class Stay:
             name,
             context=self._context,
             enable_rosout=False,
-            start_parameter_services=False,  # no parameter may change a daemon's clock
+            start_parameter_services=False,  # nobody may change a daemon's clock by a parameter
         )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)

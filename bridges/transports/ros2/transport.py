@@ -1,11 +1,12 @@
-"""The `ros2` transport, an ordinary ROS 2 node with rclpy. It works with any installed RMW.
+"""The `ros2` transport, an ordinary ROS 2 node with rclpy. It works with any installed middleware
+(RMW).
 
 As on `dds`, samples pass through the library as bytes, and `cdr.py` encodes and decodes them. Invalid
 samples are dropped and counted. A thread of this transport runs rclpy's executor.
 
 When the machine's addresses change or its wall clock is set back, this thread leaves the graph. Then it
-joins again with the same ends. After a step of the clock only Cyclone needs to join again. For another
-RMW this is only a short interruption.
+joins again with the same publishers and subscriptions. After a step of the clock this is necessary only
+with Cyclone. With another RMW it only causes a short interruption.
 
 Source: rclpy 7.1 (ROS 2 Jazzy), its public API. Only this file, `stay.py` and `ends.py` import rclpy.
 Only `types.py` imports the message packages, and only `choose.py` imports this file.
@@ -68,8 +69,8 @@ class Ros2Transport(Threaded):
         self.name = self.node.get_name()
         self._start(self._spin, "ros2")
         self._watch_clock()
-        # An executor's thread that runs at exit aborts the interpreter. This could happen after a
-        # failed start.
+        # If the executor's thread still runs when the interpreter exits, the interpreter aborts. This
+        # could happen after a failed start.
         atexit.register(self.close)
 
     @property
@@ -81,8 +82,8 @@ class Ros2Transport(Threaded):
         return self._stay.node
 
     def publisher(self, topic: AnyTopic) -> Ros2Publisher:
-        """Declare a publisher with `topic.publish` QoS. Raises TransportError, such as for a missing
-        ROS package."""
+        """Declare a publisher with `topic.publish` QoS. Raises TransportError, for example if a ROS
+        package is missing."""
         publisher = Ros2Publisher(topic, self._ends, lambda: self.lives, self._withdraw)
         with self._lock, self._reporting(f"topic {topic.name} cannot be published"):
             if self._stay is not None:
@@ -121,7 +122,8 @@ class Ros2Transport(Threaded):
         return float(self._clock.now().nanoseconds * 1e-9)
 
     def close(self) -> None:
-        """Leave the graph at once, so that no ghost endpoint remains. A second call does nothing."""
+        """Leave the graph at once, so that other nodes do not still see a dead endpoint. A second call
+        does nothing."""
         with self._lock:
             if self._closed:
                 return
@@ -137,7 +139,7 @@ class Ros2Transport(Threaded):
             self._stay.leave_soon()
 
     def _join(self) -> None:
-        """Join with a new stay. Raises one of REFUSALS."""
+        """Join the ROS graph with a new `Stay`. Raises one of REFUSALS."""
         self._addresses = addresses.addresses()
         self._stay = Stay(
             self._asked_name, self.domain_id, loopback=self._loopback, ros_args=self._ros_args

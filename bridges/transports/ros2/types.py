@@ -1,8 +1,8 @@
 """The types of `definitions.py` for rclpy, which are the classes of the installed ROS packages.
 
 Samples pass through rclpy as bytes (`transport.py`), so these classes only name the types. This file
-compares the classes' fields with `definitions.py`. Otherwise bytes of another definition could be
-misread.
+compares the classes' fields with `definitions.py`. Without this comparison, the bytes of a message with
+other fields could be misread.
 """
 
 import importlib
@@ -14,7 +14,7 @@ from bridges.messages.releases import DEFAULT, DIFFERING, NEWEST, RELEASES, Rele
 from bridges.transports.transport import TransportError
 
 NAMES = {str: "string", bool: "boolean", "byte": "octet", "float32": "float", "float64": "double"}
-"""The IDL names of our types, as ROS's Python classes use them."""
+"""The IDL name of each of our types. ROS's Python classes use these names."""
 
 
 class RosMessage(Protocol):
@@ -25,15 +25,15 @@ class RosMessage(Protocol):
 
 
 def installed() -> Release:
-    """Return the release of the installed RMF message packages. Return the default release if no
-    release fits."""
+    """Return the release to which the installed RMF message packages belong. Return the default release
+    if they belong to no known release."""
     fitting = (one for one in RELEASES.values() if all(_fits(kind, one) for kind in DIFFERING))
     return next(fitting, DEFAULT)
 
 
 def _fits(message_type: type, release: Release) -> bool:
-    """Return whether the installed package and the release define this message in the same way. Return
-    True also if neither has the message."""
+    """Return whether the installed package and the release define this message in the same way. Also
+    return True if both lack the message."""
     try:
         module = importlib.import_module(f"{PACKAGES[message_type]}.msg")
     except ImportError:
@@ -67,7 +67,7 @@ def ros_type(message_type: type, release: Release = NEWEST) -> type[RosMessage]:
     if list(theirs.items()) != list(ours.items()):
         raise TransportError(
             f"the installed {package}/{name} has the fields {theirs}; this version of rmf-bridge needs"
-            f" {ours}. `transport: dds` would not match such nodes either"
+            f" {ours}. `transport: dds` does not help, because it would not match such nodes either"
         )
     return found
 

@@ -1,6 +1,6 @@
-"""Keeps a node on this machine. If a router is linked to such a node, the node leaves the graph,
-because the router would forward its messages to other machines. The node returns some time after the
-router has gone."""
+"""Keeps a node on this machine. If a zenoh router connects to the node, the node leaves the ROS graph.
+Otherwise the router would forward the node's messages to other machines. The node returns
+GONE_AFTER_S after the router has disconnected."""
 
 import math
 from typing import Final
@@ -19,14 +19,14 @@ router that restarts needs a few seconds more.
 
 
 class Alone:
-    """The decision whether one node must be off the graph. `now`: the time (monotonic s)."""
+    """A rule that decides whether one node must be off the ROS graph. `now`: the time (monotonic s)."""
 
     def __init__(self) -> None:
         self._met_at = -math.inf
 
     def away(self, router: bool, now: float) -> bool:
-        """Return whether the node must be off the graph now. `router`: a router is linked to the
-        node."""
+        """Return whether the node must be off the graph now. `router`: Is a router connected to the
+        node?"""
         if router:
             self._met_at = now
         return router or now < self._met_at + GONE_AFTER_S

@@ -1,5 +1,5 @@
-"""Configurations of a zenoh session. One is rmw_zenoh's configuration with the YAML's settings. The
-other keeps a node on this machine.
+"""Two configurations of a zenoh session. The first is for the network: rmw_zenoh's configuration,
+changed by the YAML's settings. The second keeps a node on this machine.
 
 Source: ros2/rmw_zenoh, jazzy, DEFAULT_RMW_ZENOH_SESSION_CONFIG.json5; zenoh's DEFAULT_CONFIG.json5.
 """
@@ -12,23 +12,26 @@ from bridges.system import user_files
 from bridges.transports.transport import TransportError
 
 Configuration = dict[str, object]
-"""JSON values by the key in zenoh's configuration."""
+"""A mapping from keys of zenoh's configuration to their JSON values."""
 
 LOOPBACK_PORT: Final = 17400
-"""The port on which the nodes of domain 0 on this machine meet. Domain N uses this port number plus N.
+"""The port on which the nodes of domain 0 on this machine find each other. Domain N uses this port
+number plus N.
 
-Routers use another port (7447). The ports that Linux assigns by itself begin at 32768.
+The port collides neither with routers, which use 7447, nor with the ports that Linux assigns by itself,
+which begin at 32768.
 """
 RETRY: Final = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
 
 COMMON: Final[Configuration] = {
     "scouting/multicast/enabled": False,
-    "scouting/delay": 1,  # ms; scouting is off, so no node needs to wait for it
+    "scouting/delay": 1,  # ms; there is nothing to wait for, because scouting is off
     # zenoh's own clock panics at times before 1970. After a panic zenoh neither sends nor hears
-    # messages. Retained messages need no time, because they are ordered by their numbers.
+    # messages. Retained messages need no timestamps, because they are ordered by their numbers.
     "timestamping/enabled": False,
-    # This is the longest time (ms) for which a hung node can delay a fire alarm. New messages wait
-    # during the query for retained messages. rmw_zenoh would wait for ever.
+    # A subscription asks other nodes for retained messages, and new messages wait until they answer. So
+    # this is the longest time (ms) for which a node that hangs can delay a fire alarm. rmw_zenoh would
+    # wait for ever.
     "queries_default_timeout": 3000,
     "transport/shared_memory/enabled": False,
     "connect/timeout_ms": -1,
@@ -44,11 +47,11 @@ def is_local(endpoint: str) -> bool:
 
 
 def on_loopback(domain_id: int) -> list[Configuration]:
-    """Return configurations for a node that meets only this machine's nodes of its domain, and no
-    router. The caller tries the configurations in order.
+    """Return configurations for a node that connects only to nodes of its domain on this machine, and
+    to no router. The caller tries the configurations in order.
 
-    The first node listens on the domain's port, and introduces the later nodes to each other. A later
-    node keeps trying to connect to that port. So it also finds a node that takes over the port later.
+    The first node listens on the domain's port, and tells the later nodes of each other. A later node
+    keeps trying to connect to that port. So it also finds a node that takes over the port later.
     """
     meeting = f"tcp/127.0.0.1:{LOOPBACK_PORT + domain_id}"
     common = COMMON | {
@@ -70,7 +73,7 @@ def on_the_site(zenoh: Zenoh) -> Configuration:
         wanted["listen/endpoints"] = list(zenoh.listen)
         wanted["listen/exit_on_failure"] = True
     else:
-        wanted["connect/timeout_ms"] = 0  # a client's session opens without a router
+        wanted["connect/timeout_ms"] = 0  # a client fails at once if no router answers
     try:
         return wanted | _tls(zenoh.tls) | _user(zenoh)
     except user_files.SecretError as error:
@@ -80,11 +83,11 @@ def on_the_site(zenoh: Zenoh) -> Configuration:
 def mode(zenoh: Zenoh) -> str:
     """Return the node's mode, which is `peer` or `client`.
 
-    A router forwards no messages between peers, because peers connect directly. So a node that peers
-    cannot reach must be a client.
+    A router forwards no messages between peers, because peers connect directly. So if other peers
+    cannot connect to a node, it must be a client.
 
-    A node with several routers must be a client too. As a peer it would connect to all routers, and
-    receive each message from every router.
+    If the settings name several routers, the node must be a client too. A peer would connect to all
+    routers, and receive each message from every router.
     """
     if zenoh.mode != "auto":
         return zenoh.mode

@@ -1,13 +1,16 @@
-"""The ends of the `zenoh` transport, which are its publishers and subscriptions.
+"""The ends of the `zenoh` transport. An end is a publisher or a subscription.
 
-They are made as in rmw_zenoh (jazzy: rmw_publisher_data.cpp, rmw_subscription_data.cpp):
+The ends work as in rmw_zenoh (jazzy: rmw_publisher_data.cpp, rmw_subscription_data.cpp):
 
-- A publisher that retains messages is an advanced publisher. Its cache is as deep as its history.
-- A subscription that wants retained messages is an advanced subscriber. It queries a publisher's cache
-  when the publisher or the subscription is new. It also queries the cache for missed samples.
+- A publisher that retains messages is an advanced publisher of zenoh. Its cache holds as many messages
+  as its history.
+- A subscription that wants retained messages is an advanced subscriber of zenoh. It queries a
+  publisher's cache when the publisher or the subscription is new. It also queries the cache for missed
+  samples.
 
-An end outlives its session. When the transport joins again, the end gets a place in the new session.
-Callbacks on zenoh's threads only queue work for the transport's thread.
+The transport may leave the session and join a new one, for example when the network changes. The end
+remains, and gets a new `Place`, which is its presence in one session. Callbacks on zenoh's threads only
+queue work for the transport's thread.
 """
 
 import time
@@ -36,8 +39,8 @@ from bridges.transports.zenoh.place import Place, Tell
 from bridges.transports.zenoh.session import contained
 
 HEARTBEAT_S: Final = 0.5
-"""The time (s) after which a publisher repeats the number of its last retained message. So subscribers
-notice a lost message. rmw_zenoh uses the same value."""
+"""The interval (s) at which a publisher repeats the number of its last retained message, so that
+subscribers notice a lost message. rmw_zenoh uses the same value."""
 AT_ONCE: Final = 100
 """The maximum number of samples from one subscription before the other subscriptions have their
 turn."""
@@ -51,8 +54,8 @@ class Declared(Protocol):
 
 
 class ZenohEnd(ABC):
-    """The base of publishers and subscriptions. `do(order)` runs an order on the transport's thread.
-    `Place` explains `tell`."""
+    """The base of publishers and subscriptions. `do(order)` queues a function for the transport's
+    thread. `tell` is a callback (see `Place`)."""
 
     def __init__(
         self, topic: AnyTopic, notice: str, do: Callable[[Order], None], tell: Tell
@@ -68,14 +71,14 @@ class ZenohEnd(ABC):
 
     @abstractmethod
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
-        """Take a place in a session. `number` is unique in the session."""
+        """Declare this end in a session. `number` is unique in the session."""
 
     def _placed(self, session: zenoh.Session, keys: Keys, kind: Kind, number: int) -> Place:
         misfit, tell, do = self.log_misfit, self._tell, self._do
         return Place(session, keys, kind, self.topic, number, misfit, tell, do)
 
     def leave(self) -> None:
-        """Leave a session that stays open."""
+        """Remove this end from its session, which stays open for other ends."""
         place, self.place = self.place, None
         end, self._end = self._end, None
         if place and end:
@@ -99,9 +102,10 @@ class ZenohEnd(ABC):
 class ZenohPublisher(ZenohEnd):
     """The publisher of one topic.
 
-    `withdraw(publisher)` takes the publisher off the graph. `lives()` returns whether the transport is
-    open and its thread runs. `deaf`: the tokens of this node's own subscriptions that must not hear
-    this publisher.
+    - `withdraw(publisher)` removes the publisher from the ROS graph.
+    - `lives()` returns whether the transport is open and its thread runs.
+    - `deaf`: the tokens of this node's own subscriptions that must not receive this publisher's
+      messages
     """
 
     _end: zenoh.Publisher | ext.AdvancedPublisher | None
@@ -124,7 +128,8 @@ class ZenohPublisher(ZenohEnd):
         self._retained: deque[bytes] = deque(maxlen=depth)
 
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
-        """Take a place in a session. Send the retained messages again, for late joiners."""
+        """Declare this publisher in a session. Send the retained messages again, for nodes that join
+        late."""
         place = self._placed(session, keys, "MP", number)
         self._release = keys.release
         self._end = end = self._declared(session, place.key)
@@ -140,7 +145,7 @@ class ZenohPublisher(ZenohEnd):
             raise TransportError(f"topic {self.topic.name}: closed, or the reader has died")
         sample = cdr.encode(self.topic.type, message, self._release)
         self._retained.append(sample)
-        place, end = self.place, self._end  # another thread may clear both at any time
+        place, end = self.place, self._end  # copies: another thread may clear the attributes
         if place is None or end is None:
             raise TransportError(f"topic {self.topic.name}: not sent: the node is not on the graph")
         try:
@@ -155,7 +160,7 @@ class ZenohPublisher(ZenohEnd):
         return len(place.peers.keys() - self._deaf) if place else 0
 
     def close(self) -> None:
-        """Take this end off the graph."""
+        """Remove this publisher from the ROS graph."""
         self._withdraw(self)
 
     def _declared(
@@ -190,8 +195,9 @@ class ZenohPublisher(ZenohEnd):
 class ZenohSubscription(ZenohEnd):
     """The subscription of one topic.
 
-    `dropped`: the number of invalid samples, by the topic's name. `others_only`: skip this node's own
-    publishers. `attached`: accept only samples with the attachment of a ROS node.
+    - `dropped`: the number of invalid samples, by the topic's name
+    - `others_only`: ignore the messages of this node's own publishers
+    - `attached`: accept only samples that have the attachment (extra data) of a ROS node
     """
 
     def __init__(
@@ -209,7 +215,7 @@ class ZenohSubscription(ZenohEnd):
         super().__init__(topic, notices.NOT_HEARD, do, tell)
         self.others_only = others_only
         self._senders = senders
-        self._finds_node = self._node_of  # bound once, because many messages need it
+        self._finds_node = self._node_of  # bound once, because each message needs it
         self._ring = Merged(do, self.take)
         self._own_session = ""
         self._received = received
@@ -218,7 +224,7 @@ class ZenohSubscription(ZenohEnd):
         self._waiting: deque[Sample | CdrError] = deque(maxlen=topic.subscribe.depth)
 
     def create(self, session: zenoh.Session, keys: Keys, number: int) -> None:
-        """Take a place in a session."""
+        """Declare this subscription in a session."""
         place = self._placed(session, keys, "MS", number)
         self._release = keys.release
         self.place, self._own_session = place, keys.session
@@ -286,7 +292,7 @@ class ZenohSubscription(ZenohEnd):
         if place is None:
             return None
         if sample.kind != SampleKind.PUT or str(sample.key_expr) != place.key:
-            raise CdrError(f"sent to {sample.key_expr}, or a deletion")
+            raise CdrError(f"no message: sent to {sample.key_expr}, or a deletion of a key")
         attached = sample.attachment
         sender = None if attached is None else zenoh_keys.sender(bytes(attached))
         if sender is None and self._attached:

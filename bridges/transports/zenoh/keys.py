@@ -1,11 +1,11 @@
-"""Names of ROS's topics and nodes on zenoh: data keys, liveliness tokens, attachments. The functions
-are pure.
+"""The names that ROS's topics and nodes have on zenoh: the keys of samples, the liveliness tokens, and
+the attachments of samples. The functions are pure.
 
 There are two naming schemes. Nodes with different schemes do not hear each other.
 
 - The scheme of rmw_zenoh, in which each ROS context is a zenoh session. Source: ros2/rmw_zenoh, jazzy:
   its design.md; rmw_zenoh_cpp/src/detail/liveliness_utils.cpp and attachment_helpers.cpp.
-- The scheme of zenoh-bridge-ros2dds, which routes a DDS domain. Source:
+- The scheme of zenoh-bridge-ros2dds, which connects a DDS domain with zenoh. Source:
   eclipse-zenoh/zenoh-plugin-ros2dds, liveliness_mgt.rs and ros2_utils.rs.
 
 A liveliness token is a key that exists as long as its session. Tokens announce a node, a publisher or a
@@ -37,10 +37,11 @@ HASH: Final = re.compile(r"typehash=(RIHS01_[0-9a-f]{64});")
 
 
 class Peer(Struct, frozen=True):
-    """An end that a token has announced.
+    """A publisher or subscription of another node, as its token announces it.
 
     - `type`: the message type, with the hash if the token has a hash
-    - `transient_local`: the publisher retains messages, or the subscription wants retained messages.
+    - `transient_local`: Does the publisher retain messages, or does the subscription want retained
+      messages?
     - `announced`: the end's topic, type and hash
     - `node`: the end's node, as `/namespace/name`
     """
@@ -53,7 +54,7 @@ class Peer(Struct, frozen=True):
 
 
 class Keys(Protocol):
-    """The names of one node's ends in one of the two schemes. `session`: the id of the zenoh
+    """The keys and tokens of one node, in one of the two naming schemes. `session`: the id of the zenoh
     session."""
 
     session: str
@@ -75,7 +76,8 @@ class Keys(Protocol):
         """Return a key expression that matches the tokens of all ends of this kind on a topic."""
 
     def witnesses(self) -> list[str]:
-        """Return key expressions for the tokens that show RMF's release (`peers.py`)."""
+        """Return key expressions for the tokens that show RMF's release. Only RMF's own nodes have such
+        tokens (`peers.py`)."""
 
     def peer(self, token: str) -> Peer | None:
         """Return the end that a token announces. Return None for any other token."""
@@ -136,8 +138,8 @@ class RmwZenoh:
 class Ros2Dds:
     """The keys of zenoh-bridge-ros2dds. In a token, `§` replaces a name's slashes.
 
-    A key has no domain, because a bridge serves only one domain. A key has no type, because the token
-    states the type.
+    A key does not name the ROS domain, because a bridge serves only one domain. A key does not name the
+    type, because the token names it.
     """
 
     def __init__(
@@ -157,7 +159,8 @@ class Ros2Dds:
     def token(self, kind: Kind, topic: AnyTopic, number: int) -> str:
         qos = _qos(topic, kind)
         retained = int(qos.durability == "transient_local")
-        # The parts: no key fields; reliable; durability; keep last; user data of the bridge's DDS end.
+        # The parts: no key fields; reliable; durability; keep last; user data of the bridge's DDS
+        # endpoint.
         text = f":1:{retained}:0,{qos.depth}:typehash={type_hash(topic.type, self.release)};"
         return f"@/{self.session}/@ros2_lv/{kind}/{_name(topic, '§')[1:]}/{self.type(topic)}/{text}"
 
@@ -189,19 +192,24 @@ WAYS: Final[dict[str, type[RmwZenoh] | type[Ros2Dds]]] = {
 
 
 def gid(token: str) -> bytes:
-    """Return an end's identity in ROS, which has 16 bytes. It is the XXH3-128 of the end's token, with
-    the lower half first."""
+    """Return the 16 bytes (gid) by which ROS identifies a publisher or subscription. They are the
+    XXH3-128 hash of its token, with the lower half first."""
     return xxhash.xxh3_128_digest(token.encode())[::-1]
 
 
 def attachment(number: int, wall_ns: int, sender: bytes) -> bytes:
-    """Return the attachment of a sample. `number`: the number of the end's sample, from 1. `wall_ns`:
-    the time of sending (ns since the epoch). `sender`: the gid of the sending end."""
+    """Return the attachment that a publisher adds to a sample.
+
+    - `number`: the number of this sample among the publisher's samples, from 1
+    - `wall_ns`: the time of sending (ns since the epoch)
+    - `sender`: the gid of the publisher
+    """
     return _HEAD.pack(number, wall_ns, GID_LENGTH) + sender
 
 
 def sender(attached: bytes) -> bytes | None:
-    """Return the gid of the sending end. Return None for an attachment that no ROS node has made."""
+    """Return the gid of the publisher in an attachment. Return None for an attachment that no ROS node
+    has made."""
     if len(attached) != _HEAD.size + GID_LENGTH or attached[_HEAD.size - 1] != GID_LENGTH:
         return None
     return attached[_HEAD.size :]

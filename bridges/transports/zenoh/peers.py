@@ -1,7 +1,8 @@
-"""The tokens with which ends announce themselves on a zenoh graph.
+"""The liveliness tokens with which publishers and subscriptions announce themselves on zenoh. Both are
+called ends.
 
-Each of our ends watches the tokens on its own topic (`place.py`). `ZenohPeers` watches the tokens that
-show RMF's release, also on topics that we do not use.
+Each of our ends watches the tokens of its own topic (`place.py`). `ZenohPeers` watches the tokens that
+show RMF's release. These may be on topics that we do not use.
 """
 
 import logging
@@ -21,15 +22,16 @@ from bridges.transports.zenoh.keys import Keys, Peer
 log = logging.getLogger(__name__)
 
 MOST: Final = 1000
-"""The maximum number of tokens in memory. No site has more ends on one topic."""
+"""The maximum number of tokens that one `Tokens` keeps. It is enough, because no site has more ends on
+one topic."""
 
 Order = Callable[[], None]
 """Work for the transport's thread."""
 
 
 class Merged:
-    """An order for the transport's thread. A call does nothing while the order is already in the
-    queue."""
+    """An order for the transport's thread. While the order is in the queue, calling this object again
+    does nothing."""
 
     def __init__(self, do: Callable[[Order], None], order: Order) -> None:
         self._do, self._order = do, order
@@ -47,18 +49,18 @@ class Merged:
 
 
 class Tokens:
-    """The tokens that match some key expressions, until `leave` or the end of the session.
+    """A watch for the tokens that match some key expressions, until `leave` or the session's end.
 
-    zenoh's threads call `came(token, peer)` and `gone(token)`, one call at a time. `do(order)` runs an
-    order on the transport's thread.
+    zenoh's threads call `came(token, peer)` and `gone(token)`, one call at a time. `do(order)` queues a
+    function for the transport's thread.
 
-    At most MOST tokens are kept. Further tokens are left out, and the first such token is logged. When
+    At most MOST tokens are kept. Further tokens are left out, and the first of them is logged. When
     half of the kept tokens have gone, all tokens are queried again. So no token is missing after a
     flood.
 
-    zenoh reports the present tokens on one thread and the changes on another thread. So the report that
-    a token has gone may come before the report of its arrival. In that case the graph is asked for the
-    token. The token counts only if the graph has it.
+    zenoh reports the tokens that exist already on one thread, and all changes on another thread.
+    Therefore the report that a token has gone may come before the report that it has come. In that case
+    `Tokens` asks other nodes for the token, and counts it only if it still exists.
     """
 
     def __init__(
@@ -74,11 +76,11 @@ class Tokens:
         self._came, self._gone, self._do = came, gone, do
         self._known: set[str] = set()
         self._gone_before: dict[str, None] = {}
-        """The tokens whose departure was reported before their arrival, the oldest first. At most MOST
-        are kept."""
+        """The tokens that were reported as gone before they were reported as come, the oldest first. At
+        most MOST are kept."""
         self._doubtful: dict[str, Peer] = {}
-        """The tokens whose arrival was reported after their departure. The graph will be asked for
-        these tokens."""
+        """The tokens that were reported as come after they were reported as gone. Other nodes will be
+        asked for these tokens."""
         self._asked: dict[str, Peer] = {}
         self._ask = Merged(do, self._ask_all)
         self._crowded = self._named = self._left = False
@@ -117,9 +119,10 @@ class Tokens:
             self._watch()
 
     def _look(self, watch: int, sample: zenoh.Sample) -> None:
-        """Note a token that has come or gone. zenoh's threads call this method.
+        """Note that a token has come or gone. zenoh's threads call this method.
 
-        Ignore changes from an earlier watch, because they may arrive after the end of that watch.
+        `watch`: the number of the watch that reports this. Reports of an earlier watch are ignored,
+        because they may arrive after its end.
         """
         token = str(sample.key_expr)
         goes = sample.kind == zenoh.SampleKind.DELETE
@@ -162,7 +165,7 @@ class Tokens:
         self._asked.pop(token, None)
 
     def _ask_all(self) -> None:
-        """Ask the graph for the doubtful tokens. The transport's thread calls this method."""
+        """Ask other nodes for the doubtful tokens. The transport's thread calls this method."""
         with self._changing:
             asked, self._doubtful = self._doubtful, {}
             self._asked.update(asked)
@@ -172,8 +175,7 @@ class Tokens:
                 self._live.get(token, on_reply)
 
     def _answered(self, watch: int, reply: zenoh.Reply) -> None:
-        """Note that the graph has a token. Ignore the answer if the token has gone since the
-        question."""
+        """Note that a token exists. Ignore the answer if the token has gone since the question."""
         if (sample := reply.ok) is None:
             return
         token = str(sample.key_expr)
@@ -189,13 +191,13 @@ class Tokens:
             self._do(self._name)
 
     def _name(self) -> None:
-        on, reason = self._expressions[0], "further ends are not counted, nor compared with ours"
+        on, reason = self._expressions[0], "further ends are neither counted nor compared with ours"
         log.warning(pairs("crowded", on=on, most=MOST, reason=reason))
 
 
 class ZenohPeers:
-    """A watch that reports tokens to `peers`, on zenoh's thread. It calls `news` after each token.
-    `Tokens` explains `do`."""
+    """A watch for the tokens that show RMF's release. It reports their ends to `peers` on zenoh's
+    thread, and calls `news` after each token. `do`: as in `Tokens`."""
 
     def __init__(self, peers: Peers, news: Order, do: Callable[[Order], None]) -> None:
         self._peers = peers
@@ -203,8 +205,7 @@ class ZenohPeers:
         self._do = do
 
     def watch(self, session: zenoh.Session, keys: Keys) -> Tokens:
-        """Watch this session from its beginning. The caller must keep the returned Tokens until the
-        session is closed."""
+        """Watch a new session. The caller must keep the returned Tokens until the session is closed."""
         self._peers.clear()
         return Tokens(session, keys, keys.witnesses(), self._came, self._gone, self._do)
 

@@ -1,5 +1,5 @@
-"""An end's place in one zenoh session. A place knows the peers that the end reaches, and the peers that
-do not fit."""
+"""The presence of a publisher or subscription in one zenoh session. It knows which ends of other nodes
+match, and which do not."""
 
 from collections.abc import Callable
 
@@ -13,20 +13,23 @@ from bridges.transports.zenoh.keys import Keys, Kind
 from bridges.transports.zenoh.peers import Order, Tokens
 
 Tell = Callable[[str, Announced | None], None]
-"""A callback with a token and the token's end. The end is None if it has gone."""
+"""A callback with a token and the publisher or subscription that it announces. The latter is None if it
+has gone."""
 
 
 class Place:
-    """An end's place in one session: its token, and the tokens of its peers.
+    """The presence of one publisher or subscription (an end) in one session: its own token, and the
+    tokens of its peers.
 
-    A peer is an end of the other kind on the same topic, in any process.
+    A peer of a publisher is a subscription on the same topic, in any process. A peer of a subscription
+    is a publisher.
 
-    - `peers`: the peers that this end reaches, by token
-    - `unheard`: the gids of the peers that do not fit
-    - `misfit(policy)`: a callback on zenoh's thread for each peer whose QoS does not fit
+    - `peers`: maps the token of each peer that matches this end to the peer
+    - `unheard`: the gids of the peers that do not match
+    - `misfit(policy)`: a callback on zenoh's thread for each peer whose QoS does not match
     - `tell(token, end)`: a callback on zenoh's thread for each peer that comes or goes. `end` is None
       if the peer goes.
-    - `do`: the function that `Tokens` explains
+    - `do`: as in `Tokens`
     """
 
     def __init__(
@@ -58,7 +61,7 @@ class Place:
         self._alive: zenoh.LivelinessToken | None = None
 
     def appear(self) -> None:
-        """Declare the token. From now on the end sends or hears."""
+        """Declare the token. Other nodes see this end from now on."""
         self._alive = self._live.declare_token(self.token)
 
     def leave(self) -> None:
@@ -80,7 +83,7 @@ class Place:
             self.peers[token] = peer
             return
         self.unheard.add(zenoh_keys.gid(token))
-        if policy != "type":  # `peers.py` logs types that do not fit
+        if policy != "type":  # `peers.py` logs types that do not match
             self._misfit(policy)
 
     def _incompatible(self, theirs: zenoh_keys.Peer) -> str:

@@ -12,14 +12,14 @@ from bridges.transports.zenoh.config import Configuration
 
 @contextmanager
 def contained() -> Iterator[None]:
-    """Raise a panic of zenoh in the block as ZError. A panic is no Exception, and would end the daemon.
-    Every call into zenoh needs this block."""
+    """Turn a panic of zenoh inside the block into a ZError. A panic is not an Exception, so it would
+    end the daemon. Therefore every call into zenoh needs this block."""
     try:
         yield
     except BaseException as error:
         if (
             type(error).__name__ != "PanicException"
-        ):  # pyo3 owns the class, which cannot be imported
+        ):  # the class is inside pyo3 and cannot be imported
             raise
         raise zenoh.ZError(f"zenoh has panicked: {error}") from error
 
@@ -41,12 +41,12 @@ def opened(ways: list[Configuration]) -> zenoh.Session:
 
 
 def closed(session: zenoh.Session, held: list[object]) -> None:
-    with suppress(zenoh.ZError), contained():  # a dead link does not take the closing message
+    with suppress(zenoh.ZError), contained():  # closing fails if the link is dead
         session.close()  # type: ignore[no-untyped-call]
     held.clear()
 
 
 def trim_memory() -> None:
-    """Return freed memory to the system. This is 2.5 MB after a session has opened."""
+    """Return freed memory to the system. After a session has opened, 2.5 MB are returned."""
     with suppress(AttributeError):  # only glibc has this call
         ctypes.CDLL(None).malloc_trim(0)

@@ -1,9 +1,9 @@
-"""The `zenoh` transport. Its session looks like a ROS node on rmw_zenoh. With the other naming scheme
-it looks like a zenoh-bridge-ros2dds with one node behind the bridge.
+"""The `zenoh` transport. To other nodes, its session looks like a ROS node on rmw_zenoh. With the other
+naming scheme, it looks like a zenoh-bridge-ros2dds that has one node behind it.
 
-zenoh reconnects by itself. It keeps looking for its routers, and declares everything again when a
-router answers. This transport opens a new session only when the machine's addresses have changed. The
-old session would notice that change only after its links time out.
+zenoh reconnects by itself. It keeps looking for its routers. When a router answers, zenoh declares all
+publishers and subscriptions to it again. This transport opens a new session only when the machine's
+addresses have changed. The old session would notice that change only after its links time out.
 
 Source: eclipse-zenoh 1.10 (Python API), and the sources named in `keys.py` and `ends.py`. Only this
 folder imports zenoh, and only `choose.py` imports this file.
@@ -49,7 +49,7 @@ class ZenohTransport(Threaded):
     """One node: a session, its publishers and subscriptions, and the thread that delivers messages.
 
     `loopback`: stay on this machine without a router, even if `settings` say otherwise. Raises
-    TransportError if no session can be opened. The node needs no other node on the graph.
+    TransportError if no session can be opened. A missing router is no such error: the node tries again.
     """
 
     speaks = "zenoh"
@@ -90,7 +90,7 @@ class ZenohTransport(Threaded):
         self._join()
         if self._session is None and not self._wants_router:
             raise TransportError(f"cannot open a zenoh session: {self._why_unlinked}")
-        # A session that is open at exit aborts the interpreter.
+        # If a session is still open when the interpreter exits, the interpreter aborts.
         atexit.register(self.close)
         self._start(self._listen, "zenoh")
 
@@ -139,7 +139,8 @@ class ZenohTransport(Threaded):
         return subscription
 
     def close(self) -> None:
-        """Leave the graph at once, so that no ghost endpoint remains. A second call does nothing."""
+        """Leave the graph at once, so that other nodes do not still see a dead endpoint. A second call
+        does nothing."""
         with self._lock:
             if self._closed:
                 return
@@ -180,15 +181,15 @@ class ZenohTransport(Threaded):
         trim_memory()
 
     def _appear(self, session: zenoh.Session) -> None:
-        """Put the node and every end on the graph."""
+        """Declare the node and all its publishers and subscriptions in the session."""
         self._presence = session.liveliness().declare_token(self._keys.presence())
         self._witnesses = self._watcher.watch(session, self._keys)
         for end in self._ends:
             self._attach(end)
 
     def _vanish(self) -> None:
-        """Take the node and every end off the graph. Keep the session, which later shows that the
-        router has gone."""
+        """Remove the node and all its publishers and subscriptions from the session. Keep the session
+        open, because it shows when the router has gone."""
         for end in self._ends:
             end.leave()
         self._deaf.clear()
@@ -199,8 +200,8 @@ class ZenohTransport(Threaded):
             presence.undeclare()  # type: ignore[no-untyped-call]
 
     def _attach(self, end: ZenohEnd) -> None:
-        """Give an end its place. Do nothing if the node is off the graph, or if the release lacks the
-        end's message."""
+        """Declare a publisher or subscription in the session. Do nothing if the node must be off the
+        graph, or if the release lacks the message."""
         self._peers.ours(end.topic, publishes=isinstance(end, ZenohPublisher))
         off = self._away or end.place or not self.release.has(end.topic.type)
         if self._session is None or off:
@@ -211,10 +212,10 @@ class ZenohTransport(Threaded):
         end.create(self._session, self._keys, number)
 
     def _neighbour(self, neighbours: dict[str, zenoh.WhatAmI], event: zenoh.TransportEvent) -> None:
-        """Note a router or peer that has connected or gone. zenoh's thread calls this method.
+        """Note that a router or peer has connected or gone. zenoh's thread calls this method.
 
-        This file keeps its own list of neighbours. A question to the session would wait for a lock that
-        zenoh's thread holds.
+        This class keeps its own list of neighbours. If it asked the session for them, it would wait for
+        a lock that zenoh's thread holds.
         """
         if event.kind == zenoh.SampleKind.PUT:
             neighbours[str(event.transport.zid)] = event.transport.whatami
@@ -253,12 +254,13 @@ class ZenohTransport(Threaded):
             self._closing = [closing for closing in self._closing if closing.is_alive()]
             try:
                 self._join()
-            except (TransportError, zenoh.ZError) as error:  # a secret's file is missing
+            except (TransportError, zenoh.ZError) as error:  # e.g. a missing secret
                 self._why_unlinked = str(error)
                 self._leave()
 
     def _follow_release(self) -> None:
-        """Adopt RMF's release. Give a new place to each end whose message differs in this release."""
+        """Adopt RMF's release. Declare each publisher or subscription again if its message differs in
+        this release."""
         before = self.release
         if not self._peers.settle():
             self._peers.name_misfits()
@@ -319,8 +321,8 @@ class ZenohTransport(Threaded):
         return not all(map(zenoh_config.is_local, endpoints))
 
     def _look(self) -> None:
-        """Log when no router or peer answers any more, and when one answers again. On loopback, leave
-        the graph when a router is linked."""
+        """Log when the last router or peer has gone, and when a router or peer is back. With
+        `loopback`, leave the graph while a router is connected."""
         neighbours = list(self._neighbours.values())
         routers = zenoh.WhatAmI.ROUTER in neighbours
         if self._loopback:
@@ -339,7 +341,7 @@ class ZenohTransport(Threaded):
             log.warning(pairs("not_linked", node=self.name, connect=where, reason=reason))
 
     def _keep_apart(self, away: bool) -> None:
-        """Leave the graph if `away`, because a router is linked. Otherwise return to the graph."""
+        """Leave the graph if `away`, because a router is connected. Otherwise return to the graph."""
         with self._lock:
             before, session = self._away, self._session
             if self._closed or session is None or not (before or away):
@@ -350,7 +352,7 @@ class ZenohTransport(Threaded):
             try:
                 self._vanish() if away else self._appear(session)
             except zenoh.ZError:
-                self._away = True  # the next look tries again
+                self._away = True  # so that the next check tries again
                 raise
         if not away:
             log.info(pairs("back_on_graph", node=self.name))

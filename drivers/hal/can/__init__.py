@@ -2,13 +2,14 @@
 
     settings.py    the settings in a YAML
     frames.py      frames, their ids and their names
-    bus.py         receives and distributes frames, pauses, and tracks the bus's troubles
+    bus.py         receives and distributes frames, pauses, and notes troubles such as bus-off
     link.py        opens, reads and sends through python-can
     broadcasts.py  one device that broadcasts its frames and needs periodic frames from the driver
     canopen.py     one CANopen node
     sdo.py         the SDO client of the canopen library
 
-Only link.py and sdo.py import a library. They are imported when a bus or a node is made.
+Only link.py and sdo.py import a library. They are themselves imported only when the daemon makes a bus
+or a node.
 """
 
 from drivers.hal import BusType

@@ -15,8 +15,8 @@ NEVER = float("-inf")
 
 
 class Said(NamedTuple):
-    """A frame that the device sends. `mask` selects the bits of the id to compare. `length` is the
-    payload's length in bytes.
+    """A frame that the device sends. `mask` has a 1 for each bit of the id that must equal `id`.
+    `length` is the payload's length in bytes.
 
     `fresh_s` is the time (s) for which a received frame is valid. If `needed` is true, a reading fails
     without this frame.
@@ -30,16 +30,16 @@ class Said(NamedTuple):
 
 
 Values = Mapping[str, float]
-"""The value of each signal. A key is the frame's name and the signal's name, as in `Frame.Signal`."""
+"""The value of each signal. A key is the frame's name, a dot, and the signal's name."""
 
 
 class Sequel(NamedTuple):
-    """A frame that needs an explanation, such as a frame with an error state, and the frames that
-    explain it.
+    """The frames that explain a certain state in another frame. For example, error frames give the
+    cause of an error state, and may come later than the state.
 
-    `first` is the name of the frame that needs the explanation. `others` are the names of the
-    explaining frames, which may come later. `begins(values)` returns whether `first` needs an
-    explanation now. `is_told(values)` returns whether the explanation has come.
+    `first` is the name of the frame with the state, and `others` are the names of the explaining
+    frames. `begins(values)` returns whether the state now needs an explanation. `is_told(values)`
+    returns whether the explanation has come.
     """
 
     first: str
@@ -49,8 +49,8 @@ class Sequel(NamedTuple):
 
 
 class Broadcasts:
-    """The frames of one device, by their names. `decode(frame, payload)` returns the value of each
-    signal."""
+    """The frames of one device, by their names. `decode(frame, payload)` must return the value of each
+    signal in a payload."""
 
     def __init__(
         self,
@@ -77,8 +77,9 @@ class Broadcasts:
         """Return the value of each signal in all fresh frames. Raises HalError, and the errors of
         `decode`.
 
-        If a needed frame is missing, the call waits for this frame. When the sequel's first frame
-        begins to need an explanation, the call waits once for the explaining frames.
+        If a needed frame is missing, the call waits for this frame. If the first frame of `Sequel` has
+        just begun to show a state that needs an explanation, the call waits once for the explaining
+        frames.
         """
         self._bus.take()
         if self._missing():
@@ -130,7 +131,7 @@ class Broadcasts:
             if len(heard.payload) == length:
                 self._heard[name] = (heard.payload, at)
             else:
-                size = f"{len(heard.payload)} bytes, where the map has {length}"
+                size = f"{len(heard.payload)} bytes instead of the map's {length}"
                 self._odd[name] = f"one ({named(heard.id)}) of {size}"
 
         return hear
@@ -159,5 +160,5 @@ class Broadcasts:
         said = self._frames[name]
         text = f"no {name} ({named(said.id)}) at {self._bus.where} within {said.fresh_s:g} s"
         if odd := self._odd.pop(name, ""):
-            return f"{text}, but {odd}: is it another make?"
+            return f"{text}, but {odd}: is the device of another make?"
         return f"{text}: {self._bus.silence()}"

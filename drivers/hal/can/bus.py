@@ -1,14 +1,14 @@
 """One CAN bus through python-can. The bus is on an interface of the kernel (SocketCAN) or on an slcan
 adapter.
 
-Everything runs in the loop's thread. A reading takes all frames that came after the last reading. It
-gives each frame to the devices that want the frame. The bus remembers for some seconds the ids that no
-device wants, because errors about missing frames name these ids. Only a scan sends frames. No cyclic
-sender of the kernel or of the library sends frames. So a daemon that hangs falls silent.
+Everything runs in the loop's thread. A reading takes all frames that came since the last reading. The
+bus gives each frame to the devices that listen to its id. For some seconds the bus remembers the ids to
+which no device listens, because errors about missing frames name these ids. Only a scan sends frames.
+No cyclic sender of the kernel or of the library sends frames. So a daemon that hangs sends nothing.
 
 If the interface is down, gone or bus-off, the bus closes it and opens it again after a backoff of 0.5
-to 30 s. Calls during the backoff fail at once. A bus-off ends with the next frame, or when the
-controller reports its end. `restart-ms` of `ip link` makes the controller restart.
+to 30 s. Calls during the backoff fail at once. A bus-off is over when the next frame comes, or when the
+controller reports a restart. `restart-ms` of `ip link` makes the controller restart.
 """
 
 import random
@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 FRAMES_AT_ONCE: Final = 20_000
 """The maximum number of frames in a reading. A bus at 1 Mbit/s has about 8,000 frames a second."""
 HANG_S: Final = 1.0
-"""The delay (s) of a reading, beyond the period of scans, from which the daemon counts as hung."""
+"""The longest delay (s) of a reading beyond the scan period. A longer delay means that the daemon has
+hung."""
 ROUTES_MAX: Final = 4096
 RECENT_S: Final = 5.0
 OTHERS_MAX: Final = 64
@@ -60,22 +61,23 @@ class CanBus(Bus):
         self._deaf = False
 
     def backoff(self) -> Backoff:
-        """Return a new backoff for one device. A call of `insist` also ends the pauses of this
-        backoff."""
+        """Return a new backoff for one device. `insist` of the bus reaches this backoff too."""
         made = Backoff(self.now, self._jitter)
         self._backoffs.append(made)
         return made
 
     def listen(self, wanted: Iterable[FrameFilter], hear: Hear) -> None:
-        """Call `hear` for each of these frames, until the bus is closed."""
+        """Call `hear` with each received frame that one of these filters lets pass, until the bus is
+        closed."""
         self._wanted += [(one, hear) for one in wanted]
         self._routes.clear()
         self._others.clear()
 
     def take(self) -> None:
-        """Distribute the frames received after the last call. Raises HalError.
+        """Distribute the frames that came since the last call. Raises HalError.
 
-        After a hang the age of the received frames is unknown, so the frames are dropped.
+        If the daemon has hung since the last call (HANG_S), drop these frames, because their age is
+        unknown.
         """
         self._deaf = self.now() - self._taken_at > HANG_S + self.settings.scan_s
         try:
@@ -101,7 +103,7 @@ class CanBus(Bus):
         return True
 
     def send(self, frame: Frame) -> None:
-        """Send a frame. Raises HalError. After an error nobody knows whether the frame was sent."""
+        """Send a frame. Raises HalError. After an error the frame may have been sent."""
         self._open()
         try:
             self._link.send(frame)
@@ -117,7 +119,7 @@ class CanBus(Bus):
             return f"the bus has trouble: {self._trouble.text}"
         others = self.others()
         if not others:
-            return "nothing else is heard on the bus either: power, cable, termination, bitrate?"
+            return "no other frames come on the bus either: check power, cable, termination and bitrate"
         shown = ", ".join(map(named, others[:OTHERS_SHOWN]))
         return f"the bus works, and other ids are heard: {shown}{' …' if others[OTHERS_SHOWN:] else ''}"
 
@@ -143,7 +145,7 @@ class CanBus(Bus):
             raise self._failed(str(error)) from error
 
     def _step(self, wait_s: float) -> bool:
-        """Take one frame or trouble. Return False if nothing came."""
+        """Receive one frame or one report of a bus trouble. Return False if neither came."""
         self._open()
         try:
             found = self._link.receive(wait_s)

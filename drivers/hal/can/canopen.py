@@ -6,8 +6,8 @@ alone would accept any frame with the reply's id, even a late reply. This file h
 
 - A reply counts only if it has eight bytes and names the requested object. Other frames are dropped. If
   no reply comes, the error names the dropped frames.
-- After a request without a reply, the node gets no request for LATE times the timeout. Otherwise a late
-  reply could pass for the reply to the next request.
+- After a request without a reply, the node gets no request for a time of LATE x timeout. Otherwise a
+  late reply could pass for the reply to the next request.
 - No request is sent twice.
 - A write that switches power off is sent at once, even after a failed reading.
 
@@ -81,7 +81,7 @@ class CanOpenNode:
         self._beat_pause.mended()
         if self._state != OPERATIONAL:
             state = STATES.get(self._state, f"in state {self._state}")
-            raise HalError(f"{self._name()} is {state}, not operational: look at the node")
+            raise HalError(f"{self._name()} is {state}, not operational: check the node")
 
     def read(self, index: int, subindex: int, octets: int) -> int:
         """Read an unsigned number of `octets` bytes. Raises HalError."""
@@ -98,11 +98,11 @@ class CanOpenNode:
     def write(
         self, index: int, subindex: int, octets: int, number: int, safe: bool = False
     ) -> None:
-        """Set an unsigned number. Raises HalError. After an error nobody knows whether the number is
-        set.
+        """Set an unsigned number. Raises HalError. After an error it is unknown whether the node has
+        set the number.
 
-        `safe` means that the write switches power off. So the write ignores the backoff of failed
-        readings.
+        `safe` means that the write switches power off. Such a write does not wait for the backoff of
+        failed readings.
         """
         what = f"write 0x{index:04X}:{subindex:02X}"
         payload = number.to_bytes(octets, "little")
@@ -126,7 +126,8 @@ class CanOpenNode:
         return found
 
     def exchange(self, request: bytes) -> bytes:
-        """Send eight bytes. Return the reply about the same object. Raises TimeoutError or HalError."""
+        """Send a request of eight bytes. Return the reply that names the same object. Raises
+        TimeoutError or HalError."""
         self._bus.take()  # drops a late reply to the last request
         self._answer, self._stray, self._asked = None, "", request[1:4]
         began = self._bus.now()
@@ -176,7 +177,7 @@ class CanOpenNode:
         if self._odd_beat:
             return f"{text}, but {self._odd_beat}: is it a CANopen node?"
         if nodes:
-            return f"{text}, but of node {', '.join(map(str, nodes))}: is 'node' right?"
+            return f"{text}, but heartbeats of node {', '.join(map(str, nodes))}: is 'node' right?"
         return f"{text}: {self._bus.silence()}"
 
     def _no_reply(self) -> str:

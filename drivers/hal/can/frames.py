@@ -15,16 +15,15 @@ class Frame(NamedTuple):
 
 
 class Trouble(NamedTuple):
-    """A trouble of the bus itself, which an error frame reports. `text` is "" when the trouble has
-    ended."""
+    """A trouble of the bus itself (such as bus-off), which an error frame reports. `text` is "" if the
+    report says that the trouble is over."""
 
     text: str
     bus_off: bool
 
 
 class LinkDown(Exception):
-    """The error of an interface that cannot be used now. The error's text tells the reader which parts
-    to check."""
+    """The error of an interface that cannot be used now. The error's text says what to check."""
 
 
 class FrameFilter(NamedTuple):
@@ -39,7 +38,7 @@ class FrameFilter(NamedTuple):
 
 
 Hear = Callable[[Frame, float], None]
-"""A function that receives a frame and the time of its reading (monotonic seconds)."""
+"""A function that receives a frame, and the time (monotonic seconds) when the daemon read the frame."""
 
 
 def named(frame_id: int) -> str:

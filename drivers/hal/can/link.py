@@ -4,13 +4,14 @@ adapter.
 python-can opens, reads and sends. This file corrects the following behaviour of python-can:
 
 - python-can's `recv` waits by the wall clock. If somebody sets the clock back by an hour, `recv` waits
-  an hour longer on a silent bus. So this file waits, and `recv` only reads received data.
+  an hour longer on a silent bus. So this file waits itself, and calls `recv` only for data that has
+  already come.
 - python-can may return no frame although an slcan adapter has sent more data. This happens when the
-  adapter sends an acknowledgement first. So this file reads on.
+  adapter sends an acknowledgement first. So this file reads again.
 - Bytes that are not slcan break python-can's parser permanently. So this file opens the adapter again.
 - python-can's slcan write waits for the adapter without limit. In this file the write has `timeout_s`.
 - An interface that is down or gone raises many types of exceptions. This file turns each exception into
-  a LinkDown, whose text has a remedy.
+  a LinkDown, whose text says what to do.
 - SocketCAN reports the bus's own troubles as error frames (linux/can/error.h). This file decodes them.
 """
 
@@ -31,13 +32,13 @@ from can.interfaces.slcan import slcanBus
 from drivers.hal.can.frames import EXTENDED, Frame, LinkDown, Trouble
 from drivers.hal.can.settings import Slcan
 
-logging.getLogger("can").setLevel(logging.CRITICAL)  # this file's errors report the same failures
+logging.getLogger("can").setLevel(logging.CRITICAL)  # silenced: LinkDown reports the same failures
 
 FAILURES: Final = (can.CanError, serial.SerialException, OSError, ValueError, IndexError)
 """The errors of python-can and its libraries. python-can's parser raises ValueError and IndexError."""
 IN_ONE_GO: Final = 4096
-"""The maximum number of lines that one call reads from an adapter before it gives up finding a
-frame."""
+"""The maximum number of lines that one call reads from an adapter. If none of them is a frame, the call
+returns without a frame."""
 
 BUS_OFF: Final = 0x40
 RESTARTED: Final = 0x100
@@ -54,11 +55,11 @@ TROUBLES: Final = {
 
 
 Vendor = Callable[[], BusABC]
-"""A function that opens python-can's bus."""
+"""A function that opens a bus with python-can and returns it."""
 
 
 def socketcan(interface: str) -> BusABC:
-    """Open an interface of the kernel. The bitrate is that of `ip link`."""
+    """Open an interface of the kernel. The interface already has a bitrate, which `ip link` has set."""
     from can.interfaces.socketcan import SocketcanBus
 
     return SocketcanBus(channel=interface)
@@ -162,19 +163,19 @@ _HINTS: Final = {
     errno.ENXIO: "no such interface; see `ip link show type can`",
     errno.ENETDOWN: "the interface is down; sudo ip link set {where} up type can bitrate 250000"
     " restart-ms 100, with the bitrate of your charger",
-    errno.ENOBUFS: "frames pile up because nobody acknowledges them; is the other side powered,"
-    " wired and terminated, and the bitrate the same?",
+    errno.ENOBUFS: "frames pile up because no device acknowledges them; is the device powered,"
+    " wired and terminated, and has it the same bitrate?",
     errno.EAFNOSUPPORT: "this kernel has no CAN; sudo modprobe can-raw",
     errno.ENOENT: "the adapter is not there; is it plugged in? ls /dev/serial/by-id",
-    errno.EACCES: "the port may not be opened; add the daemon's user to the group dialout",
+    errno.EACCES: "no permission; the daemon's user must be in the group dialout",
     errno.EAGAIN: "another program has it open",
     errno.EBUSY: "another program has it open",
 }
 
 
 def _selecting(bus: BusABC) -> Callable[[float], bool] | None:
-    """Return a function that waits for input. Return None for a bus inside this process, because such a
-    bus has no file to wait for."""
+    """Return a function that waits for input. Return None for a simulated bus inside this process,
+    because such a bus has no file to wait for."""
     try:
         descriptor = bus.fileno()
     except NotImplementedError:

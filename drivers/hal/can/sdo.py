@@ -11,7 +11,7 @@ from canopen.sdo.client import SdoClient
 
 ABORT: Final = 0x80
 
-logging.getLogger("canopen").setLevel(logging.CRITICAL)  # HalErrors report these failures
+logging.getLogger("canopen").setLevel(logging.CRITICAL)  # HalErrors report its failures
 
 
 class Client(SdoClient):

@@ -58,9 +58,11 @@ class CanSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=
     ] = None
     slcan: Annotated[Slcan | None, tells("an adapter on a serial port.")] = None
     timeout_s: Annotated[
-        Timeout, tells("the time limit for a reply, and for an adapter to take a frame.")
+        Timeout, tells("the time limit for a reply, and for handing a frame to the adapter.")
     ] = 0.2
-    scan_s: Annotated[Period, tells("how often devices are read and frames sent.")] = 0.2
+    scan_s: Annotated[
+        Period, tells("the period at which the daemon reads the devices and sends frames.")
+    ] = 0.2
 
     def problems(self) -> Remarks:
         """Yield problems that involve more than one field."""
@@ -80,20 +82,21 @@ def warnings(settings: CanSettings) -> Remarks:
     """Yield a warning, with its path in the YAML, for each valid setting that may be a mistake."""
     if settings.slcan and not settings.slcan.port.startswith("/dev/serial/by-"):
         port = settings.slcan.port
-        text = f"{port} may be another adapter after a reboot: use a path of /dev/serial/by-id"
+        text = f"{port} may name another adapter after a reboot: use a path of /dev/serial/by-id"
         yield ("slcan", "port"), text
 
 
 def where(settings: CanSettings) -> Where:
-    """Return the place of the bus. Several programs can use a kernel's interface, but only one can use
-    an adapter's port."""
+    """Return the interface or port that the bus uses. Several programs can use a kernel's interface at
+    the same time, but only one can use an adapter's port."""
     if settings.slcan:
         return Where(settings.slcan.port, local=True, clients="one")
     return Where(str(settings.socketcan), local=True)
 
 
 def needs(settings: CanSettings) -> Needs:
-    """Return the needed permissions. An interface needs CAN sockets. An adapter needs its port."""
+    """Return the permissions that the daemon needs: CAN sockets for a kernel's interface, or access to
+    the adapter's port."""
     return serial_port.needs(settings.slcan.port) if settings.slcan else Needs(family="AF_CAN")
 
 

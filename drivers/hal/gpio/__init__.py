@@ -1,8 +1,8 @@
 """GPIO: the pins of a Raspberry Pi's 40-pin header, through gpiozero on lgpio.
 
-One call claims an output and sets its safe level. An output is released at its safe level
-(`drivers/hal/gpio/pins.py`). Every scan reads the inputs' levels. An edge only calls `wake`, because
-lgpio loses edges.
+A pin becomes an output and gets its safe level in one call, so the output never has the wrong level. A
+released output keeps its safe level (`drivers/hal/gpio/pins.py`). Every scan reads the levels of all
+inputs. An edge only starts a scan earlier (`wake`), because lgpio may miss edges.
 
     header.py     the spelling of pins
     bus.py        claims, samples, drives and releases pins
@@ -50,14 +50,14 @@ class GpioSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
 
     chip: Annotated[
         Annotated[int, msgspec.Meta(ge=0, le=255)] | None,
-        tells("""the number N of `/dev/gpiochipN`. Without it the daemon finds the chip by its label
-        `pinctrl-…`."""),
+        tells("""the number N of `/dev/gpiochipN`. Without a number the daemon finds the chip by the
+        chip's label `pinctrl-…`."""),
     ] = None
     scan_s: Annotated[Period, tells("how often every input is read.")] = 0.05
 
 
 def where(settings: GpioSettings) -> Where:
-    """Return the place of the pins: the header, or another chip."""
+    """Return the hardware that the bus uses: the header, or another chip."""
     return Where("the header" if settings.chip is None else f"gpiochip{settings.chip}", local=True)
 
 
@@ -73,7 +73,7 @@ def open_bus(
     factory: Factory | None = None,
     clock: Callable[[], float] = time.monotonic,
 ) -> "GpioBus":
-    """Open the header's pins. Raises HalError, whose text tells the reader which parts to check.
+    """Open the header's pins. Raises HalError, whose text says what to check.
 
     `factory` is a gpiozero pin factory whose pins claim lines in the same way as `pins.py`.
     """
@@ -98,8 +98,8 @@ def _with_lgpio() -> Iterator[None]:
         yield
     except ImportError as error:
         raise HalError(
-            f"GPIO needs lgpio ({error}): apt install python3-lgpio, or in the"
-            " clone .venv/bin/pip install '.[gpio]'; or run with --simulate"
+            f"GPIO needs lgpio ({error}): run `apt install python3-lgpio`, or in a git clone"
+            " `.venv/bin/pip install '.[gpio]'`; or run with --simulate"
         ) from error
     except OSError as error:  # lgpio's import makes a FIFO in the working directory
         raise HalError(f"lgpio cannot write in the working directory: {error}") from error

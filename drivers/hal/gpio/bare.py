@@ -1,5 +1,5 @@
-"""Pins on lgpio, without gpiozero. A new process switches outputs off sooner if it does not load
-gpiozero.
+"""Pins on lgpio, without gpiozero. They are for a new process that only switches outputs off. Loading
+gpiozero would delay such a process.
 
 The calls that claim, write and release outputs are the same as in `pins.py`. These pins report no
 edges.
@@ -40,7 +40,7 @@ class BarePin:
         self._safe = int(state)
 
     def input_with_pull(self, pull: str) -> None:
-        """Claim the line as an input with this resistor."""
+        """Claim the line as an input with this pull resistor."""
         self._claim(lgpio.gpio_claim_input, PULLS[pull])
 
     def close(self) -> None:
@@ -58,7 +58,8 @@ class BarePin:
 
 
 class BareFactory:
-    """The lines of an open chip. The kernel refuses to claim one pin twice in one process."""
+    """The lines of an open chip. No reservation of pins is needed here, because the kernel refuses to
+    claim one pin twice in one process."""
 
     def __init__(self, chip: int | None) -> None:
         """Open this chip. Without a number, open the header's chip. Raises HalError."""

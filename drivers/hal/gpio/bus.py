@@ -17,8 +17,8 @@ from drivers.hal.points import Clearing, Pull
 log = logging.getLogger(__name__)
 
 DROPPED = (
-    f"no scan finished for {AFTER_S:g} s: the dead-man dropped every output. Find out why (the log,"
-    " the load of this machine), then `rmf-bridge reset`"
+    f"no scan finished for {AFTER_S:g} s: the dead-man switched every output off. Find out why (the"
+    " log, the load of this machine), then run `rmf-bridge reset`"
 )
 
 
@@ -33,7 +33,7 @@ class Pin(Protocol):
         """Claim the pin as an output that has this level from the first moment."""
 
     def input_with_pull(self, pull: str) -> None:
-        """Claim the pin as an input with this resistor: `up`, `down` or `floating`."""
+        """Claim the pin as an input with this pull resistor: `up`, `down` or `floating`."""
 
     def close(self) -> None:
         """Release the pin."""
@@ -73,8 +73,9 @@ class GpioBus(Bus):
         unread: Collection[str] = (),
         clearing: Mapping[str, Clearing] = MappingProxyType({}),
     ) -> "GpioLines":
-        """Return the lines of these points: canonical inputs with their pull, and outputs with their
-        safe level. The last two parameters concern only Modbus modules."""
+        """Return the lines of these points. `inputs` gives the pull resistor of each canonical input,
+        and `outputs` gives the safe level of each output. GPIO ignores the last two parameters,
+        which are for Modbus modules."""
         self._devices.append(GpioLines(self, dict(inputs), dict(outputs)))
         return self._devices[-1]
 
@@ -105,7 +106,7 @@ class GpioBus(Bus):
         try:
             self.factory.close()
         except _failures():
-            return  # the kernel releases the lines at the process's end
+            return  # the kernel releases the lines when the process ends
 
 
 class GpioLines:
@@ -142,8 +143,8 @@ class GpioLines:
         return self._levels(self._pulls)
 
     def write(self, levels: Mapping[str, bool]) -> None:
-        """Drive these outputs. If an output fails, still try every output that goes off. Raises
-        HalError."""
+        """Drive these outputs. If an output fails, still try every output that should go to its safe
+        level. Raises HalError."""
         every = Every()
         for point, level in levels.items():
             if level != self._safe[point]:
@@ -153,19 +154,19 @@ class GpioLines:
                 self._of(point).state = level
         every.check()
         if self._dropped and levels.items() - self._safe.items():
-            self.drop()  # the dead-man dropped the outputs during this write, so drop again
+            self.drop()  # the dead-man intervened during this write, so switch off again
             self._check()
 
     def drop(self) -> None:
-        """Hold every output at its safe level until the next claim. Any thread may call `drop`. Does
-        not raise."""
+        """Set every output to its safe level, and refuse other levels until the next claim. Any thread
+        may call `drop`. Does not raise."""
         self._dropped = True
         for point, level in self._safe.items():
             if point in self._claimed:
                 try:
                     self._claimed[point].state = level
                 except _failures():
-                    continue  # the other outputs must still drop
+                    continue  # still switch the other outputs off
 
     def outputs(self) -> dict[str, bool]:
         """Read the outputs' levels from the chip. Raises HalError."""
@@ -206,8 +207,8 @@ class GpioLines:
         pin.when_changed = self._bus.edge
 
     def _conflicts_with(self, other: object) -> bool:
-        """Return whether `other` is a different device. gpiozero calls this with the device that holds
-        a wanted pin."""
+        """Return whether `other` is a different device. gpiozero calls this when this device wants a
+        pin that `other` holds."""
         return other is not self
 
     def _release(self) -> None:
@@ -240,5 +241,5 @@ def _hal_errors(point: str) -> Iterator[None]:
 
 
 def _hal_error(point: str, error: Exception) -> HalError:
-    text = getattr(error, "value", error)  # an lgpio error as text has quotes
+    text = getattr(error, "value", error)  # str of an lgpio error would add quotes
     return HalError(f"{describe(point)}: {text}")

@@ -1,8 +1,8 @@
 """The header's chip and the claims of its lines, through lgpio alone. Import this file only where lgpio
 is installed.
 
-The import of lgpio creates a FIFO in the working directory. So import this file in the runtime
-directory.
+The import of lgpio creates a FIFO (a named pipe) in the working directory. So import this file only
+while the runtime directory is the working directory.
 """
 
 import os
@@ -83,4 +83,4 @@ def _not_found(numbers: Iterable[int], refused: list[str]) -> str:
     if refused:
         return "; ".join(refused)
     seen = ", ".join(f"gpiochip{n}" for n in numbers) or "no GPIO chip at all"
-    return f"no chip of a Raspberry Pi's header (label {HEADER_LABEL}…) among: {seen}"
+    return f"no chip has the label of a Raspberry Pi's header ({HEADER_LABEL}…); chips here: {seen}"

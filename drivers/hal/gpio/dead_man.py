@@ -1,9 +1,9 @@
-"""A dead-man that watches a loop. When the loop's scans stop, the dead-man switches the outputs to
-their safe level. The outputs stay there.
+"""A dead-man: a thread that watches a loop. When the loop's scans stop, the dead-man switches the
+outputs to their safe level. The outputs keep this level.
 
 The dead-man writes outputs from another thread, so it is only for GPIO. No thread can interrupt a
-Modbus client, so Modbus modules have their own watchdog. A thread that keeps Python's global lock stops
-the dead-man too. In this case systemd's watchdog acts.
+Modbus client, so Modbus modules have their own watchdog. If some thread never releases Python's global
+interpreter lock, the dead-man cannot run either. In this case systemd's watchdog acts.
 """
 
 import threading
@@ -26,15 +26,15 @@ class GpioDeadMan:
         self._thread: threading.Thread | None = None
 
     def fed(self) -> None:
-        """Report a finished scan. The first scan starts the watch."""
+        """Report a finished scan. The dead-man watches from the first scan on."""
         self._fed_at = self._clock()
         if self._thread is None:
             self._thread = threading.Thread(target=self._watch, name="dead-man", daemon=True)
             self._thread.start()
 
     def check(self) -> bool:
-        """Drop the outputs if the last scan is too old. Return whether this call dropped the
-        outputs."""
+        """Switch the outputs to their safe level if the last scan finished more than AFTER_S seconds
+        ago. Return whether this call did so."""
         overdue = self._fed_at is not None and self._clock() - self._fed_at > AFTER_S
         if overdue:
             self._fed_at = None
@@ -52,6 +52,6 @@ class GpioDeadMan:
             self.check()
 
     def _left_s(self) -> float:
-        """Return the time (s) until the last scan is too old."""
+        """Return the time (s) that is left until the next scan must have finished."""
         fed_at = self._fed_at
         return AFTER_S if fed_at is None else max(fed_at + AFTER_S - self._clock(), 0.01)

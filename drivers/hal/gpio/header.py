@@ -66,11 +66,11 @@ def describe(point: str) -> str:
 
 
 def boot_level(point: str) -> bool:
-    """Return the level of a pin from power-on until the daemon claims the pin. A resistor sets this
-    level.
+    """Return the level of a pin from power-on until the daemon claims the pin. A pull resistor in the
+    chip sets this level.
 
-    The resistor pulls BCM0 to BCM8 up, and BCM9 to BCM27 down (BCM2835 ARM Peripherals, table 6-31, and
-    its successors).
+    The resistor pulls BCM0 to BCM8 up, and BCM9 to BCM27 down (BCM2835 ARM Peripherals, table 6-31).
+    The chips after the BCM2835 do the same.
     """
     return int(canonical(point)[3:]) <= 8
 
@@ -89,16 +89,11 @@ def wire_problems(wire: Wire) -> Iterable[str]:
     elif wire.pull is not None:
         yield "an output has no pull"
     elif not wire.read_back:
-        yield (
-            "read_back is for the coils of a module, but a pin keeps its level: delete read_back"
-        )
+        yield "read_back is only for the coils of a Modbus module: delete read_back"
     elif wire.flash is not None:
-        yield (
-            "flash is for modules that time pulses, but the daemon times a pin's pulses:"
-            " delete flash"
-        )
+        yield "flash is only for Modbus modules that end pulses themselves: delete flash"
     elif name in HAT_EEPROM:
-        yield f"{name} belongs to the HAT EEPROM, and the firmware drives it at boot: use another"
+        yield f"{name} is for a HAT's EEPROM, and the firmware drives it at boot: use another pin"
 
 
 def wire_warnings(wire: Wire) -> Iterable[str]:
@@ -108,5 +103,5 @@ def wire_warnings(wire: Wire) -> Iterable[str]:
     except ValueError:
         return  # the spelling check reports an invalid point
     if name in SHARED:
-        free = "; see that it is switched off in config.txt, or use another pin"
+        free = "; make sure that config.txt switches this use off, or use another pin"
         yield f"{name} is for {SHARED[name]}{free}"

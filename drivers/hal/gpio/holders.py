@@ -1,5 +1,5 @@
-"""Finds the processes that have a GPIO chip open. The kernel itself tells only a label ('lg') of a
-line's holder."""
+"""Finds the processes that have a GPIO chip open. The kernel itself does not name the process that
+holds a line. It only gives the label that the process has chosen ('lg' for lgpio)."""
 
 import os
 from collections.abc import Iterator

@@ -1,8 +1,9 @@
 """gpiozero's pins on lgpio, with outputs that never glitch. Import this file only where lgpio is
 installed.
 
-gpiozero's own `LGPIOPin` claims an output in three steps: as an input, as an output at low, and at last
-at its level. So an active-low relay clicks at each start. On close `LGPIOPin` claims a floating input.
+gpiozero's own `LGPIOPin` claims an output in three steps: as an input, then as a low output, and only
+then with the wanted level. So an active-low relay clicks at each start. On close `LGPIOPin` claims a
+floating input.
 
 The pins of this file claim a line once, at its safe level. They keep this level after close, because
 the kernel of Raspberry Pi OS keeps the level of a line that no process holds.
@@ -18,8 +19,9 @@ from gpiozero.pins.local import LocalPiFactory, LocalPiPin
 
 from drivers.hal.gpio.chip import DEV, PULLS, claim, open_chip
 
-# The revision of any board with the 40-pin header. gpiozero needs a board for the names of pins. It
-# would read the board from /proc/cpuinfo, but the daemon's hardened systemd unit hides that file.
+# The revision of any board with the 40-pin header. gpiozero must know a board to know the names of the
+# pins. gpiozero would read the revision from /proc/cpuinfo, but the daemon's hardened systemd unit
+# hides that file.
 REVISION = 0xA02082
 
 
@@ -68,8 +70,8 @@ class HeldPin(LGPIOPin):  # type: ignore[misc]
 
 
 class HeldFactory(LGPIOFactory):  # type: ignore[misc]
-    """The pins of an open chip. This constructor takes the chip, because gpiozero's own constructor
-    would choose a chip by the board."""
+    """The pins of a chip that is already open. gpiozero's own constructor would choose a chip by the
+    board, so this constructor gets the open chip instead."""
 
     def __init__(self, handle: int, chip: int) -> None:
         LocalPiFactory.__init__(self)

@@ -6,16 +6,16 @@
     points.py         the spelling of contacts and relays
     registers.py      the spelling of places in a register map
     bus.py            the units of one connection or line, with retries and pauses
-    lines.py          one device's coils and registers: claim, read, write, read back, release;
-                      reports a second master on an output as a fault, without chattering relays
+    lines.py          the coils and registers of one device: reads and writes them, and verifies
+                      each write; if a second master writes an output too, reports this as a fault
     clearing.py       commands that a controller takes and clears by itself, such as lift calls
     dead_man.py       arms and refreshes the modules' watchdogs
     wire.py           a request and its answer
     tcp.py, rtu.py    carry requests and answers
     frames.py         makes and reads the frames
 
-Only frames.py (pymodbus) and rtu.py (pyserial) import a library. They are imported when a bus needs
-them.
+Only frames.py (pymodbus) and rtu.py (pyserial) import a library. They are themselves imported only when
+a bus needs them.
 """
 
 from drivers.hal import BusType

@@ -2,13 +2,15 @@
 
 - One try of a request has `timeout_s`, from the name lookup to the last byte of the reply. After a
   failure there are up to `retries` more tries. Reads and writes may be repeated. A pulse is not
-  repeated, because a repeat would prolong it. A late reply or half a frame must not pass for the reply
-  to another request. For this, `tcp.py` opens a new connection, and `rtu.py` waits for silence.
+  repeated, because a repeat would prolong it.
+- A late reply or an incomplete frame must not pass for the reply to another request. To prevent this,
+  `tcp.py` opens a new connection after a failure, and `rtu.py` waits for silence.
 - If the connection or port cannot be opened, the whole bus backs off for 0.5 to 30 s. If a unit fails,
   only this unit backs off. During a backoff calls fail at once with the same text.
 - After a backoff each request gets only one try, until the unit answers again. A unit that has never
   answered also gets only one try. So a dead unit costs the other units one `timeout_s` for each
-  backoff. Between two such failed tries the live units have their turn.
+  backoff. After such a failed try no other dead unit is tried for TURN_S, so that the units that answer
+  are read in between.
 - At each unit, writes that switch off have a backoff of their own. So a failed reading never delays the
   first such write.
 
@@ -46,16 +48,16 @@ from drivers.hal.modbus.wire import (
 from drivers.hal.points import Clearing, Pull
 
 TURN_S: Final = 0.05
-"""The pause (s) between a failed try and a try of another failed unit. The pause is longer than the
-rest of a scan, and shorter than the period of scans."""
+"""The pause (s) after a failed try before a try of another failed unit. The scan that has begun ends
+within this pause. The pause is shorter than the period of scans."""
 
 
 class ModbusBus(Bus):
     """One TCP connection or serial line, and its units. It is also a `drivers.hal.points.PointsBus`.
 
     Tests replace `clock` and `jitter`. `now` is the clock. `scan_s` is the period of readings (s).
-    `refused` holds ranges of addresses that a unit refused, because the unit lacks an address between
-    the used points. No further reading asks for such a range.
+    `refused` remembers each range of addresses that a unit has refused to read, because the range
+    includes an address that the unit lacks. No further reading asks for such a range.
     """
 
     canonical = staticmethod(canonical)
@@ -100,29 +102,30 @@ class ModbusBus(Bus):
         return Image(self, points).read()
 
     def write(self, point: Point, value: int, safe: bool = False) -> None:
-        """Set this coil (0 or 1) or register. Raises HalError. After an error nobody knows its
-        value."""
+        """Set this coil (0 or 1) or register. Raises HalError. After an error the value of the coil or
+        register is unknown."""
         coil = point.table == "coil"
         sent = (COIL_ON if value else 0) if coil else value
         what = f"write {'coil' if coil else 'register'} {point.address}"
         self._ask(what, UnitRequest(point.unit, WRITES[point.table], point.address, sent), safe)
 
     def flash(self, place: Point, on_s: float) -> None:
-        """Let the module time a pulse, by the command "flash on" of Waveshare's Modbus RTU Relay
-        boards.
+        """Let the module switch a relay on and, after `on_s` seconds, off again. This is the command
+        "flash on" of Waveshare's Modbus RTU Relay boards.
 
         The request is function 5. Its address is 0x0200 plus the relay's number, which begins at 0. Its
         value is the time in tenths of a second. The reply is an echo. Source: the maker's manual,
         protocol V2: `01 05 02 00 00 07 8D B0` switches relay 0 of unit 1 on for 0.7 s.
 
-        The request is sent once, because a repeat would restart the time. Raises HalError. After an
-        error nobody knows whether the module gives the pulse.
+        The request is sent once, because a second request would restart the pulse. Raises HalError.
+        After an error it is unknown whether the module gives the pulse.
         """
         question = UnitRequest(place.unit, WRITES["coil"], place.address, round(on_s * 10))
         self._ask(f"flash at coil {place.address:#x}", question, once=True)
 
     def guard(self, units: Iterable[int]) -> DeviceWatchdogs:
-        """Return the watchdogs of the modules at these units. The caller's device has outputs there."""
+        """Return the watchdogs of the modules at these units, where the caller's device has its
+        outputs."""
         return self._watchdogs.guard(units)
 
     def scanned(self) -> None:
@@ -164,8 +167,8 @@ class ModbusBus(Bus):
         raise self._refused(backoff, unit, text, answer.exception)
 
     def _tried(self, question: UnitRequest, tries: int) -> tuple[UnitReply | None, str]:
-        """Return the answer and "". If no answer comes, return None and the reason. Raises HalError
-        without a connection."""
+        """Return the answer and "". If no answer comes, return None and the reason. Raises HalError if
+        there is no connection."""
         reason = ""
         for _ in range(tries):
             began, failed = self.now(), True
@@ -196,8 +199,8 @@ class ModbusBus(Bus):
 
 
 def _way(settings: ModbusSettings) -> tuple[UnitWire, str]:
-    """Return the wire to the units, and its name for messages. Only this function imports the
-    libraries."""
+    """Return the connection or serial line to the units, and its name for messages. Only this function
+    imports the libraries."""
     if settings.serial:
         from drivers.hal.modbus.rtu import SerialLine
 

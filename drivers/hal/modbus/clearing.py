@@ -1,12 +1,13 @@
-"""Calls (such as a lift's calls) that a controller takes from a place and then clears. Soon after the
-write the place reads "no call".
+"""Calls (such as a lift's calls) that a controller takes and then clears. The daemon writes a call to a
+place (a coil or register). Soon after the write the place reads "no call".
 
-This file judges only the places of calls. A place counts as clearing itself if each written call is
-lost within a scan. Another master that writes "no call" as quickly would look the same, so the warning
-names both causes.
+This file judges only places for calls. A place counts as one that its controller clears if every call
+disappears within one scan. Another master that writes "no call" as quickly would look the same, so the
+warning names both causes.
 
-Every other contradiction counts as another master's write (`Rivals` in `lines.py`). A contradiction is,
-for example, a call that is lost later, a call that the daemon did not write, or any other command.
+Everything else that contradicts the written value counts as another master's write (`Rivals` in
+`lines.py`). Examples are a call that disappears later, a call that the daemon did not write, and any
+other command.
 """
 
 import logging
@@ -19,12 +20,14 @@ from drivers.hal.points import Clearing
 log = logging.getLogger(__name__)
 
 TWICE: Final = 2
-"""The number of successive calls that must be lost within a scan before the place counts as clearing
-itself. The driver writes the first lost call again, because the module may have restarted."""
+"""The number of successive calls that must disappear within one scan. Then the place counts as one that
+its controller clears. The driver writes the first of these calls again, because the module may have
+restarted."""
 
 
 class ClearedCalls:
-    """The places, by name, that may clear a written call. `scan_s` is the period of readings (s)."""
+    """The outputs whose calls a controller may clear. Each output has a name. `scan_s` is the period of
+    readings (s)."""
 
     def __init__(
         self,
@@ -50,13 +53,14 @@ class ClearedCalls:
         self._gone.discard(name)
 
     def may_read(self, name: str, written: int, found: int) -> bool:
-        """Return whether `found` is the written value, or the written value without its call."""
+        """Return whether the reading `found` fits the value `written`. It fits if both are equal, and
+        also if the controller has only cleared the call in `written`."""
         cleared = name not in self._stayed and found == self._without_call(name, written)
         return found == written or cleared
 
     def keeps(self, name: str, written: int, found: int) -> bool:
-        """Return False if the written call must be written again. `may_read` must be true for this
-        reading."""
+        """Return False if the driver must write the call again. The reading `found` must fit
+        (`may_read`)."""
         habits = self._clearing.get(name)
         if habits is None or habits.pulse or self._without_call(name, written) == written:
             return True
@@ -75,13 +79,13 @@ class ClearedCalls:
         if self._in_a_row.get(name, 0) >= TWICE and name not in self._told:
             self._told.add(name)
             text = (
-                f"{place} loses each written call within a scan. If the controller takes each"
-                " call and clears its place, write read_back: false at this command. Otherwise"
-                " another master writes the place too"
+                f"each call that the daemon writes to {place} disappears within a scan. If the"
+                " controller takes the call and clears the place, write read_back: false at this"
+                " command. Otherwise another master writes the place too"
             )
             log.warning(pairs("call_cleared", place=place, reason=text))
 
     def _without_call(self, name: str, written: int) -> int:
-        """Return the value of the place when the call of `written` is cleared."""
+        """Return what the place reads after the controller has cleared the call in `written`."""
         bits = self._clearing[name].bits if name in self._clearing else 0
         return (written & ~bits) | (self._safe[name] & bits)

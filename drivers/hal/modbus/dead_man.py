@@ -1,13 +1,15 @@
 """Arms and refreshes the watchdogs inside Modbus modules. Their settings are in `watchdog.py`.
 
-- An output is driven only after its module's watchdog is armed. A watchdog counts as armed only after
-  the daemon has read this back.
+- The daemon drives an output only after it has armed the module's watchdog. A watchdog counts as armed
+  only after the daemon has read from the module that it is armed.
 - Only a finished scan refreshes a watchdog. So the module switches its outputs off when the daemon
   hangs. One round of the loop must be shorter than the module's time, even with failing units.
-- A trip is read back, or exception 4 reports it. After a trip the state of every output is unknown. The
-  watchdog is armed again. Each device on the unit fails one reading, and writes its outputs anew.
+- The daemon reads whether a watchdog has tripped. Exception 4 of the module shows this too. After a
+  trip the state of every output is unknown. The daemon then arms the watchdog again. For each device on
+  the unit one reading fails, and the device writes its outputs anew.
 
-After the daemon's end the watchdog stays armed. The outputs are off already, and stay off.
+After the daemon's end the watchdog stays armed. The daemon has switched the outputs off before its end,
+so they stay off.
 """
 
 import itertools
@@ -62,7 +64,7 @@ class UnitWatchdog:
             self.tripped()
 
     def tripped(self) -> None:
-        """Record a trip. After a trip nobody knows the state of the outputs."""
+        """Record a trip. After a trip the state of the outputs is unknown."""
         if self.armed:
             self.armed = False
             self.trips += 1
@@ -85,14 +87,14 @@ class UnitWatchdog:
 
 
 class DeviceWatchdogs:
-    """The watchdogs of the units that have one device's outputs."""
+    """The watchdogs of the units where one device has its outputs."""
 
     def __init__(self, watchdogs: Iterable[UnitWatchdog]) -> None:
         self._seen = {watchdog: watchdog.trips for watchdog in watchdogs}
 
     def check(self) -> None:
-        """Arm all watchdogs. Raises HalError. After each trip `check` raises once more, because outputs
-        went off."""
+        """Arm all watchdogs. Raises HalError if this fails. After a trip, also raise HalError once
+        although the watchdog is armed again, because the trip has switched outputs off."""
         trips = [watchdog for watchdog, seen in self._seen.items() if watchdog.trips != seen]
         for watchdog in self._seen:
             watchdog.arm()
@@ -117,7 +119,7 @@ class Watchdogs:
             self._units = {unit: UnitWatchdog(bus, unit, habits) for unit in settings.units}
 
     def guard(self, units: Iterable[int]) -> DeviceWatchdogs:
-        """Return the watchdogs of these units. The caller's device has outputs there."""
+        """Return the watchdogs of these units, where the caller's device has its outputs."""
         return DeviceWatchdogs(
             self._units[unit] for unit in sorted(set(units)) if unit in self._units
         )

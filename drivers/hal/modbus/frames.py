@@ -2,10 +2,14 @@
 
 pymodbus's decoders accept wrong replies, so this file has stricter decoders.
 
-This code does not use pymodbus's client, for four reasons. The client's timeout starts again at each
-byte and follows the wall clock. Its name lookup has no limit. It repeats requests on a connection that
-may still hold late replies. It accepts a reply to another function. Nothing imports pymodbus's server,
-because it costs 15 MB of memory.
+This code does not use pymodbus's client, for four reasons:
+
+- The client's timeout starts again at each byte, and follows the wall clock.
+- The client's name lookup has no limit.
+- The client repeats requests on a connection that may still hold late replies.
+- The client accepts a reply whose function code differs from the request's.
+
+No file imports pymodbus's server, because it costs 15 MB of memory.
 """
 
 import logging
@@ -93,7 +97,7 @@ class InputRegisters(HoldingRegisters):
 
 
 class CoilEcho(WriteSingleCoilResponse):
-    """The echo of a coil's address and value. pymodbus alone would read every value as 1."""
+    """The echo of a coil's address and value. pymodbus's own decoder would read every value as 1."""
 
     def decode(self, data: bytes) -> None:
         """Decode address and value. Raises ValueError for a wrong number of bytes."""
@@ -121,8 +125,8 @@ RTU: Final = FramerRTU(DECODER)
 
 
 def tcp_request(question: UnitRequest, number: int) -> bytes:
-    """Return the request's frame on TCP. `number` is the transaction number, which must not be 0.
-    Raises BadReply."""
+    """Return the Modbus TCP frame of this request. `number` is the transaction number, which must not
+    be 0. Raises BadReply."""
     return number.to_bytes(2, "big") + _after_number(question)
 
 
@@ -132,12 +136,12 @@ def _after_number(question: UnitRequest) -> bytes:
 
 
 def tcp_answer(question: UnitRequest, number: int, heard: bytes) -> tuple[int, UnitReply | None]:
-    """Return the number of used bytes, and the answer. The answer is None until it is complete. Raises
-    BadReply.
+    """Return how many bytes of `heard` were used, and the answer. The answer is None until it is
+    complete. Raises BadReply.
 
-    Replies to other requests and replies of other units are dropped. pymodbus alone would accept a
-    reply with number 0 for any request. pymodbus would also accept any unit's reply to a request to
-    unit 0.
+    `number` is the request's transaction number. Replies with another number and replies of other units
+    are dropped. pymodbus alone would accept a reply with number 0 for any request. pymodbus would also
+    accept any unit's reply to a request to unit 0.
     """
     used = 0
     while True:
@@ -146,7 +150,7 @@ def tcp_answer(question: UnitRequest, number: int, heard: bytes) -> tuple[int, U
         if not content:
             return used, None
         if replied == 0:
-            raise BadReply("its transaction number is 0, not the request's")
+            raise BadReply("the reply's transaction number is 0, not the request's number")
         if (unit, replied) == (question.unit, number):
             return used, _decoded(question, content)
 
@@ -189,7 +193,8 @@ def _request(question: UnitRequest, number: int = 0) -> ModbusPDU:
 
 
 _last: Final[dict[UnitRequest, tuple[bytes, UnitReply]]] = {}
-"""The last reply to each request that reads, and its answer. Most polls bring the same reply again."""
+"""The bytes of the last reply to each read request, and the decoded answer. Most polls bring the same
+bytes again, so the answer need not be decoded again."""
 
 
 def _decoded(question: UnitRequest, content: bytes) -> UnitReply:

@@ -2,9 +2,9 @@
 through this file.
 
 The driver reads an output before its first write, and reads it back after each write. Each later
-reading compares the output with the written value. The comparison reveals a module that restarted with
-its outputs off, a tripped watchdog, and another master (`Rivals`). Every output that goes to its safe
-value is written, even if another output, an input or the unit's watchdog fails.
+reading compares the output with the written value. A difference reveals a module that restarted with
+its outputs off, a tripped watchdog, or another master (`drivers/hal/rivals.py`). Every output that
+should go to its safe value is written, even if another output, an input or the unit's watchdog fails.
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -66,8 +66,8 @@ class ModbusLines:
     """One device's inputs and outputs by name (`drivers.hal.points.Lines`).
 
     `safe` gives each output's safe value. `unread` are the outputs that cannot be read back. Every scan
-    writes these outputs, because the controller may have restarted. `clearing` are the outputs that the
-    controller may clear.
+    writes the `unread` outputs, because the controller may have restarted. `clearing` are the outputs
+    that the controller may clear by itself (`clearing.py`).
     """
 
     def __init__(
@@ -90,8 +90,9 @@ class ModbusLines:
         self._calls = ClearedCalls(units.now, units.scan_s, safe, clearing)
         self._clearing = bool(clearing)
         self._verified: tuple[dict[str, int], dict[Point, int]] | None = None
-        """The written values and the readings that `read` has compared last. A place that clears itself
-        is judged by the time too."""
+        """The written values and the readings that `read` has compared last, so that it need not
+        compare the same values again. It is None if a controller may clear outputs, because then the
+        result depends on time too."""
         self._levels: dict[str, int] = {}
         self._set: dict[str, int] = {}
         self._touched = False
@@ -103,7 +104,8 @@ class ModbusLines:
         """Read each output. In the first claim, also bring each output to its safe value.
 
         If the outputs cannot be read, read the inputs instead, to check that the unit answers. A claim
-        after a failure leaves the outputs unchanged, because a lost reply must not release a held door.
+        after a failure leaves the outputs unchanged. For example, a lost reply must not release a door
+        that RMF holds.
         """
         self._set.clear()
         every = Every()
@@ -119,8 +121,8 @@ class ModbusLines:
         self._claimed = True
 
     def read(self) -> dict[str, int]:
-        """Read every input, and each output whose lost call must be written again. Raises HalError,
-        also if an output contradicts its written value.
+        """Read every input, and each output whose lost call must be written again. Raises HalError if a
+        request fails, or if an output contradicts its written value.
 
         After a failure the outputs count as unknown.
         """
@@ -138,17 +140,18 @@ class ModbusLines:
         return self._levels
 
     def bring(self, values: Mapping[str, int]) -> None:
-        """Set these outputs. Skip an output that certainly has its value already. Raises HalError.
+        """Set these outputs. Do not write an output that is known to have its value already. Raises
+        HalError.
 
-        Also raises while another master writes one of the device's outputs.
+        Also raises HalError while another master writes one of the device's outputs.
         """
         changed = {n for n, value in values.items() if self._set.get(n) != value}
         self.write({n: values[n] for n in values if n in changed | self._unread})
         self._rivals.check(map(str, self._outputs.values()))
 
     def write(self, values: Mapping[str, int]) -> None:
-        """Set these outputs, and read them back. Raises HalError. After an error nobody knows the
-        outputs' values."""
+        """Set these outputs, and read them back. Raises HalError. After an error the values of these
+        outputs are unknown."""
         every = Every()
         self._write(values, every)
         every.check()
@@ -175,13 +178,13 @@ class ModbusLines:
         if not self._touched:
             return
         self._units.insist()
-        unheard = Every()  # keeps failures that nobody reads, because the daemon is ending
+        unheard = Every()  # nobody reads these failures, because the daemon ends
         for name, point in self._outputs.items():
             with unheard.one():
                 self._units.write(point, self._safe[name], safe=True)
 
     def _write(self, values: Mapping[str, int], every: Every) -> None:
-        """Write first the outputs that go to their safe value. After a failure write no other outputs.
+        """Write the outputs, first those that go to their safe value. After a failure write only those.
         Then read each written output back."""
         self._touched = self._touched or bool(values)
         safe = {name for name, value in values.items() if value == self._safe[name]}
@@ -215,12 +218,12 @@ class ModbusLines:
                 )
 
     def _reading(self, name: str, value: int, image: Mapping[Point, int]) -> int:
-        """Return an output's value in this image. Return the written value instead if the image lacks
-        the output, or if the output cannot be read back (`unread`)."""
+        """Return an output's value in `image` (the last readings). Return the written value instead if
+        `image` lacks the output, or if the output cannot be read back (`unread`)."""
         return value if name in self._unread else image.get(self._outputs[name], value)
 
     def _lost(self, known: Mapping[str, int], image: Mapping[Point, int]) -> dict[str, int]:
-        """Return the reading of each output that has lost its call. The driver must write these calls
+        """Return what each output reads that has lost its call, so that the driver must write the call
         again."""
         lost: dict[str, int] = {}
         for name, value in known.items():

@@ -15,12 +15,13 @@ from drivers.numbers import Bit
 
 
 class Placed(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A part with a place. `TABLES` lists the tables that the place may be in."""
+    """A part of a register map that has a place (Modbus table and address). `TABLES` lists the tables
+    that the place may be in."""
 
     TABLES: ClassVar[Collection[str]] = tuple(TABLES)
     refused: ClassVar[Mapping[str, str]] = {
-        "bus": "a map is read from its device's own bus: only contacts (driver: dry_contact) can be on"
-        " another bus"
+        "bus": "all places of a map are on the device's own bus: only contacts (driver: dry_contact)"
+        " can be on another bus"
     }
 
     at: Annotated[

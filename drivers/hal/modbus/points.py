@@ -19,7 +19,8 @@ from drivers.hal.points import Wire
 from drivers.numbers import BITS
 
 Table = Literal["coil", "discrete input", "holding register", "input register"]
-"""The four tables of a unit. `registers.py` has places without a unit."""
+"""The name of one of a unit's four tables. A `Point` of this file also has a unit. For places without a
+unit see `registers.py`."""
 
 GAP_MAX: Final[dict[Table, int]] = {
     "coil": 8,
@@ -27,9 +28,11 @@ GAP_MAX: Final[dict[Table, int]] = {
     "holding register": 0,
     "input register": 0,
 }
-"""The widest gap between two points of one read request, for each table. A request never reads
-registers that nobody uses. A controller may lack such registers, or take their reading for an
-acknowledgement."""
+"""The maximum number of unused addresses between two points of one read request, for each table.
+
+For registers this number is 0, because a controller may lack an unused register. A controller may also
+take the reading of a register as an acknowledgement.
+"""
 COUNT_MAX: Final[dict[Table, int]] = {
     "coil": 2000,
     "discrete input": 2000,
@@ -82,7 +85,8 @@ class Point(Struct, frozen=True, order=True):
         return self if self.bit is None else Point(self.unit, self.table, self.address)
 
     def of(self, value: int) -> int:
-        """Return the point's value. `value` is the value of the point's cell."""
+        """Return the point's value. `value` is the content of the coil, input or whole register
+        (`cell`)."""
         return value if self.bit is None else value >> self.bit & 1
 
 
@@ -142,8 +146,8 @@ def wire_problems(wire: Wire) -> Iterable[str]:
     yield from _flash_problems(wire, point)
     if point.bit is not None:
         yield (
-            "an output is a coil: writing a register would also write its other bits, which another"
-            " device may use; driver: register writes whole registers"
+            "an output must be a coil: a write to a register would also write its other bits, which"
+            " another device may use. The driver 'register' can write whole registers"
         )
     elif point.table != "coil":
         yield f"an output is a coil, and a {point.table} can only be read"
@@ -155,8 +159,8 @@ def wire_problems(wire: Wire) -> Iterable[str]:
 
 
 def wire_warnings(wire: Wire) -> Iterable[str]:
-    """Yield a warning for a relay if nobody can verify that the relay went off. A call needs no such
-    proof."""
+    """Yield a warning for a relay if the driver cannot verify that the relay went off. Yield no warning
+    for a lift call, because a call ends by itself."""
     if wire.direction == "out" and not (wire.read_back or wire.clearing):
         yield "the coil is not read back: switching it off is not verified"
 
@@ -168,7 +172,7 @@ def _flash_problems(wire: Wire, output: Point) -> Iterable[str]:
     if flash.table != "coil":
         yield f"flash is a write to a coil, not to a {flash.table}"
     if flash.unit != output.unit:
-        yield f"flash is at unit {flash.unit}, and the relay at unit {output.unit}: one is wrong"
+        yield f"flash is at unit {flash.unit}, but the relay is at unit {output.unit}: correct one"
 
 
 def ranges(points: Iterable[Point], gap: int | None = None) -> list[Range]:
@@ -193,7 +197,8 @@ def pieces(whole: Range, points: Iterable[Point]) -> Sequence[Range]:
 
 
 class RefusedRanges:
-    """Ranges that a unit has refused because it lacks an address between the used points."""
+    """The ranges that a unit has refused to read. A unit refuses a range if it lacks an unused address
+    between the used points."""
 
     def __init__(self) -> None:
         self._found: set[Range] = set()
@@ -266,7 +271,7 @@ def _model_number(table: Table, text: str, number: int) -> str:
     meant = int(text[1:]) - 1
     hint = f"write {table} {meant}" if meant >= 0 else "the first is address 0"
     return (
-        f"{text} looks like a number of the data model, which begins at 1: {hint}; or 0x{number:x} if"
+        f"{text} looks like a manual's number, and these begin at 1: {hint}. Write 0x{number:x} if"
         f" {number} really is the address on the wire"
     )
 

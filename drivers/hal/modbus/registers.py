@@ -59,6 +59,7 @@ def misplaced(text: str, tables: Collection[str]) -> str | None:
 
 
 def at(unit: int, text: str, base: int = 0) -> Point:
-    """Return the point of a valid place at this unit. Add `base` to the address of the place."""
+    """Return the point of this unit that a valid place names. Add `base` to the address of the
+    place."""
     table, address = place(text)
     return Point(unit, table, address + base)

@@ -1,17 +1,19 @@
 """A serial line with Modbus RTU units: one request at a time, one deadline, silence between frames.
 
 pyserial opens and configures the port. pymodbus makes and reads the frames (`frames.py`). This file
-waits and times. A bus imports this file when it needs a serial line.
+does all the waiting. A bus imports this file when it needs a serial line.
 
 RTU has no transaction number, so a late reply looks like the reply to the present request. Hence these
 rules:
 
 - A request is sent only after 3.5 characters of silence. Earlier bytes are dropped.
-- Frames of other units are dropped, and the wait goes on. Bytes that are not a frame may be the wanted
-  reply in collision with a late reply. After such bytes the try ends when the line is silent.
+- Frames of other units are dropped, and the wait goes on. Bytes that are not a frame may come from a
+  collision of the wanted reply with a late reply. After such bytes the try ends when the line is
+  silent.
 - A unit that misses its timeout may answer late, until LATE x `timeout_s` after its request. Until then
-  the unit gets only repeats of the same request, within the same call. The first reply counts, because
-  the unit sampled both replies after the call began. The second reply is dropped.
+  the unit gets only repeats of the same request, within the same call. Both the first try and the
+  repeat may get a reply. The first reply that comes counts, because the unit measured its values after
+  the call began. The second reply is dropped.
 
 A unit that answers even later needs a longer `timeout_s`.
 """
@@ -34,10 +36,11 @@ from drivers.hal.modbus.wire import BadReply, NoReply, UnitReply, UnitRequest, U
 LATE: Final = 3.0
 PARITY: Final = {"none": "N", "even": "E", "odd": "O"}
 WRITES: Final = (5, 6, 15, 16)
-"""The functions whose replies may begin with the same bytes as the request."""
+"""The functions that write. Their replies may begin with the same bytes as the request, as an adapter's
+echo does."""
 UNITS: Final = range(1, 248)
 PAUSE_S: Final = 0.05
-"""The longest pause (s) within a frame. Adapters delay characters by up to 16 ms."""
+"""The longest pause (s) between two bytes of one frame. Adapters delay characters by up to 16 ms."""
 FRAME_MAX: Final = 256
 """The number of characters in the longest frame (Modbus over Serial Line V1.02, 2.5.1)."""
 
@@ -60,7 +63,8 @@ class SerialLine:
         self._stray = b""
 
     def owes(self, unit: int) -> bool:
-        """May this unit still reply to an older request? In this case a new request should wait."""
+        """May this unit still reply to an older request? Then a new request to this unit should
+        wait."""
         return time.monotonic() < self._late.get(unit, 0.0)
 
     def begin(self, unit: int) -> None:
@@ -68,7 +72,7 @@ class SerialLine:
         time.sleep(max(0.0, self._late.pop(unit, 0.0) - time.monotonic()))
 
     def connect(self) -> None:
-        """Open the port if necessary, and start the time of one try. Raises Unreachable."""
+        """Open the port if necessary, and start the time limit of one try. Raises Unreachable."""
         if self._port is None:
             try:
                 self._port = self._opened()
@@ -123,12 +127,13 @@ class SerialLine:
             timeout=0,
             exclusive=True,
         )
-        with suppress(OSError, ValueError):  # adapters that refuse this delay bytes by up to 16 ms
+        with suppress(OSError, ValueError):  # some adapters refuse, and delay bytes by up to 16 ms
             port.set_low_latency_mode(True)
         return port
 
     def _settle(self) -> None:
-        """Wait until the line is silent for the gap between frames. Drop all bytes until then."""
+        """Wait until the line has been silent for `gap_s`, the gap between frames. Drop all bytes until
+        then."""
         while heard := self._heard(self._busy_until + self._settings.gap_s - time.monotonic()):
             self._stray = heard
         self._stray = b""
@@ -136,7 +141,7 @@ class SerialLine:
     def _send(self, request: bytes) -> None:
         self._sent_at = time.monotonic()
         self._busy_until = self._sent_at + len(request) * self._settings.character_s
-        if request[0] in self._late:  # the unit may answer this repeat late too
+        if request[0] in self._late:  # the unit may also answer this repeat late
             self._late[request[0]] = self._sent_at + LATE * self._timeout_s
         assert self._port  # `connect` has opened it
         if os.write(self._port.fileno(), request) != len(request):
@@ -187,7 +192,7 @@ class SerialLine:
         if is_echo and self._settings.ignore_echo:
             raise Noise("the adapter's echo came late")
         if is_echo:
-            text = "our own request comes back; does the adapter echo? write ignore_echo: true"
+            text = "the request itself came back; if the adapter echoes, write ignore_echo: true"
             raise BadReply(text)
         raise BadReply(f"CRC of {frame.hex(' ')} is wrong")
 
@@ -199,13 +204,13 @@ class SerialLine:
         self._stray = heard
         if not frames.crc_fits(heard):
             raise Noise(
-                f"{_start(heard)} is not a frame: a collision, noise or other line settings"
+                f"{_start(heard)} is not a frame: a collision, noise, or wrong line settings?"
             )
 
     def _silence(self) -> str:
         text = f"no reply within {self._timeout_s:g} s"
         if self._stray:
-            text += f", but {_start(self._stray)} of another unit"
+            text += f", but bytes of another unit: {_start(self._stray)}"
         return text
 
     def _unreachable(self, error: Exception) -> str:
@@ -214,15 +219,15 @@ class SerialLine:
         if code == errno.ENOENT:
             return text + "the port is not there; is the adapter plugged in? ls /dev/serial/by-id"
         if code == errno.EACCES:
-            return text + "the port may not be opened: add the daemon's user to the group dialout"
+            return text + "no permission: the daemon's user must be in the group dialout"
         if code in (errno.EAGAIN, errno.EBUSY):
             return text + "another program has it open"
         return text + _why(error)
 
 
 def _answers(request: bytes, function: bytes) -> bool:
-    """Return whether a reply to this request may have this function. If the function has not come yet,
-    return True."""
+    """Return whether `function`, the second byte of a reply, may answer this request. Return True if
+    this byte has not come yet."""
     return not function or function[0] & 0x7F == request[1]
 
 
@@ -238,7 +243,7 @@ def _start(heard: bytes) -> str:
 
 
 def _why(error: Exception) -> str:
-    """Return the text of the cause itself. pyserial wraps this text, and termios.error is not an
-    OSError."""
+    """Return the text of an error's cause. pyserial puts this text into a longer text, and
+    termios.error (which is no OSError) has it in its arguments."""
     text = getattr(error, "strerror", None) or (error.args[-1] if error.args else error)
     return str(text)

@@ -20,8 +20,8 @@ Timeout = Annotated[float, msgspec.Meta(ge=0.05, le=5, extra={"unit": "s"})]
 class ModbusSettings(
     BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="modbus"
 ):
-    """A module, or a gateway or serial line with several units. The YAML gives either `tcp` or
-    `serial`."""
+    """A Modbus connection. It reaches one module, a gateway with several units, or a serial line with
+    several units. The YAML gives either `tcp` or `serial`."""
 
     tcp: Annotated[Tcp | None, tells("where the module or gateway listens.")] = None
     serial: Annotated[Serial | None, tells("the serial line (Modbus RTU).")] = None
@@ -35,9 +35,9 @@ class ModbusSettings(
     ] = None
     without_watchdog: Annotated[
         dict[Unit, Name],
-        tells("""unit -> why its outputs may keep their value when the daemon's machine or the
-        network dies. Or write how the unit drops its outputs (`its web page: all off after 5 s
-        without a master`)."""),
+        tells("""unit -> the reason why this unit needs no watchdog here. Write why its outputs may
+        keep their value when the daemon's machine or the network dies. Or write how the unit
+        switches them off by itself (`set on its web page: all off after 5 s without a master`)."""),
     ] = msgspec.field(default_factory=dict)
 
     def problems(self) -> Remarks:
@@ -67,8 +67,8 @@ def warnings(settings: ModbusSettings) -> Remarks:
 
 
 def unwatched(settings: ModbusSettings, places: Iterable[str]) -> UnwatchedOutputs:
-    """Report the units that the daemon writes and that have no watchdog. Only this daemon switches the
-    outputs of these units off."""
+    """Report the units that the daemon writes and that have no watchdog. If the daemon's machine fails,
+    nothing switches the outputs of these units off."""
     written = {int(place.split()[1]) for place in places}
     bare = sorted(written.difference(settings.watched(), settings.without_watchdog))
     warned = [((), _bare(bare))] if bare else []
@@ -95,13 +95,13 @@ def paced(
         yield (
             ("timeout_s",),
             (
-                f"one silent unit delays the others by {silent_s:g} s (timeout_s for each try),"
-                f" but their readings are stale after {stale_s:g} s: lower timeout_s or retries"
+                f"one silent unit delays the other units by {silent_s:g} s (timeout_s for each try),"
+                f" but readings are stale after {stale_s:g} s: lower timeout_s or retries"
             ),
         )
     line = settings.serial
     if line and (round_s := len(units) * line.least_s) > settings.scan_s:
-        text = f"a reading of every unit takes {round_s:.2g} s at {line.baudrate} baud"
+        text = f"to read every unit once takes {round_s:.2g} s at {line.baudrate} baud"
         yield ("scan_s",), f"{text}: raise scan_s or the baud rate"
 
 
@@ -132,7 +132,7 @@ def unreachable(settings: ModbusSettings, point: str) -> str | None:
     unit = int(point.split()[1])
     if settings.serial is None or 1 <= unit <= 247:
         return None
-    why = "addresses all units, and no unit answers" if unit == 0 else "is for Modbus TCP"
+    why = "addresses all units at once, so no unit answers" if unit == 0 else "is for Modbus TCP"
     return f"unit {unit} {why}: units on a serial line are 1 to 247"
 
 
@@ -141,7 +141,7 @@ def where(settings: ModbusSettings) -> Where:
     port."""
     if settings.serial:
         return Where(settings.serial.port, local=True, clients="one")
-    assert settings.tcp  # otherwise `problems` has reported the missing address
+    assert settings.tcp  # `problems` has reported a missing address
     return Where(f"{settings.tcp.host}:{settings.tcp.port}", local=False, clients=None)
 
 
@@ -149,5 +149,5 @@ def needs(settings: ModbusSettings) -> Needs:
     """Return the permission to use the line's port, or to reach the module's address."""
     if settings.serial:
         return serial_port.needs(settings.serial.port)
-    assert settings.tcp  # otherwise `problems` has reported the missing address
+    assert settings.tcp  # `problems` has reported a missing address
     return Needs(host=settings.tcp.host)

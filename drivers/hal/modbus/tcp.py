@@ -9,8 +9,8 @@ from drivers.hal.modbus import frames
 from drivers.hal.modbus.wire import BadReply, NoReply, UnitReply, UnitRequest, Unreachable
 
 NUMBERS: Final = 0xFFFF
-"""The highest transaction number. The lowest is 1. The number 0 stays free for gateways that do not
-number their replies."""
+"""The highest transaction number. The lowest is 1. The number 0 is not used, because gateways that do
+not number their replies send 0."""
 
 
 class Connection:
@@ -23,10 +23,10 @@ class Connection:
         self._where = f"{host}:{port}"
         self._dialler = Dialler(host, port, resolve)
         self._socket: socket.socket | None = None
-        self._number = 0  # also counts on in the next connection, so no late reply matches
+        self._number = 0  # never restarts at 1, so no late reply of an old connection matches
 
     def owes(self, unit: int) -> bool:
-        """Return False. Replies have numbers, so a late reply cannot pass for a new reply."""
+        """Return False, because replies have numbers. So a late reply cannot pass for a new reply."""
         return False
 
     def begin(self, unit: int) -> None:
@@ -83,7 +83,7 @@ class Connection:
     def _unreachable(self, error: OSError) -> str:
         text = f"no Modbus TCP connection to {self._where}: "
         if isinstance(error, ConnectionRefusedError):
-            return text + "refused; is this the module, and does it accept more connections?"
+            return text + "refused; is the address right, and has the module a free connection?"
         if isinstance(error, socket.gaierror):
             return text + "the host's name is not known; write its address"
         if isinstance(error, TimeoutError):

@@ -29,17 +29,17 @@ class Tcp(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
 
 class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A serial line (RS-485). Its settings hold for every unit on the line. A character has 8 data
-    bits."""
+    """A serial line (RS-485). Every unit on the line must have the same settings. A character has 8
+    data bits."""
 
-    port: Annotated[Name, tells("the adapter's path, best the stable path: /dev/serial/by-id/….")]
+    port: Annotated[Name, tells("the adapter's path. Paths like /dev/serial/by-id/… never change.")]
     baudrate: Annotated[int, msgspec.Meta(ge=300, le=1_000_000), tells("bits a second.")]
     parity: Annotated[Literal["none", "even", "odd"], tells("the parity bit of each character.")]
     stopbits: Annotated[Literal[1, 2], tells("stop bits of each character.")]
-    ignore_echo: Annotated[bool, tells("true for an adapter that receives its own bytes.")] = False
+    ignore_echo: Annotated[bool, tells("true for an adapter that receives what it sends.")] = False
 
     def problems(self) -> Remarks:
-        """Yield a problem for a relative path, and for a rate that no unit has."""
+        """Yield a problem for a relative path, and for an unusual baud rate."""
         if not self.port.startswith("/"):
             text = "write the whole path, as `ls /dev/serial/by-id/*` prints it"
             yield ("port",), f"{self.port!r} is not a serial port: {text}"
@@ -63,8 +63,8 @@ class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     @property
     def least_s(self) -> float:
-        """Return the time (s) of the shortest reading. Its request has 8 characters, and its reply has
-        6."""
+        """Return the time (s) that the shortest reading of a unit takes on the line. Its request has 8
+        characters, and its reply has 6."""
         return 14 * self.character_s + 2 * self.gap_s
 
     @property

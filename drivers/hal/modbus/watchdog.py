@@ -1,8 +1,8 @@
 """The watchdog that a Modbus module has for its own outputs (`module_watchdog:` in the YAML).
 
-Without timely writes the module switches its outputs off by itself. Each make has its own registers for
-arming, refreshing and checking the watchdog. So these registers are in the YAML or a profile.
-`dead_man.py` uses them.
+If the daemon's periodic writes cease, the module switches its outputs off by itself. Each make has its
+own registers for arming, refreshing and checking the watchdog. So the YAML or a profile gives these
+registers. `dead_man.py` uses them.
 """
 
 from collections.abc import Iterator
@@ -37,13 +37,13 @@ class Refresh(WrittenPlace, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class Shows(Placed, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A place that is read, and the values that count as a match."""
+    """A place that the daemon reads, and the values of this place that count as a match."""
 
     values: Annotated[list[Word], msgspec.Meta(min_length=1), tells("the readings that match.")]
 
 
 class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The registers and times of one make's watchdog."""
+    """The registers and times of the watchdog in one make of module."""
 
     time_s: Annotated[Period, tells("the time that `arm` gives the module.")]
     arm: Annotated[
@@ -54,14 +54,16 @@ class Habits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     armed: Annotated[
         list[Shows],
         msgspec.Meta(min_length=1),
-        tells("places that all match while the watchdog is armed."),
+        tells("the places to read. All of them match while the watchdog is armed."),
     ]
     refresh: Annotated[Refresh, tells("the write that prevents a trip.")]
     refresh_s: Annotated[Period, tells("the period of this write; at most half of `time_s`.")]
     tripped: Annotated[
-        list[Shows], tells("places, of which at least one matches after a trip.")
+        list[Shows], tells("the places to read. At least one of them matches after a trip.")
     ] = []
-    rearm: Annotated[list[RegisterWrite], tells("the writes that end a trip, before `arm`.")] = []
+    rearm: Annotated[
+        list[RegisterWrite], tells("the writes that end a trip. They come before `arm`.")
+    ] = []
 
     def problems(self) -> Remarks:
         """Yield a problem for a refresh that would come too late."""
@@ -91,7 +93,8 @@ class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         yield from PROFILE.problems(self.profile, self.habits)
 
     def chosen(self) -> Habits:
-        """Return the YAML's habits, or the profile's habits if the YAML has none."""
+        """Return the registers and times (`Habits`) from the YAML. If the YAML has none, return those
+        of the profile."""
         return PROFILE.chosen(self.profile, self.habits)
 
     def rows(self) -> Iterator[tuple[str, str, str]]:
@@ -113,7 +116,7 @@ class Watchdog(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     def warnings(self) -> Remarks:
         """Yield a warning for a profile that nobody has tried on hardware."""
         if not any(PROFILE.problems(self.profile, self.habits)):
-            advice = "pull the network cable, and see that the relays drop"
+            advice = "pull the network cable, and check that the relays go off"
             yield from PROFILE.warnings(self.profile, advice)
 
 

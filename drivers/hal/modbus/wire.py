@@ -33,9 +33,7 @@ EXCEPTIONS: Final = {
     11: "gateway target device failed to respond: look at the unit's power, cable and id",
 }
 """The meanings of exception codes (Modbus Application Protocol V1.1b3, section 7)."""
-UNDEFINED: Final = (
-    "which Modbus does not define: the unit is at fault; ask its maker for the meaning"
-)
+UNDEFINED: Final = "a code that Modbus does not define: the unit is at fault, so ask its maker"
 ILLEGAL_ADDRESS: Final = 2
 
 
@@ -49,8 +47,8 @@ class UnitRequest(Struct, frozen=True):
 
 
 class UnitReply(NamedTuple):
-    """A unit's reply. The reply has either bits or registers as numbers, or the code of an exception.
-    The code may be 0."""
+    """A unit's reply. `values` has the bits or registers as numbers. If the unit has answered with an
+    exception, `exception` is its code, which may be 0."""
 
     values: tuple[int, ...] = ()
     exception: int | None = None
@@ -66,7 +64,7 @@ class NoReply(Exception):
 
 
 class BadReply(Exception):
-    """The error of a reply that does not belong to the request."""
+    """The error of a reply that is invalid, or that is not the reply to the request."""
 
 
 class UnitException(HalError):

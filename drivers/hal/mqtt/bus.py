@@ -4,24 +4,23 @@ devices.
 A driver whose signals are not contacts uses these calls:
 
     bus.listen(topic)                  in the constructor, for each topic that the driver reads
-    bus.fresh(topic, stale_after_s)    in `read`: the last message, or a HalError if it is no fact
+    bus.fresh(topic, stale_after_s)    in `read`: the last message, or a HalError if it is not valid
     bus.heard(topic)                   the last message of any age; None without a message
     bus.publish(topic, payload)        in `write`; with `safe=True` for a message that switches off
     bus.up()                           in `open`: a HalError if there is no broker
 
-A message is a fact only if it came live in this connection, and is not older than the device's own
-period.
+A message is valid only if it came live in this connection, and is not older than `stale_after_s`.
 
-No reading waits. The connection has a thread of its own, which receives the messages. A changed payload
-wakes the bus's thread for a scan. With `listen(topic, take)` the connection's thread calls `take` for
-each message. This is for a driver that must not miss a message.
+A reading never waits for a message. The connection has a thread of its own, which receives the
+messages. A changed payload wakes the bus's thread for a scan. With `listen(topic, take)` the
+connection's thread calls `take` for each message. This is for a driver that must not miss a message.
 
-- A retained message is no fact, because it reports an earlier state of unknown age.
+- A retained message is not valid, because it reports an earlier state of unknown age.
 - All devices of the bus share one connection. If the connection fails, every device fails, and the bus
-  backs off for 0.5 to 30 s. A silent device costs the other devices nothing, because no call waits for
+  backs off for 0.5 to 30 s. A silent device does not delay the other devices, because no call waits for
   it.
-- Every connection starts with a clean session and without earlier messages. The bus may have missed the
-  decisive message while the broker was away.
+- Every connection starts with a clean session and without the messages of earlier connections. The bus
+  may have missed an important message while the broker was away, so the earlier messages may be wrong.
 - A message to a device is never retained, and is sent once. "On" expires at the broker (MQTT 5), so
   that it never reaches a device that comes back later.
 """
@@ -69,14 +68,15 @@ def open_bus(settings: MqttSettings) -> "MqttBus":
     """Make the bus. Raises HalError if paho is not installed."""
     if find_spec("paho") is None:
         raise HalError(
-            "MQTT needs the Python package paho-mqtt: in the clone .venv/bin/pip install '.[mqtt]'"
+            "MQTT needs the Python package paho-mqtt: run .venv/bin/pip install '.[mqtt]' in the git"
+            " clone"
         )
     return MqttBus(settings)
 
 
 class MqttBus(Bus):
-    """One broker. It is also a `drivers.hal.points.PointsBus`. `now` is the bus's clock, which tests
-    replace."""
+    """One broker. It is also a bus with points (`drivers.hal.points.PointsBus`). `now` is the bus's
+    clock, which tests replace."""
 
     def __init__(
         self,
@@ -96,7 +96,7 @@ class MqttBus(Bus):
         self._wake: Callable[[], None] = lambda: None
 
     def canonical(self, point: str) -> str:
-        """Return the point's name, which has only one spelling."""
+        """Return the point's name unchanged, because a name has only one spelling."""
         return point
 
     def lines(
@@ -119,7 +119,7 @@ class MqttBus(Bus):
         """Subscribe to this topic, now and in each later connection.
 
         Another thread calls `take` for each message. `take` must be quick and must not raise. Raises
-        HalError if the bus would have too many topics.
+        HalError if the bus already listens to TOPICS_MAX topics.
         """
         if len(self._takers) >= TOPICS_MAX and topic not in self._takers:
             raise HalError(f"a bus listens to at most {TOPICS_MAX} topics: define a second bus")
@@ -129,8 +129,8 @@ class MqttBus(Bus):
 
     def up(self, safe: bool = False) -> "Link":
         """Return the connection, and make one if there is none. Raises HalError. During a backoff,
-        raises it at once. `safe` means that the caller switches off. Such a call does not wait for
-        the backoff of a failed reading."""
+        raises it at once. `safe` means that the caller will switch an output off. Such a call does
+        not wait for the backoff of a failed reading."""
         if self._link is not None and self._link.up:
             return self._link
         backoff = self._safe_backoff if safe else self._backoff
@@ -152,13 +152,16 @@ class MqttBus(Bus):
         return self._heard.get(topic)
 
     def fresh(self, topic: str, stale_after_s: float = math.inf) -> Heard:
-        """Return the topic's last message if the message is a fact. Otherwise raise HalError."""
+        """Return the topic's last message if it came live in this connection and is not stale.
+        Otherwise raise HalError."""
         found = self.heard(topic)
         if found is None or found.at is None:
             was = (
-                f"; a retained message of unknown age says {_shown(found.payload)}" if found else ""
+                f"; there is a retained message, of unknown age: {_shown(found.payload)}"
+                if found
+                else ""
             )
-            raise HalError(f"nothing has come on {topic} in this connection{was}")
+            raise HalError(f"no message has come on {topic} since the connection began{was}")
         age_s = self.now() - found.at
         if age_s > stale_after_s:
             raise HalError(
@@ -170,10 +173,11 @@ class MqttBus(Bus):
         return found
 
     def believed(self, topic: str, stale_after_s: float, notices: Availability | None) -> Heard:
-        """Return the topic's last message if the message is a fact. Otherwise raise HalError.
+        """Return the topic's last message if it came live in this connection and is not stale.
+        Otherwise raise HalError.
 
-        If the device has gone offline after the message, raise HalError too. A retained notice of
-        availability does not count.
+        If the device has gone offline since the message, raise HalError too. A retained notice that the
+        device is offline does not count.
         """
         found = self.fresh(topic, stale_after_s)
         if notices is None or (notice := self.heard(notices.topic)) is None or notice.at is None:
@@ -193,9 +197,9 @@ class MqttBus(Bus):
     ) -> None:
         """Send a message that is not retained. With `qos` 1, wait for the broker's confirmation.
 
-        `safe` means that the message switches off. Such a message does not wait for a backoff, and
-        never expires. Every message is sent once. Raises HalError. After an error nobody knows whether
-        the device has received the message.
+        `safe` means that the message switches an output off. Such a message does not wait for the
+        backoff of a failed reading, and never expires. Every message is sent once. Raises HalError.
+        After an error it is unknown whether the device has received the message.
         """
         data = payload.encode() if isinstance(payload, str) else payload
         link = self.up(safe)
@@ -203,11 +207,12 @@ class MqttBus(Bus):
             link.publish(topic, data, qos, None if safe else expires_s)
 
     def ask(self, asks: Iterable[Ask]) -> None:
-        """Send these messages. Send each message at most once in half a scan, even if many points need
-        it.
+        """Send these messages, which make devices publish their states. Send each message at most once
+        in half a scan, even if several devices request it.
 
         The broker must confirm each message within `timeout_s`, otherwise the connection ends. A broker
-        that was frozen would deliver old states as if they were live. Raises HalError.
+        that was frozen (for example a suspended machine) would deliver old states as if they were live.
+        Raises HalError.
         """
         now, rest_s = self.now(), self.settings.scan_s / 2
         for one in asks:
@@ -245,8 +250,8 @@ class MqttBus(Bus):
     def survey(self, listen_s: float) -> tuple[Mapping[str, str], bool]:
         """Listen to every topic of the broker on a second connection, for people who look for devices.
 
-        Return `live` or `retained` for each topic, and whether there was room for all topics. Raises
-        HalError.
+        Return `live` or `retained` for each topic. Also return False if the broker has more topics than
+        TOPICS_MAX, so that some are missing. Raises HalError.
         """
         from drivers.hal.mqtt.link import Link
 
@@ -287,7 +292,8 @@ class MqttBus(Bus):
 
     @contextmanager
     def _call(self) -> Iterator[None]:
-        """Count a connection to the broker, or a message that the broker confirms."""
+        """Run one call to the broker: a connection, or a message that the broker must confirm. Count it
+        and measure its time."""
         began, failed = self.now(), True
         try:
             yield

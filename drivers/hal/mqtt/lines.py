@@ -1,9 +1,9 @@
 """One device's contacts and relays behind a broker (`drivers.hal.points.Lines`).
 
-The claim switches every relay off. A relay's state must follow each command within `answers_within_s`.
-A later contradiction has one of three causes. The device has restarted, its timer has run out, or
-somebody else switches the relay too (`Rivals`). Every relay that goes off gets its message, even if
-another relay fails.
+The claim switches every relay off. A relay's published state must follow each command within
+`answers_within_s`. If the state contradicts the command later, there are three possible causes. The
+device has restarted, its timer has run out, or somebody else switches the relay too
+(`drivers/hal/rivals.py`). Every relay that should go off gets its message, even if another relay fails.
 """
 
 import math
@@ -44,8 +44,8 @@ class MqttLines:
         """Check each state. In the first claim, also switch every relay off, and give the device time
         to publish its first states.
 
-        Raises HalError for a state that is not live and recent. A claim after a failure only reads,
-        because a lost confirmation must not release a held door.
+        Raises HalError for a state that is not live and recent. A claim after a failure only reads. For
+        example, a lost confirmation must not release a door that RMF holds.
         """
         points = (*self._inputs.values(), *self._outputs.values())
         if not self._claimed:
@@ -58,8 +58,8 @@ class MqttLines:
                 self._state(point)
 
     def read(self) -> dict[str, bool]:
-        """Read every contact. Raises HalError if a contact's topic has no live state, or if a relay's
-        state contradicts its last command."""
+        """Read every contact. Raises HalError if a contact's topic has no live state. Also raises
+        HalError if a relay's state contradicts the relay's last command."""
         self._bus.ask(self._asks)
         found = {name: self._state(point) for name, point in self._inputs.items()}
         for name, level in self._set.items():
@@ -67,8 +67,8 @@ class MqttLines:
         return found
 
     def write(self, levels: Mapping[str, bool]) -> None:
-        """Switch these relays. Switch off before on. Raises HalError. After an error nobody knows the
-        states of these relays."""
+        """Switch these relays. Switch relays off before others are switched on. Raises HalError. After
+        an error the states of these relays are unknown."""
         self._touched = self._touched or bool(levels)
         every = Every()
         for name in sorted(levels, key=lambda name: levels[name]):
@@ -78,13 +78,13 @@ class MqttLines:
             with every.one():
                 if levels[name]:
                     self._rivals.check([name])
-                self._since[name] = self._bus.now()  # before sending: answers are fast
+                self._since[name] = self._bus.now()  # before the send, because answers are fast
                 self._send(name, levels[name])
                 self._set[name] = levels[name]
         every.check()
 
     def renew(self, names: Iterable[str]) -> None:
-        """Restart the timers of these relays, which are on. Raises HalError."""
+        """Restart the timers of these relays, which must be on already. Raises HalError."""
         for name in names:
             if self._outputs[name].switches_off_after_s is not None:
                 self._rivals.check([name])
@@ -109,7 +109,7 @@ class MqttLines:
         if not self._touched:
             return
         self._bus.insist()
-        unheard = Every()  # keeps failures that nobody reads, because the daemon is ending
+        unheard = Every()  # nobody reads these failures, because the daemon ends
         for name in self._outputs:
             with unheard.one():
                 self._send(name, False)
@@ -128,8 +128,8 @@ class MqttLines:
         return point.asserted(found.payload)
 
     def _verify(self, name: str, level: bool) -> None:
-        """Raise HalError if this relay's state contradicts `level`, although the relay has had time to
-        follow."""
+        """Raise HalError if this relay's state contradicts `level`, although `answers_within_s` has
+        passed since the command."""
         point = self._outputs[name]
         if point.topic is None:
             return

@@ -2,12 +2,12 @@
 is never used again.
 
 Each connection has a client of its own and a clean session, so it sends nothing of an earlier
-connection. paho would repeat unconfirmed messages after a reconnect. An "on" of a minute
-ago must not be sent again. A thread serves the connection, and ends with the connection.
+connection. A single paho client would repeat unconfirmed messages after a reconnect, for example an
+"on" of a minute ago. A thread serves the connection, and ends with the connection.
 
 The protocol allows packets of 256 MB. With MQTT 5 the link tells the broker its limit (Maximum Packet
 Size, section 3.1.2.11.4), and the broker holds longer packets back. MQTT 3.1.1 has no such limit. With
-this version the link reads no payload of a longer packet, and ends the connection.
+MQTT 3.1.1 the link ends the connection when a longer packet comes, and does not read its payload.
 """
 
 import os
@@ -43,7 +43,7 @@ GARBLED: Final = (ValueError, IndexError, KeyError, TypeError, struct.error, MQT
 """The errors that paho raises for bytes that are not MQTT."""
 
 Taken = Callable[[str, bytes, bool], None]
-"""A function that takes a message: its topic, its payload, and whether the message is retained. The
+"""A function that receives a message: its topic, its payload, and whether the message is retained. The
 connection's thread calls the function."""
 
 
@@ -86,7 +86,7 @@ class Link(threading.Thread):
         except OSError as error:
             failure = self._explained(error)
         except GARBLED as error:
-            failure = f"no MQTT ({excerpt(str(error))}): is it an MQTT broker?"
+            failure = f"the server does not speak MQTT ({excerpt(str(error))}): is it a broker?"
         finally:
             self._ended(failure)
 
@@ -173,7 +173,7 @@ class Link(threading.Thread):
         self._rise()
 
     def _on_message(self, client: object, _: object, message: paho.MQTTMessage) -> None:
-        if not self._closing:  # after the end of a connection its messages may be old
+        if not self._closing:  # messages of a connection that is closing may be old
             self._take(message.topic, bytes(message.payload), message.retain)
 
     def _on_publish(self, _c: Any, _u: Any, mid: int, reason: ReasonCode, _p: Any) -> None:
@@ -211,7 +211,7 @@ class Link(threading.Thread):
         self._client.disconnect()
         self._client.loop_write()
         if (sock := self._client.socket()) is not None:
-            sock.close()  # a broker that does not read blocks DISCONNECT, so close the socket anyway
+            sock.close()  # close anyway, because a broker may never read DISCONNECT
         self.on_end()
 
     def _explained(self, error: OSError) -> str:
@@ -231,17 +231,15 @@ class Link(threading.Thread):
 class BoundedClient(paho.Client):
     """A client that ends the connection before it reads a packet beyond PACKET_MAX.
 
-    If this happens, `cut` is the reason. The limit works because paho reads the rest of a packet with
-    one call of `_sock_recv`.
+    If this happens, `cut` holds the reason as text. The limit works because paho reads the rest of a
+    packet with one call of `_sock_recv`.
     """
 
     cut = ""
 
     def _sock_recv(self, bufsize: int) -> bytes:
         if bufsize > PACKET_MAX:
-            self.cut = (
-                f"the broker sent a message of {bufsize} bytes; at most {PAYLOAD_MAX} are taken"
-            )
+            self.cut = f"the broker sent a message of {bufsize} bytes; the limit is {PAYLOAD_MAX}"
             raise ConnectionError(self.cut)
         return super()._sock_recv(bufsize)
 

@@ -1,7 +1,8 @@
 """Relays and inputs of well-known makes on MQTT: their topics, payloads and fields.
 
-Each function takes the device's name on MQTT, one part of the device, and the time of the relay's timer
-in seconds (None without a timer). Each function returns the keys of a point (`points.py`).
+Each function takes the device's name on MQTT, the name of one relay or input (`part`), and the time of
+the relay's timer in seconds (None without a timer). Each function returns the YAML keys of a point
+(`points.py`) with their values.
 """
 
 import json
@@ -42,11 +43,11 @@ def shelly(device: str, part: str, off_s: float | None) -> Keys:
 def tasmota(device: str, part: str, off_s: float | None) -> Keys:
     """Return the keys for `POWER1` or `Switch1` of a device with Tasmota. `device` is its topic.
 
-    A timer is the device's own setting `PulseTime`, which each `POWER1 ON` starts again. For times from
-    12 s on, set `PulseTime1` to the seconds plus 100. A switch needs a `SwitchMode` of 1 or 2. Tasmota
-    answers every command without a payload with the present value. A device with a single relay answers
-    on `POWER`. For such a device write `POWER`. Sources: tasmota.github.io/docs: Commands (Power,
-    PulseTime, Status 10), MQTT (topics cmnd, stat and tele, LWT) and Buttons-and-Switches.
+    A timer is the device's own setting `PulseTime`. Each `POWER1 ON` starts the timer again. For times
+    from 12 s on, set `PulseTime1` to the seconds plus 100. A switch needs a `SwitchMode` of 1 or 2. To
+    a command without a payload, Tasmota answers with the present value. A device with a single relay
+    answers on `POWER`, so write `POWER` for such a device. Sources: tasmota.github.io/docs: Commands
+    (Power, PulseTime, Status 10), MQTT (topics cmnd, stat and tele, LWT) and Buttons-and-Switches.
     """
     sort, _ = _matched(part, r"(POWER|Switch)([0-9]{0,2})", "POWER1 or Switch1")
     away = {"topic": f"tele/{device}/LWT", "offline": ["Offline"]}
@@ -64,12 +65,12 @@ def tasmota(device: str, part: str, off_s: float | None) -> Keys:
 
 
 def zigbee2mqtt(device: str, part: str, off_s: float | None) -> Keys:
-    """Return the keys for a property such as `state` (a relay) or `contact`. `device` is the device's
-    friendly name.
+    """Return the keys for one value that a Zigbee2MQTT device publishes, such as `state` (a relay) or
+    `contact`. `device` is the device's friendly name.
 
     `contact` is true while the contact is closed. The relay's firmware must support `on_time`. A
-    battery sensor sleeps and does not answer `get`, so the bus never asks for a sensor's properties.
-    The availability topic is published only if Zigbee2MQTT has `availability` enabled. Sources:
+    battery sensor sleeps and does not answer `get`, so the bus never asks for a sensor's values. The
+    availability topic is published only if Zigbee2MQTT has `availability` enabled. Sources:
     www.zigbee2mqtt.io/guide/usage/mqtt_topics_and_messages.html, and "On with timed off" on the pages
     of switches below www.zigbee2mqtt.io/devices.
     """
@@ -102,7 +103,7 @@ MAKES: Final[Mapping[Profile, Callable[[str, str, float | None], Keys]]] = {
 def _matched(part: str, pattern: str, examples: str) -> tuple[str, str]:
     found = re.fullmatch(pattern, part)
     if not found:
-        raise ValueError(f"{part!r} is not a part of this make: write {examples}")
+        raise ValueError(f"{part!r} is no relay or input of this make: write {examples}")
     return found[1], found[2]
 
 

@@ -15,7 +15,7 @@ from drivers.hal.points import HalError
 from drivers.json_fields import Field, Value
 
 WHOLE = "payload"
-"""The name that messages use for a whole payload, which is read without `field`."""
+"""The word that messages use in place of a field's name if the whole payload is the value."""
 
 
 class MqttPoint(
@@ -24,7 +24,8 @@ class MqttPoint(
     """A contact or relay behind a broker. A profile gives the topics, payloads and fields of a make."""
 
     profile: Annotated[
-        Profile | None, tells("the make. Without `profile`, write the keys from `topic` on here.")
+        Profile | None,
+        tells("the make. Without `profile`, write the keys from `topic` to `command`."),
     ] = None
     device: Annotated[
         Topic | None,
@@ -49,24 +50,25 @@ class MqttPoint(
     ] = []
     stale_after_s: Annotated[
         Age | None,
-        tells("""the age from which a state is unknown. Write more than the device's own period, or
-        than the time in which the device answers `ask`."""),
+        tells("""a state that is older counts as unknown. Write a longer time than the device's own
+        period, or than the device needs to answer `ask`."""),
     ] = None
     ask: Annotated[
         Ask | None, tells("a message, sent in every scan, that makes the device publish its state.")
     ] = None
     availability: Annotated[
-        Availability | None, tells("the device's own notice that it has lost its connection.")
+        Availability | None,
+        tells("the notice that the device has lost its connection to the broker."),
     ] = None
     command: Annotated[RelayCommand | None, tells("switches the relay.")] = None
     answers_within_s: Annotated[
-        Answer, tells("how long the state may take to follow a command.")
+        Answer, tells("how soon after a command the device must publish the new state.")
     ] = 2.0
     switches_off_after_s: Annotated[
         Timeout | None,
         tells("""the time of the relay's own timer. The timer switches the relay off this long after
-        the last message that switches it on. The driver sends this message in every scan while the
-        relay is on."""),
+        the last "on" message. The driver sends the "on" message in every scan while the relay is
+        on."""),
     ] = None
     without_timer: Annotated[
         Name | None, tells("why this relay may stay on when the network or the broker fails.")
@@ -85,13 +87,13 @@ class MqttPoint(
         if self.profile and not (self.device and self.part):
             yield (
                 ("profile",),
-                "needs device and part: its name on MQTT, and its relay or input",
+                "needs device (its name on MQTT) and part (the relay or input of the device)",
             )
             return
         if not self.profile and (self.device or self.part):
             yield (
                 ("device" if self.device else "part",),
-                "is for a profile: add profile, or delete this",
+                "is only for points with a profile: add profile, or delete this key",
             )
             return
         try:
@@ -145,7 +147,7 @@ def _state_problems(point: MqttPoint) -> Remarks:
     if bool(point.when) != bool(point.when_not):
         yield (
             ("when",),
-            "when and when_not need each other, because any other value is then a fault",
+            "needs when_not, and when_not needs when: a value in neither list is a fault",
         )
     for value in point.when:
         if any(json_fields.same(value, other) for other in point.when_not):
@@ -158,13 +160,13 @@ def _relay_problems(point: MqttPoint) -> Remarks:
     if point.command is None:
         for key in ("switches_off_after_s", "without_timer"):
             if getattr(point, key) is not None:
-                yield (key,), "is for a relay: add command, or delete this"
+                yield (key,), "is only for a relay: add command, or delete this key"
         return
     if point.switches_off_after_s is None and point.without_timer is None:
         text = (
-            "unsafe: when the network or the broker fails nothing switches this relay off: use the"
-            " relay's own timer, and write its time as switches_off_after_s; or without_timer: <why it"
-            " is safe here>"
+            "unsafe: nothing switches this relay off when the network or the broker fails. If the"
+            " relay has a timer of its own, write the timer's time as switches_off_after_s. Otherwise"
+            " write without_timer: <why it is safe here>"
         )
         yield (), text
     if point.switches_off_after_s is not None and point.without_timer is not None:

@@ -17,10 +17,11 @@ from drivers.hal.mqtt.topics import TOPICS_MAX
 from drivers.hal.points import Wire
 
 Confirmation = Annotated[float, msgspec.Meta(ge=0.1, le=5, extra={"unit": "s"})]
-"""The longest wait for a confirmation. It is at most 5 s, because systemd would take a longer wait for
-a hang (`WatchdogSec=10` of the unit)."""
+"""The longest wait for a confirmation. It is at most 5 s, because systemd could restart a daemon that
+waits longer (`WatchdogSec=10` of the unit)."""
 RENEWED = 3
-"""The least number of scans that a relay's timer must last."""
+"""The minimum time of a relay's timer, as a number of scans. The driver restarts the timer in every
+scan."""
 
 
 class BrokerTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -51,7 +52,7 @@ class BrokerTls(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class MqttSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="mqtt"):
-    """A broker, and the contacts and relays behind it."""
+    """A broker, and the contacts and relays of devices that are connected to the broker."""
 
     host: Annotated[Name, tells("the broker's address or name.")]
     port: Annotated[
@@ -60,12 +61,13 @@ class MqttSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
     ] = None
     version: Annotated[
         Literal["5", "3.1.1"],
-        tells("""the version of MQTT. Only with 5 does the broker hold long payloads back, drop a
-        command that it cannot deliver at once, and report that no device receives a command."""),
+        tells("""the version of MQTT. Only with version 5 the broker does three things: it holds long
+        payloads back, it drops a command that it cannot deliver at once, and it reports that no
+        device receives a command."""),
     ] = "5"
-    tls: Annotated[BrokerTls | None, tells("encryption, and the authorities that are trusted.")] = (
-        None
-    )
+    tls: Annotated[
+        BrokerTls | None, tells("encryption, and the authorities that the daemon trusts.")
+    ] = None
     user: Annotated[Name | None, tells("the daemon's user name at the broker.")] = None
     password_file: Annotated[
         Name | None, tells("a file with the user's password, which only the daemon may read.")
@@ -78,14 +80,17 @@ class MqttSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
     keepalive_s: Annotated[
         int,
         msgspec.Meta(ge=1, le=60, extra={"unit": "s"}),
-        tells("the silence after which the daemon asks the broker for a sign of life."),
+        tells("after this time without a message the daemon sends a ping to the broker."),
     ] = 5
     timeout_s: Annotated[
         Confirmation, tells("how long a connection, or the broker's confirmation, may take.")
     ] = 1.0
-    scan_s: Annotated[Period, tells("how often the states are checked, and asked for.")] = 0.5
+    scan_s: Annotated[
+        Period, tells("the period at which the daemon checks the states, and asks for them.")
+    ] = 0.5
     points: Annotated[
-        dict[Name, MqttPoint], tells("name -> a contact or relay, for `point:` of a device.")
+        dict[Name, MqttPoint],
+        tells("name -> a contact or relay. A device's `point:` gives this name."),
     ] = msgspec.field(default_factory=dict)
 
     def wholes(self) -> Mapping[str, MqttPoint]:
@@ -114,7 +119,7 @@ class MqttSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
             off_s = point.switches_off_after_s
             if off_s is not None and off_s < least_s:
                 text = (
-                    f"is {off_s:g}, but the daemon renews it only every {self.scan_s:g} s (scan_s):"
+                    f"is {off_s:g}, but the daemon restarts the timer every {self.scan_s:g} s (scan_s):"
                     " write at least"
                 )
                 path = ("points", name, "switches_off_after_s")
@@ -140,7 +145,7 @@ def _used_twice(points: Mapping[str, MqttPoint]) -> Remarks:
                 whose = f"{topic} is the state topic of '{states[topic]}'"
                 yield (
                     _at(point, name, key),
-                    f"{whose}: the daemon would take the {key} for a state",
+                    f"{whose}: the daemon would read the {key} as a state",
                 )
 
 
@@ -159,7 +164,8 @@ def _written(point: MqttPoint) -> Iterator[tuple[str, str]]:
 
 
 def _at(point: MqttPoint, name: str, key: str) -> tuple[str, ...]:
-    """Return the path of a point's key in the YAML. For a profile's key, return `part`."""
+    """Return the path of a point's key in the YAML. If the key comes from a profile, return the path of
+    `part`."""
     if point.profile:
         return "points", name, "part"
     return ("points", name, key) if key == "topic" else ("points", name, key, "topic")
@@ -168,7 +174,7 @@ def _at(point: MqttPoint, name: str, key: str) -> tuple[str, ...]:
 def warnings(settings: MqttSettings) -> Remarks:
     """Yield a warning, with its path in the YAML, for each valid setting that may be a mistake."""
     if settings.password_file and not settings.tls:
-        text = "the password goes over the network unencrypted: add tls where the broker has it"
+        text = "the password goes over the network unencrypted: add tls if the broker supports it"
         yield ("password_file",), text
     for name, point in settings.wholes().items():
         path = ("points", name)
@@ -180,13 +186,13 @@ def warnings(settings: MqttSettings) -> Remarks:
         if point.command is None:
             continue
         if point.switches_off_after_s is not None:
-            text = "pull the network plug while it is on: the relay must drop within this time"
+            text = "pull the network plug while the relay is on: it must go off within this time"
             yield (*path, "switches_off_after_s"), text
         if point.topic is None:
             yield path, f"'{name}' has no topic for its state: switching off is not verified"
         if settings.version == "3.1.1" and point.command.qos == 1:
             text = (
-                f"a device that keeps its session gets an old 'on' of '{name}' when it returns: write"
+                f"when the device of '{name}' returns to its session, it gets an old 'on': write"
                 ' version: "5", which drops late commands, or qos: 0'
             )
             yield path, text
@@ -198,7 +204,7 @@ def needs(settings: MqttSettings) -> Needs:
 
 
 def where(settings: MqttSettings) -> Where:
-    """Return the broker's address as the bus's place."""
+    """Return the broker's address, which is the hardware that the bus uses."""
     host, port = settings.address()
     return Where(f"{host}:{port}", local=False)
 
@@ -210,7 +216,7 @@ def unfit(settings: MqttSettings, point: str, direction: Literal["in", "out"]) -
         return unknown("point", point, settings.points)
     whole = settings.wholes().get(point)
     if whole is None:
-        return None  # the point's own check reports its problems
+        return None  # the check of the point itself reports its problems
     if direction == "in" and whole.topic is None:
         return f"'{point}' has no topic, so its state cannot be read: add topic to it"
     if direction == "out" and whole.command is None:
@@ -219,8 +225,8 @@ def unfit(settings: MqttSettings, point: str, direction: Literal["in", "out"]) -
 
 
 def place(settings: MqttSettings, point: str) -> str | None:
-    """Return the command of a relay, because no other file may send it. Return None for a state,
-    because every file may read it."""
+    """Return a text that names a relay's command, because no other device YAML may send the same
+    command. Return None for a state, because every device YAML may read a state."""
     command = settings.wholes()[point].command
     return f"the command {command.topic} {command.payload_on}" if command else None
 
@@ -230,11 +236,11 @@ def wire_problems(wire: Wire) -> Iterable[str]:
     if wire.pull is not None:
         yield "pull is for GPIO pins: delete pull"
     if wire.flash is not None:
-        yield "a pulse that the module times is for Modbus: use the relay's own timer"
+        yield "flash is only for Modbus modules: use the relay's own timer"
     if not wire.read_back:
-        yield "read_back is for coils; a point without topic is not read back: delete read_back"
+        yield "read_back is only for coils; a point without topic is never read back: delete it"
     if wire.direction == "out" and wire.active == "low":
-        yield "write active: high: the point says which message switches the relay on"
+        yield "write active: high, because the point's payload_on already says how to switch on"
 
 
 def tables(settings: MqttSettings) -> Iterable[Table]:

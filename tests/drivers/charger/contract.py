@@ -65,13 +65,14 @@ class Bench(benches.Bench[ChargerSample, ChargerOutputs]):
         wait_until(lambda: self.scan(outputs) is activity, f"the station is {activity}")
 
     def does(self) -> Activity | None:
-        """Return the activity after all pauses, or None if the station cannot be read."""
+        """Return the activity after all pauses of the bus, or None if the station cannot be read."""
         found = self.patiently()
         return None if isinstance(found, str) else found.activity
 
 
 def behind(driver: Any, settings: Any, canonical: Callable[[str], str] = str) -> tuple[Any, Any]:
-    """Return a fast world with this driver's simulated charger, and the far side for the bus.
+    """Return a world that runs this driver's simulated charger at PACE. Also return the far side for
+    the bus.
 
     The far side is the simulated station. Without a station, the far side consists of wires.
     """

@@ -168,7 +168,7 @@ def test_height_and_range_are_signals_of_the_map_and_without_them_there_is_no_re
             "station",
             "the station is too hot; the receiver is too hot",
         ),
-        ("0000000000000010", "", ""),  # no error, because our own frames block the charger
+        ("0000000000000010", "", ""),  # the daemon's own frames cause this bit: no error
     ],
 )
 def test_error_bits_name_the_fault_and_its_side(
@@ -336,16 +336,16 @@ def test_without_a_status_frame_there_is_no_state(charger: Charger) -> None:
     charger.driver.read()
     charger.far.now += 0.2
     assert failure(charger.driver.read) == (
-        "no ChargerStatus (0x18FF50E5) at can0 within 1 s: nothing else is heard on the bus"
-        " either: power, cable, termination, bitrate?"
+        "no ChargerStatus (0x18FF50E5) at can0 within 1 s: no other frames come on the bus"
+        " either: check power, cable, termination and bitrate"
     )
 
 
 def test_without_its_receiver_there_is_no_reading(charger: Charger) -> None:
     charger.says(0x18FF50E5, "0000000000000000")
     assert failure(charger.driver.read) == (
-        "no MobileSerial (0x1FFD0001) at can0 within 5 s: nothing else is heard on the bus either:"
-        " power, cable, termination, bitrate?"
+        "no MobileSerial (0x1FFD0001) at can0 within 5 s: no other frames come on the bus either:"
+        " check power, cable, termination and bitrate"
     )
 
 
@@ -355,7 +355,7 @@ def test_frames_of_another_length_are_named_and_never_read(charger: Charger) -> 
     charger.says(0x1FFD0104, "00")
     assert failure(charger.driver.read) == (
         "no ChargerStatus (0x18FF50E5) at can0 within 1 s, but one (0x18FF50E5) of"
-        " 6 bytes, where the map has 8: is it another make?"
+        " 6 bytes instead of the map's 8: is the device of another make?"
     )
 
 

@@ -133,7 +133,10 @@ def test_check_tells_rules_numbers_and_bits() -> None:
 def test_a_map_must_say_in_some_way_what_the_state_is() -> None:
     found = msgspec.convert({**MAP, "rules": []}, FrameMap)
     assert list(found.problems()) == [
-        (("state",), "needs state (a signal, and the meanings of its numbers), or rules")
+        (
+            ("state",),
+            "is missing: give a signal and the meanings of its numbers here, or give rules",
+        )
     ]
 
 

@@ -34,7 +34,7 @@ WIFERION: dict[str, Any] = {
 
 
 class PadBench(Bench):
-    """A bench for range checks. A check's result is valid 1 s after the check."""
+    """A bench for range checks. The result of a check becomes valid 1 s after the check."""
 
     def sample(self, outputs: ChargerOutputs) -> ChargerSample | None:
         """Run one scan, and return the reading, or None if the station cannot be read."""

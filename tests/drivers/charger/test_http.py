@@ -102,8 +102,8 @@ def test_every_code_of_a_byte_has_a_state_in_rmf_and_none_is_passed_on_raw() -> 
 @pytest.mark.parametrize(
     ("answer", "text"),
     [
-        ({}, "the answer has no 'state', but nothing: is state_path right?"),
-        ({"stat": 1, "b\n": 2}, "the answer has no 'state', but stat, b: is state_path right?"),
+        ({}, "the answer has no 'state'; it has nothing: is state_path right?"),
+        ({"stat": 1, "b\n": 2}, "the answer has no 'state'; it has stat, b: is state_path right?"),
         ({"state": "5"}, "'state' is '5', and a whole number is expected"),
         ({"state": 5.0}, "'state' is 5.0, and a whole number is expected"),
         ({"state": True}, "'state' is true, and a whole number is expected"),
@@ -326,7 +326,10 @@ def test_a_code_table_that_cannot_be_right_is_refused(
 def test_a_table_without_errors_is_worth_a_warning() -> None:
     [_, (path, text)] = warnings(HttpChargerSettings(codes=Codes(idle=[0], charging=[5])))
     assert path == ("codes",)
-    assert text == "no code is listed as an error, so an error will be shown as an unknown state"
+    assert (
+        text
+        == "no code is listed under error, so an error of the station shows as an unknown state"
+    )
 
 
 def test_check_prints_addresses_and_meanings() -> None:

@@ -84,7 +84,7 @@ def test_a_range_may_be_a_number() -> None:
 @pytest.mark.parametrize(
     ("said", "text"),
     [
-        ({}, "the answer has no 'charger.state', but nothing: is state_path right?"),
+        ({}, "the answer has no 'charger.state'; it has nothing: is state_path right?"),
         (answer(2), "'charger.state' is 2, and a text is expected"),
         (answer(None), "'charger.state' is null, and a text is expected"),
         (answer(receiver=True), "'pad.receiver' is true, and a text or a whole number is expected"),
@@ -92,11 +92,11 @@ def test_a_range_may_be_a_number() -> None:
         (answer(aligned=1), "'pad.aligned' is 1, and true or false is expected"),
         (
             {**answer(), "pad": {"aligned": True}},
-            "the answer has no 'pad.receiver', but charger, pad, battery: is state_path right?",
+            "the answer has no 'pad.receiver'; it has charger, pad, battery: is state_path right?",
         ),
         (
             {**answer(), "pad": {"receiver": "A41F"}},
-            "the answer has no 'pad.aligned', but charger, pad, battery: is state_path right?",
+            "the answer has no 'pad.aligned'; it has charger, pad, battery: is state_path right?",
         ),
         (
             {**answer(), "battery": {"millivolts": "48"}},
@@ -304,7 +304,10 @@ def test_keep_needs_a_station_that_can_be_stopped_and_serve_known_needs_receiver
     )
     assert list(seed.problems()) == [
         (("unrequested",), "serve_known needs receivers: without them no robot is known"),
-        (("on_death",), "the driver cannot stop this station: delete on_death"),
+        (
+            ("on_death",),
+            "has no effect, because the driver cannot stop this station: delete on_death",
+        ),
     ]
 
 

@@ -1,4 +1,5 @@
-"""A charging station behind a real broker: readings from its topics, and a lasting power command."""
+"""A charging station behind a real broker: readings from its topics, and a power command that stays in
+force."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -127,14 +128,14 @@ def test_every_failure_is_a_driver_error(pad: Pad, part: str, mode: FailureMode)
         (
             "state: status.state",
             "state: stauts.state",
-            "stauts.state begins with the name of a topic: unknown topic 'stauts':"
+            "stauts.state must begin with the name of a topic in topics: unknown topic 'stauts':"
             " did you mean 'status'? known here: status, fault",
         ),
         ("topic: tpu/b/fault ", "topic: tpu/b/status ", "is the topic of fault too"),
         (
             "stop: {topic: tpu/b/set,",
             "stop: {topic: tpu/b/status,",
-            "tpu/b/status is a state topic: the daemon would take the command for a state",
+            "tpu/b/status is a state topic: the daemon would read the command as a state",
         ),
         (
             'stop: {topic: tpu/b/set, payload: "OFF"}',

@@ -105,4 +105,4 @@ def test_a_contact_whose_cut_wire_would_energise_the_pad_is_refused(
     with pytest.raises(SettingsError) as refused:
         load(file)
     (problem,) = refused.value.problems
-    assert "and is energised" in problem.text
+    assert "so the station energises it" in problem.text

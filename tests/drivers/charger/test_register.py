@@ -112,7 +112,7 @@ WRONG: dict[str, tuple[str, str]] = {
     ),
     "    unit: 3\n": (
         "    unit: 3\n    receivers: {a: fleet/robot}\n",
-        "'receivers': the map needs the value rec",
+        "'receivers': the map needs a value 'receiver'",
     ),
 }
 

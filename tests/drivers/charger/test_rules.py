@@ -134,7 +134,7 @@ WRONG = {
     "switches_off_after_s: 30 ": (
         "switches_off_after_s: 2 ",
         "switches_off_after_s is 2, but it is renewed every 1 s (scan_s): write at least 4, so that one"
-        " lost reply does not drop the output",
+        " lost reply does not switch off the output",
     ),
     "{means: idle}": (
         "{means: idel}",

@@ -24,7 +24,7 @@ class Bench(benches.Bench[WorkcellSample, WorkcellOutputs]):
         return [value for signal, value in self.relays() if signal == "start"]
 
     def is_done(self) -> bool:
-        """Return whether the driver reads `done` after all pauses."""
+        """Return whether the driver reads `done` after all pauses of the bus."""
         found = self.patiently()
         return isinstance(found, WorkcellSample) and found.done is True
 

@@ -47,7 +47,7 @@ class Bench(benches.Bench[DoorSample, DoorOutputs]):
         return ends(self.read())
 
     def reads(self, wanted: Ends) -> bool:
-        """Return whether the driver gives these readings after all pauses."""
+        """Return whether the driver gives these readings after all pauses of the bus."""
         found = self.patiently()
         return isinstance(found, DoorSample) and ends(found) == wanted
 

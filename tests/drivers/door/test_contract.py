@@ -73,7 +73,8 @@ class TestDryContactsOnGpio(DoorContract):
 
 
 class MqttBench(Bench):
-    """A bench whose bus measures real time. So the test must ask the bus to end a pause."""
+    """A bench whose bus measures real time. So `a_moment` asks the bus to end its pause after a
+    failure."""
 
     bus: MqttBus
 

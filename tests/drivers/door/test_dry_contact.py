@@ -61,12 +61,12 @@ def test_the_shipped_door_is_sound() -> None:
         (
             {"pulse": {"on_s": 3.0, "every_s": 3.0}},
             "pulse.on_s",
-            "must be shorter than every_s; delete pulse for a steady hold",
+            "must be shorter than every_s; delete pulse if the relay must stay on",
         ),
         (
             {"inputs": {"opened": NONE}},
             "inputs",
-            "needs 'opened'; without that contact write feedback: estimated",
+            "needs 'opened'; if the door has no such contact, write feedback: estimated",
         ),
         (
             {"limits": {"open_delay_s": 3.0}},
@@ -110,7 +110,8 @@ def test_the_shipped_door_is_sound() -> None:
         (
             {"outputs": {"hold_open": FLASHED}, "pulse": {"on_s": 0.75, "every_s": 3.0}},
             "pulse.on_s",
-            "with flash the module counts whole tenths of a second, and 0.75 s is none",
+            "with flash the module counts in tenths of a second, so 0.75 s is impossible: write a"
+            " multiple of 0.1",
         ),
     ],
 )
@@ -169,14 +170,14 @@ def test_accepting_wiring_that_is_not_unsafe_is_warned_of() -> None:
 
 def test_a_closed_contact_that_a_cut_wire_imitates_is_warned_of() -> None:
     inverted = {"point": "unit 1 discrete input 1", "active": "low"}
-    text = "a cut wire may read as a closed door; wire a contact that the door closes"
+    text = "a cut wire may read as a closed door; use a contact that a closed door closes"
     assert list(warnings(settings(inputs={"closed": inverted}))) == [(("inputs", "closed"), text)]
     assert list(warnings(settings())) == []
 
 
 def test_estimated_feedback_is_warned_of() -> None:
     door = settings(feedback="estimated", inputs={"opened": NONE}, limits={"open_delay_s": 4.0})
-    text = "OPEN and CLOSED for RMF follow the clock, whatever the door does"
+    text = "RMF gets OPEN and CLOSED after fixed times, whatever the door really does"
     assert list(warnings(door)) == [(("feedback",), text)]
 
 

@@ -158,7 +158,7 @@ def test_an_input_that_is_neither_yes_nor_no_gives_no_reading() -> None:
 
 @pytest.mark.parametrize("signal", ["opened", "closed", "obstruction", "fire"])
 def test_an_input_that_is_null_gives_no_reading(signal: str) -> None:
-    """A door of which neither end were known would be MOVING."""
+    """A reading with two unknown end positions would mean that the door moves."""
     inputs = msgspec.structs.replace(SETTINGS.inputs, **{signal: JsonFlag(field="it")})
     settings = msgspec.structs.replace(SETTINGS, inputs=inputs)
     answer = Relay().get_json("")
@@ -177,11 +177,11 @@ WRONG = {
     "switches_off_after_s: 10 ": (
         "switches_off_after_s: 3 ",
         "switches_off_after_s is 3, but it is renewed every 1 s (scan_s): write at least 4, so"
-        " that one lost reply does not drop the output",
+        " that one lost reply does not switch off the output",
     ),
     '      closed: {field: "input:1.state"} ': (
         "",
-        "'inputs' needs 'closed'; without that input write feedback: estimated",
+        "'inputs' needs 'closed'; if the door has no such input, write feedback: estimated",
     ),
     "on=false": ("on=true&toggle_after=10", "'release' is the same command as hold"),
 }
@@ -207,5 +207,5 @@ def test_a_relay_without_a_timer_is_taken_with_a_reason(tmp_path: Path) -> None:
 
 def test_check_says_that_nothing_closes_the_door() -> None:
     rows = dict(door_http.describe(SETTINGS, http.HttpSettings(api_base="relay")))
-    assert rows["closing"].startswith("nothing is driven: a released door stays open unless")
+    assert rows["closing"].startswith("not commanded: a released door stays open unless")
     assert DoorOutputs.__struct_fields__ == ("hold_open", "between_pulses")

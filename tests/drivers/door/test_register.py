@@ -59,8 +59,8 @@ def test_each_listed_status_is_what_the_map_says() -> None:
         ({"status": 4}, "status 4: blocked"),
         ({"status": 6}, "status 6 is not in the map"),
         ({"status": 65535}, "status 65535 is not in the map"),
-        ({"status": 2, "position": 94}, "the status is open and the position is not"),
-        ({"status": 0, "position": 6}, "the status is closed and the position is not"),
+        ({"status": 2, "position": 94}, "the status says open, but the position says not open"),
+        ({"status": 0, "position": 6}, "the status says closed, but the position says not closed"),
         ({"status": 2, "position": 101}, "the position is not between 0 and 100"),
         ({"status": 1, "position": 65535}, "the position is not between 0 and 100"),
     ],
@@ -187,7 +187,7 @@ def test_a_devices_changes_are_judged_where_they_stand(
 def test_a_map_that_is_written_out_has_no_changes_beside_it(tmp_path: Path) -> None:
     text = "    changes: {command: {at: coil 4, hold: 1, release: 0}}\n"
     assert problems_of(tmp_path / "door.yaml", YAML + text) == [
-        "11:5: 'changes' is for a profile: this device has a map of its own, so change the map"
+        "11:5: 'changes' is for a profile, but this device has a map: write the changes into the map"
     ]
 
 
@@ -222,8 +222,8 @@ def test_a_changed_command_is_claimed_and_its_warning_stands_where_it_is_changed
             "at: input register 0",
             "at: input register 30001",
             [
-                "9:20: 30001 looks like a number of the data model, which begins at 1: write input"
-                " register 0; or 0x7531 if 30001 really is the address on the wire"
+                "9:20: 30001 looks like a manual's number, and these begin at 1: write input"
+                " register 0. Write 0x7531 if 30001 really is the address on the wire"
             ],
         ),
         ("hold: 1, release: 0", "hold: 1, release: 1", ["10:47: 'release' is the value of hold too"]),

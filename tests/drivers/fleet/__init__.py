@@ -1,1 +1,1 @@
-"""Drivers of robots, on real wires. The simulated robots drive."""
+"""Tests of the robots' drivers, on real wires with simulated robots that drive."""

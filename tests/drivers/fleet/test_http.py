@@ -56,8 +56,8 @@ START = Pose("L1", 1.0, 2.0, 0.5)
 
 @dataclass
 class Bench:
-    """The robots of one manager on one bus, each with its driver. The bus measures its pauses with
-    `clock`."""
+    """The robots of one manager on one bus, each with its driver. After a failure the bus pauses.
+    `clock` measures these pauses."""
 
     plants: dict[str, RobotPlant]
     drivers: dict[str, HttpRobot]
@@ -239,7 +239,9 @@ def test_an_answer_about_another_robot_is_refused() -> None:
             return answers
 
     driver = HttpRobot("AMR01", MILLIMETRES, Confused())  # type: ignore[arg-type]
-    with pytest.raises(DriverError, match="answers for 'AMR07' and was asked for 'AMR01'"):
+    with pytest.raises(
+        DriverError, match="answers about robot 'AMR07', but was asked about 'AMR01'"
+    ):
         driver.read()
 
 
@@ -305,9 +307,9 @@ def test_a_placeholder_without_a_value_and_an_action_without_an_end_are_refused(
     tmp_path: Path,
 ) -> None:
     assert texts_of(tmp_path / "robots.yaml", YAML) == [
-        "'path': '$where' has no value here; there are $robot, $id, $running, $map, $x, $y, $yaw,"
-        " $goal, $dock, $speed_limit, $activity",
-        "'actions' needs fields: completed, by which an action's end is seen",
+        "'path': '$where' has no value here; the placeholders here are $robot, $id, $running,"
+        " $map, $x, $y, $yaw, $goal, $dock, $speed_limit, $activity",
+        "'actions' needs the field 'completed', which shows the end of an action",
     ]
 
 

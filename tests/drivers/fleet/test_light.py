@@ -153,7 +153,7 @@ def test_after_a_death_it_is_paused(way: str, monkeypatch: pytest.MonkeyPatch) -
     [
         ({"points": 3}, "'plan.points' is 3, and a list of places is expected"),
         ({"points": [7]}, "'plan.points' is 7, and a place is expected"),
-        ({"points": [{"x": 1.0}]}, "a place of 'plan.points' has no 'x' or 'y'"),
+        ({"points": [{"x": 1.0}]}, "an item of 'plan.points' has no 'x' or no 'y'"),
         ({"points": [{"x": "?", "y": 1}]}, "'x' is '?', and a number is expected"),
         ({}, "the answer has no 'plan.points'"),
     ],
@@ -203,5 +203,5 @@ def test_an_interface_that_lacks_a_call_for_the_control_is_named() -> None:
     assert HTTP.lacks("traffic_light") == ""
     assert HTTP.lacks("full") == "control: full needs navigate, stop in the interface"
     dies = replace(HTTP, on_death="stop").lacks("traffic_light")
-    assert dies == "on_death: stop needs stop in the interface"
+    assert dies == "on_death: stop needs the call 'stop' in the interface"
     assert VdaRobotSettings(manufacturer="acme").lacks("traffic_light") == ""

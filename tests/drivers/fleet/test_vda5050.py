@@ -201,7 +201,7 @@ def test_a_fatal_error_is_a_fault(bench: Bench) -> None:
 def test_a_robot_that_drops_off_the_net_has_no_place(bench: Bench) -> None:
     bench.until(moving=False)
     bench.plant.fail("unit", "off")
-    bench.until_error("the robot has left the broker: CONNECTION")
+    bench.until_error("the robot is not connected to the broker: CONNECTION")
     bench.plant.fail("unit", None)
     bench.until(at=START)
 
@@ -213,7 +213,7 @@ def test_noise_and_another_robots_state_are_no_place(bench: Bench) -> None:
     bench.until_error("is no JSON")
     bench.plant.fail("unit", "wrong")
     bench.plant.press("manual", False, bench.plant.now)
-    bench.until_error("is of robot another, not 0001")
+    bench.until_error("is from robot another, not 0001")
 
 
 def test_a_killed_broker_is_an_error_and_its_return_mends_it(bench: Bench) -> None:
@@ -281,7 +281,7 @@ def test_a_driving_robots_place_is_the_newest_of_state_and_visualization() -> No
 def test_an_old_place_of_a_driving_robot_is_no_place_and_of_a_standing_one_it_is() -> None:
     bus, driver = scripted()
     bus.clock.now += 4.0
-    with pytest.raises(DriverError, match="the robot drives, and its place is 4 s old"):
+    with pytest.raises(DriverError, match="the robot drives, but its reported position is 4 s old"):
         driver.read()
     bus.clock.now -= 4.0
     bus.says("state", {**STATE, "driving": False})
@@ -291,7 +291,7 @@ def test_an_old_place_of_a_driving_robot_is_no_place_and_of_a_standing_one_it_is
 
 def test_a_robot_that_is_not_localized_has_no_place() -> None:
     _, driver = scripted(agvPosition={**STATE["agvPosition"], "positionInitialized": False})
-    with pytest.raises(DriverError, match="does not know its place"):
+    with pytest.raises(DriverError, match="does not know its position"):
         driver.read()
 
 

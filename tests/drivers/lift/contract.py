@@ -1,7 +1,7 @@
-"""Duties of every driver of a lift, on any bus. Each test has its own bench.
+"""The duties of every lift driver on any bus, as tests. Each test gets its own bench.
 
-A test class implements `benches`, and derives from `LiftContract`. A class whose link can fail derives
-from `WiredLiftContract`.
+A bench is a driver on a bus, with a simulated lift behind the bus. A test class implements `benches`
+and derives from `LiftContract`. It derives from `WiredLiftContract` if its connection can fail.
 
 The lift has the landings B1, G and 1, and stands at B1 with its door closed. The wires are
 `fire_alarm`, `agv_mode`, `door_opened`, `door_closed`, `moving`, and a line for each landing.
@@ -21,7 +21,7 @@ from tests.drivers.benches import Contract
 from tests.waiting import wait_until
 
 QUICK = LiftPace(floor_s=0.2, door_s=0.05, agv_s=0.02, dwell_s=0.1)
-"""The times of a simulated lift (s). With such short times no test waits for the lift."""
+"""The times (s) of the simulated lift. They are so short that the tests lose no time."""
 
 IDLE = LiftSample("B1", DoorReading.CLOSED, motion=Motion.STOPPED, agv=False)
 OFF, AGV = LiftOutputs(), LiftOutputs(agv_request=True)
@@ -29,7 +29,7 @@ CALL, HOLD = LiftOutputs(True, call="1"), LiftOutputs(True, hold_door=Side.FRONT
 
 
 class Bench(benches.Bench[LiftSample, LiftOutputs]):
-    """A bench with a lift."""
+    """A lift driver on a bus, with a simulated lift behind the bus."""
 
     def until(self, holds: Callable[[LiftSample], bool], what: str) -> list[LiftSample]:
         """Read until the condition holds. Return all readings."""
@@ -43,13 +43,13 @@ class Bench(benches.Bench[LiftSample, LiftOutputs]):
         return seen
 
     def sees(self, edges: int) -> None:
-        """Wait until so many edges have come through to the relays."""
+        """Wait until the relays have changed at least `edges` times."""
         wait_until(lambda: len(self.relays()) >= edges, f"{edges} edges have come through")
 
     def rides(self) -> list[LiftSample]:
-        """Call the lift to landing 1 in AGV mode. Then hold the door open.
+        """Call the car to landing 1 in AGV mode. Then hold its door open until the door reads open.
 
-        Return all readings since the call.
+        Return all readings after the call.
         """
         self.write(AGV)
         self.until(lambda sample: sample.agv is True, "AGV mode")
@@ -60,7 +60,7 @@ class Bench(benches.Bench[LiftSample, LiftOutputs]):
 
 
 class LiftContract(Contract[Bench]):
-    """The contract on any bus. Each bench begins with an idle lift."""
+    """The duties of a lift driver on any bus. Each test begins with an idle lift."""
 
     def test_opening_a_lift_switches_no_output(self, bench: Bench) -> None:
         bench.open()
@@ -153,7 +153,7 @@ class LiftContract(Contract[Bench]):
 
 
 class WiredLiftContract(LiftContract):
-    """The contract on a bus whose far side can fail. Its parts are `server` and `unit`."""
+    """The duties on a bus with a server and a unit. Both parts can fail."""
 
     @pytest.mark.parametrize("part", ["server", "unit"])
     def test_a_link_that_is_gone_is_a_driver_error_and_the_outputs_survive_it(

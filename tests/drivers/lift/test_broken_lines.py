@@ -1,5 +1,7 @@
-"""A code on lines, of which one is cut or shorted. The code must never read as a safer state than the
-true state."""
+"""Codes on several lines, of which one line is cut or shorted.
+
+The driver must not accept a code that then reads as a less safe state than the true state.
+"""
 
 from typing import Any
 
@@ -19,7 +21,7 @@ from tests.drivers.lift.wirings import settings as wired
 def service(
     codes: dict[int, str], lines: list[dict[str, Any]] | None = None
 ) -> DryContactLiftSettings:
-    """Return a lift with one service code for AGV mode and hazards."""
+    """Return a lift whose AGV mode and hazards are read as one number (the service code)."""
     width = max(codes).bit_length()
     code = {"bits": lines or bits(width, 60), "codes": codes}
     return wired(inputs=inputs(agv_mode=None, fire_alarm=None, service=code))
@@ -123,7 +125,7 @@ def test_what_the_site_accepts_is_not_refused() -> None:
 
 
 SAFEST = ("agv_mode", "normal", "fire_alarm")
-"""Three states of a service code. The first gives the most permissions, and the last gives none."""
+"""Three states of a service code. In the first a robot may use the lift, and in the last nobody may."""
 
 
 @given(

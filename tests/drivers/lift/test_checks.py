@@ -1,4 +1,7 @@
-"""`check` on a lift's wiring: errors, errors that a file may accept by name, and warnings."""
+"""The findings of `check` in a lift's wiring: errors, warnings, and unsafe wiring.
+
+A file may accept unsafe wiring with the name of its signal in `accept_unsafe`.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -70,7 +73,7 @@ WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
     ),
     (
         binary(lines={"B1": line(40)}),
-        [("floor_code.lines", "binary has bits and codes; lines are for one_hot")],
+        [("floor_code.lines", "binary needs bits and codes; only one_hot has lines")],
     ),
     (
         binary(codes={1: "B1", 2: "G", 3: "L9"}),
@@ -89,14 +92,14 @@ WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
             ("floor_code.between_floors.9", "9 does not fit on 3 lines in binary"),
             (
                 "floor_code.codes.0",
-                "0 is B1 here and means between floors as well: write between_floors: [9]",
+                "0 is B1 here, but is also in between_floors: write between_floors: [9]",
             ),
         ],
     ),
     ({"calls": {"B1": coil(2), "G": coil(3)}}, [("calls", "no call for 1")]),
     (
         {"call_code": {"bits": [coil(20), coil(21)], "codes": {1: "B1", 2: "G", 3: "1"}}},
-        [("calls", "calls and call_code are two ways of calling: delete one of the two")],
+        [("calls", "calls and call_code are alternatives: delete one of the two")],
     ),
     (
         {"calls": {}, "call_code": {"bits": [coil(20)], "codes": {0: "B1", 1: "G", 2: "1"}}},
@@ -107,15 +110,25 @@ WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
     ),
     (
         {"inputs": inputs(door_opened=None, door_closed=None)},
-        [("inputs", "no door contact: door, or door_opened and _closed")],
+        [("inputs", "no contact of this door: give door, or both door_opened and door_closed")],
     ),
     (
         {"inputs": inputs(door_closed=None)},
-        [("inputs.door_opened", "with one contact, write door: {…, proves: open}")],
+        [
+            (
+                "inputs.door_opened",
+                "is the only contact of this door: write door: {…, proves: open} instead",
+            )
+        ],
     ),
     (
         {"inputs": inputs(door=line(40, proves="open"))},
-        [("inputs.door", "door stands for one contact alone: delete door, or the other contacts")],
+        [
+            (
+                "inputs.door",
+                "door is for a door with only one contact: delete door, or the other contacts",
+            )
+        ],
     ),
     (
         {"inputs": inputs(**REAR)},
@@ -123,21 +136,30 @@ WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
     ),
     (
         {"floors": TWO_FLOORS, "outputs": {"rear_door_open": coil(5)}},
-        [("inputs", "no rear_door contact: rear_door, or rear_door_opened and _closed")],
+        [
+            (
+                "inputs",
+                "no contact of this door: give rear_door, or both rear_door_opened and"
+                " rear_door_closed",
+            )
+        ],
     ),
     (
         {"inputs": inputs(up=line(40))},
         [
             (
                 "inputs.up",
-                "give motion as moving, or stopped, or up with down, or motion; not up",
+                "the motion needs either moving, or stopped, or motion, or both up and down; not up",
             )
         ],
     ),
     (
         {"inputs": inputs(motion={"bits": bits(1, 40), "codes": {0: "stopped", 2: "up"}})},
         [
-            ("inputs.motion.codes", "needs a code for stopped, and for moving or up and down"),
+            (
+                "inputs.motion.codes",
+                "needs a code for stopped; it also needs either one for moving, or both up and down",
+            ),
             ("inputs.motion.codes.2", "2 does not fit on the bits"),
         ],
     ),
@@ -146,7 +168,12 @@ WRONG: list[tuple[dict[str, Any], list[tuple[str, str]]]] = [
             "inputs": inputs(service={**SERVICE, "codes": {**SERVICE_CODES, 3: "normal"}}),
             "accept_unsafe": ACCEPTED_SERVICE,
         },
-        [("inputs.agv_mode", "service shows agv_mode too: delete one of the two")],
+        [
+            (
+                "inputs.agv_mode",
+                "service has a code for agv_mode too: delete this input, or that code",
+            )
+        ],
     ),
     (
         {"inputs": inputs(agv_mode=None, service=SERVICE), "accept_unsafe": ACCEPTED_SERVICE},
@@ -237,21 +264,21 @@ UNSAFE: list[tuple[str, dict[str, Any], str, str]] = [
         "floor_bit0",
         binary(codes={0: "B1", 1: "G", 2: "1"}, between_floors=[]),
         "floor_code",
-        "with the floor code's cable cut, the car reads at B1",
+        "with the floor code's cable cut, the daemon reads the car at B1",
     ),
     (
         "door_open",
         {"outputs": {"door_open": pin("J8:36", "low")}},
         "outputs.door_open",
-        "BCM16 = J8:36 is pulled low from power-on through boot, and its relay is on at"
-        " low: use BCM4 to 8, or the other active level",
+        "BCM16 = J8:36 is pulled low from power-on through boot, and low switches its relay on:"
+        " use BCM4 to 8, or the opposite active level",
     ),
     (
         "call_G",
         {"calls": {"B1": coil(2), "G": pin("BCM5", "high"), "1": coil(4)}},
         "calls.G",
-        "BCM5 = J8:29 is pulled high from power-on through boot, and its relay is on at"
-        " high: use BCM9 to 27, or the other active level",
+        "BCM5 = J8:29 is pulled high from power-on through boot, and high switches its relay on:"
+        " use BCM9 to 27, or the opposite active level",
     ),
 ]
 
@@ -273,10 +300,10 @@ def test_a_safe_choice_of_pins_is_not_refused() -> None:
 
 
 def test_the_first_public_wiring_is_possible_when_its_two_unsafe_places_are_accepted() -> None:
-    """The wiring has two unsafe places. The contact of the door reads open when its wire is cut.
-
-    The door opens on a low level, and the pin is low from boot on.
-    """
+    """This wiring has three unsafe places:
+    - If the wire of the door's contact is cut, the door reads open.
+    - If the cable of the floor code is cut, the car reads at L1.
+    - The relay of `door_open` is on at a low level, and its pin is low from power-on through boot."""
     literal = {
         "floors": ["L1", "L2", "L3", "L4"],
         "inputs": {
@@ -344,7 +371,7 @@ def test_accepting_wiring_that_does_not_exist_is_pointed_out() -> None:
                 (
                     "floor_code",
                     "with floor_bit1 cut, G reads as B1; with floor_bit1 shorted, B1 reads as G: ask"
-                    " for a parity line, or for codes two lines apart",
+                    " for a parity line, or for codes that differ in at least two lines",
                 )
             ],
         ),
@@ -356,7 +383,7 @@ def test_accepting_wiring_that_does_not_exist_is_pointed_out() -> None:
                 (
                     "floor_code",
                     "with floor_bit0 cut, B1 reads as G; with floor_bit0 shorted, G reads as B1: ask"
-                    " for a parity line, or for codes two lines apart",
+                    " for a parity line, or for codes that differ in at least two lines",
                 )
             ],
         ),
@@ -389,7 +416,8 @@ def test_agv_mode_that_no_output_asks_for_is_warned_of() -> None:
     assert warned(settings(outputs={"door_open": coil(1)})) == [
         (
             "outputs",
-            "no agv_mode_request, and AGV mode is awaited: the lift must enter AGV mode by itself",
+            "no agv_mode_request, although the daemon waits for AGV mode: the lift must enter AGV"
+            " mode by itself",
         )
     ]
 
@@ -402,19 +430,19 @@ def test_agv_mode_by_call_is_shown_by_the_lift_and_asked_for_by_calls_only() -> 
     assert found(settings(**BY_CALL, inputs=inputs(agv_mode=None))) == [
         (
             "agv_mode",
-            "by_call needs an agv_mode input: nothing else shows that the lift accepted a call",
+            "by_call needs an agv_mode input, which alone shows that the lift has accepted a call",
         )
     ]
     assert found(settings(agv_mode="by_call")) == [
         (
             "outputs.agv_mode_request",
-            "with agv_mode: by_call the calls request AGV mode: delete one of the two",
+            "with agv_mode: by_call a call already requests AGV mode: delete this or by_call",
         )
     ]
     assert warned(settings(agv_mode="by_call", outputs={})) == [
         (
             "inputs",
-            "no door_open: with by_call nothing keeps AGV mode on while a robot goes through",
+            "no door_open: with by_call nothing keeps AGV mode on while a robot enters or leaves",
         )
     ]
 
@@ -430,7 +458,7 @@ def test_a_fire_that_no_topic_announces_is_noted_and_not_warned_of() -> None:
     assert list(notes(settings(alarm="fire_alarm_trigger"))) == []
     assert list(notes(settings(inputs=inputs(fire_alarm=None)))) == []
     blue = inputs(code_blue={"point": "BCM27", "active": "low", "pull": "down"})
-    untold = "code_blue stops this lift for robots, but nobody tells the fleets"
+    untold = "code_blue stops this lift for robots, but no topic tells the fleets"
     assert list(notes(settings(alarm="emergency_signal", inputs=blue))) == [(("alarm_on",), untold)]
     both = ["fire_alarm", "code_blue"]
     assert list(notes(settings(alarm="emergency_signal", alarm_on=both, inputs=blue))) == []

@@ -10,8 +10,8 @@ from tests.drivers.lift.wirings import FLOORS, bits, line, settings
 
 
 def on(text: str) -> list[bool]:
-    """Return the lines of a binary number. `011` is 3, because the first line is the most significant
-    bit."""
+    """Return the lines of a binary number, least significant first. `011` is 3, because the first
+    character is the most significant bit."""
     return [c == "1" for c in reversed(text)]
 
 
@@ -68,7 +68,7 @@ def test_only_listed_codes_are_floors_and_no_line_on_is_between_floors() -> None
         "000": (None, ""),
         "001": ("B1", ""),
         "010": ("G", ""),
-        "011": (None, "code 3 is not a floor's"),
+        "011": (None, "code 3 is no floor's code"),
         "100": ("1", ""),
     }
 

@@ -1,4 +1,4 @@
-"""The contract of lifts, tried with every driver."""
+"""The contract tests of lifts, run with every driver and bus."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,7 +25,7 @@ class TestDryContactsOnModbus(WiredLiftContract):
     serial: ClassVar[modbus.Serial | None] = None
 
     def wired(self) -> dict[str, Any]:
-        """Return the wiring in the form of a YAML file."""
+        """Return the wiring as a YAML file has it."""
         return whole(inputs=inputs(moving=line(4)))
 
     @contextmanager
@@ -38,7 +38,7 @@ class TestDryContactsOnModbus(WiredLiftContract):
 
 
 class MqttBench(Bench):
-    """A bench whose bus measures real time. So the test must ask the bus to end a pause."""
+    """A bench whose bus measures its pauses in real time. So a test ends a pause with `insist`."""
 
     bus: MqttBus
 
@@ -47,7 +47,8 @@ class MqttBench(Bench):
 
 
 class TestWordsOnMqtt(WiredLiftContract):
-    """A gateway that publishes words in one JSON object. The commands to the gateway are also words."""
+    """A gateway that publishes all signals as words in one JSON object. It also gets commands as
+    words."""
 
     @contextmanager
     def benches(self) -> Iterator[Bench]:
@@ -82,7 +83,7 @@ def _point(wire: Wire) -> dict[str, object]:
 
 
 def on_topics(part: Any, names: list[str]) -> Any:
-    """Return the same wiring. A name replaces each point."""
+    """Return this part of a wiring with a name in place of each point. Append each name to `names`."""
     if not isinstance(part, dict):
         return part
     if "point" in part:
@@ -152,7 +153,7 @@ class TestDryContactsOnRs485(TestDryContactsOnModbus):
 
 
 def in_registers(part: Any) -> Any:
-    """Return the same wiring. Each contact becomes a bit in a register of the gateway."""
+    """Return this part of a wiring, with a bit of a gateway's register in place of each contact."""
     if not isinstance(part, dict):
         return part
     if "point" in part and "discrete input" in part["point"]:
@@ -170,7 +171,7 @@ class TestContactsAsBitsOfRegisters(TestDryContactsOnModbus):
 
 
 def on_header(part: Any, pins: Iterator[int]) -> Any:
-    """Return the same wiring. Each point becomes the next of these pins."""
+    """Return this part of a wiring, with the next GPIO pin of `pins` in place of each point."""
     if not isinstance(part, dict):
         return part
     if "point" in part:
@@ -195,8 +196,8 @@ def contact(number: int, active: str = "high") -> dict[str, Any]:
 
 
 class TestRegistersBesideContacts(TestRegistersWithCallsAsNumbers):
-    """A lift on two units. Gateway unit 3 has the floor as a number, and module unit 4 has all other
-    signals."""
+    """A lift on two units. The gateway (unit 3) has the floor as a number, and has AGV mode and the
+    calls. The module (unit 4) has the contacts and the other commands."""
 
     serial: ClassVar[modbus.Serial | None] = None
 

@@ -1,4 +1,5 @@
-"""A lift's lines. Truth tables turn signals into a sample, and outputs into levels of lines."""
+"""Truth tables of a lift driver. They turn signals into a sample, and outputs into the levels of
+lines."""
 
 from itertools import product
 from typing import Any

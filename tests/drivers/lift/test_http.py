@@ -1,4 +1,8 @@
-"""A lift behind a gateway that answers HTTP: the contract, true answers, held commands and the YAML."""
+"""A lift behind a gateway with an HTTP API.
+
+The tests cover the contract of lifts, false and old answers, commands that must be renewed, and errors
+in the YAML file.
+"""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -191,7 +195,7 @@ def test_check_says_what_a_lift_of_the_template_cannot_confirm() -> None:
     told = [text for _, text in warnings(TEMPLATE)]
     assert "no agv_mode: the lift cannot confirm that it serves the robot" in told
     assert "no fire_alarm: a fire recall would not be seen" in told
-    assert any("believe a gateway that has lost the lift" in text for text in told)
+    assert any("if the gateway loses the lift and repeats its last state" in text for text in told)
 
 
 GOOD: dict[str, Any] = {
@@ -205,7 +209,8 @@ GOOD: dict[str, Any] = {
 
 
 class Gateway:
-    """A bus that gives `answer` to every request. The commands in `broken` fail."""
+    """A stand-in for the HTTP bus. It answers every request with `answer`, and fails for the paths in
+    `broken`."""
 
     def __init__(self, **changes: Any) -> None:
         self.answer: dict[str, Any] = {**GOOD, **changes}
@@ -239,7 +244,7 @@ def test_values_that_are_not_listed_are_faults_and_never_a_floor_a_door_or_stand
         sample = reading(car={"floor": odd, "door": odd, "motion": odd})
         assert (sample.level, sample.door) == (None, DoorReading.UNKNOWN)
         assert sample.motion is Motion.CONTRADICTORY
-        assert "is not a floor's value" in sample.code_fault
+        assert "is no floor's value" in sample.code_fault
 
 
 def test_what_is_null_is_not_known() -> None:
@@ -287,7 +292,7 @@ def test_held_commands_with_a_timer_are_renewed_in_each_scan_and_a_call_is_sent_
         lift.write(outputs)
         gateway.answer["out"] = {"agv": outputs.agv_request}
     assert gateway.sent == [
-        *("/call/none", "/door/off"),  # sent by the claim, with AGV mode already off
+        *("/call/none", "/door/off"),  # the claim sends no /agv/off, because it is off already
         *("/agv/on", '/call{"to": 1}'),
         "/agv/on",
         *("/call/none", "/agv/on", "/door/on"),
@@ -371,9 +376,9 @@ def test_a_restart_after_a_lost_answer_ends_no_ride() -> None:
         (
             "          switches_off_after_s: 10                  # the same number as in `ask`\n",
             "",
-            "unsafe: when the network dies nothing ends agv_mode_request: let ask set the gateway's"
-            " own timer, and write the timer's time as switches_off_after_s; or accept_unsafe:"
-            " {agv_mode_request: <why it is safe here>}",
+            "unsafe: when the network dies nothing switches agv_mode_request off: let ask set the"
+            " gateway's own timer, and write the timer's time as switches_off_after_s; or"
+            " accept_unsafe: {agv_mode_request: <why it is safe here>}",
         ),
         ('{"floor": "{level}"}', "{}", '"{level}" into its body, or give calls'),
         ("open: [OPEN], ", "", "'door' needs 'open'"),
@@ -391,11 +396,11 @@ def test_a_restart_after_a_lost_answer_ends_no_ride() -> None:
         ),
         ('{"on": false}', '{"on": true, "seconds": 10}', "is the same request as ask"),
         ('{"hold": false}', "{hold: false}", "is not JSON"),
-        ("    api:\n", "    lift_id: east\n    api:\n", "no request carries"),
+        ("    api:\n", "    lift_id: east\n    api:\n", "no request contains"),
         ("    api:\n", "    profile: rmf-lift-template\n    api:\n", "delete one of the two"),
         ("method: digest}", "method: plain}", "digest"),
         ("moving: [OPENING", "shut: [OPENING", "unknown key 'shut'"),
-        ("up: [up], ", "", "needs values for moving, or for up and down"),
+        ("up: [up], ", "", "needs values for moving, or else values for both up and down"),
         ("path: /lifts/1/cancel", 'path: /lifts/1/call, body: \'{"floor": "{level}"}\'', "same"),
     ],
 )
@@ -417,7 +422,7 @@ lifts:
   Lift1: {floors: [l1, l2], profile: rmf-lift-template, accept_unsafe: {door_open: it closes}}
 """
     [found] = texts_of(tmp_path / "lift.yaml", text)
-    assert found == """'Lift1' needs 'lift_id': the API's requests carry "{lift_id}\""""
+    assert found == """'Lift1' needs 'lift_id', because requests of the API contain "{lift_id}\""""
     [found] = texts_of(tmp_path / "lift.yaml", text.replace("rmf-lift-template", "rmf-lift"))
     assert "rmf-lift-template" in found
 
@@ -427,11 +432,11 @@ def test_check_shows_every_request_and_field() -> None:
     assert rows["state"] == "GET http://gateway/lifts/1 every 0.5 s"
     assert rows["age"] == "gateway.age_ms x 0.001"
     assert rows["agv_mode_request ask"].endswith('/lifts/1/robot {"on": true, "seconds": 10}')
-    assert rows["agv_mode_request ends"] == "by itself 10 s after its last request"
+    assert rows["agv_mode_request ends"] == "by itself, 10 s after the last request for it"
 
 
 def test_the_call_waits_for_nothing_and_the_gateway_is_the_plants() -> None:
-    """The lift has the numbers and words of the example file."""
+    """The simulated lift uses the numbers and words of the example file in `config/`."""
     world = RealTime({"lift": build("lift", SETTINGS, QUICK)})
     station = FakeHttpLift(world.plants["lift"], SETTINGS)
     with on_http(world, station, timeout_s=0.5) as (bus, clock):

@@ -1,4 +1,4 @@
-"""Signals on points: polarity, the order of switching, and writes in an unknown state."""
+"""Signals on points: the active level, the order of switching, and writes after a failed write."""
 
 from collections.abc import Mapping
 
@@ -15,7 +15,7 @@ WIRES = (
 
 
 class Recorded:
-    """A bus that records every write in order. With `broken`, writes fail."""
+    """A stand-in for a bus that records every write in order. If `broken` is true, each write fails."""
 
     def __init__(self) -> None:
         self.claims: list[tuple[Mapping[str, Pull | None], Mapping[str, bool]]] = []

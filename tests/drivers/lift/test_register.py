@@ -1,5 +1,8 @@
-"""A lift on a gateway's registers: the meaning of its numbers, refused maps, and the writes of each
-command."""
+"""A lift behind a gateway with registers.
+
+The tests cover the meaning of each register's number, register maps that the driver refuses, and the
+values that each command writes.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -22,8 +25,8 @@ def shipped() -> RegisterLiftSettings:
 
 
 def sample(**words: int) -> LiftSample:
-    """Return a reading of the shipped gateway, which is in AGV mode at L1. `words` replaces some
-    words."""
+    """Return the sample of the example lift at L1 in AGV mode. `words` replaces words that the
+    registers hold."""
     plain = {"floor": 1, "motion": 1, "door": 0, "service": 1, "overload": 0}
     return decode(shipped().map, plain | words)
 
@@ -39,7 +42,7 @@ def test_a_car_at_a_landing_is_read_from_its_registers() -> None:
     ("words", "changes"),
     [
         ({"floor": 0}, {"level": None}),
-        ({"floor": 9}, {"level": None, "code_fault": "code 9 is not a floor's"}),
+        ({"floor": 9}, {"level": None, "code_fault": "code 9 is no floor's code"}),
         ({"floor": 0xFF03}, {"level": "L3"}),
         ({"motion": 0x0100}, {"motion": Motion.UP}),
         ({"motion": 0x0300}, {"motion": Motion.CONTRADICTORY}),
@@ -88,7 +91,7 @@ def test_commands_that_share_a_register_are_joined_in_it() -> None:
     ]
 
 
-MODEL = "looks like a number of the data model, which begins at 1"
+MODEL = "looks like a manual's number, and these begin at 1"
 
 
 @pytest.mark.parametrize(
@@ -103,7 +106,7 @@ MODEL = "looks like a number of the data model, which begins at 1"
         (
             "at: input register 1\n",
             "at: input register 30002\n",
-            f"36:13: 30002 {MODEL}: write input register 1; or 0x7532 if 30002 really is the address"
+            f"36:13: 30002 {MODEL}: write input register 1. Write 0x7532 if 30002 really is the address"
             " on the wire",
         ),
         (
@@ -129,13 +132,13 @@ MODEL = "looks like a number of the data model, which begins at 1"
             "44:51: 'ask': door_open shares bits of holding register 10 with agv_mode_request: give"
             " each command bits of its own",
         ),
-        ("none: 0", "none: 4", "47:43: 'codes': 4 is the number for no call (none)"),
+        ("none: 0", "none: 4", "47:43: 'codes': 4 means no call already (none)"),
         (", 4: L4}\n          none", "}\n          none", "47:11: 'codes': no code for L4"),
         (
             "    floors:",
             "    agv_mode: by_call\n    floors:",
-            "44:9: 'agv_mode_request': with agv_mode: by_call the calls request AGV mode:"
-            " delete one of the two",
+            "44:9: 'agv_mode_request': with agv_mode: by_call a call already requests AGV mode:"
+            " delete this or by_call",
         ),
     ],
 )
@@ -161,7 +164,7 @@ def test_commands_that_cannot_be_read_back_are_warned_of() -> None:
 
 
 def told(title: str) -> list[tuple[str, ...]]:
-    """Return the rows of this table that `check` prints for the shipped lift."""
+    """Return the rows of the table with this title that `check` prints for the example lift."""
     return next(list(table.rows) for table in tables(shipped()) if table.title == title)
 
 
@@ -190,7 +193,7 @@ def test_each_command_is_a_row_with_what_is_written() -> None:
     held = "on while a robot holds the lift, and 3 s longer"
     assert told("outputs") == [
         ("agv_mode_request", "holding register 10: 1", "0", held),
-        ("door_open", "holding register 10: 2", "0", "on while the car stands for a robot"),
+        ("door_open", "holding register 10: 2", "0", "on while the car waits for a robot"),
         ("call L1", "holding register 11: 1", "0", called),
         ("call L2", "holding register 11: 2", "0", called),
         ("call L3", "holding register 11: 3", "0", called),
@@ -223,7 +226,7 @@ CONTACTS = CONFIG.with_name("lift_gateway_contacts.yaml")
          "36:7: moving and stopped give the motion in several ways: keep one"),
         ("      stopped: {at", "      door: {at: input register 5, codes: {0: open, 1: closed}}"
          "\n      stopped: {at",
-         "33:7: 'door_opened': door and its contacts are two ways: delete one of the two"),
+         "33:7: 'door_opened': door and its contacts both give the door: delete one of the two"),
         ("at: discrete input 2, unit: 2", "at: discrete input 2, unit: 256",
          "34:49: 'unit' is 256: write a whole number from 0 to 255"),
         ("at: coil 1, unit: 2}", "at: coil 0, unit: 2}",
@@ -252,7 +255,7 @@ def test_a_cut_wire_of_an_alarm_at_a_module_is_warned_of(tmp_path: Path) -> None
         CONTACTS.read_text().replace("unit: 2, active: low}", "unit: 2, active: high}")
     )
     told = [warning.text for warning in load(tmp_path / "lift.yaml").warnings]
-    assert any("its cut reads as no fire_alarm" in text for text in told)
+    assert any("a cut wire reads as no fire_alarm" in text for text in told)
 
 
 def test_the_units_of_a_map_are_its_own_or_the_lifts() -> None:

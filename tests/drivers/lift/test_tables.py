@@ -1,6 +1,7 @@
-"""The tables of `check` for a lift's codes.
+"""The tables that `check` prints for the codes of a lift.
 
-The tables list the effect of each cut line. A likely mistake in the file changes a table.
+The tables show what each code reads when a line is cut. The tests make likely mistakes in the file, and
+expect that the tables show them.
 """
 
 from pathlib import Path
@@ -25,7 +26,8 @@ DOOR_OPEN = '      door_open: {point: "J8:36", active: high}\n'
 
 
 def table(tmp_path: Path, title: str, *changes: tuple[str, str]) -> list[str]:
-    """Return one table for the shipped lift, after these changes to its file."""
+    """Return the table with this title for `config/lift_dry_contact.yaml`, after these changes to the
+    file."""
     text = SHIPPED.read_text()
     for old, new in changes:
         assert old in text
@@ -90,7 +92,7 @@ def test_the_table_says_how_long_a_call_lasts(tmp_path: Path) -> None:
     pulse = ("    inputs:\n", "    limits: {call_pulse_s: 0.5}\n    inputs:\n")
     assert table(tmp_path, "outputs", pulse) == [
         "agv_mode_request agv_mode_request on while a robot holds the lift, and 3 s longer",
-        "door_open door_open on while the car stands for a robot",
+        "door_open door_open on while the car waits for a robot",
         *(f"call L{n} call_L{n} one pulse of 0.5 s" for n in (1, 2, 3, 4)),
     ]
 

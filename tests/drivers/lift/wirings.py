@@ -1,5 +1,5 @@
-"""Lift wirings for tests. Points have consecutive numbers, because the tests need only their
-meanings."""
+"""Wirings of a lift for tests. The points have consecutive numbers, because only their signals
+matter."""
 
 from typing import Any
 
@@ -25,7 +25,7 @@ def coil(number: int) -> dict[str, Any]:
 
 
 def whole(**changes: Any) -> dict[str, Any]:
-    """Return a correct wiring. Each section in `changes` replaces a whole section."""
+    """Return a correct wiring. Each item of `changes` replaces the whole section with its name."""
     return {
         "floors": FLOORS,
         "inputs": {
@@ -49,7 +49,7 @@ def settings(**changes: Any) -> DryContactLiftSettings:
 
 
 def inputs(**more: Any) -> dict[str, Any]:
-    """Return the inputs of `whole`, changed by `more`. None removes an input."""
+    """Return the inputs of `whole`, changed by `more`. An input with the value None is left out."""
     return {k: v for k, v in {**whole()["inputs"], **more}.items() if v is not None}
 
 

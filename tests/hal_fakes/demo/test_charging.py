@@ -1,4 +1,5 @@
-"""The charging demo with real processes on real DDS, and the demo's verdict."""
+"""The charging demo with real processes on real DDS. It prints RIGHT if the chargers charged as
+planned."""
 
 import os
 import signal
@@ -66,8 +67,10 @@ def test_ctrl_c_in_the_middle_leaves_nothing_behind(directory: Path) -> None:
 
 
 def journal(*told: tuple[str, str, str]) -> Journal:
-    """Return a journal of these charges, one after the other. Each charge is (charger, robot, request
-    id). Between two charges the charger is IDLE."""
+    """Return a journal with a CHARGING state for each of these charges, one charge after the other.
+
+    Each charge is (charger, robot, request id). Between two charges the charger is IDLE.
+    """
     made = Journal(0.0, lambda text: None, colour=False)
     for charger, robot, request_id in told:
         value = int(d.ChargerStateValue.CHARGER_CHARGING)

@@ -1,4 +1,4 @@
-"""The demo accepts only a day without mistakes. It finds and names each possible mistake."""
+"""The demo's check of its own run. It accepts only a run without mistakes, and names each mistake."""
 
 from collections.abc import Callable
 from typing import Any
@@ -122,7 +122,7 @@ def test_the_devices_and_floors_of_the_day_are_those_of_the_shipped_files() -> N
     assert {FROM, TO} <= set(named[LIFT]["floors"])
 
 
-# --- the journal -------------------------------------------------------------------------------
+# --- the journal, which prints the messages and edges of a run ----------------------------------
 
 
 def printed() -> tuple[Journal, list[str]]:

@@ -1,4 +1,4 @@
-"""The charger's physics in virtual time, and each failure of its parts."""
+"""The simulated charger in virtual time: how it charges, and how each of its parts fails."""
 
 import pytest
 
@@ -20,7 +20,7 @@ def at(plant: ChargerPlant, now: float) -> Reading:
 
 
 def parked(*failures: tuple[str, FailureMode]) -> ChargerPlant:
-    """Return a station with these failures. A robot drives onto its pad at 1 s."""
+    """Return a station with these failures, after a robot has driven onto the station's pad at 1 s."""
     plant = ChargerPlant("a")
     for part, mode in failures:
         plant.fail(part, mode)
@@ -35,7 +35,8 @@ def commanded(asked: bool = False, cleared: bool = True) -> ChargerPlant:
 
 
 def powered(cleared: bool = True) -> ChargerPlant:
-    """Return a station with its power on. A robot drives onto its pad at 1 s."""
+    """Return a station after a robot has driven onto its pad and its power was ordered on, both at 1
+    s."""
     plant = commanded(cleared=cleared)
     plant.press("robot", True, 1.0)
     plant.drive("power", True, 1.0)

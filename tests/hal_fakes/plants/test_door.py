@@ -1,4 +1,5 @@
-"""The door plant moves, waits and fails like a door operator, in virtual time."""
+"""The simulated door (the plant) in virtual time. It moves, waits and fails like a real door
+operator."""
 
 import pytest
 

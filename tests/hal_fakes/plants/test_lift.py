@@ -1,4 +1,4 @@
-"""The lift plant. Tests compare whole histories of its terminal block in virtual time."""
+"""The simulated lift (the plant) in virtual time. Tests compare all edges at the lift's terminals."""
 
 from collections.abc import Callable
 from typing import Any

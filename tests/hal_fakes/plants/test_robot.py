@@ -1,5 +1,5 @@
-"""The simulated robot drives, turns, drains its battery, charges and rides. It fails as its table
-says."""
+"""The simulated robot in virtual time. It drives, turns, drains its battery, charges, rides a lift and
+fails."""
 
 import msgspec
 import pytest

@@ -1,4 +1,5 @@
-"""Stories of one alarm panel in virtual time. They test which causes the core reports, and when."""
+"""Stories of one alarm panel in virtual time. They test which causes of an alarm the core reports, and
+when."""
 
 from typing import Any
 
@@ -27,9 +28,10 @@ STEP_S = 0.125
 
 
 class Panel:
-    """A panel that the core reads every STEP_S.
+    """An alarm panel that the core reads every STEP_S.
 
-    `told` gets an entry (s, present causes, seen, drill) at each change.
+    `told` gets an entry (s, present causes, `seen`, `drill`) whenever one of the last three changes.
+    `seen` says that the panel was read. `drill` says that a drill is on.
     """
 
     def __init__(self) -> None:
@@ -161,7 +163,7 @@ def test_a_reading_is_believed_until_it_is_stale_and_the_silence_has_its_own_rea
 
 
 def test_a_panel_that_was_never_tried_is_not_silent_yet() -> None:
-    """ALARM-2: the first scan may be an event."""
+    """ALARM-2: an event, such as a person's reset, can come before the first reading."""
     panel = Panel()
     panel.scan(OperatorReset())
     assert (panel.report.silent, panel.faults) == (False, [])
@@ -186,14 +188,15 @@ def test_without_a_debounce_a_source_and_a_drill_count_at_their_first_reading() 
     memory = core.decide(memory, Sampled(off), 1.0, plain).memory
     made = core.decide(memory, Sampled(on), 2.0, plain)
     assert made.report.alarm == AlarmInputs(frozenset({"fire"}), True, drill=True)
-    assert made.wake_at == 3.0  # the reading is stale then
+    assert made.wake_at == 3.0  # 1 s after the reading, when it is stale
 
 
 @pytest.mark.parametrize("drill", [False, True])
 def test_a_panel_that_is_scanned_only_when_it_asks_for_it_sees_every_change_in_time(
     drill: bool,
 ) -> None:
-    """ALARM-1 to ALARM-4: the daemon reads a quiet panel no sooner than the core asks for it."""
+    """ALARM-1 to ALARM-4: the daemon may wait for the core's `wake_at` before it reads a quiet panel
+    again."""
     panel, told = Panel().until(1.0), []
     fault = "ALARM_DRILL: a drill, which ends by itself" if drill else "ALARM_SOURCE_ACTIVE: fire"
     panel.drill, panel.on["fire"] = drill, not drill
@@ -231,7 +234,7 @@ def test_a_silent_panel_asks_to_be_woken_for_its_alarm() -> None:
 
 
 def test_a_failed_reading_restarts_the_debounce_of_the_drill_too() -> None:
-    """ALARM-1 and ALARM-4: one bad reading must not make a drill of a bounce."""
+    """ALARM-1 and ALARM-4: after one failed reading a bounce of the key must not begin a drill."""
     panel = Panel().until(1.0)
     panel.drill = True
     panel.until(1.125)
@@ -288,9 +291,10 @@ def test_a_key_that_is_on_at_the_start_begins_no_drill() -> None:
 
 
 def test_no_history_hides_a_lasting_cause_or_makes_a_drill_last() -> None:
-    """Try all histories of five readings, or of seven readings in `make deep`.
+    """Try all histories of five moves, or of seven moves in `make deep`.
 
-    Readings are 0.375 s or 6 s apart. The checks do not use the core's code.
+    A move lasts 0.375 s, or 6 s for "later". The panel is read every STEP_S. The checks judge the
+    reports without the core's code.
     """
     moves = ("fire", "out", "key", "no key", "dead", "later")
 

@@ -1,7 +1,8 @@
 """Rules for every decision of the charger's core, in any history.
 
-The rules judge the event, the readings, the outputs and the walk's ledger. From the core's memory the
-rules take only one fact: whether a request still holds the station.
+The rules judge the event, the readings, the outputs, and a ledger of events that the walk keeps
+(`walk.py`). From the core's memory the rules take only the present request, the ordered power and the
+counts of commands.
 """
 
 from bridges.kinds.charger.signals import Activity
@@ -30,7 +31,7 @@ def check(step: Step) -> None:
 def the_message_is_whole(step: Step) -> None:
     """Require an error text in state ERROR, and no error text in any other state.
 
-    A message with a request id must also name the robot of that request.
+    While the core has a request, the message must name that request and its robot.
     """
     shown = step.decision.report
     assert shown.state in set(State)
@@ -50,9 +51,10 @@ def the_message_is_whole(step: Step) -> None:
 
 
 def the_state_is_what_was_read(step: Step) -> None:
-    """Require the state CHARGING if current flows. Without current the state must not be CHARGING.
+    """If current flows, require the state CHARGING or ERROR. Without current forbid the state CHARGING.
 
-    Require ERROR if the station is lost or faulty, or if a second node serves the same station.
+    Require ERROR if the station does not answer or is faulty, or if a second node serves the same
+    station.
     """
     state = step.decision.report.state
     sighted = _sighted(step)
@@ -69,7 +71,7 @@ def the_state_is_what_was_read(step: Step) -> None:
 
 
 def power_has_a_reason(step: Step) -> None:
-    """Require a valid request and a healthy station that answers whenever the core orders power."""
+    """If the core orders power, require a valid request and a station that is healthy and answers."""
     power, shown = step.decision.outputs.power, step.decision.report
     if power:
         assert step.ledger.granted is not None
@@ -93,7 +95,7 @@ def power_has_a_reason(step: Step) -> None:
 
 
 def nobody_else_is_energised(step: Step) -> None:
-    """Require power only for the robot of the request, if the station recognises robots.
+    """If the station recognises robots, require power only for the robot of the request.
 
     The robot must be in range when the power begins.
     """
@@ -115,9 +117,9 @@ def nobody_else_is_energised(step: Step) -> None:
 
 
 def protection_lasts(step: Step) -> None:
-    """Require a station to stay out of service until a clearing of errors has helped.
+    """Require a station to stay out of service until the core has cleared its errors with success.
 
-    A good reading within CLEAR_S after the clearing proves that the clearing has helped.
+    A good reading within CLEAR_S after the clearing proves the success.
     """
     before, after = step.before.ledger, step.ledger
     if before.out and not after.out:
@@ -130,8 +132,8 @@ def protection_lasts(step: Step) -> None:
 def requests_end_on_good_readings(step: Step) -> None:
     """Require a good reading whenever a request ends.
 
-    One end needs no good reading: an operator's reset at a station that has been silent for a long
-    time.
+    There is one exception: an operator may reset a station that has been silent for a long time. This
+    reset ends the request without a reading.
     """
     before = step.before.ledger
     if before.granted is None or step.ledger.granted == before.granted:
@@ -143,7 +145,7 @@ def requests_end_on_good_readings(step: Step) -> None:
         assert before.read_at is None or step.now - before.read_at >= silent_s
     elif step.ledger.granted is None:
         assert isinstance(step.event, Sampled)
-    else:  # the station has seen another robot on its pad, and serves that robot's request
+    else:  # a reading shows the robot of a newer request on the pad
         assert step.seen
         seen = step.limits.receivers.get(step.seen.measured.receiver_id or "")
         assert seen == step.ledger.robot
@@ -151,9 +153,9 @@ def requests_end_on_good_readings(step: Step) -> None:
 
 
 def commands_are_counted(step: Step) -> None:
-    """Require that a decision adds at most one command of each type.
+    """Require that a decision raises the count of each type of command by at most one.
 
-    No command may clear errors while a second node serves the same station.
+    While a second node serves the same station, the core may not clear errors.
     """
     before, outputs = step.before.memory, step.decision.outputs
     assert outputs.clear_errors - before.clear_errors in (0, 1)
@@ -163,10 +165,10 @@ def commands_are_counted(step: Step) -> None:
 
 
 def a_request_that_waits_has_a_reason(step: Step) -> None:
-    """Require a reason for each waiting request.
+    """Require a reason in the report for each request that waits.
 
-    A request that holds the station waits in the states ASSIGNED and ERROR. The request also waits in
-    CHARGING if the core forbids the power.
+    A request waits in the states ASSIGNED and ERROR. It also waits in CHARGING if the core orders the
+    power off.
     """
     shown, seen = step.decision.report, step.seen
     may_not = step.decision.outputs.power is False and seen and seen.activity is Activity.CHARGING
@@ -189,6 +191,6 @@ def _rivalled(step: Step) -> bool:
 
 
 def _going_on(step: Step) -> bool:
-    """Has current already flowed for this request?"""
+    """Return whether current has already flowed for the present request."""
     holder = step.decision.memory.holder
     return holder is not None and holder.started

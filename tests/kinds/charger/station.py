@@ -1,5 +1,5 @@
-"""The first part of a story. The station recognises the robot on its pad, and the core can switch
-it."""
+"""The beginning of stories about a station that recognises the robot on its pad. The core can switch
+the station's power."""
 
 from msgspec.structs import replace
 

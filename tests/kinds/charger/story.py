@@ -65,10 +65,10 @@ CANCEL_1 = Cancelled("req-1")
 
 @dataclass
 class Story:
-    """A core with its memory, in virtual time.
+    """The charger's core with its memory, in virtual time.
 
-    `told` gets an entry (time, state, request id or error) at each change. `powered` has the core's
-    decision about power after each poll by `sees`.
+    `told` gets an entry (s, state, request id or error) at each change. `powered` gets the core's order
+    for the power after each reading by `sees`.
     """
 
     limits: ChargerLimits = LIMITS
@@ -82,7 +82,7 @@ class Story:
     powered: list[bool | None] = field(default_factory=list)
 
     def event(self, event: Event) -> "Story":
-        """Let an event happen now."""
+        """Let the core decide on an event now."""
         decision = core.decide(self.memory, event, self.now, self.limits)
         self.memory, self.outputs, self.report = decision.memory, decision.outputs, decision.report
         shown = decision.report
@@ -98,8 +98,8 @@ class Story:
         return self
 
     def polls(self, script: str) -> "Story":
-        """Poll once a second. `idle 3, charging 2` means three polls that read idle and two that read
-        charging."""
+        """Read the station once a second. `idle 3, charging 2` means three readings of idle, then two
+        readings of charging."""
         for part in script.split(","):
             word, count = part.split()
             for _ in range(int(count)):
@@ -108,9 +108,9 @@ class Story:
         return self
 
     def sees(self, *readings: tuple[Activity, str, int], **known: Any) -> "Story":
-        """Poll a station that recognises the robot on its pad.
+        """Read a station that recognises the robot on its pad, once a second.
 
-        Each reading is `(activity, receiver, number of polls)`.
+        Each item of `readings` is `(activity, receiver, number of readings)`.
         """
         for activity, receiver, count in readings:
             sample = ChargerSample(activity, 0, measured=Measured(receiver_id=receiver, **known))

@@ -1,4 +1,4 @@
-"""The charger's decision core in whole histories, in virtual time, with one poll a second."""
+"""Whole histories of the charger's core in virtual time. The core gets one reading a second."""
 
 import pytest
 

@@ -1,4 +1,5 @@
-"""Properties of the charger's core over long histories, and how often the core clears errors."""
+"""Rules that the charger's core keeps in long histories. One rule limits how often the core clears
+errors."""
 
 import itertools
 

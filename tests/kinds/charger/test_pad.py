@@ -1,4 +1,5 @@
-"""ChargerState's error_message names the robot on the pad. A reader gets exactly that name back."""
+"""The robot's name in a ChargerState's error_message. A reader of the message gets back exactly the
+name that the charger wrote."""
 
 import pytest
 from hypothesis import given, settings

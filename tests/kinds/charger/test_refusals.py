@@ -55,7 +55,8 @@ class Idle:
 
 @dataclass
 class Station:
-    """A charger's node that scans once a second. `said` has the node's messages."""
+    """A charger's node that scans once per call of `hears`. `said` has (topic, message) of each
+    message."""
 
     now: float = 0.0
     said: list[tuple[str, Any]] = field(default_factory=list)

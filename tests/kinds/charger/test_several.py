@@ -33,7 +33,10 @@ def trickles(caller: Caller) -> None:
 
 @contextmanager
 def daemon(file: Path, **stations: Conversation) -> Iterator[list[ChargerState]]:
-    """Yield the states of these stations. Each station has its own bus, and station `b` is faulty."""
+    """Serve these stations. Yield a list that gets each ChargerState of the daemon.
+
+    Each station has its own bus. Station `b` is the faulty station.
+    """
     buses, chargers = {}, {}
     with ExitStack() as open_:
         for name, talk in stations.items():

@@ -1,6 +1,7 @@
-"""A station that recognises the robot on its pad. The core can switch its power.
+"""A station that recognises the robot on its pad, and whose power the core can switch.
 
-The stories play the five situations of a shared charger, in virtual time, with one poll a second.
+The stories play the situations of a shared charger: scheduled, ad hoc, stacked, and wrong station.
+`test_station_faults.py` has the faults. The stories run in virtual time, with one reading a second.
 """
 
 from msgspec.structs import replace
@@ -26,7 +27,7 @@ from tests.kinds.charger.story import (
     Story,
 )
 
-# ---- CHARGER-1, CHARGER-5: scheduled
+# ---- CHARGER-1, CHARGER-5: a charge that was scheduled before the robot came
 
 
 def test_a_scheduled_charge_names_robot_and_request_in_every_state() -> None:
@@ -92,13 +93,13 @@ def test_a_receiver_that_is_lost_from_sight_during_a_charge_keeps_its_power() ->
     assert it.outputs.power is True
 
 
-# ---- CHARGER-5: the range
+# ---- CHARGER-5: whether the robot is in range of the pad
 
 
 def test_power_waits_for_a_check_of_the_range_that_the_core_has_ordered() -> None:
     it = story().event(AMR1).sees((A.IDLE, NOBODY, 1), in_range=True)
     assert it.outputs == ChargerOutputs(power=False)
-    it.sees((A.IDLE, ONE, 1), in_range=True)  # before the core has ordered a check
+    it.sees((A.IDLE, ONE, 1), in_range=True)  # this result is older than the core's order to check
     assert it.outputs == ChargerOutputs(power=False, range_checks=1)
     it.sees((A.IDLE, ONE, 1), in_range=False)
     assert it.outputs == ChargerOutputs(power=False, range_checks=1)
@@ -132,7 +133,7 @@ def test_a_coupling_that_is_sought_again_needs_a_new_check_of_the_range() -> Non
     assert it.outputs == ChargerOutputs(power=True, range_checks=2)
 
 
-# ---- CHARGER-2, CHARGER-3: ad hoc
+# ---- CHARGER-2, CHARGER-3: a charge ad hoc, for a robot that is on the pad already
 
 
 def test_a_robot_already_on_the_pad_is_charged_when_it_asks() -> None:
@@ -204,7 +205,7 @@ def test_robots_served_without_a_request_push_no_ended_request_out_of_memory() -
     assert it.refused == [(it.now, "request is over")]
 
 
-# ---- CHARGER-2: stacked
+# ---- CHARGER-2: stacked robots, of which the second waits for the first
 
 
 def test_a_second_robot_is_not_granted_until_the_first_has_left_the_pad() -> None:

@@ -1,4 +1,5 @@
-"""A check of the charger's rules in every state near the start and near each stage of a charge."""
+"""Tests of the charger's rules in all states near the start, and in all states near each stage of a
+charge."""
 
 import pytest
 from msgspec.structs import replace
@@ -27,12 +28,13 @@ STAGES: dict[str, tuple[str | float, ...]] = {
 
 
 def path(limits: ChargerLimits, *steps: str | float) -> World:
-    """Return the world after these moves and waits (s)."""
+    """Return the world (the core and its station) after these moves and waits (s)."""
     return walker(limits).path(World(), *steps, seen=check)
 
 
 def shown(world: World, limits: ChargerLimits) -> tuple[str, str, bool | None]:
-    """Return the state, the request and the ordered power after one more scan."""
+    """Scan once more. Return the reported state, the request's id, and the core's order for the
+    power."""
     steps: list[Step] = []
     walker(limits).path(world, 0.5, seen=steps.append)
     decision = steps[-1].decision
@@ -91,8 +93,8 @@ def test_from_every_state_a_station_without_faults_recovers_and_charges_the_robo
 
 
 def _mended(world: World, limits: ChargerLimits) -> World:
-    """Return the world after all repairs: the pad is clear, all parts work and answer, no error is
-    latched."""
+    """Return the world after a repair of everything. The pad is clear, all parts work and answer, and
+    no error is left."""
     world = replace(world, readable=True, writable=True)
     steps = ("idle", "the pad is clear", "in range", "gap right", "pad at height")
     then = ("A cancels", "B cancels", 32.0, "reset", 4.0)
@@ -100,8 +102,7 @@ def _mended(world: World, limits: ChargerLimits) -> World:
 
 
 def _charged(world: World, limits: ChargerLimits) -> World:
-    """Return the world in which the first robot has sent a request, has docked, and has begun to
-    charge."""
+    """Return the world after robot A has sent a request, has docked, and has begun to charge."""
     asked = ChargeRequested("req-new", "tiny", "A")
     world = moved(world, lambda before: (before, [asked]), limits, check)
     world = walker(limits).path(world, "A docks", 2.0, seen=check)

@@ -1,10 +1,10 @@
 """A walk through all states that the charger's core can reach within some steps.
 
-A state has the core's memory, the station with its pad, and a ledger of events. All times in a state
-are relative to now. The ledger is written without the core's code.
+A state consists of the core's memory, the station with its pad, and a ledger. The ledger has the events
+so far, and this file writes it without the core's code. All times in a state are relative to now.
 
-The walk cuts long ages to a limit and leaves counts out. So two states that must behave alike count as
-one state.
+The walk replaces long ages by an upper limit, and sets the counts of commands to 0. So two states in
+which the core must behave alike count as one state.
 """
 
 from collections.abc import Callable
@@ -57,12 +57,13 @@ SITES = {
 class Ledger(msgspec.Struct, frozen=True):
     """The events so far, noted without the core's conclusions. Times are relative to the state's time.
 
-    - `granted` is the last accepted request, until a reading shows its end.
+    - `granted` is the id of the core's present request, "" for a charge without a request.
     - `robot` is the robot of that request.
     - `spoiled` says that the request was cancelled, or that an error was read after the grant.
     - `read_at` is the time of the last good reading. `misses` counts the failed readings after it.
-    - `out` says that a reading has shown a fault of the station itself, and no clearing has helped yet.
-    - `cleared_at` is the time of the last clearing.
+    - `out` says that the station is out of service. A reading has shown a fault of the station itself,
+      and no later clearing of errors has succeeded.
+    - `cleared_at` is the time of the last clearing of errors.
     """
 
     granted: str | None = None
@@ -77,7 +78,7 @@ class Ledger(msgspec.Struct, frozen=True):
 
 
 class World(msgspec.Struct, frozen=True):
-    """The station, with the core's memory and the ledger at time 0.
+    """The station, the core's memory and the ledger. All times in them are relative to now.
 
     `readable` says whether the station answers readings. `writable` says whether it obeys commands.
     """
@@ -111,7 +112,8 @@ Move = Callable[[World], tuple[World, list[Event]]]
 
 
 def reading(world: World) -> list[Event]:
-    """Return the events of a scan."""
+    """Return the events of a scan: a reading or its failure, and a failed write if the station obeys
+    nothing."""
     if not world.readable:
         return [IoFailed("timeout")]
     return [Sampled(world.sample), *([] if world.writable else [WriteFailed("status 500")])]
@@ -190,7 +192,7 @@ def waited(world: World, seconds: float, limits: ChargerLimits, seen: Seen) -> W
 
 
 def decided(world: World, event: Event, now: float, limits: ChargerLimits, seen: Seen) -> World:
-    """Let the core decide at `now`. Return the world with its time set to 0 again."""
+    """Let the core decide at `now`. Return the new world, with its times relative to `now`."""
     decision = decide(world.memory, event, now, limits)
     ledger = noted(world, event, now, limits, decision)
     sample = event.sample if isinstance(event, Sampled) else world.seen
@@ -254,16 +256,16 @@ def _read(ledger: Ledger, sample: ChargerSample, now: float, limits: ChargerLimi
 
 
 def _held(ledger: Ledger, decision: Any) -> Ledger:
-    """Return the ledger. The ledger loses its request if the core holds no request now.
+    """Return the ledger, without its request if the core has no request now.
 
-    Other rules judge how the request ended.
+    The function does not judge the end of the request, because other rules do.
     """
     shown = decision.report
     if decision.memory.holder is None:
         return replace(ledger, granted=None, robot=None, spoiled=False)
     who = RobotName(shown.fleet, shown.robot)
     if not shown.request_id and (ledger.granted != "" or who != ledger.robot):
-        # a robot that charges without a request
+        # the core shows a robot that charges without a request
         return replace(ledger, granted="", robot=who, spoiled=False, adopted=False)
     return ledger
 
@@ -274,7 +276,7 @@ def _held(ledger: Ledger, decision: Any) -> Ledger:
 def alike(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
     """Return the memory with its times relative to now.
 
-    Two memories that must behave alike become equal.
+    If the core must behave alike with two memories, this function returns equal memories for them.
     """
     holder = memory.holder
     if holder:
@@ -315,7 +317,7 @@ def _at(at: Any, now: float, oldest_s: float = OLDEST_S) -> Any:
 
 
 def walker(limits: ChargerLimits) -> Walker[World, Move]:
-    """Return the charger's walker with these limits."""
+    """Return a walker through the states of a charger with these limits."""
     return Walker(
         MOVES,
         WAITS,

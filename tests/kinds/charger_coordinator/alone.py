@@ -27,7 +27,10 @@ A, B = "charger_a", "charger_b"
 
 
 class Alone(alone.Alone[SiteMemory, Event, SiteLimits, SiteReport]):
-    """The core alone. `shows` has each station's state. `seen` has the robots that the fleets show."""
+    """The coordinator's core alone. Tests give it messages through `run`.
+
+    `shows` has the ChargerState that each station shows. `seen` has the robots that the fleets report.
+    """
 
     def __init__(self) -> None:
         self.shows = {name: ChargerStateHeard(name, IDLE) for name in (A, B)}
@@ -35,7 +38,7 @@ class Alone(alone.Alone[SiteMemory, Event, SiteLimits, SiteReport]):
         super().__init__(core.initial("site", 0.0), core.decide, SiteLimits.of(SETTINGS), True)
 
     def words(self, message: d.Message) -> str:
-        """Return a message to a station in words, and "" for any other message."""
+        """Describe a request or cancel to a station in words. Return "" for any other message."""
         match message:
             case d.ChargerRequest():
                 return f"{message.charger_name}: {message.robot_name}"
@@ -60,13 +63,13 @@ class Alone(alone.Alone[SiteMemory, Event, SiteLimits, SiteReport]):
         return self.sent[said:]
 
     def wants(self, who: RobotName, place: str | None = None, percent: float = 40.0) -> None:
-        """Let the fleet show from now on that this robot wants to charge."""
+        """Let the fleet report from now on that this robot wants to charge."""
         place = f"wait_{who.name[-1]}" if place is None else place
         self.seen[who] = Sighting(who, True, place, percent, f"task of {who.name}")
 
     def does(self, station: str, state: Any, error: str = "") -> None:
-        """Let the station show this state, together with the coordinator's last request to this
-        station."""
+        """Let the station show this state, and the coordinator's last request to this station, from now
+        on."""
         grant = self.memory.grants[station]
         self.shows[station] = ChargerStateHeard(
             station, state, grant.request_id, grant.robot, error

@@ -13,7 +13,7 @@ from tests.kinds.charger_coordinator.virtual_site import PLACES, Yard, settings,
 
 
 def yard() -> Yard:
-    """Return a yard in which both fleets run and no robot wants to charge."""
+    """Return a simulated charging yard. Both fleets run, and no robot wants to charge."""
     site = Yard(two_brands(), finishing="charge")
     assert [what for _, what in site.run(5.0)][-4:] == [
         "B01 -> WAIT bay_1",

@@ -141,7 +141,7 @@ def test_no_event_that_counts_is_refused() -> None:
     assert [answer(site_, event) for event in events] == [""] * 5
 
 
-# ---- COORDINATOR-3: a request that no station takes
+# ---- COORDINATOR-3: a station that does not accept its request
 
 
 def test_a_station_that_accepts_no_request_is_passed_over_and_its_robot_is_queued_last() -> None:
@@ -205,7 +205,7 @@ def test_requests_are_numbered_one_after_the_other() -> None:
     ]
 
 
-# ---- COORDINATOR-STATIONS-2, COORDINATOR-STATIONS-3: the side at fault
+# ---- COORDINATOR-STATIONS-2, COORDINATOR-STATIONS-3: whether the station or the robot is at fault
 
 
 def test_an_error_of_an_unknown_side_counts_until_another_station_charges_the_robot() -> None:
@@ -270,7 +270,7 @@ def test_a_robot_that_drives_from_a_station_where_it_failed_is_not_astray() -> N
     assert [(nudge.count, nudge.at) for nudge in site_.memory.nudges.values()] == [(1, 32.0)]
 
 
-# ---- COORDINATOR-WISHES-4: a robot on its way
+# ---- COORDINATOR-WISHES-4: a robot on its way to its station
 
 
 def test_an_idle_robot_that_begins_a_task_after_its_call_is_on_its_way() -> None:
@@ -434,7 +434,7 @@ def test_a_station_whose_pad_another_robot_does_not_leave_is_given_up_after_the_
     assert site_.memory.strikes == {}
 
 
-# ---- COORDINATOR-7: rivals
+# ---- COORDINATOR-7: a second coordinator (a rival)
 
 
 def test_a_request_delayed_by_a_rival_is_sent_after_the_rival_has_gone() -> None:

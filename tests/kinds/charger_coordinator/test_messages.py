@@ -21,7 +21,7 @@ ONE = RobotName("tiny", "AMR01")
 
 
 def robot(x: float, y: float, level: str = "L1", mode: int = 1) -> Sighting:
-    """Return AMR01 as its fleet shows it at this place."""
+    """Return AMR01 as the coordinator reads it from a FleetState that has the robot at this place."""
     at = d.Location(x=x, y=y, level_name=level)
     state = d.RobotState("AMR01", "", "task", 0, d.RobotMode(mode), 40.0, at)
     (seen,) = messages.accept_fleet(d.FleetState("tiny", (state,)), SETTINGS, 0.0).robots
@@ -139,7 +139,7 @@ def test_an_alert_is_sent_once_with_its_id_and_its_time() -> None:
         ("waits_at: wait_1", "waits_at: wait_2", "'wait_2' already belongs to tiny/AMR01"),
         ("waits_at: wait_1", "waits_at: dock_b", "'dock_b' is a charger's place"),
         ("waypoint: dock_b", "waypoint: dock_x", "stands at 'dock_x', which is in no fleet's"),
-        ("waypoint: dock_b", "waypoint: charger_a", "stands at 'charger_a', as 'charger_a' does"),
+        ("waypoint: dock_b", "waypoint: charger_a", "'charger_a' both stand at 'charger_a'"),
         ("[charger_b], waits", "[charger_c], waits", "no station 'charger_c'; there are"),
         ("[RX-0002]", "[RX-0001]", "'RX-0001' already belongs to tiny/AMR01"),
         ("full_percent: 100", "full_percent: 80", "is above full_percent"),

@@ -26,7 +26,7 @@ X, Y = RobotName("big", "X"), RobotName("big", "Y")
 
 
 def site(stations: int) -> SiteLimits:
-    """Return a site with this number of stations. Each station suits every robot."""
+    """Return the limits of a site with this number of stations. Every robot may use every station."""
     names = tuple(f"s{i + 1}" for i in range(stations))
     robots = dict.fromkeys((ONE, TWO, THREE), names)
     places: dict[str, dict[str, str]] = {name: {} for name in names}
@@ -94,8 +94,8 @@ def test_without_permission_to_publish_robots_wait_for_the_permission() -> None:
 
 
 def said(now: float, seen: StationSeen, *robots: RobotName) -> str:
-    """Return the reason why AMR01 waits. These robots stand on the pad of the only station for
-    AMR01."""
+    """Return the reason why AMR01 waits, if it may use only station s1 and `robots` stand on the pad of
+    s1."""
     one = SiteLimits({ONE: ("s1",)}, {}, {"s1": {"tiny": "p1"}}, {}, 60.0, 100.0, 90.0, 60.0)
     there = {who: Standing(Sighting(who, False, "p1", 50.0, ""), 10.0) for who in robots}
     memory = replace(BUSY, wishes=BUSY.wishes[:1], grants={}, stations={"s1": seen}, robots=there)

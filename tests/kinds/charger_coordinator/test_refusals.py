@@ -1,4 +1,5 @@
-"""The coordinator reports a refused wish in the same way as a charger reports a refused request."""
+"""The coordinator publishes each refusal of a robot's or operator's wish on the same topic and in the
+same form as a charger."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,7 +21,8 @@ WISH = ChargerRequest("charger_a", "tiny", "AMR03", Duration(60), "wish-1")
 
 @dataclass
 class Office:
-    """The coordinator's node on a graph, and an operator who hears its refusals."""
+    """The coordinator's node on a network, and an operator. `heard` has the refusals that the operator
+    gets."""
 
     now: float = 0.0
     heard: list[ChargerRefusal | None] = field(default_factory=list)
@@ -35,7 +37,7 @@ class Office:
         operator.subscribe(topics.CHARGER_REFUSALS, lambda status: self.heard.append(read(status)))
 
     def rounds(self, until: float) -> None:
-        """Run a round each quarter of a second."""
+        """Let the node work once each quarter of a second until the time `until`."""
         while self.now < until:
             self.node.round()
             self.now += 0.25

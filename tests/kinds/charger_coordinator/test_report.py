@@ -1,5 +1,4 @@
-"""The coordinator's report with its texts, and the times at which the loop must wake the
-coordinator."""
+"""The coordinator's report and the texts in it. Also the times at which the core asks to be woken."""
 
 import pytest
 
@@ -100,7 +99,7 @@ def wakes(site_: Alone) -> float:
     return core.decide(site_.memory, Woken(), site_.now, SITE).wake_at
 
 
-# ---- COORDINATOR-REPORT-1, COORDINATOR-3: the times of waking
+# ---- COORDINATOR-REPORT-1, COORDINATOR-3: when the core asks to be woken
 
 
 def test_the_core_wakes_for_a_silent_station_and_for_a_repeat_of_a_request() -> None:

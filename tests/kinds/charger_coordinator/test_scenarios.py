@@ -1,8 +1,9 @@
-"""The numbered charging scenarios, with every `finishing_request` and with RMF's retreat to a charger.
+"""The numbered charging scenarios, with every `finishing_request`. Some tests let RMF send a robot to a
+charger because its battery is low.
 
-The fleet shows its robots as RMF's adapter does (`workbench/rmf_model/fleet.py`). A robot that charges
-because of its finishing request is IDLE and has no task. After its first charge a robot shows the mode
-CHARGING in every task.
+The simulated fleet reports its robots as RMF's adapter does (`workbench/rmf_model/fleet.py`). A robot
+that charges because of its finishing request is reported as IDLE and without a task. After its first
+charge a robot is reported with the mode CHARGING in every task.
 """
 
 from typing import Final
@@ -21,15 +22,15 @@ History = list[tuple[float, str]]
 
 
 def yard(finishing: Finishing, **changes: object) -> Yard:
-    """Return a yard in which each robot stands at its waiting place with a full battery."""
+    """Return a simulated charging yard in which each robot stands at its waiting place with a full
+    battery."""
     site = Yard(finishing=finishing, **changes)  # type: ignore[arg-type]
     site.run(5.0)
     return site
 
 
 def home_from_work(finishing: Finishing, percent: float, jazzy: bool = False) -> Yard:
-    """Return a yard in which AMR01 has just ended its task in the ward with this battery level
-    (`percent`)."""
+    """Return a yard in which AMR01 has just ended a task in the ward. Its battery is at `percent`."""
     site = yard(finishing, jazzy=jazzy)
     site.fleet.works("AMR01", "ward", site.now)
     site.run(10.0)
@@ -39,7 +40,8 @@ def home_from_work(finishing: Finishing, percent: float, jazzy: bool = False) ->
 
 
 def charged_at_a(told_at: float, full_at: float, drives_s: float = 6.0) -> History:
-    """Return the history in which the coordinator calls AMR01 to charger_a, and AMR01 charges there."""
+    """Return the events (s, text) of a charge: the coordinator calls AMR01 to charger_a, and AMR01
+    charges."""
     return [
         (told_at, "charger_a <- charge AMR01"),
         (told_at, "charger_a: ASSIGNED AMR01"),
@@ -216,7 +218,7 @@ def test_0_a_robot_that_does_not_come_gives_way_at_once_and_is_called_again_late
     assert site.node.devices()["site"]["did not come"] == "tiny/AMR01"
 
 
-# ---- 1: scheduled
+# ---- 1: a charge that the schedule begins
 
 
 @EACH
@@ -247,7 +249,7 @@ def test_1_the_schedule_calls_its_robots_and_is_shown(finishing: Finishing) -> N
             (27.5, "charger_a: RELEASED AMR01"),
             (28.5, "charger_a: IDLE"),
         ]
-    else:  # RMF moves a robot only in a task
+    else:  # with this finishing_request RMF moves a robot only in a task
         assert told == [(at + 4.0, what) for at, what in CALLED_IN_VAIN[3:]]
 
 
@@ -269,11 +271,11 @@ def test_2_the_wish_of_a_robot_and_the_wish_of_an_operator_are_shown_apart(
     )
 
 
-# ---- 3: stacked
+# ---- 3: stacked: more robots than stations
 
 
 def three_at_two(finishing: Finishing) -> Yard:
-    """Return a yard in which each of the two stations charges a robot. AMR02 waits for a free
+    """Return a yard in which AMR01 and AMR03 charge at the two stations. AMR02 waits for a free
     station."""
     site = yard(finishing)
     for who in ("AMR03", "AMR01", "AMR02"):
@@ -308,7 +310,7 @@ def test_3_a_finished_robot_is_sent_to_its_place_and_the_next_robot_is_called(
 
 def test_3_an_alert_names_a_finished_robot_that_stays_and_the_robot_that_it_blocks() -> None:
     site = three_at_two("nothing")
-    why = "RMF moves it only with a charging task (finishing_request: charge gives it one)"
+    why = "RMF moves this robot only with a charging task (as with finishing_request: charge)"
     assert site.run(110.0) == [
         (25.5, "charger_b: RELEASED AMR03"),
         (25.5, "AMR03 -> WAIT wait_3"),
@@ -321,12 +323,12 @@ def test_3_an_alert_names_a_finished_robot_that_stays_and_the_robot_that_it_bloc
         (
             100.5,
             "ALERT PAD_BLOCKED: tiny/AMR03 stands at charger_b,"
-            f" and tiny/AMR02 waits for it: {why}",
+            f" and tiny/AMR02 waits for that station: {why}",
         ),
         (
             101.5,
             "ALERT PAD_BLOCKED: tiny/AMR01 stands at charger_a,"
-            f" and tiny/AMR02 waits for it: {why}",
+            f" and tiny/AMR02 waits for that station: {why}",
         ),
     ]
     assert site.node.devices()["site"]["queue"] == (

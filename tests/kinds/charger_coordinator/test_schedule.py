@@ -1,4 +1,5 @@
-"""The coordinator's own charging schedule: its settings, its times, and the robots that it covers."""
+"""The coordinator's own charging schedule: its settings, its times of day, and which robots it
+calls."""
 
 from pathlib import Path
 

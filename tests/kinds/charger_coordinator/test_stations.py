@@ -1,6 +1,7 @@
-"""A station's state ends, fails or continues a request, and shows which side is at fault.
+"""The effects of a ChargerState on its request, which goes on, ends or fails. After a failure the core
+also decides whether the station or the robot is at fault.
 
-Each test builds a memory and lets a station show a state. Then the test compares the whole memory.
+Each test builds a memory, and lets a station show a state. Then the test compares the whole memory.
 """
 
 import pytest
@@ -35,13 +36,13 @@ LOST, MISPLACED = "Charger unreachable", "wrong docking: tiny/AMR02 is not assig
 
 
 def at(who: RobotName, place: str | None, since: float = AGES_AGO) -> Standing:
-    """Return a robot without a task. `place` is its last place in its fleet's reports."""
+    """Return a robot without a task. Its fleet has reported it at `place` since the time `since`."""
     return Standing(Sighting(who, False, place, 50.0, ""), 20.0, since, since)
 
 
 def site(**changes: object) -> SiteMemory:
-    """Return a memory in which AMR01 has charger_a and AMR02 waits. Both stand at their waiting
-    places."""
+    """Return a memory in which charger_a is assigned to AMR01, and AMR02 waits for a station. Both
+    robots stand at their waiting places."""
     robots = {ONE: at(ONE, "wait_1"), TWO: at(TWO, "wait_2")}
     known = {"may_speak": True, "wishes": WISHES, "grants": {A: GRANT}, "robots": robots}
     return SiteMemory(**{**known, **changes})  # type: ignore[arg-type]
@@ -54,7 +55,8 @@ def shows(state: int, error: str = "", since: float = 10.0, heard: float = 20.0)
 def after(memory: SiteMemory, state: int, error: str = "", request_id: str = "r1") -> SiteMemory:
     """Return the memory after charger_a has shown this state at 30 s.
 
-    The stored states of the stations stay as before, so that a test sees only the conclusions.
+    The stored states of the stations are those of `memory`, because a test compares only the other
+    changes.
     """
     heard = ChargerStateHeard(A, state, request_id, ONE, error)  # type: ignore[arg-type]
     return replace(stations.heard(memory, heard, 30.0, SITE), stations=memory.stations)
@@ -235,7 +237,7 @@ def test_a_time_limit_ends_no_charge_but_ends_the_next_request() -> None:
         assert stations.in_time(memory, 99.0, SITE).grants == {A: first}
 
 
-# ---- COORDINATOR-STATIONS-2, COORDINATOR-STATIONS-3: the side at fault
+# ---- COORDINATOR-STATIONS-2, COORDINATOR-STATIONS-3: whether the station or the robot is at fault
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Whole situations of shared chargers. The coordinator works with a fleet adapter and chargers'
+"""Stories of shared chargers in a simulated yard: the coordinator, a fleet adapter and the chargers'
 cores."""
 
 from typing import Any
@@ -15,7 +15,7 @@ from tests.kinds.charger_coordinator.virtual_site import Yard
 
 
 def yard(**changes: object) -> Yard:
-    """Return a yard in which all parts run and no robot wants to charge yet."""
+    """Return a simulated charging yard in which everything runs, and no robot wants to charge yet."""
     found = Yard(**changes)  # type: ignore[arg-type]
     assert found.run(5.0) == [
         (0.25, "charger_a: IDLE"),
@@ -235,9 +235,9 @@ def test_a_restart_keeps_the_queue_and_touches_no_charge_under_way() -> None:
 
 
 def charges_at_a(*, by_operator: bool, knows: bool) -> Yard:
-    """Return a yard in which AMR01 charges at charger_a.
+    """Return a yard at 14 s, while AMR01 charges at charger_a.
 
-    At 14 s the battery is at 60 %, or at 65 % if an operator sent the request.
+    The battery is then at 60 %, or at 65 % if an operator sent the request.
     """
     site = yard(fills=1.0, knows=knows)
     if by_operator:
@@ -252,7 +252,7 @@ def charges_at_a(*, by_operator: bool, knows: bool) -> Yard:
 
 
 AGAIN: Any = [(16.25, "charger_a: ASSIGNED AMR01"), (18.25, "charger_a: CHARGING AMR01")]
-"""The end of a history in which the station answers again and gets a request."""
+"""The last events of a story: after its restart the station gets a request again, and charges."""
 REFUSED = (16.25, "charger_a: ERROR AMR01 (wrong docking: tiny/AMR01 is not assigned here)")
 
 
@@ -341,9 +341,10 @@ def test_a_coordinator_without_memory_takes_over_the_requests_that_the_stations_
 
 
 def dedicate(site: Yard, **places: str) -> Publisher[Any]:
-    """Publish RMF's charging schedule, which sends each robot to its place.
+    """Publish ChargingAssignments, RMF's charging schedule, which sends each robot to its place.
 
-    A robot with a place named `wait_…` waits at this place and does not charge.
+    If the name of the place begins with `wait`, the robot only waits there. Otherwise the robot charges
+    there.
     """
     schedule: Publisher[Any] = site.rmf.publisher(topics.CHARGING_ASSIGNMENTS)
     modes = {who: int(place.startswith("wait")) for who, place in places.items()}

@@ -1,7 +1,9 @@
-"""Rules that hold in every history. Tests check all short histories and random long histories.
+"""Rules that hold in every history. Tests check all short histories, and random long histories.
 
-The walk takes all histories of three moves, and `make deep` takes all 10^4 histories of four moves. Two
-moves are at least a second apart. Two robots and two stations behave as RMF's charger messages say.
+`make test` checks all histories of three moves. `make deep` checks all 10^4 histories of four moves.
+STEP_S passes after each move. Two robots and two stations behave as the rules of RMF's charger messages
+demand.
+
 After the last move the test repairs everything. Then every robot that wants to charge must be charged.
 """
 
@@ -50,7 +52,7 @@ STEP_S = 1.25
 class Node:
     """A charger's daemon that obeys the rules of the charger messages.
 
-    `holder` is the present request's id and robot. `ends` says that this request was cancelled.
+    `holder` is the id and robot of the present request. `ends` says that this request was cancelled.
     `on_pad` is the robot that was charging when the daemon restarted.
     """
 
@@ -86,7 +88,11 @@ class Node:
                 self.state = RELEASED
 
     def goes_on(self) -> None:
-        """Take the next step of a charge without faults."""
+        """Let the station go to the next state of a charge. If it shows an error, the error ends
+        instead.
+
+        A robot that charges without a request makes the station show an error.
+        """
         if self.on_pad and self.state is CHARGING:
             self.fails(f"wrong docking: {self.on_pad} is not assigned here")
             return
@@ -110,7 +116,8 @@ class Node:
 
 
 class Ledger:
-    """The coordinator's core with two stations and two robots. The rules check each message."""
+    """The coordinator's core with two stations and two robots. `_check` checks each message of the
+    core."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -124,7 +131,7 @@ class Ledger:
         self.passes()
 
     def copy(self) -> "Ledger":
-        """Return a copy with the same history, which can continue in another way."""
+        """Return a copy, so that several histories can begin with the same moves."""
         made = copy(self)
         made.nodes = {name: copy(node) for name, node in self.nodes.items()}
         for node in made.nodes.values():
@@ -177,7 +184,7 @@ class Ledger:
                 if message.request_id in node.known:
                     return  # the coordinator has repeated a request
                 assert node.takes(who), "asked for a station that is not free"
-                assert who not in self._live(), "a robot that has a station asks for another"
+                assert who not in self._live(), "a robot that has a station gets a second station"
                 assert not self.memory.faulty(who)
                 node.hears(message)
             case d.ChargerCancel(charger_name=name):
@@ -199,7 +206,8 @@ class Ledger:
         ]
 
     def restarts(self) -> None:
-        """Restart the coordinator, and let its quiet time after the start pass."""
+        """Restart the coordinator from its stored memory. It publishes nothing before its quiet start
+        is over."""
         memory = self.memory
         kept = keep.persist({"site": memory})
         self.memory = keep.restore(kept, SETTINGS, self.now)["site"]
@@ -238,7 +246,7 @@ MOVES: list[Any] = [
 
 
 def after(ledger: Ledger, move: Any) -> Ledger:
-    """Return a copy of the ledger after one more move."""
+    """Return a copy of the ledger after this move, and after STEP_S more seconds."""
     ledger = ledger.copy()
     move(ledger)
     ledger.passes()

@@ -1,6 +1,6 @@
 """Robots' wishes to be charged, rule by rule.
 
-Each test builds a memory, and compares it with the memory after one FleetState.
+Each test builds a memory, and compares it with the memory after one report of a robot.
 """
 
 import pytest
@@ -33,16 +33,17 @@ AT_NIGHT, AT_NOON = LocalTime(0, 23 * 60), LocalTime(0, 12 * 60)
 def seen(
     place: str | None = "wait_1", percent: float = 50.0, task: str = "", charges: bool = False
 ) -> Sighting:
-    """Return AMR01 as the FleetState of its fleet shows the robot."""
+    """Return AMR01 as the coordinator reads it from a FleetState."""
     return Sighting(ONE, charges, place, percent, task)
 
 
 def after(
     memory: SiteMemory, sighting: Sighting, now: float, site: SiteLimits = SITE
 ) -> SiteMemory:
-    """Return the memory after this sighting.
+    """Return the memory after this report of AMR01.
 
-    The remembered sightings stay as before, so that a test sees only the conclusions.
+    The stored reports of the robots are those of `memory`, because a test compares only the other
+    changes.
     """
     return replace(wishes.sighted(memory, sighting, now, site), robots=memory.robots)
 
@@ -88,7 +89,7 @@ def test_an_operator_withdraws_a_request_by_its_own_id_or_by_the_shown_id() -> N
     assert wishes.unwanted(left, "r1") == (left, "no such request")
 
 
-# ---- COORDINATOR-WISHES-5: whether a robot came after its call
+# ---- COORDINATOR-WISHES-5: whether a robot came after the coordinator had called it
 
 
 @pytest.mark.parametrize(
@@ -136,9 +137,9 @@ def test_a_robot_that_did_not_come_gets_no_call_for_ten_minutes() -> None:
 
 
 def charged(by: By = "fleet", **changes: object) -> SiteMemory:
-    """Return a memory in which AMR01 charges at charger_a.
+    """Return a memory in which AMR01 charges at charger_a during its task "t1".
 
-    AMR01 failed at charger_b before. Now AMR01 stands at the pad of charger_a in the task "t1".
+    AMR01 has failed at charger_b before.
     """
     return SiteMemory(
         wishes=(Wish(ONE, by, "t1"), Wish(TWO, "fleet")),
@@ -235,7 +236,7 @@ def test_a_served_robot_that_left_in_another_task_is_not_remembered_as_served(
     assert after(memory, sighting, 30.0).served == served
 
 
-# ---- COORDINATOR-WISHES-4: a robot that begins a task
+# ---- COORDINATOR-WISHES-4: a robot that begins a task after its wish to be charged
 
 IDLE_WISH = Wish(ONE, "fleet")
 ON_ITS_WAY = Wish(ONE, "fleet", "t2", called=True)

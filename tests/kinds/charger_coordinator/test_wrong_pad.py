@@ -1,4 +1,5 @@
-"""Robots on the wrong pad, rule by rule. Each test builds a memory and compares the whole result."""
+"""Robots on the wrong pad, rule by rule. Each test builds a memory, and compares what the core finds in
+it."""
 
 from collections.abc import Mapping
 
@@ -30,14 +31,14 @@ SITE = SiteLimits.of(settings())
 ONE, TWO, THREE = (RobotName("tiny", f"AMR0{i}") for i in (1, 2, 3))
 A, B = "charger_a", "charger_b"
 AT = {A: "charger_a", B: "dock_b"}
-"""The waypoint of each station."""
+"""The waypoint at which each station stands."""
 PAD = "wrong docking: tiny/AMR01 is not assigned here"
 
 
 def at(
     who: RobotName, place: str | None, since: float, task: str = "", heard: float = 85.0
 ) -> Standing:
-    """Return a robot that came to this waypoint at `since`. Its fleet last showed the robot at
+    """Return a robot that has stood at this waypoint since `since`. Its fleet's last report was at
     `heard`."""
     return Standing(Sighting(who, False, place, 50.0, task), heard, since, since)
 
@@ -58,7 +59,7 @@ def site(*robots: Standing, **changes: object) -> SiteMemory:
 
 
 def found(memory: SiteMemory, *times: float) -> list[list[OnWrongPad]]:
-    """Return one list for each of these times. The list has the robots on wrong pads at that time."""
+    """Return a list for each of these times, with the robots that are on a wrong pad at that time."""
     return [list(wrong_pad.found(memory, now, SITE).values()) for now in times]
 
 
@@ -99,8 +100,10 @@ def test_only_a_station_in_error_names_the_robot_on_its_pad() -> None:
 def history(
     memory: SiteMemory, *times: float
 ) -> list[tuple[float, dict[RobotName, Nudge], bool, bool]]:
-    """Return a tuple for each time: the time (s), the nudges so far, whether the coordinator nudges ONE
-    now, and whether an alarm is on."""
+    """Return (s, nudges so far, whether robot ONE is nudged now, whether an alarm is on) for each time.
+
+    A nudge changes the robot's charging assignment for TOLD_S, so that RMF's adapter moves the robot.
+    """
     lines = []
     for now in times:
         memory = wrong_pad.nudged(memory, now, SITE)
@@ -139,7 +142,8 @@ def test_a_stray_robot_is_nudged_again_for_a_new_request() -> None:
     assert wrong_pad.nudged(left, 60.0, SITE).nudges == {ONE: Nudge("r1", 1, 22.0)}
 
 
-# ---- COORDINATOR-WRONG-PAD-3, COORDINATOR-WRONG-PAD-4: robots that the coordinator cannot nudge
+# ---- COORDINATOR-WRONG-PAD-3, COORDINATOR-WRONG-PAD-4: robots that the coordinator cannot order to
+# leave
 
 
 @pytest.mark.parametrize("why", ["it works", "another node assigns", "we may not speak"])
@@ -169,7 +173,7 @@ BLOCKS = OnWrongPad(TWO, A, 90.0, A, 1, waiter=ONE)
 
 
 def blocks(station: str) -> OnWrongPad:
-    """Return the finding that robot TWO blocks this station."""
+    """Return the result of the core that robot TWO blocks this station."""
     return BLOCKS._replace(station=station, why=station)
 
 
@@ -193,8 +197,8 @@ def test_no_robot_blocks_a_pad_for_which_no_other_robot_waits() -> None:
 
 
 def test_the_pads_of_all_waiting_robots_are_checked_in_the_order_of_the_queue() -> None:
-    """Robot THREE is first in the queue and has its station already. ONE and TWO wait. TWO stands on a
-    pad."""
+    """Robot THREE is first in the queue, and a station is already assigned to it. ONE and TWO wait. TWO
+    stands on a pad."""
     memory = blocked(
         wishes=(Wish(THREE, "fleet"), Wish(TWO, "fleet"), Wish(ONE, "fleet")),
         grants={B: Grant(THREE, "r3", 10.0, shown=True)},

@@ -1,7 +1,8 @@
-"""A charging yard in virtual time: our coordinator, chargers, and a fleet that obeys.
+"""A simulated charging yard in virtual time: our coordinator, chargers, and fleet adapters.
 
-The coordinator runs as in its daemon. Each charger has the core of its daemon and a plant. A fleet
-adapter moves the robots to the assigned places. The network is the memory transport.
+The coordinator is the product's own node. Each charger has the core of a charger's daemon, and a
+simulated station. The fleet adapters move their robots to the assigned places. All messages go through
+the memory transport.
 """
 
 from typing import Any
@@ -42,7 +43,7 @@ BIG_GRAPH = {
     "bay_1": ("L1", 0.0, 10.0),
     "ward": ("L1", 50.0, 0.0),
 }
-"""The waypoints of the second brand, which gives the same places its own names."""
+"""The waypoints of the second brand's fleet, which uses its own names for the two charging places."""
 PLACES = {
     "charger_a": {"tiny": "charger_a", "big": "station_1"},
     "charger_b": {"tiny": "dock_b", "big": "station_2"},
@@ -53,7 +54,8 @@ BIG = {"RX-9": RobotName("big", "B01")}
 
 
 def settings(**changes: Any) -> CoordinatorSettings:
-    """Return the settings of two stations and three robots. AMR03 may use charger_b only."""
+    """Return the coordinator's settings for two stations and three robots. AMR03 may use charger_b
+    only."""
     robots = {
         who.name: RobotSettings(
             stations=["charger_a", "charger_b"][who.name == "AMR03" :],
@@ -79,7 +81,7 @@ def settings(**changes: Any) -> CoordinatorSettings:
 
 
 def two_brands() -> CoordinatorSettings:
-    """Return the settings of the same two stations, with a second fleet of another brand."""
+    """Return the settings of `settings()`, with a second fleet of another brand."""
     tiny = settings().fleets["tiny"]
     waypoints = {
         n: Waypoint(level=a, x=x, y=y) for n, (a, x, y) in BIG_GRAPH.items() if n != "ward"
@@ -96,10 +98,10 @@ def two_brands() -> CoordinatorSettings:
 
 
 class Charger:
-    """A charger's daemon: its own core, and a station.
+    """A charger: the core of a charger's daemon, and a simulated station.
 
     Possible faults:
-    - `broken`: the station shows an error on the side `fails` as soon as power flows.
+    - `broken`: the station shows an error as soon as power flows. `fails` is the side at fault.
     - `refuses`: the handshake with these receivers fails.
     - `unplugged`: the station does not answer its daemon.
     - `dead`: the daemon is dead.
@@ -125,18 +127,22 @@ class Charger:
         self._told_at = -1.0
 
     def restarts(self, now: float, switched_off: bool = True) -> None:
-        """Restart a killed daemon. `switched_off` says that `outputs-off` has switched the station off
-        before the restart."""
+        """Restart a killed daemon.
+
+        `switched_off` says whether the command `outputs-off` has switched the station off before the
+        restart.
+        """
         self.memory = charger.initial(self.limits, now)
         self._power = self._power and not switched_off
         self._clears, self._told, self.dead = 0, None, False
 
     def stops(self) -> None:
-        """End the power, although the daemon may order it."""
+        """Switch the station's power off, whatever its daemon has ordered."""
         self._power = False
 
     def scan(self, now: float) -> d.ChargerState | None:
-        """Read, decide and drive. Return the state if the daemon must publish now, otherwise None."""
+        """Read the station, let the core decide, and switch the power. Return the state to publish now,
+        or None."""
         self._run(now)
         if self.unplugged:
             return self.decide(IoFailed("no route to host"), now)
@@ -148,7 +154,7 @@ class Charger:
         return self.decide(Sampled(ChargerSample(self.activity, 0, text, measured, side)), now)
 
     def decide(self, event: Any, now: float) -> d.ChargerState | None:
-        """Make one decision of the daemon's core."""
+        """Let the daemon's core decide on this event. Return the state to publish now, or None."""
         decision = charger.decide(self.memory, event, now, self.limits)
         self.memory, outputs = decision.memory, decision.outputs
         if not self.unplugged:
@@ -184,7 +190,7 @@ class Charger:
 
 
 class Yard:
-    """The whole yard.
+    """The whole yard: the coordinator, the chargers and the fleets.
 
     `story` has (s, event) in order of time. `fills` is the charging speed (% per s).
     """
@@ -225,7 +231,7 @@ class Yard:
         self.coordinator = self.serves("ours", self.disk)
 
     def serves(self, name: str, disk: Disk | None = None) -> Served:
-        """Start a coordinator's daemon. Its wall clock shows 13:46:40 at 0 s."""
+        """Start a coordinator's daemon whose wall clock showed 13:46:40 at the monotonic time 0 s."""
         return Served(self.world, KIND, self.settings, name, 1e6 - EPOCH, disk)
 
     @property
@@ -252,17 +258,17 @@ class Yard:
             self._scan(charger_)
 
     def tell(self, what: str) -> None:
-        """Add an event to the story."""
+        """Add an event to `story` with the present time."""
         self.story.append((round(self.now, 3), what))
 
     def wants(self, who: str, station: str = "", request_id: str = "op-1") -> None:
-        """Publish an operator's wish."""
+        """Publish an operator's request to charge this robot."""
         timeout = duration(0.0)
         request = d.ChargerRequest(station, "tiny", who, timeout, request_id)
         self.wishes.publish(request)
 
     def mode(self, station: str) -> str:
-        """Return the name of the mode in the station's last state."""
+        """Return the name of the station's last shown state, for example CHARGING."""
         return self._shown[station].split()[0]
 
     @property

@@ -1,4 +1,8 @@
-"""Single decisions of a dispenser's core: failures in mid-cycle, the disk, decisions of a person."""
+"""Single decisions of a dispenser's core.
+
+The tests cover failures in the middle of a dispensing cycle, writes to the disk, and what a person
+decides about a request in doubt.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -36,7 +40,7 @@ OFF = WorkcellOutputs(False, "task", BOX)
 
 
 class Cell:
-    """A dispenser from event to event. `refused` and `wake_at` are those of the last decision."""
+    """A dispenser's core that gets events. `refused` and `wake_at` come from the last decision."""
 
     def __init__(self, limits: WorkcellLimits = STEADY) -> None:
         self.limits = limits
@@ -62,7 +66,7 @@ class Cell:
 
 
 def asked(limits: WorkcellLimits = STEADY) -> Cell:
-    """Return a dispenser whose next cycle is decided, and is not on disk yet."""
+    """Return a dispenser whose core has decided to start a cycle. The start is not on the disk yet."""
     cell = Cell(limits).take(Sampled(CALM), at=10.0).take(ASKS, MemoryKept())
     assert (cell.outputs, cell.report.queue) == (WorkcellOutputs(), ("task",))
     return cell
@@ -100,14 +104,14 @@ def test_a_failure_without_a_cycle_stops_nothing_and_its_reason_ends_with_a_read
 
 
 def test_a_suspended_daemon_knows_no_input_any_more() -> None:
-    """DISPENSER-4: what was read before the sleep may be outdated."""
+    """DISPENSER-4: what was read before the daemon was suspended may be outdated."""
     cell = Cell().take(Sampled(CALM), at=10.0).take(Suspended("slept"))
     assert cell.faults == ["COMMUNICATION_LOST: slept"]
     assert cell.take(ASKS, MemoryKept(), MemoryKept()).outputs == WorkcellOutputs()
 
 
 def test_a_failed_reading_restarts_the_debounce_of_each_input() -> None:
-    """DISPENSER-4: one bad reading makes no `ready` of a bounce."""
+    """DISPENSER-4: after one failed reading a bounce of the contact must not count as `ready`."""
     limits = replace(STEADY, debounce={"ready": 0.5})
     cell = Cell(limits).take(Sampled(replace(CALM, ready=False)), at=10.0)
     cell.take(Sampled(replace(CALM, ready=False)), at=10.5)
@@ -118,11 +122,11 @@ def test_a_failed_reading_restarts_the_debounce_of_each_input() -> None:
     assert cell.outputs == ON
 
 
-# ---- DISPENSER-2: the disk
+# ---- DISPENSER-2: the core waits until a start is on the disk
 
 
 def test_a_cycle_that_rmf_gave_up_before_its_start_was_on_disk_waits_again() -> None:
-    """DISPENSER-2 and DISPENSER-4: RMF repeats within 5 s."""
+    """DISPENSER-2 and DISPENSER-4: RMF repeats a request within 5 s if it still wants the item."""
     cell = asked().take(MemoryNotKept("disk full"))
     assert (cell.outputs, cell.faults) == (
         WorkcellOutputs(), ["NOT_KEPT: nothing is accepted or started: disk full"],
@@ -135,7 +139,7 @@ def test_a_cycle_that_rmf_gave_up_before_its_start_was_on_disk_waits_again() -> 
 
 
 def test_a_cycle_whose_start_comes_late_to_the_disk_has_its_whole_pulse_and_time() -> None:
-    """DISPENSER-2: the time counts from the disk."""
+    """DISPENSER-2: the pulse and the cycle's time limit begin when the start is on the disk."""
     cell = asked(PULSED).take(MemoryNotKept("disk full"))
     cell.take(Sampled(CALM), ASKS, at=14.0).take(MemoryKept())
     assert cell.outputs == ON
@@ -166,7 +170,7 @@ def test_a_result_is_sent_once_for_each_request_of_rmf() -> None:
     assert cell.take(ASKS).report.results == accepted[:1]
 
 
-# ---- refusals and decisions
+# ---- refused events, and decisions of a person
 
 
 def test_no_event_but_a_wrong_request_or_decision_is_refused() -> None:

@@ -1,6 +1,8 @@
-"""RMF's phase never counts an undelivered item as done, even if the daemon dies or messages are lost.
+"""RMF's phase DispenseItem must not count an undelivered item as done if the daemon dies or messages
+are lost.
 
-DISPENSER-1, DISPENSER-2, DISPENSER-3, DISPENSER-7: the daemon dies at each effect of a dispensing.
+DISPENSER-1, DISPENSER-2, DISPENSER-3, DISPENSER-7: in these tests the daemon dies at each effect of a
+dispensing. `world.py` explains effects.
 """
 
 from collections.abc import Callable, Iterable
@@ -15,7 +17,10 @@ WHOLE_S = 6.0
 
 
 def told(world: World) -> str:
-    """Let a person look at the machine and decide a request in doubt. Return the person's verdict."""
+    """If the outcome of the request is in doubt, let a person look at the machine and decide.
+
+    Return the person's decision, or "" without a doubt.
+    """
     if "OUTCOME_UNKNOWN" not in world.faults:
         return ""
     world.run(4.0)
@@ -26,15 +31,17 @@ def told(world: World) -> str:
 
 
 def effects(jam: str = "") -> list[str]:
-    """Return every effect of one dispensing during which the daemon lives."""
+    """Return the names of all effects of one dispensing in which the daemon does not die."""
     world = World()
     dispensed(world, jam)
     return world.effects
 
 
 def dispensed(world: World, jam: str = "", seconds: float = 12.0) -> WorkcellPhase:
-    """Let RMF repeat its request until its phase ends or the request is in doubt. `jam` is the
-    conveyor's failure."""
+    """Let RMF repeat its request until its phase ends or the outcome is in doubt.
+
+    If `jam` is not "", the conveyor is stuck.
+    """
     if jam:
         world.plant.fail("conveyor", "stuck")
     phase = world.ask()
@@ -49,7 +56,7 @@ def test_a_request_and_its_start_are_on_disk_before_they_are_published() -> None
         *("before the disk", "after the disk"),  # the daemon writes the request to its disk
         *("before dispenser_states", "after dispenser_states"),
         *("before dispenser_results", "after dispenser_results"),
-        *("before the disk", "after the disk"),  # the daemon writes the start to its disk
+        *("before the disk", "after the disk"),  # the daemon writes to its disk that it starts
         *("before the outputs", "after the outputs"),
     ]
 
@@ -66,7 +73,7 @@ def test_wherever_the_daemon_dies_rmf_goes_on_only_with_exactly_one_item(jam: st
         what = (place, world.effects[place : place + 1], said, phase.outcome, phase.why)
         assert world.plant.moved == (0 if jam else 1), what
         assert phase.outcome == ("failed" if jam else "completed"), what
-    assert doubts > 4  # the daemon died between the start and the outcome
+    assert doubts > 4  # these deaths fell between the start and the outcome
 
 
 def is_over(phase: WorkcellPhase) -> Callable[[], bool]:
@@ -78,8 +85,8 @@ def losing(topic: str, first: int, last: int) -> Callable[[str, int], bool]:
 
 
 def losses(most: int) -> Iterable[tuple[str, int, int]]:
-    """Yield tuples (topic, first, last). The messages number `first` to `last` of this topic are
-    lost."""
+    """Yield (topic, first, last). The test loses the messages of this topic from number `first` to
+    number `last`."""
     for topic in ("dispenser_requests", "dispenser_states", "dispenser_results"):
         for first in range(most):
             for last in range(first, most):
@@ -104,7 +111,7 @@ def every_third(first: int) -> Callable[[str, int], bool]:
 
 
 def test_a_death_and_lost_messages_together_send_no_robot_off_without_its_item() -> None:
-    """The states after the restart are the only messages that could complete RMF's phase wrongly."""
+    """Only states that the daemon publishes after its restart could wrongly complete RMF's phase."""
     for place in range(0, len(effects()) + 4, depth(3, 1)):
         for first in range(3):
             world = World(die_at=place, lose=every_third(first))

@@ -1,4 +1,5 @@
-"""Stories of a dispenser in virtual time: RMF's phase, the daemon, its disk and the machine."""
+"""Stories of a dispenser in virtual time. They contain RMF's phase DispenseItem, the daemon, its disk
+and the machine."""
 
 from collections.abc import Callable
 
@@ -18,7 +19,8 @@ def over(*phases: WorkcellPhase) -> Callable[[], bool]:
 
 
 def finished(world: World, guid: str = "task", seconds: float = 20.0) -> WorkcellPhase:
-    """Let RMF repeat its request until its phase has an outcome, for at most `seconds`."""
+    """Let RMF repeat its request until its phase is completed or has failed, or until `seconds` have
+    passed."""
     phase = world.ask(guid)
     world.run(seconds, until=over(phase))
     return phase
@@ -56,7 +58,7 @@ def test_two_robots_are_served_in_turn_each_with_its_own_result() -> None:
     assert (one.outcome, other.outcome, world.plant.moved) == ("completed", "completed", 2)
 
 
-# ---- DISPENSER-2: the daemon writes to its disk first
+# ---- DISPENSER-2: the daemon acts only after a write to its disk
 
 
 def test_nothing_is_listed_acknowledged_or_started_while_the_disk_is_full() -> None:
@@ -213,7 +215,7 @@ def test_a_steady_start_is_on_until_done() -> None:
 
 
 def test_a_plc_that_restarts_in_mid_cycle_does_not_dispense_twice() -> None:
-    """A restarted PLC would take a steady start signal for a new start."""
+    """After a restart a PLC would count a start signal that is still on as a new start."""
     limits = WorkcellDurations(cycle_limit_s=8.0, settle_s=4.0)
     world = World(replace(SETTINGS, pulse_s=None, limits=limits))
     phase = world.ask()
@@ -243,7 +245,8 @@ def test_after_a_failed_reading_the_start_stays_off_and_done_still_counts() -> N
 
 
 def doubtful(world: World) -> WorkcellPhase:
-    """Kill the daemon in the middle of a cycle in which the machine is jammed. Return RMF's phase."""
+    """Kill the daemon in the middle of a dispensing cycle, so that the outcome is in doubt. Return
+    RMF's phase."""
     phase = world.ask()
     world.run(5.0, until=lambda: world.relays() == [True])
     world.run(0.25)
@@ -312,8 +315,8 @@ def test_a_daemon_without_its_memory_is_offline_and_gives_no_result_until_a_pers
 
 
 def test_a_lost_memory_completes_no_request_that_the_daemon_has_acknowledged_before() -> None:
-    """The first states after the restart list no request. RMF ignores them, because their stamp is
-    0."""
+    """After the restart the daemon's first states list no request. RMF must not take this for the end
+    of the request. RMF ignores these states, because their stamp is 0."""
     world = World(new=False)
     world.decide("again")
     world.run(1.0)
@@ -338,7 +341,7 @@ def test_a_damaged_entry_loses_the_memory_of_its_device() -> None:
 
 
 def test_the_guid_of_a_finished_request_with_other_items_is_in_doubt() -> None:
-    """RMF's tasks/Delivery.cpp gives two pickups of one task the same guid."""
+    """RMF uses the same guid for two pickups of one task (tasks/Delivery.cpp)."""
     world = World()
     finished(world)
     second = world.ask(items=JAR)
@@ -362,8 +365,8 @@ def test_the_guid_of_a_waiting_request_with_other_items_is_refused() -> None:
 
 
 def test_the_guid_of_a_finished_request_is_in_doubt_after_a_long_silence() -> None:
-    """Guids can repeat. rmf_task_ros2 uses five random hexadecimal digits, or counts from 0 at each
-    start."""
+    """Guids can repeat, because rmf_task_ros2 makes them from five random hexadecimal digits, or counts
+    from 0 after each start."""
     world = World()
     finished(world)
     world.run(301.0)

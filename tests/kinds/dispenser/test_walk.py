@@ -1,4 +1,5 @@
-"""A check of every state within some steps. RMF goes on only with its item, and no item moves twice."""
+"""Tests of the rules in every state within some steps. RMF must not go on without its item, and no item
+may leave the machine twice."""
 
 from typing import Any
 
@@ -17,7 +18,7 @@ BEGUN = (
     ("RMF asks", "disk full or not", 0.5),
     ("RMF asks", 0.5, "bus down or not", 2.0),
 )
-"""The states from which the walk goes on."""
+"""The steps to the states from which the walk begins."""
 
 
 def checked(step: Any) -> None:

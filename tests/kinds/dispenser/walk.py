@@ -1,8 +1,8 @@
-"""A walk through all states that a dispenser and RMF's phase can reach within some steps.
+"""A walk through all states that a dispenser and RMF's phase DispenseItem can reach within some steps.
 
 A state has the core's memory, the disk, the machine and RMF's phase. All times are relative to now.
-This file writes RMF's phase anew, after `_get_status` of DispenseItem.cpp. Every message is newer than
-the messages before it.
+This file has its own version of RMF's phase, written after `_get_status` of DispenseItem.cpp. In it
+every message has a newer stamp than the messages before it.
 """
 
 import math
@@ -34,10 +34,10 @@ GUID = "task"
 
 
 class Phase(msgspec.Struct, frozen=True):
-    """RMF's phase.
+    """RMF's phase DispenseItem.
 
-    `deaf` says that the phase's node hears nothing. `stamped` says that the phase has heard a message
-    with a stamp. After such a message a state with the stamp 0 counts as older.
+    `deaf` says that no message reaches the phase. `stamped` says that the phase has received a message
+    with a stamp other than 0. From then on the phase ignores each state with the stamp 0 as too old.
     """
 
     asks: bool = False
@@ -51,10 +51,10 @@ class World(msgspec.Struct, frozen=True):
     """The daemon, its machine, and RMF's phase.
 
     - `disk` has the bytes that outlive the daemon.
-    - `works` says that the machine runs a cycle.
+    - `works` says that the machine is in a dispensing cycle.
     - `moved` is the number of items that have left the machine.
     - `again` is the number of times that a person has ordered another cycle.
-    - `decided` says that a person has decided the request in doubt.
+    - `decided` says that a person has decided a request in doubt.
     """
 
     memory: WorkcellMemory
@@ -71,7 +71,7 @@ class World(msgspec.Struct, frozen=True):
 
 
 class Step(msgspec.Struct, frozen=True):
-    """A state after a move or a scan, for the invariants."""
+    """The state and the outputs after a scan. The test checks its rules on each step."""
 
     world: World
     outputs: Any
@@ -126,7 +126,7 @@ def _loses(world: World) -> tuple[World, Event | None]:
 
 
 def _decides(verdict: Any) -> Move:
-    """Return the move in which a person looks at the machine and gives this verdict.
+    """Return a move: a person looks at the machine and gives this verdict.
 
     The person says `done` only if an item has moved, and `again` only if no item has moved.
     """
@@ -181,7 +181,7 @@ def moved(world: World, move: Move, seen: Callable[[Any], None]) -> World:
 
 
 def waited(world: World, seconds: float, seen: Callable[[Any], None]) -> World:
-    """Return the state after some time, in which RMF repeats its request and the daemon scans."""
+    """Return the state after `seconds`. In this time the daemon scans, and RMF repeats its request."""
     now, step_s = 0.0, max(0.25, seconds / 8)
     while now < seconds:
         now += step_s
@@ -192,8 +192,8 @@ def waited(world: World, seconds: float, seen: Callable[[Any], None]) -> World:
 
 
 def _scanned(world: World, event: Event, now: float, seen: Callable[[Any], None]) -> World:
-    """Decide, write the memory to the disk, drive the outputs and publish, as the daemon's node
-    does."""
+    """Do a scan as the daemon's node does it: decide, write the memory to the disk, drive the outputs,
+    and publish."""
     decision = decide(world.memory, event, now, LIMITS)
     kept = KEEPING.persist(decision.memory)
     if kept != world.disk or decision.memory.not_kept:
@@ -235,7 +235,7 @@ def _heard(phase: Phase, report: Any) -> Phase:
 
 
 def _shifted(value: Any, by: float) -> Any:
-    """Return the memory with its times `by` seconds earlier. Times before -LONGEST_S become
+    """Return the value with all times in it moved back by `by` seconds, but not to before
     -LONGEST_S."""
     if isinstance(value, tuple):
         return tuple(_shifted(one, by) for one in value)

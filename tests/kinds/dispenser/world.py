@@ -1,9 +1,10 @@
-"""One dispenser in virtual time: RMF's phase, the network, the daemon's node, its disk and the machine.
+"""One dispenser in virtual time: RMF's phase DispenseItem, the network, the daemon's node, its disk and
+the machine.
 
-The daemon is the product's own `Node`, with its keeper and the driver for contacts. An effect is the
-instant before or after one of these acts: a write to the disk, a message, a switched output. The daemon
-dies at the effect with the number `die_at`. Then its outputs go off. After DOWN_S a new daemon starts
-on the same disk.
+The daemon is the product's own `Node`. It has its own memory on disk, and the driver for contacts. An
+effect is the instant right before or right after a write to the disk, a message, or a switched output.
+The daemon dies at the effect with the number `die_at`. Then its outputs go off. After DOWN_S a new
+daemon starts with the same disk.
 """
 
 from collections.abc import Callable, Mapping
@@ -59,8 +60,10 @@ class Killed(BaseException):
 
 @dataclass
 class Disk:
-    """The file that outlives the daemon. `full` is the reason why a write fails, or "" if writes
-    succeed."""
+    """The daemon's file on disk, which outlives the daemon.
+
+    `full` is the reason why writes fail, or "" if they succeed.
+    """
 
     content: bytes | None = None
     full: str = ""
@@ -79,9 +82,10 @@ class Disk:
 
 @dataclass
 class World:
-    """The dispenser with its surroundings.
+    """The daemon, RMF's phases, the disk and the machine.
 
-    `lose(topic, number)` decides whether a message is lost. `said` has every message of the daemon.
+    `lose(topic, number)` decides whether a message is lost. `said` has (s, message) of the daemon's
+    messages.
     """
 
     settings: DryContactWorkcellSettings = SETTINGS
@@ -109,7 +113,7 @@ class World:
     # ---- actions of a story
 
     def ask(self, guid: str = "task", items: Any = BOX) -> WorkcellPhase:
-        """Begin RMF's phase with this request."""
+        """Let RMF begin a phase DispenseItem with this request."""
         phase = WorkcellPhase(d.DispenserRequest(d.Time(), guid, NAME, "robot", items), self.now)
         self.phases.append(phase)
         return phase
@@ -123,7 +127,7 @@ class World:
         return self
 
     def decide(self, verdict: Any, request: str = "") -> None:
-        """Let a person decide a request in doubt."""
+        """Let a person decide the outcome of a request in doubt."""
         self.inbox["person"] = DecidedByPerson(verdict, request)
 
     def reset(self) -> None:
@@ -172,7 +176,7 @@ class World:
         edges = self.plant.edges
         return [bool(e.value) for e in edges if e.what == "relay" and e.signal == signal]
 
-    # ---- inside
+    # ---- private functions
 
     def _effect(self, what: str) -> None:
         self.effects.append(what)
@@ -233,7 +237,8 @@ class World:
 
 
 class _Mortal:
-    """A driver whose daemon may die right before or right after each switched output."""
+    """A driver that counts effects. So the daemon may die right before or right after a switched
+    output."""
 
     def __init__(self, driver: Any, around: Callable[[str], None]) -> None:
         self._driver = driver
@@ -243,7 +248,8 @@ class _Mortal:
         self.make_safe, self.close = driver.make_safe, driver.close
 
     def write(self, outputs: Any) -> None:
-        """Write the outputs. A change of the outputs has two effects, before and after the write."""
+        """Write the outputs. If they change, count one effect before the write and one effect after
+        it."""
         changes, self._last = outputs != self._last, outputs
         if changes:
             self._around("before the outputs")

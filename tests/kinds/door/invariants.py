@@ -1,6 +1,7 @@
 """Rules for every decision of the door's core, in any history.
 
-The rules judge the event, the inputs, the outputs and the walk's ledger, but never the core's memory.
+The rules judge the event, the inputs, the outputs, and a ledger of events that the walk keeps
+(`walk.py`). They do not use the core's memory.
 """
 
 from typing import Any
@@ -25,10 +26,10 @@ def check(step: Step) -> None:
 
 
 def the_hold_has_a_reason(step: Step) -> None:
-    """Require a reason whenever the door is held open.
+    """Require a reason whenever the core holds the door open.
 
-    A reason is RMF's request, a fire, or an obstruction. An obstruction counts only while the door
-    closes after a hold.
+    A reason is RMF's request, a fire, or an obstruction. An obstruction counts only after the core has
+    let the door go, while the door closes.
     """
     held, ledger = step.decision.report.hold, step.ledger
     if not _sighted(step):
@@ -51,18 +52,21 @@ def the_hold_has_a_reason(step: Step) -> None:
 
 
 def the_relay_follows_the_hold(step: Step) -> None:
-    """Require the relay to follow the hold. The relay is on without a break, or in pulses that begin
-    with the hold."""
+    """Require that the relay is on if and only if the core holds the door open.
+
+    With `pulse` the relay is on in pulses. The first pulse begins when the core begins to hold the
+    door.
+    """
     on, pulse = step.decision.outputs.hold_open, step.limits.pulse
     in_pulse = pulse is None or (step.now - step.ledger.held_since) % pulse.every_s < pulse.on_s
     assert on == (step.ledger.held and in_pulse)
 
 
 def open_is_the_truth(step: Step) -> None:
-    """Require evidence whenever the door shows OPEN.
+    """Require evidence whenever the report shows the door OPEN.
 
-    The evidence is a fresh reading of the open contact. Without that contact the evidence is the
-    opening time, if the site permits estimates.
+    The evidence is a fresh reading of the open contact. If the door has no such contact, and the site
+    permits estimates, the evidence is that the door has been held for the opening time.
     """
     shown, sample = step.decision.report, step.world.sample
     if not _sighted(step):
@@ -86,10 +90,11 @@ def open_is_the_truth(step: Step) -> None:
 
 
 def a_request_that_waits_has_a_reason(step: Step) -> None:
-    """Require a reason for each waiting OPEN request.
+    """Require a reason in the report for each OPEN request that waits.
 
-    An OPEN request waits if RMF wants the door open and the door does not show OPEN. If such a door is
-    also not held, the rule requires a fault. Before the first reading the rule requires no fault.
+    An OPEN request waits if RMF wants the door open and the report does not show OPEN. If the core does
+    not hold the door then, the rule also requires a fault. This fault is not required before the first
+    reading.
     """
     shown = step.decision.report
     assert bool(shown.waits) == (step.ledger.wanted and shown.mode is not DoorModeValue.MODE_OPEN)
@@ -98,9 +103,10 @@ def a_request_that_waits_has_a_reason(step: Step) -> None:
 
 
 def hazards_are_as_read(step: Step) -> None:
-    """Require the hazards that the contacts show.
+    """Require that the core reports a fire and an obstruction as the contacts show them.
 
-    A fire begins at once and ends after a delay. An OPEN request is refused only because of a fire.
+    A fire begins at once, and ends after a delay. An OPEN request is refused only during a fire with
+    `on_fire: release`.
     """
     clear_s = step.limits.t.hazard_clear_s
     if fresh(step.ledger, step.now, step.limits):
@@ -114,7 +120,8 @@ def hazards_are_as_read(step: Step) -> None:
 
 
 def nothing_changes_before_wake_at(world: World, limits: DoorLimits) -> None:
-    """Require that a scan before `wake_at` with the same inputs changes neither outputs nor report."""
+    """Scan now, and scan again right before the core's `wake_at` with the same inputs. Require that the
+    outputs and the report stay the same."""
     now = _scan(world, world.memory, 0.0, limits)
     until = min(now.wake_at, 1e4)
     later = _scan(world, now.memory, until * (1.0 - 1e-6), limits)
@@ -138,7 +145,7 @@ def _codes(step: Step) -> set[str]:
 
 
 def _exact(step: Step) -> bool:
-    """Return whether this step is a reading that counts at once, because nothing is debounced."""
+    """Return whether the event is a reading that counts at once, because this door has no debounce."""
     return isinstance(step.event, Sampled) and not step.limits.debounce
 
 
@@ -147,6 +154,6 @@ def _signal(step: Step, name: str) -> bool:
 
 
 def _told_otherwise(step: Step, name: str, for_s: float) -> bool:
-    """Return whether all readings of the last `for_s` seconds showed this contact not asserted."""
+    """Return whether this contact was "not asserted" in all readings of the last `for_s` seconds."""
     since = step.ledger.unlike[UNLIKE.index(name)]
     return since is not None and step.now >= since + for_s

@@ -1,11 +1,12 @@
-"""DOOR-2: a door without its supervisor stays held open. A site may limit the time of this hold."""
+"""DOOR-2: if the door supervisor disappears, the core goes on holding the door open. A site may limit
+how long."""
 
 from bridges.kinds.shared.decision import Attended
 from tests.kinds.door.virtual import OBSTRUCTION, Door
 
 
 def held(**limits: float) -> Door:
-    """Return a door that is held open from 1 s on. Its supervisor disappears at 20 s."""
+    """Return a door that the core holds open from 1 s on. Its door supervisor disappears at 20 s."""
     door = Door(limits=limits, inputs={"obstruction": OBSTRUCTION})
     door.scan(Attended(True))
     door.run(1.0)

@@ -35,7 +35,7 @@ from tests.kinds.door.virtual import (
 ESTIMATED = DoorLimits(t=DoorDurations(open_delay_s=4.0, travel_s=6.0), estimated=True)
 
 
-# ---- DOOR-5: without a fresh reading
+# ---- DOOR-5: a door without a fresh reading
 
 
 def test_before_the_first_reading_a_door_is_offline_and_nothing_is_held() -> None:
@@ -67,7 +67,7 @@ def test_a_doors_position_is_unknown_before_its_contacts_have_settled() -> None:
     assert core.told == [(0.0, "UNKNOWN", False), (0.0625, "OPEN", False)]
 
 
-# ---- DOOR-1: OPEN, CLOSE and the grace
+# ---- DOOR-1: OPEN, CLOSE and the grace (the delay between CLOSE and the release of the door)
 
 
 def test_an_open_request_holds_the_door_and_its_contacts_show_its_position() -> None:

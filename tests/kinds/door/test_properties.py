@@ -28,7 +28,11 @@ LIMITS = st.builds(
 
 
 def checked(step: Step) -> None:
-    """Check the rules. Check also that the core decides the same when it decides twice."""
+    """Check the rules. Also check that the same event gives the same decision again.
+
+    This must hold with the memory from before the decision. With the memory from after the decision,
+    the outputs and the mode must be the same.
+    """
     check(step)
     once = step.decision
     assert decide(step.before, step.event, step.now, step.limits) == once

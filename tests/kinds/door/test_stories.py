@@ -1,4 +1,5 @@
-"""Whole stories of a door, with its driver, its operator and RMF's supervisor, in virtual time."""
+"""Stories of a door with its driver, its simulated door operator, and RMF's door supervisor, in virtual
+time."""
 
 from typing import Any
 
@@ -12,7 +13,8 @@ from workbench.rmf_model.supervisors import DoorSupervisor
 
 
 class Corridor:
-    """A door, RMF's door supervisor, and robots. The door publishes its state at 1 Hz and on change."""
+    """A door, RMF's door supervisor, and robots. The door publishes its state each second and at each
+    change."""
 
     def __init__(self, **changes: Any) -> None:
         self.door = Door(**changes)
@@ -25,7 +27,7 @@ class Corridor:
         self._deliver(door_request("door", name, mode, self.door.now))
 
     def run(self, until: float) -> None:
-        """Let time pass."""
+        """Let time pass until the time `until`."""
         while self.door.now < until:
             self.door.run(min(until, self.door.now + SCAN_S))
             report = self.door.report
@@ -44,7 +46,7 @@ class Corridor:
 OPEN, CLOSED = DoorModeValue.MODE_OPEN, DoorModeValue.MODE_CLOSED
 
 
-# ---- DOOR-1, DOOR-2: passages
+# ---- DOOR-1, DOOR-2: robots that pass the door
 
 
 def test_a_robot_passes_a_door() -> None:

@@ -1,6 +1,6 @@
-"""DOOR-1: the grace after CLOSE limits how often the relay switches.
+"""DOOR-1: the grace (the delay between CLOSE and the release) limits how often the relay switches.
 
-The grace may make a hold longer, but never delays or refuses a hold.
+The grace may make a hold longer, but it never delays or refuses a hold.
 """
 
 import pytest

@@ -1,4 +1,5 @@
-"""A check of the door's rules in every state near the start and near each stage of a passage."""
+"""Tests of the door's rules in all states near the start, and in all states near each stage of a
+robot's passage."""
 
 import pytest
 from msgspec.structs import replace
@@ -37,12 +38,12 @@ STAGES: dict[str, tuple[str | float, ...]] = {
 
 
 def path(*steps: str | float, limits: DoorLimits = PLAIN) -> World:
-    """Return the world after these moves and waits (s)."""
+    """Return the world (the core and its door) after these moves and waits (s)."""
     return walker(limits).path(start(limits), *steps)
 
 
 class Scan:
-    """One more scan of a state, with the core's decision. The rules are checked too."""
+    """One more scan of a world. It has the core's decision, and the rules check this decision."""
 
     def __init__(self, world: World, limits: DoorLimits) -> None:
         self._steps: list[Step] = []
@@ -79,7 +80,11 @@ def test_each_stage_of_a_passage_is_what_its_name_says() -> None:
 
 
 def check_rules_within(steps: int, roots: list[World], limits: DoorLimits) -> int:
-    """Check every step and every state. Return the number of states."""
+    """Check the rules at every step within `steps` steps from the roots. Also check `wake_at` in every
+    state.
+
+    Return the number of states.
+    """
     found = walker(limits).walk(roots, steps, check)
     for world in found:
         nothing_changes_before_wake_at(world, limits)
@@ -105,8 +110,8 @@ def test_the_rules_of_a_door_hold_near_all_stages_at_each_kind_of_site(site: str
 
 
 def mended(world: World, limits: DoorLimits) -> World:
-    """Return the world after all repairs: the door is shut, the doorway is empty, nothing burns, and
-    the contacts answer."""
+    """Return the world after a repair of everything. The door is shut, the doorway is empty, nothing
+    burns, and the contacts answer."""
     world = replace(world, sample=start(limits).sample, readable=True, writable=True)
     return path_checked(world, limits, 6.0)
 
@@ -117,7 +122,7 @@ def path_checked(world: World, limits: DoorLimits, *steps: str | float) -> World
 
 
 def states_around_all_stages(limits: DoorLimits) -> list[World]:
-    """Return every state that is at most one step away from a stage of a passage."""
+    """Return every state within one step of a stage of a robot's passage."""
     roots = [path(*steps, limits=limits) for steps in STAGES.values()]
     return walker(limits).walk(roots, 1, check)
 

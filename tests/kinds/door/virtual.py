@@ -1,4 +1,5 @@
-"""A door in virtual time: its core alone, or its core with driver, wires and plant.
+"""A door in virtual time: its core alone, or its core with driver, wires and a simulated door (the
+plant).
 
 The door is scanned as in the daemon's loop.
 """
@@ -45,9 +46,10 @@ def word(mode: DoorModeValue) -> str:
 
 
 class CoreAlone:
-    """The core alone. The test gives it events.
+    """The door's core alone, which gets its events from the test.
 
-    `told` gets an entry (s, mode, hold relay) whenever the mode or the relay changes.
+    `told` gets an entry (s, mode, relay on) whenever the mode or the relay changes. The relay holds the
+    door open.
     """
 
     def __init__(self, limits: DoorLimits | None = None) -> None:
@@ -58,7 +60,7 @@ class CoreAlone:
         self.last: Decided | None = None
 
     def hears(self, event: Event) -> Decided:
-        """Make one decision, now."""
+        """Let the core decide on this event now."""
         decided = decide(self.memory, event, self.now, self.limits)
         self.memory, self.last = decided.memory, decided
         told = (word(decided.report.mode), decided.outputs.hold_open)
@@ -108,9 +110,9 @@ FIRE = _input(3, "low")
 
 
 class Door:
-    """The whole door.
+    """The core, the driver, the wires and the simulated door.
 
-    `told` has each (s, mode) that RMF hears. `faults` gets an entry whenever the faults change.
+    `told` has (s, mode) of each mode that RMF hears. `faults` gets an entry whenever the faults change.
     """
 
     def __init__(self, **changes: Any) -> None:
@@ -125,7 +127,8 @@ class Door:
         self.restart()
 
     def restart(self) -> None:
-        """Start a new daemon on the same door. Its outputs are off, and it remembers nothing."""
+        """Start a new daemon for the same door. The daemon's outputs are off, and it remembers
+        nothing."""
         self.driver: DryContactDoor = create("door", self.settings, self.bus)
         self.memory = initial(self.limits, self.now)
         self.driver.open()
@@ -138,7 +141,8 @@ class Door:
             self.scan()
 
     def scan(self, *requests: Event) -> None:
-        """Read, decide and write. The core gets the requests after the reading."""
+        """Read the door, let the core decide, and write its outputs. The core gets the requests after
+        the reading."""
         self.scans += 1
         decided = self._decide(self._read())
         for request in requests:
@@ -162,7 +166,7 @@ class Door:
 
     @property
     def relay(self) -> list[tuple[float, bool]]:
-        """Return every edge of the hold relay."""
+        """Return (s, on) for every change of the relay that holds the door open."""
         return [
             (round(e.at, 4), bool(e.value)) for e in self.plant.edges if e.signal == "hold_open"
         ]

@@ -1,10 +1,10 @@
 """A walk through all states that the door's core can reach within some steps.
 
-A state has the core's memory, the building, and a ledger of events. All times in a state are relative
-to now. The ledger follows the rules without the core's code.
+A state consists of the core's memory, the building, and a ledger of events. All times in a state are
+relative to now. This file writes the ledger by the rules of the door, without the core's code.
 
-The walk cuts long ages to a limit. So two states that must behave alike count as one state. All
-durations are sums of powers of two, so no time is rounded.
+The walk replaces long ages by an upper limit. So two states in which the core must behave alike count
+as one state. All durations are sums of powers of two, so no time is rounded.
 """
 
 from collections.abc import Callable
@@ -24,16 +24,20 @@ from tests.kinds.door.virtual import Decided
 from tests.walk import Walker
 
 LONG_S = 32.0
-"""The longest gap between two scans (s) if the core asks for no earlier scan. It is less than
+"""The longest time (s) between two scans, if `wake_at` is not earlier. LONG_S is less than
 `stale_after_s`."""
 
 DURATIONS: dict[str, float] = {"stale_after_s": 60.0, "max_hold_s": 30.0}
-"""The durations (s) that differ from the defaults. A long `stale_after_s` saves scans. `max_hold_s`
-turns on the alarm for a long hold."""
+"""The durations (s) that differ from the defaults.
+
+A long `stale_after_s` makes the walk shorter, because it needs fewer scans. `max_hold_s` turns on the
+alarm for a long hold.
+"""
 
 
 def limits_of(durations: dict[str, float] | None = None, **facts: Any) -> DoorLimits:
-    """Return limits. `durations` have priority over DURATIONS, and DURATIONS over the defaults."""
+    """Return the limits of a door. `durations` override DURATIONS, and DURATIONS override the
+    defaults."""
     return DoorLimits(t=DoorDurations(**{**DURATIONS, **(durations or {})}), **facts)
 
 
@@ -41,11 +45,12 @@ class Ledger(msgspec.Struct, frozen=True):
     """The events so far, noted without the core's conclusions. Times are relative to the state's time.
 
     - `wanted` says that RMF wants the door open.
-    - `ends_at` is the time at which RMF's CLOSE takes effect.
-    - `let_go` says that the reason for the hold has ended. A reading of the closed contact resets it.
+    - `ends_at` is the time at which RMF's CLOSE takes effect, after the grace.
+    - `let_go` says that the reason for the hold has ended. It lasts until a reading shows the door
+      closed.
     - `shut` says that the last reading shows the door closed.
     - `sure_since` is the time of the last change of the hold, or of the first reading after a failure.
-    - `unlike` has a time for each contact: since then all readings have said "not asserted".
+    - `unlike` has a time for each contact in UNLIKE. Since that time all readings were "not asserted".
     """
 
     held: bool = False
@@ -64,7 +69,7 @@ UNLIKE = ("opened", "obstruction", "fire")
 
 
 class World(msgspec.Struct, frozen=True):
-    """The building, with the core's memory and the ledger at time 0.
+    """The building, the core's memory and the ledger. All times in them are relative to now.
 
     `readable` says whether the door's contacts answer. `writable` says whether the door's relays
     answer.
@@ -78,7 +83,10 @@ class World(msgspec.Struct, frozen=True):
 
 
 def start(limits: DoorLimits) -> World:
-    """Return a daemon right after its start, with a closed door. An estimated door has no contacts."""
+    """Return a daemon right after its start, with a closed door.
+
+    If the site estimates the door's position, the door has no contacts.
+    """
     opened, closed = (None, None) if limits.estimated else (False, True)
     return World(initial(limits, 0.0), DoorSample(opened, closed, obstruction=False, fire=False))
 
@@ -151,8 +159,8 @@ MOVES: dict[str, Move] = {
     "reset": _event(OperatorReset()),
 }
 TIMES = (0.0625, 1.0, 4.0, 16.0, 64.0)
-"""Waits (s). They lie below and above each limit of the core: debounce, end of a hazard, grace, travel
-time, opening time, and greatest age."""
+"""Waits (s). Some are shorter and some are longer than each duration of the core: debounce, end of a
+hazard, grace, travel time, opening time, and greatest age of a reading."""
 
 
 # ---- one step
@@ -161,7 +169,7 @@ Seen = Callable[["Step"], None]
 
 
 class Step(msgspec.Struct, frozen=True):
-    """One decision at the time `now`, in seconds after the state began. `ledger` includes this
+    """One decision. `now` is its time in seconds after the state before it. `ledger` includes this
     decision."""
 
     before: DoorMemory
@@ -174,14 +182,14 @@ class Step(msgspec.Struct, frozen=True):
 
 
 def moved(world: World, move: Move, limits: DoorLimits, seen: Seen) -> World:
-    """Return the state after a move, at the same instant."""
+    """Return the state after a move, without any passing of time."""
     around, event = move(world)
     return _scanned(around, event, 0.0, limits, seen)[0]
 
 
 def waited(world: World, seconds: float, limits: DoorLimits, seen: Seen) -> World:
-    """Return the state after some time. In that time the door is scanned whenever the core wants a
-    scan."""
+    """Return the state after `seconds`. In this time the door is scanned at each `wake_at` of the
+    core."""
     now = 0.0
     world, wake_at = _scanned(world, reading(world), now, limits, seen)
     while now < seconds:
@@ -197,7 +205,10 @@ def waited(world: World, seconds: float, limits: DoorLimits, seen: Seen) -> Worl
 def _scanned(
     world: World, event: Event, now: float, limits: DoorLimits, seen: Seen
 ) -> tuple[World, float]:
-    """Decide and write once. Return the new world, and the time of the next scan (s)."""
+    """Let the core decide, and let the write fail if the relays do not answer.
+
+    Return the new world, and the time of the next scan (s).
+    """
     step = _step(world, event, now, limits, seen)
     world = replace(world, memory=step.decision.memory, ledger=step.ledger)
     if not world.writable:
@@ -219,7 +230,8 @@ def noted(
 ) -> Ledger:
     """Return the ledger after a decision.
 
-    This function takes only three facts from the decision: the hold, the refusal and the fire.
+    The function takes only three facts from the decision: whether the door is held, whether the request
+    is refused, and whether a fire is reported.
     """
     wanted, ends_at = _asked(ledger, event, now, bool(decision.refused), limits)
     if limits.on_fire == "release" and burns(decision):
@@ -284,7 +296,7 @@ def _asked(
 def _unlike(
     ledger: Ledger, event: Event, now: float, limits: DoorLimits
 ) -> tuple[float | None, ...]:
-    """Return a time (s) for each contact. Since that time all readings have said "not asserted"."""
+    """Return for each contact the time (s) since which all readings were "not asserted", or None."""
     if isinstance(event, Sampled):
         gap = not fresh(ledger, now, limits)
         said = [getattr(event.sample, signal) for signal in UNLIKE]
@@ -301,7 +313,7 @@ def _unlike(
 
 
 def shifted(memory: DoorMemory, by: float, limits: DoorLimits) -> DoorMemory:
-    """Return the same memory with every time moved by `by` seconds. Times that are too old are cut to a
+    """Return the memory with `by` added to each of its times. Ages above their limit become the
     limit."""
     t, senses = limits.t, memory.senses
     return replace(
@@ -337,12 +349,13 @@ def _shifted(ledger: Ledger, by: float, limits: DoorLimits) -> Ledger:
 
 
 def _at(at: Any, by: float, oldest_s: float = float("inf")) -> Any:
-    """Return a time moved by `by`. Ages above `oldest_s` become `oldest_s`, and None stays None."""
+    """Return a time plus `by`. Ages above `oldest_s` become `oldest_s`, and None stays None."""
     return None if at is None else max(at + by, -oldest_s)
 
 
 def _held_since(at: float, by: float, limits: DoorLimits) -> float:
-    """Return the moved start of the hold. A move by whole pulses keeps the phase of the pulses."""
+    """Return the start of the hold plus `by`. An age above the limit is shortened by whole pulses, so
+    that the next pulse comes at the same time."""
     age_s, oldest_s = -(at + by), max(limits.t.travel_s, limits.t.open_timeout_s)
     if age_s <= oldest_s:
         return -age_s
@@ -350,7 +363,8 @@ def _held_since(at: float, by: float, limits: DoorLimits) -> float:
 
 
 def _settled(seen: Settled[Any] | None, by: float) -> Any:
-    """Return a contact with moved time. A settled contact needs no time, so its time is dropped."""
+    """Return a contact with its time moved by `by`. A settled contact gets a fixed time, because its
+    time does not matter."""
     if seen is None:
         return None
     return Settled(
@@ -363,7 +377,8 @@ def _settled(seen: Settled[Any] | None, by: float) -> Any:
 
 
 def alike(world: World, limits: DoorLimits) -> World:
-    """Return the world in a reduced form. Two worlds that must behave alike have the same form."""
+    """Return the world in a reduced form. If the core must behave alike in two worlds, their forms are
+    equal."""
     return replace(
         world,
         memory=shifted(world.memory, 0.0, limits),
@@ -372,7 +387,7 @@ def alike(world: World, limits: DoorLimits) -> World:
 
 
 def walker(limits: DoorLimits) -> Walker[World, Move]:
-    """Return the door's walker with these limits."""
+    """Return a walker through the states of a door with these limits."""
     return Walker(
         MOVES,
         TIMES,

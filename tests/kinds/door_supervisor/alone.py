@@ -1,6 +1,6 @@
-"""The door supervisor's core for one door, without network, in virtual time.
+"""The core of the door supervisor for one door, without a network, in virtual time.
 
-Tests give events to the core. The core's messages are kept in a list.
+The tests give events to the core, and read its messages from a list.
 """
 
 from bridges.kinds.door_supervisor import core
@@ -39,18 +39,18 @@ class Alone(alone.Alone[SupervisedDoor, Event, DoorSupervisorLimits, DoorHoldRep
             self.faults.append((round(self.now, 3), faults))
 
     def opens(self, who: str = "a", *, aged: float = 0.0) -> None:
-        """Let an OPEN request arrive. By the requester's clock the request is `aged` seconds old."""
+        """Let an OPEN request arrive that was sent `aged` seconds ago."""
         self.hears(RequesterOpens(who, self.stamp(aged)))
 
     def closes(self, who: str = "a", *, aged: float = 0.0) -> None:
-        """Let a CLOSE request arrive. By the requester's clock the request is `aged` seconds old."""
+        """Let a CLOSE request arrive that was sent `aged` seconds ago."""
         self.hears(RequesterCloses(who, self.stamp(aged)))
 
     def stamp(self, aged: float) -> int:
         return round(self.stamped(aged) * SECOND_NS)
 
     def shows(self, mode: str, until: float | None = None) -> None:
-        """Let a DoorState with this mode arrive. With `until` it arrives each second until that
+        """Let a DoorState with this mode arrive. With `until` it arrives again each second until that
         time."""
         self.hears(DoorStateHeard(DoorModeValue[f"MODE_{mode}"]))
         while until is not None and self.now + 1.0 <= until:

@@ -1,7 +1,9 @@
-"""Robots at a door. Messages are lost, late, doubled or reordered, and parties die.
+"""Robots at one door in bad conditions. Messages are lost, late, doubled or reordered. The supervisor,
+the door's daemon and the fleet adapters are killed and restarted.
 
-The supervisor must send no CLOSE after it has let a robot in, and must not flood the network. After the
-network has recovered, every robot must get through. The door must close behind the last robot.
+The supervisor must send no CLOSE while a robot is inside that it has let in. It must not flood the
+network. After the network has recovered, every robot must get through, and the door must close behind
+the last robot.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,7 +35,11 @@ def late(random: Random) -> Sequence[float]:
 
 
 class Storm:
-    """A site in bad conditions. The test watches each message of our supervisor."""
+    """One door, robots and our supervisor in bad conditions. The test watches each message of our
+    supervisor.
+
+    `wrong` has each CLOSE that was sent while a robot was inside.
+    """
 
     def __init__(self, seed: int, fate: Fate, disk: Disk | None = None) -> None:
         self.random = Random(seed)
@@ -53,7 +59,8 @@ class Storm:
         self.wrong: list[tuple[float, tuple[str, ...]]] = []
 
     def rages(self) -> None:
-        """Kill one party after 2 s to 15 s, start it again, and repeat until STORM_S."""
+        """Restart the supervisor, the door's daemon or a fleet adapter every 2 s to 15 s, until
+        STORM_S."""
         while self.world.now < STORM_S:
             self.run(self.world.now + self.random.uniform(2.0, 15.0))
             match self.random.choice(("supervisor", "supervisor", "door", *ROBOTS)):
@@ -72,7 +79,7 @@ class Storm:
         self.run(self.world.now + CALM_S)
 
     def run(self, until: float) -> None:
-        """Run in steps of 1/16 s. At each step note the robots that are let in or leave."""
+        """Let time pass in steps of 1/16 s, until the time `until`."""
         while self.world.now < until:
             self.world.run(min(until, self.world.now + 0.0625))
 
@@ -88,9 +95,10 @@ class Storm:
             self.wrong.append((self.world.now, tuple(self.let_in)))
 
     def _look(self) -> None:
-        """Note each robot that is let in.
+        """Update the set of the robots that our supervisor has let in.
 
-        A robot that is let in without an entry in the table was misled by an earlier heartbeat.
+        If a robot goes in although our supervisor's table has no entry for it, an old heartbeat has
+        misled the robot.
         """
         for who, walker in self.walkers.items():
             if not walker.passing:
@@ -104,8 +112,7 @@ class Storm:
 
 
 def rates(storm: Storm, topic: Any) -> list[float]:
-    """Return the gaps (s) between our supervisor's messages on this topic. Gaps at restarts count
-    too."""
+    """Return the times (s) between our supervisor's messages on this topic, also across restarts."""
     at = [when for when, who, said, _ in storm.world.sent if (who, said) == ("supervisor", topic)]
     return [b - a for a, b in pairwise(at)]
 
@@ -133,15 +140,15 @@ def test_no_door_closes_on_a_robot_and_no_robot_waits_for_ever(seed: int, fate: 
 
 
 class Forgetful(Disk):
-    """A table that is not on a disk. A restart loses the table, as in RMF's own supervisor."""
+    """A disk that keeps no table. So a restart loses the table, as in RMF's own supervisor."""
 
     def read(self) -> bytes | None:
         return None
 
 
 def test_the_test_notices_a_close_on_a_robot() -> None:
-    """A restarted supervisor without its table on disk sends CLOSE to a door with a robot in it. The
-    test must notice that CLOSE."""
+    """Prove that this test works. A supervisor that loses its table at a restart sends CLOSE to a door
+    with a robot inside. The test must notice that CLOSE."""
     wrong = 0
     for seed in range(4):
         storm = Storm(seed, lossy, Forgetful())

@@ -39,7 +39,7 @@ def test_a_request_that_counts_is_not_refused() -> None:
     assert (desk.sent, desk.refused) == ([(0.0, "OPEN"), (0.5, "CLOSED")], [])
 
 
-# ---- DOOR-SUPERVISOR-3: silent parties
+# ---- DOOR-SUPERVISOR-3: requesters or a door that send nothing
 
 
 def test_silence_and_time_close_nothing() -> None:

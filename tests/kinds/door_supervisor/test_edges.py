@@ -1,4 +1,4 @@
-"""The supervisor accepts or refuses RMF's messages and the table in its state directory."""
+"""The supervisor accepts or refuses RMF's messages, and the table of holders in its state directory."""
 
 import pytest
 

@@ -20,7 +20,8 @@ HEARTBEAT = topics.DOOR_SUPERVISOR_HEARTBEAT
 
 
 class Graph:
-    """A network with our node. `heard` has (s, words) for each message of the node."""
+    """A network with the door supervisor's node. `heard` has (s, words) for each message of the
+    node."""
 
     def __init__(self) -> None:
         self.now = 0.0

@@ -1,4 +1,4 @@
-"""Whole stories of a door with its daemon, a supervisor, and robots that follow RMF's rules."""
+"""Stories of a door with its daemon, a door supervisor, and robots that follow RMF's rules."""
 
 from bridges.kinds.door_supervisor import keep
 from bridges.messages import definitions as d
@@ -18,8 +18,10 @@ A, B = "fleet/a", "fleet/b"
 
 
 class Site:
-    """One door, robots with these plans, and a supervisor. The supervisor is ours with its disk, or
-    RMF's."""
+    """One door, robots and a door supervisor. Each robot has a plan of its passages.
+
+    The supervisor is our supervisor with its disk, or a stand-in for RMF's supervisor (`theirs`).
+    """
 
     def __init__(
         self, *plans: list[tuple[float, float]], theirs: bool = False, **changes: object
@@ -56,7 +58,7 @@ class Site:
         return [(at, word) for at, _, word in to_door(self.world)]
 
 
-# ---- DOOR-SUPERVISOR-1, DOOR-SUPERVISOR-2: passages
+# ---- DOOR-SUPERVISOR-1, DOOR-SUPERVISOR-2: robots that pass the door
 
 
 def test_a_robot_passes_a_door_through_the_supervisor() -> None:
@@ -276,9 +278,9 @@ def test_a_door_that_falls_silent_is_forgotten() -> None:
 
 
 def doorway(*, rival: bool = False, quiet_s: float = 3.0) -> Site:
-    """Return a site after the deaths of the door's node and our supervisor.
+    """Return a site in which the door's daemon and our supervisor were killed and restarted.
 
-    A silent robot stands in the doorway.
+    A robot stands in the doorway and sends nothing.
     """
     site = Site([(10.0, 60.0)], quiet_start_s=quiet_s)
     site.world.run(25.0)
@@ -296,7 +298,7 @@ def doorway(*, rival: bool = False, quiet_s: float = 3.0) -> Site:
     return site
 
 
-# ---- DOOR-SUPERVISOR-4: restored holders
+# ---- DOOR-SUPERVISOR-4: holders that a restart has restored from the disk
 
 
 def test_a_robot_in_the_doorway_keeps_its_door_when_the_door_and_our_supervisor_die_together() -> (

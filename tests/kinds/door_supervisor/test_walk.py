@@ -1,10 +1,11 @@
-"""All histories up to a depth, and random histories. The rules that check them do not use the core's
-code.
+"""Tests of the door supervisor's rules in all histories up to a depth, and in random histories. The
+tests judge the messages without the core's code.
 
-The first walk has all 4^7 = 16384 histories of seven steps, 0.75 s apart. In these histories two
-requesters open and close, with stamps in order. The second walk has all 6^5 = 7776 histories of late
-requests, states and permissions to publish. `make test` leaves out the last two steps of the first walk
-and the last step of the second walk.
+The first walk has all 4^7 = 16384 histories of seven steps, 0.75 s apart. In these histories each of
+two requesters sends OPEN or CLOSE, and the stamps are in order. The second walk has all 6^5 = 7776
+histories of five steps: late requests, states of the door, and changes of the permission to publish.
+
+`make test` shortens the histories to five steps in the first walk, and to four in the second walk.
 """
 
 from collections.abc import Callable
@@ -31,8 +32,10 @@ STEP_S = 0.75
 
 
 class Ledger:
-    """The table of holders by RMF's rules, if requests arrive in order. The rules check each
-    message."""
+    """The core, and a table of holders that the test keeps by RMF's rules, from requests in order.
+
+    The test compares the core's table with its own table, and checks each message of the core.
+    """
 
     def __init__(self, *, speaks: bool) -> None:
         self.memory: SupervisedDoor = core.initial("ward", 0.0)
@@ -46,7 +49,7 @@ class Ledger:
         self.hears(MaySpeak(speaks))
 
     def copy(self) -> "Ledger":
-        """Return a copy with the same history, which can continue in another way."""
+        """Return a copy, so that several histories can begin with the same steps."""
         made = copy(self)
         made.holders, made.newest, made.sent = set(self.holders), dict(self.newest), [*self.sent]
         return made
@@ -64,8 +67,8 @@ class Ledger:
         codes = [fault.code for fault in decided.report.faults]
         assert ("DOOR_HELD_OPEN" in codes) == bool(late)
         assert bool(decided.report.waits) == (bool(self.holders) and not self.speaks)
-        # A new holder's OPEN must reach the node soon. So the last message was OPEN, or a message is
-        # due within GAP_S.
+        # A new holder's OPEN must reach the door's node soon. So either OPEN was the last message, or
+        # the core wants to be woken within GAP_S.
         if self.speaks and self.holders:
             assert self.memory.sent == OPEN or self.wake_at <= self.now + GAP_S
 
@@ -110,7 +113,8 @@ def after(ledger: Ledger, event: Callable[[float], Any]) -> Ledger:
 
 
 def asked(ledger: Ledger, move: tuple[Any, str]) -> Ledger:
-    """Return a copy that has heard this requester open or close."""
+    """Return a copy of the ledger after this requester's OPEN or CLOSE, and after STEP_S more
+    seconds."""
     word, who = move
     return after(ledger, lambda now: word(who, stamp(now)))
 
@@ -167,10 +171,10 @@ def told(history: list[tuple[float, Any]]) -> Ledger:
 
 
 def _would_be_believed(ledger: Ledger, event: Any) -> bool:
-    """Return whether the core would accept this old request.
+    """Return whether the core would accept this request although its stamp is old.
 
-    An old stamp counts again long after the requester's last request. A clock may have been set back,
-    or the core may have forgotten the requester. test_core has stories of both cases.
+    The core accepts an old stamp if the requester has been silent for long, or if its clock seems to
+    have been set back. test_core has stories of both cases.
     """
     if not isinstance(event, RequesterOpens | RequesterCloses) or event.stamp >= ledger.newest.get(
         event.requester, 0

@@ -22,7 +22,7 @@ WARD = "ward"
 
 
 def holds(disk: Disk, who: str) -> bool:
-    """Return whether this requester holds the door, according to the table on this disk."""
+    """Return whether the table on this disk has this requester as a holder of the door."""
     found = keep.restore(disk.kept, DoorSupervisorSettings(), 0.0) if disk.kept else {}
     return WARD in found and found[WARD].holder(who) is not None
 
@@ -54,9 +54,9 @@ def to_door(world: World) -> list[tuple[float, str, str]]:
 
 
 class DoorDaemon:
-    """A door's daemon, which scans and obeys door_requests.
+    """A door's daemon, which scans the door and obeys door_requests.
 
-    The daemon publishes the door's state at 1 Hz and on change.
+    The daemon publishes the door's state each second and at each change.
     """
 
     def __init__(self, world: World, name: str = WARD, **changes: Any) -> None:
@@ -69,7 +69,7 @@ class DoorDaemon:
         world.add(self, topics.DOOR_REQUESTS)
 
     def hear(self, topic: topics.Topic[Any], message: Any) -> None:
-        """Take a request. The request may be for another door."""
+        """Let the daemon hear a request. The daemon ignores requests for other doors."""
         if message.door_name == self.name:
             self.door.now = self.world.now
             self.door.scan(door_messages.accept(message, self.door.settings))
@@ -103,7 +103,7 @@ class Walker:
     """A fleet adapter and its robot, which goes through the door again and again.
 
     - `log` has (s, event).
-    - `passing` says that the robot has been let in and its adapter has not sent CLOSE yet.
+    - `passing` says that the robot may go through the door, and its adapter has not sent CLOSE yet.
     - `skew` is the time (s) by which the adapter's clock is ahead.
     """
 
@@ -124,8 +124,8 @@ class Walker:
         world.add(self, *RobotContext.subscribes)
 
     def hear(self, topic: topics.Topic[Any], message: Any) -> None:
-        """Apply RMF's rules for robots to a message. Then begin the robot's next step if that step is
-        due."""
+        """Let the robot's adapter react to a message by RMF's rules. Then begin the robot's next step
+        if it is due."""
         say(self.world, self.name, self.robot.hear(message, self.world.now + self.skew))
         self._go_on()
 
@@ -136,7 +136,8 @@ class Walker:
         self._go_on()
 
     def wake_at(self) -> float:
-        """Return the time (s) of the robot's next repeat or next step."""
+        """Return the time (s) at which the adapter repeats its request, or at which the robot's next
+        step is due."""
         return min(self.robot.wake_at() - self.skew, self._next_at)
 
     def restart(self) -> None:

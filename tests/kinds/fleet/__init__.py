@@ -1,1 +1,1 @@
-"""Stories of the robot's core in virtual time."""
+"""Tests of the core for one robot of a fleet, as stories in virtual time."""

@@ -1,7 +1,8 @@
 """Stories for a robot's core in virtual time. The core reads the robot eight times a second.
 
-The site is a corridor on L1 from x = 0 to x = 10 m, with a charger at each end. The pantry is in the
-middle, and a lift to L2 is at x = 8 m. The robot's map is RMF's map, turned by 90 degrees and moved.
+The robot drives in a corridor on L1 from x = 0 to x = 10 m, with a charger at each end. The pantry is
+in the middle, and a lift to L2 is at x = 8 m. The robot's map is RMF's map, turned by 90 degrees and
+moved.
 """
 
 from dataclasses import dataclass, field
@@ -66,8 +67,10 @@ DOCK_A = goal(0.0, name="charger_a", dock="dock_a")
 
 @dataclass
 class Story:
-    """One robot. `sample` is its next reading. `sent` gets an entry (s, command) whenever the command
-    changes."""
+    """One robot and its core. `sample` is the reading that the core gets next.
+
+    `sent` gets an entry (s, command) whenever the command changes.
+    """
 
     limits: RobotLimits = LIMITS
     sample: RobotSample = RobotSample(at(0.0), 0.8)
@@ -93,7 +96,8 @@ class Story:
         return self
 
     def see(self, for_s: float = 0.0, **changes: Any) -> "Story":
-        """Read this sample once. With `for_s` read it again and again for that time."""
+        """Let the core read this sample once. With `for_s` it reads the sample again and again for
+        `for_s` seconds."""
         self.sample = replace(self.sample, **changes)
         self.take(Sampled(self.sample))
         for _ in range(round(for_s / SCAN_S)):
@@ -109,7 +113,7 @@ class Story:
         return self
 
     def order(self, order: Order) -> "Story":
-        """Take an order of RMF right after a reading."""
+        """Let the core read the robot, and then get this order from RMF."""
         self.take(Sampled(self.sample))
         return self.take(order)
 
@@ -134,5 +138,5 @@ def _words(command: RobotCommand | None) -> str:
 
 
 def driving(number: int = 1, to: Goal = PANTRY, **sample: Any) -> Story:
-    """Return the story of a robot at charger_a that RMF orders to drive to this goal."""
+    """Return a story in which RMF has just ordered a robot at charger_a to drive to this goal."""
     return Story(sample=RobotSample(at(0.0), 0.8, **sample)).see().order(Navigate(number, to))

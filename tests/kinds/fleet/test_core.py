@@ -1,4 +1,4 @@
-"""A robot's commands: when they are sent, done, repeated and stopped (FLEET-1 to FLEET-4)."""
+"""When the core sends, completes, repeats and stops a robot's commands (FLEET-1 to FLEET-4)."""
 
 from bridges.kinds.fleet.signals import Act, Navigate, Stop
 from bridges.kinds.shared.decision import Fault, OperatorReset
@@ -36,7 +36,7 @@ def test_a_robot_that_lies_about_its_arrival_is_not_believed() -> None:  # FLEET
     story.see(1.0, completed="7")
     assert story.report.finished == 0
     assert story.report.faults == (
-        Fault("ROBOT_NOT_THERE", "it reports arrival, 5 m away from its goal"),
+        Fault("ROBOT_NOT_THERE", "it reports arrival, but is 5 m from its goal"),
     )
     story.see(at=at(5.0))
     assert story.report.finished == 7

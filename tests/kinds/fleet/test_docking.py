@@ -13,7 +13,7 @@ DOCK_B = goal(10.0, name="charger_b", dock="dock_b")
 
 
 def docking(**sample: Any) -> Story:
-    """Return the story of a robot that drives to its dock from the pantry."""
+    """Return a story in which RMF has just ordered a robot at the pantry to dock at charger_a."""
     story = Story().see(at=at(5.0), moving=True, **sample)
     return story.order(Navigate(7, DOCK_A))
 

@@ -1,4 +1,5 @@
-"""The edges of a robot's rules: whole commands, maps in pixels, faults word by word, rare orders."""
+"""Details of a robot's rules: all fields of commands, maps in pixels, the texts of faults, and rare
+orders."""
 
 import math
 
@@ -26,7 +27,10 @@ from tests.kinds.fleet.story import DOCK_A, GRAPH, LIMITS, Story, at, driving, g
 IN_PIXELS = RobotSite(
     GRAPH, {"L1": Similarity(20j, complex(7, 0), 0.0), "": Similarity(1, 0, 0.0)}, "charger_a"
 )
-"""The robot's map of L1 is turned by a quarter, with 20 pixels for a metre. Its map of L2 is RMF's."""
+"""A site in which the robot's map of L1 has 20 pixels for a metre, and is turned by 90 degrees.
+
+The robot's map of L2 is the same as RMF's map.
+"""
 
 
 def on_pixels(x: float, y: float = 0.0) -> Pose:
@@ -34,14 +38,14 @@ def on_pixels(x: float, y: float = 0.0) -> Pose:
 
 
 def in_pixels() -> Story:
-    """Return the story of a robot at charger_a that is told to drive to the pantry."""
+    """Return a story in which RMF has just ordered a robot at charger_a to drive to the pantry."""
     story = Story(
         limits=RobotLimits(RobotDurations(), IN_PIXELS), sample=RobotSample(on_pixels(0.0), 0.8)
     )
     return story.see(moving=True).order(Navigate(7, Goal(on_pixels(5.0), name="pantry")))
 
 
-# ---- maps whose unit is no metre
+# ---- maps in pixels instead of metres
 
 
 @pytest.mark.parametrize(("x", "finished"), [(4.4, 0), (4.51, 7), (5.49, 7), (5.6, 0)])
@@ -52,7 +56,7 @@ def test_a_robot_has_arrived_within_half_a_metre_whatever_the_unit_of_its_map(
 
 
 def test_a_robot_that_creeps_on_a_map_in_pixels_stands_only_within_3_cm() -> None:
-    """FLEET-SENSING-3: 2 cm are 0.4 pixels."""
+    """FLEET-SENSING-3. On this map 2 cm are only 0.4 pixels."""
     crept = in_pixels().see(moving=None, at=on_pixels(5.0)).see(0.75).see(0.25, at=on_pixels(5.02))
     assert crept.report.finished == 7
     drove = in_pixels().see(moving=None, at=on_pixels(5.0)).see(0.75).see(0.25, at=on_pixels(5.04))
@@ -66,7 +70,7 @@ def test_the_distance_from_the_graph_is_in_metres_and_is_measured_again_after_10
     assert story.see(at=on_pixels(3.0, 3.92)).memory.off_m == pytest.approx(4.0)
     assert story.see(at=on_pixels(3.0, 3.88)).memory.off_m == pytest.approx(3.88)
     assert story.see(at=Pose("L2", 8.0, 3.88)).memory.off_m < 1e-9
-    assert story.see(at=on_pixels(3.0, 1.0)).faults == []  # off_graph_m itself is near
+    assert story.see(at=on_pixels(3.0, 1.0)).faults == []  # exactly off_graph_m is no fault
 
 
 def test_each_level_has_its_own_transform() -> None:
@@ -95,13 +99,13 @@ def test_the_graph_finds_the_nearest_named_waypoint_and_the_nearest_lane() -> No
     assert graph.nearest(here, 0.4) is None
     assert graph.nearest(here, 10.0, chargers=True) == graph.vertices[1]
     assert graph.nearest(Pose("L2", 1.0, 2.0), 10.0, chargers=True) is None
-    assert graph.off_m(Pose("L1", 2.5 - 0.8, 4.0 + 0.6)) == pytest.approx(1.0)  # beside its middle
-    assert graph.off_m(Pose("L1", 4.0, 7.0)) == 1.0  # beyond its end
+    assert graph.off_m(Pose("L1", 2.5 - 0.8, 4.0 + 0.6)) == pytest.approx(1.0)  # beside the lane
+    assert graph.off_m(Pose("L1", 4.0, 7.0)) == 1.0  # beyond the lane's end
     assert graph.off_m(Pose("L2", 2.0, 2.0)) == 1.0
     assert graph.vertices[1].pose() == Pose("L1", 4.0, 6.0)
 
 
-# ---- whole commands
+# ---- all fields of a command
 
 
 def test_an_action_and_a_stop_reach_the_robot_whole() -> None:  # FLEET-1 and FLEET-11
@@ -143,11 +147,11 @@ def test_a_dock_that_is_ordered_anew_gets_the_whole_time_for_its_charge() -> Non
     assert [words for _, words in story.commands] == ["dock 7, attempt 1", "dock 8, attempt 1"]
 
 
-# ---- standing
+# ---- when the robot counts as standing
 
 
 def test_a_stop_is_not_believed_while_the_robot_turns_on_the_spot() -> None:
-    """FLEET-4 and FLEET-SENSING-3: more than 3° are a movement."""
+    """FLEET-4 and FLEET-SENSING-3: a turn of more than 3° counts as a movement."""
     still = driving(7)
     for n in range(1, 12):
         still.now += 0.125
@@ -158,7 +162,7 @@ def test_a_stop_is_not_believed_while_the_robot_turns_on_the_spot() -> None:
 
 
 def test_a_robot_that_creeps_is_measured_from_the_place_where_it_began_to_stand() -> None:
-    """FLEET-SENSING-3: steps of 2 cm are no standing."""
+    """FLEET-SENSING-3: a robot that moves in steps of 2 cm does not stand."""
     story = driving(7)
     for n in range(1, 24):
         story.now += 0.125
@@ -166,7 +170,7 @@ def test_a_robot_that_creeps_is_measured_from_the_place_where_it_began_to_stand(
     assert story.order(Stop(8, of=7)).see().memory.command is not None
 
 
-# ---- faults and words
+# ---- faults and their texts
 
 
 def test_a_robot_that_drives_on_is_told_at_the_second_stop_and_also_while_it_is_not_read() -> None:
@@ -192,10 +196,10 @@ def test_every_fault_says_what_a_person_must_know() -> None:
         Fault("ROBOT_TAKEN_OUT", "manual"),
     )
     story = Story().see(completed="", moving=False).order(Act(9, "clean")).see(unanswered=True)
-    text = "nobody knows whether clean has begun: it is sent again after a reset"
+    text = "nobody knows whether clean has begun: a reset sends it again"
     assert story.report.faults == (Fault("ROBOT_ACTION_UNANSWERED", text),)
     story = driving(7, to=goal(0.0, level="L2"), completed="7", moving=False).see()
-    text = "it reports arrival, on another map from its goal"
+    text = "it reports arrival, but is on another map than its goal"
     assert story.report.faults == (Fault("ROBOT_NOT_THERE", text),)
     story = Story().see(at=at(5.0), charging=False).order(Navigate(7, DOCK_A))
     story.see(at=at(0.0), moving=False)

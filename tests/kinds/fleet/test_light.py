@@ -1,6 +1,7 @@
-"""A robot that RMF can only pause: its path, its pauses, and who may resume it (`light.py`).
+"""A robot that RMF can only pause: its path, its pauses, and when it may be resumed (`light.py`).
 
-The robot drives from x 0 over checkpoints at x 3 and x 6 to x 9, and needs up to 1 m to stand.
+The robot drives from x = 0 over checkpoints at x = 3 m and x = 6 m to x = 9 m. After a pause it still
+drives up to 1 m.
 """
 
 from typing import Any
@@ -20,7 +21,7 @@ FIRST = {"path": PATH, "moving": False, "paused": False}
 
 
 def standing(**sample: Any) -> Story:
-    """Return the story of a robot that stands at x 0 and gets the path."""
+    """Return a story of a robot that stands at x = 0, and has just been sent on the path."""
     story = Story(LIGHT, RobotSample(at(0.0), 0.8, moving=False, paused=False, path=()))
     return story.see().see(**{**FIRST, **sample})
 
@@ -37,7 +38,8 @@ def started() -> Story:
 
 
 def asked(story: Story) -> tuple[int, int, str]:
-    """Return path, checkpoint and state of the question for RMF."""
+    """Return the number of the path, the last reached checkpoint, and whether the robot moves or stands
+    there."""
     light = story.report.light
     assert light
     return light.number, light.checkpoint, light.stands
@@ -101,7 +103,7 @@ def test_a_path_over_a_lift_goes_on_at_the_other_floor() -> None:
     assert asked(story) == (1, 2, "moving")
 
 
-# ---- when it pauses (FLEET-LIGHT-2)
+# ---- when the robot is paused (FLEET-LIGHT-2)
 
 
 def test_without_an_answer_it_is_paused() -> None:  # FLEET-LIGHT-2
@@ -160,7 +162,7 @@ def test_an_answer_about_an_earlier_path_does_not_count() -> None:
     assert says(story, "continue", 0, path=1).memory.light.answer is None
 
 
-# ---- a pause is believed when the robot stands (FLEET-4)
+# ---- a pause counts as obeyed only when the robot stands (FLEET-4)
 
 
 def test_a_robot_that_does_not_pause_is_told_again_and_the_fault_said() -> None:  # FLEET-4
@@ -191,7 +193,7 @@ def test_a_robot_beyond_its_light_is_told_and_gets_its_path_anew() -> None:  # F
     assert not story.faults
 
 
-# ---- standing before a checkpoint (FLEET-LIGHT-3)
+# ---- a robot that stands right before a checkpoint (FLEET-LIGHT-3)
 
 
 def test_a_robot_that_stands_before_a_granted_checkpoint_counts_as_there() -> None:
@@ -209,12 +211,12 @@ def test_a_checkpoint_that_was_not_granted_is_not_reported() -> None:  # FLEET-L
     assert asked(story) == (1, 0, "at")
     says(story, "resume", 0).see()
     assert asked(story) == (1, 1, "at")
-    assert story.memory.command is None, "it could not stop there: it waits for the next one"
+    assert story.memory.command is None, "it could not stop there: it waits for the next checkpoint"
     says(story, "resume", 1)
     assert story.commands[-1][1] == "resume 2, attempt 1"
 
 
-# ---- who may resume it (FLEET-LIGHT-4)
+# ---- when a paused robot may be resumed (FLEET-LIGHT-4)
 
 
 def test_a_resume_is_sent_again_until_the_robot_goes_on() -> None:
@@ -263,7 +265,7 @@ def test_a_restart_knows_whom_it_has_paused() -> None:  # FLEET-LIGHT-4
         KEEPING.restore(b'{"held": 3}', 0.0)
 
 
-# ---- what people read
+# ---- the texts in the report
 
 
 def test_its_doing_names_path_checkpoint_light_and_pause() -> None:

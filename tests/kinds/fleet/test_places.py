@@ -1,5 +1,5 @@
-"""A robot's place after silence, on another map, off the graph and after a lift ride (FLEET-5, FLEET-6,
-FLEET-7)."""
+"""The place that is reported for a robot: after a silence, on another map, off the graph, and after a
+lift ride (FLEET-5, FLEET-6, FLEET-7)."""
 
 import math
 from typing import Any
@@ -89,7 +89,7 @@ def test_a_robot_that_turns_on_the_spot_does_not_stand() -> None:  # FLEET-SENSI
 def test_another_map_is_named_and_not_sent() -> None:  # FLEET-6
     story = Story().see(at=Pose("basement", 0.0, 0.0))
     assert story.report.at is None
-    text = "it is on 'basement', and the graph has L1, L2"
+    text = "it is on the map 'basement', but the graph has L1, L2"
     assert story.report.faults == (Fault("ROBOT_ON_OTHER_MAP", text),)
     assert not story.report.fit
 

@@ -1,5 +1,8 @@
-"""Any readings of a robot and any orders of RMF. No stale or impossible place reaches RMF, and no
-command counts as done before the robot has carried it out."""
+"""Rules that hold for any readings of a robot and any orders of RMF.
+
+RMF must never get a stale place, or a place that does not exist. A command must not count as done
+before the robot has carried it out.
+"""
 
 import math
 from typing import Any
@@ -78,7 +81,7 @@ def test_rmf_gets_only_fresh_and_possible_places_and_true_ends(
             assert report.at.map in ("L1", "L2")
             assert all(map(math.isfinite, (report.at.x, report.at.y, report.at.yaw)))
         if memory.finished != before.finished:
-            is_new = isinstance(event, Navigate | Localize | Act)  # the robot already stood there
+            is_new = isinstance(event, Navigate | Localize | Act)  # the robot stood there already
             done = event if is_new else before.command
             assert done is not None
             assert memory.finished == done.id

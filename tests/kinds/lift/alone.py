@@ -1,4 +1,4 @@
-"""The lift's core without driver or network. Tests give events to the core at chosen times."""
+"""The lift's core without driver and network. Tests give events to the core at chosen times."""
 
 from typing import Any
 
@@ -33,7 +33,8 @@ ASKED = LiftRequested("A", True, "L1")
 
 
 class Alone:
-    """A core without driver. The test gives it events. `decision` is the core's last decision."""
+    """The lift's core without a driver. The test gives events to the core. `decision` is the last
+    decision."""
 
     def __init__(
         self, debounce: dict[str, float] | None = None, by_call: bool = False, **limits: Any

@@ -1,6 +1,6 @@
 """Rules for every decision of the lift's core, in any history.
 
-The rules compare the event, the inputs and the outputs with the core's memory.
+The rules compare the event and the inputs with the decision: its outputs, its report and its memory.
 """
 
 import math
@@ -39,10 +39,13 @@ def check(step: Step) -> None:
 
 
 def outputs_make_sense(step: Step) -> None:
-    """Require that no output calls a landing while another output holds a door.
+    """Require that the outputs are possible together, and that each output is permitted.
 
-    A call and a held door both need AGV mode, a session and the right floor. On some lifts a call
-    brings AGV mode. There such a call needs no AGV mode, and may name the car's own landing.
+    No output calls a landing while another output holds a door. Both need AGV mode, and a session or
+    the grace after it. A call goes to the session's floor, and a door is held only there.
+
+    On lifts with `by_call` a call brings AGV mode. Such a call needs no AGV mode, and may go to the
+    car's own landing.
     """
     driven, memory, sample = step.decision.outputs, step.decision.memory, step.world.sample
     session, grace = memory.session, memory.grace
@@ -70,14 +73,14 @@ def outputs_make_sense(step: Step) -> None:
 
 
 def nothing_is_driven_when_forbidden(step: Step) -> None:
-    """Require all outputs off, at once, whenever driving is forbidden.
+    """Require that all outputs go off at once whenever driving is forbidden.
 
     These facts forbid driving:
     - a hazard except overload, or a latched fire,
-    - a second node of this name,
+    - a second node that publishes states of this lift,
     - no fresh reading,
-    - HUMAN mode,
-    - a fault of the session that waits for a retry.
+    - HUMAN mode, requested by the holder of the session,
+    - a fault of the session, until the core tries again.
     """
     memory, now = step.decision.memory, step.now
     session = memory.session
@@ -94,12 +97,13 @@ def nothing_is_driven_when_forbidden(step: Step) -> None:
 
 
 def sessions_end_by_end_alone(step: Step) -> None:
-    """Require sessions to begin and end only as the rules permit.
+    """Require that sessions begin and end only as the rules permit.
 
-    A request begins a session of a free lift. The holder's END ends the session. The silence of a robot
-    after its supervisor's END also ends the session. No other event ends a session.
+    A request begins a session of a free lift. The holder's END ends the session. The session also ends
+    if the supervisor has sent END and the robot's own adapter is silent. No other event ends a session.
 
-    In the grace the lift goes back to a robot that may be in the car, and to no other session.
+    In the grace after END the lift goes back to a robot that may still be in the car. No other session
+    gets the lift then.
     """
     before, after, event = _id(step.before), _id(step.decision.memory), step.event
     if before and _fell_silent(step):
@@ -133,8 +137,8 @@ def _is_asked_for(event: object, session: str) -> bool:
 
 
 def _fell_silent(step: Step) -> bool:
-    """Return whether the robot has been silent for five seconds after the supervisor's END for its
-    session."""
+    """Return whether the supervisor has sent END for the session, and its robot has been silent for
+    five seconds."""
     session = step.before.session
     assert session is not None
     disowned = session.forgotten is not None and session.forgotten.disowned
@@ -142,10 +146,11 @@ def _fell_silent(step: Step) -> bool:
 
 
 def _is_its_end(step: Step, event: object) -> bool:
-    """Return whether the event is an END that counts.
+    """Return whether the event is an END that must end the session.
 
-    A person's END counts. The supervisor's END counts if the robot no longer repeats its request. The
-    END of the robot's own adapter counts after a first END, or after the supervisor's END.
+    A person's END must end it. The supervisor's END must end it if the robot no longer repeats its
+    request. An END from the robot's own adapter must end it if this adapter or the supervisor has sent
+    END before.
     """
     session = step.before.session
     assert session is not None
@@ -165,9 +170,9 @@ def _is_its_end(step: Step, event: object) -> bool:
 
 
 def open_is_the_truth(step: Step) -> None:
-    """Require a car that stands at a known floor with its door open whenever the lift shows OPEN.
+    """If the report shows OPEN, require a car that stands at a known floor with its door open.
 
-    If the lift has a fault, it must not show OPEN to a robot outside.
+    While the lift has a fault, the report must not show OPEN to a robot that is outside.
     """
     shown: LiftReport = step.decision.report
     if shown.door is not LiftDoor.DOOR_OPEN:
@@ -192,10 +197,10 @@ def open_is_the_truth(step: Step) -> None:
 
 
 def a_request_that_waits_has_a_reason(step: Step) -> None:
-    """Require a reason for each waiting request.
+    """Require a reason in the report for each request that waits.
 
-    A request waits if it has the session and the lift does not show OPEN at the requested floor. A worn
-    relay that must rest also requires a fault.
+    A request waits if it has the session and the lift does not show OPEN at the requested floor. If the
+    reason is a relay that has switched on too often, the rule also requires a fault.
     """
     shown, session = step.decision.report, step.decision.memory.session
     event = step.event
@@ -228,7 +233,8 @@ def _worn(channel: Any, step: Step) -> bool:
 
 
 def nothing_changes_before_wake_at(world: World, limits: LiftLimits) -> None:
-    """Require that a scan before `wake_at` with the same inputs changes neither outputs nor report."""
+    """Scan now, and scan again right before the core's `wake_at` with the same inputs. Require that the
+    outputs and the report stay the same."""
     now = _scan(world, world.memory, 0.0, limits)
     until = min(now.wake_at, 1e4)
     later = _scan(world, now.memory, until * (1.0 - 1e-6), limits)
@@ -245,7 +251,7 @@ def _scan(world: World, memory: LiftMemory, now: float, limits: LiftLimits) -> A
 
 
 def _sampled(step: Step) -> bool:
-    """Return whether this step is a reading that counts at once, because nothing is debounced."""
+    """Return whether the step has a reading that counts at once, because this lift has no debounce."""
     read = step.world.readable and not isinstance(step.event, IoFailed)
     return step.exact and (read or isinstance(step.event, Sampled))
 

@@ -18,12 +18,12 @@ REPLAYED = 100
 
 
 class World:
-    """The lift's node, RMF's supervisor and fleet adapters.
+    """The lift's node, and stand-ins for RMF's supervisor and RMF's fleet adapters.
 
-    - `fate` gives the delays (s) with which a LiftRequest reaches the node. An empty list loses the
-      request, and two delays double it.
-    - `hears` decides whether RMF gets a LiftState.
-    - `adapters_first` gives each state to the robots before the supervisor.
+    - `fate` gives the delays (s) with which a LiftRequest reaches the node. With an empty list the
+      request is lost, and with two delays it arrives twice.
+    - `hears` decides whether the supervisor and the adapters get a LiftState.
+    - `adapters_first` says that the adapters get each state before the supervisor gets it.
 
     By default all messages arrive at once and in order.
     """
@@ -41,7 +41,7 @@ class World:
         story.hear = self._hear
 
     def run(self, until: float) -> None:
-        """Let time pass, and deliver delayed requests."""
+        """Let time pass until the time `until`, and deliver delayed requests."""
         while self.story.now < until:
             self.story.run(min(until, self.story.now + STEP_S))
             arrived = [r for at, r in self._flying if at <= self.story.now]
@@ -90,7 +90,7 @@ class World:
         self._arrive()
 
     def finds_again(self, robot: RobotContext, apart_s: float = 0.02) -> None:
-        """Let the supervisor find an adapter that was cut off, and hear the adapter's retained
+        """End the isolation of this robot's adapter. The supervisor then gets the adapter's retained
         requests."""
         for request in self.asked_by(robot):
             self._deliver(self.supervisor.hear(request, self._now))
@@ -102,7 +102,8 @@ class World:
         return self._history[robot.requester_id][-REPLAYED:]
 
     def restart_adapter(self, robot: RobotContext) -> RobotContext:
-        """Start a new fleet adapter for the same robot, without a task and without a lift."""
+        """Start a new fleet adapter for the same robot. The new adapter has no task, and does not use a
+        lift."""
         fresh = RobotContext(robot.requester_id)
         fresh.on_task = False
         self.robots[self.robots.index(robot)] = fresh

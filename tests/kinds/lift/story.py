@@ -1,7 +1,7 @@
 """A lift in virtual time: the real node and core, and a building that tests control.
 
-The node scans every `scan_s`, at every `wake_at` and with every request, as the daemon's loop does.
-Histories are lists of (s, event), so a test can compare a whole history with ==.
+The node scans every `scan_s`, at every `wake_at`, and whenever a request comes, as in the daemon's
+loop. Histories are lists of (s, event), so a test can compare a whole history with ==.
 """
 
 import math
@@ -55,11 +55,11 @@ STANDING = LiftSample("L1", DoorReading.CLOSED, motion=Motion.STOPPED, agv=False
 
 
 class Building:
-    """A lift that does nothing by itself. The test sets its inputs (`drivers.Driver[LiftSample,
-    LiftOutputs]`).
+    """A lift that does nothing by itself, in the place of a driver (`drivers.Driver[LiftSample,
+    LiftOutputs]`). The test sets its inputs.
 
-    `edges` has (s, output, value). `unreadable` and `unwritable` are the reasons why reading or writing
-    fails, or "".
+    `edges` has (s, output, value). `unreadable` is the reason why reading fails, or "" if reading
+    succeeds. `unwritable` is the same for writing.
     """
 
     def __init__(self, sample: LiftSample = STANDING) -> None:
@@ -118,10 +118,11 @@ def _of(outputs: LiftOutputs, name: str) -> Any:
 
 
 class Controller(Building):
-    """A lift that works. It grants AGV mode, goes to called floors, and opens its door for a hold.
+    """A lift that works. It grants AGV mode, goes to called floors, and opens its door when the door is
+    held.
 
-    A ride of one floor takes `FLOOR_S`. In the middle of the ride the lift shows no floor. Opening or
-    closing takes `DOOR_S`.
+    A ride of one floor takes `FLOOR_S`. In the middle of the ride the lift shows no floor. The door
+    opens or closes in `DOOR_S`.
     """
 
     AGV_S, FLOOR_S, DOOR_S = 0.5, 2.0, 1.0
@@ -190,10 +191,10 @@ def words(state: LiftState) -> str:
 
 
 class Story:
-    """One lift in service.
+    """A lift with its node, in service.
 
-    `told` has (s, LiftState) for every state that RMF heard. The story calls `hear` with each state. If
-    `hear` puts messages into `incoming`, they arrive at once.
+    `told` has (s, LiftState) of every published state. For each state the story calls `hear`. Messages
+    that `hear` puts into `incoming` reach the node right after the scan.
     """
 
     def __init__(
@@ -263,12 +264,13 @@ class Story:
         return round(self.now, 2)
 
     def asks(self, session: str, floor: str, mode: LiftRequestType = AGV) -> None:
-        """Let a request arrive in the form that fleet adapters and rmf-web send."""
+        """Let a request for this floor arrive, with the fields that fleet adapters and rmf-web fill
+        in."""
         self.request(LiftRequest("Lift1", session_id=session, request_type=int(mode),
                                  destination_floor=floor, door_state=2))  # fmt: skip
 
     def ends(self, session: str) -> None:
-        """Let END_SESSION arrive in the form that fleet adapters send: no floor, and door 0."""
+        """Let END_SESSION arrive without a floor and with door_state 0, as fleet adapters send it."""
         self.request(LiftRequest("Lift1", session_id=session, request_type=int(END)))
 
     def request(self, *requests: LiftRequest) -> None:
@@ -338,7 +340,7 @@ class Story:
             self.receive(*arrived)
 
     def _alarm_hears(self, event: Any) -> None:
-        """Let the daemon's core for fleet alarms decide."""
+        """Give this event to the daemon's core for the fleets' alarm, and note what it publishes."""
         limits = alarming.alarm_limits({"Lift1": self.settings})
         if limits is not None:
             made = fleet_alarm.decide(self._alarm, event, self.now, limits)
@@ -358,8 +360,8 @@ OPEN_AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
 
 
 def boarding(**inputs: object) -> Story:
-    """Return a story in which A waits at L1 and the lift stands open there. `inputs` changes the
-    reading."""
+    """Return a story in which A has requested L1, where the car stands with an open door. `inputs`
+    changes the lift's inputs."""
     story = Story(Building(replace(OPEN_AT_L1, **inputs)))
     story.run(1.0)
     story.asks("A", "L1")

@@ -1,7 +1,8 @@
-"""Each wire and each part of the lift breaks in turn during rides of RMF's robots.
+"""Rides of RMF's robots on a simulated lift, in which one wire or one part is broken.
 
-Node, driver, wires and plant take part. A robot may wait for ever at a broken part, but the lift must
-not show OPEN for a closed door. After the repair the robot gives up, and the next ride completes.
+The node, the driver and the wires take part. A robot may wait for ever at a broken part, but the lift
+must not show OPEN while its door is closed. After the repair the robot gives up, and another robot must
+complete a ride.
 """
 
 from dataclasses import dataclass
@@ -19,14 +20,14 @@ from tests.kinds.lift.wired import WiredStory, shipped
 from workbench.rmf_model.robot import RobotContext
 
 LATE_S = 0.3
-"""The greatest permitted age of a state (s): debounce, one scan, and the least gap between two
-states."""
+"""The longest time (s) for which a state may still show an open door. It consists of the debounce, one
+scan, and the least time between two states."""
 
 WIRES = [w.signal for w in wires(shipped())]
 WIRE_FAILURES: list[FailureMode] = ["off", "stuck", "wrong"]
 LIES = {("door", "wrong")}
-"""The failures that may show a false OPEN. A broken contact says open, and no second contact
-contradicts."""
+"""The failures after which the lift may wrongly show OPEN. The only contact of the door reports
+"open"."""
 
 BREAKS = [(w, mode) for w in WIRES for mode in WIRE_FAILURES if (w, mode) not in LIES]
 BREAKS += [(p, m) for p, modes in FAILS.items() for m in modes if p != "rear_door_operator"]
@@ -34,8 +35,8 @@ BREAKS += [(p, m) for p, modes in FAILS.items() for m in modes if p != "rear_doo
 
 @dataclass
 class Witness:
-    """A witness that looks at the real car at each state. The witness remembers the landing with an
-    open door."""
+    """A check of each published state against the simulated car. It remembers the landing at which the
+    car last stood with an open door."""
 
     story: WiredStory
     open_at: str | None = None
@@ -54,7 +55,7 @@ class Witness:
 
 
 def ride(broken: str, mode: FailureMode, broken_at: float) -> WiredStory:
-    """Play a ride on a lift with this failure. After the repair the robot gives up, and another robot
+    """Let a robot ride while this part fails. After the repair the robot gives up, and another robot
     rides."""
     story = WiredStory(scan_s=0.1, agv_timeout_s=5, floor_timeout_s=10, door_timeout_s=5)
     robot, other = RobotContext("fleet/a"), RobotContext("fleet/b")

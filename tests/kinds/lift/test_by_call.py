@@ -1,4 +1,5 @@
-"""LIFT-DRIVE-2, LIFT-DRIVE-5: on this lift only a call brings AGV mode. No output requests AGV mode."""
+"""LIFT-DRIVE-2, LIFT-DRIVE-5: a lift with `agv_mode: by_call`. A call brings AGV mode, and no output
+requests it."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -28,7 +29,8 @@ CONFIG = Path(__file__).parents[3] / "config" / "lift_by_call.yaml"
 
 
 def simulator() -> WiredStory:
-    """Return the lift of the open simulator, as `config/lift_by_call.yaml` wires it."""
+    """Return the lift of `config/lift_by_call.yaml`, wired as the open-source lift simulator needs
+    it."""
     settings = load(CONFIG).devices["Lift1"]
     assert isinstance(settings, DryContactLiftSettings)
     story = WiredStory(settings)
@@ -78,7 +80,8 @@ def test_agv_mode_ends_with_the_hold_after_a_whole_ride() -> None:
 
 
 def called(agv: bool = True) -> tuple[Building, Story]:
-    """Return a car at L1 that a robot has called to L3. With `agv` the lift has granted AGV mode."""
+    """Return a car at L1 that a robot has called to L3. If `agv` is true, the lift has granted AGV
+    mode."""
     building = Building(replace(STANDING, agv=False))
     story = Story(building, agv_mode="by_call", agv_timeout_s=5)
     story.run(1.0)
@@ -133,7 +136,7 @@ def calls_and_holds(
 
 
 def test_a_car_that_has_come_is_not_called_again_when_its_floor_is_unknown() -> None:
-    """With `by_call` in AGV mode, the core calls a car again only after a reading at another floor."""
+    """In AGV mode a lift with `by_call` is called again only after a reading at another floor."""
     alone = Alone(by_call=True)
     below = replace(CLOSED, level="L2", agv=False)
     readings = [
@@ -156,8 +159,8 @@ def test_a_car_that_has_come_is_not_called_again_when_its_floor_is_unknown() -> 
 
 
 def test_a_car_at_its_destination_is_called_again_when_agv_mode_has_ended_by_itself() -> None:
-    """With `by_call`. An overload ended the hold. Then all outputs were off, because no floor was
-    read."""
+    """On this lift (`by_call`) an overload has ended the hold. Then all outputs went off, because no
+    floor was read."""
     alone = Alone(by_call=True)
     below, gone = replace(CLOSED, level="L2"), replace(CLOSED, level=None)
     readings = [

@@ -13,8 +13,8 @@ from tests.kinds.lift.wired import GatewayBuilding, WiredStory
 
 CONFIG = Path(__file__).parents[3] / "config"
 ELSEWHERE = {"lift_supervisor.yaml", "lift_http.yaml", "lift_two_buses.yaml"}
-"""A file without a lift, and files whose lifts ride in tests/runtime/test_http_lift.py and
-test_other_bus.py."""
+"""The examples that this file leaves out. The first has no lift. The others are tested in
+tests/runtime/test_http_lift.py and tests/runtime/test_other_bus.py."""
 EXAMPLES = sorted({path.name for path in CONFIG.glob("lift_*.yaml")} - ELSEWHERE)
 A = "fleet/a"
 
@@ -35,7 +35,7 @@ def in_service(name: str) -> Story:
 
 
 def told(story: Story) -> list[str]:
-    """Return the states that RMF heard, without the states between two floors."""
+    """Return the states that RMF heard, except the states from the ride between two floors."""
     return [words for _, words in story.states if "moving" not in words and "at ?" not in words]
 
 

@@ -44,11 +44,11 @@ FAULTS: dict[str, tuple[list[tuple[float, Any]], Fault]] = {
     ),
     "a door whose number means nothing": (
         [(0.0, replace(AT_L1, door=DoorReading.UNKNOWN))],
-        Fault("DOOR_CODE_ILLEGAL", "the YAML does not list the door's number"),
+        Fault("DOOR_CODE_ILLEGAL", "the YAML does not list the number of the door's position"),
     ),
     "a rear door whose number means nothing": (
         [(0.0, replace(AT_L1, rear_door=DoorReading.UNKNOWN))],
-        Fault("DOOR_CODE_ILLEGAL", "the YAML does not list the rear door's number"),
+        Fault("DOOR_CODE_ILLEGAL", "the YAML does not list the number of the rear door's position"),
     ),
     "up and down at once": (
         [(0.0, replace(AT_L1, motion=Motion.CONTRADICTORY))],

@@ -1,4 +1,5 @@
-"""LIFT-SENSING-3, LIFT-SENSING-4: the floor code, and floors that the car cannot have reached."""
+"""LIFT-SENSING-3, LIFT-SENSING-4: floor codes, and readings of floors that the car cannot have
+reached."""
 
 from msgspec.structs import replace
 

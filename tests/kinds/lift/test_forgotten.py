@@ -1,7 +1,9 @@
-"""LIFT-2: RMF's supervisor has forgotten the robot in the car. Tests by RMF's rules, then rule by rule.
+"""LIFT-2: RMF's supervisor has forgotten the robot in the car.
 
 RMF's supervisor (rmf_ros2, lift_supervisor/Node.cpp) has one slot for each lift. The first session that
-asks takes the slot. The supervisor drops all requests of other sessions, even END.
+requests the lift gets the slot. The supervisor drops all requests of other sessions, even END.
+
+The first tests use stand-ins that follow RMF's rules. The other tests check our rules one by one.
 """
 
 from collections.abc import Sequence
@@ -83,8 +85,10 @@ def test_a_lost_end_is_heard_from_its_adapter_although_another_robot_waits() -> 
 
 
 class Overheard:
-    """A lift that stands open at L2 and that `A` holds. `adapter` sends A's requests directly to the
-    node."""
+    """A lift that stands at L2 with an open door, and that robot A holds.
+
+    `adapter` sends the requests of A's adapter directly to the node.
+    """
 
     def __init__(self, building: Building | None = None) -> None:
         self.story = Story(building or Controller())

@@ -1,4 +1,4 @@
-"""A hazard or a rival node takes the lift away from RMF. After its end RMF gets the lift back."""
+"""A hazard or a second node takes the lift away from RMF. When it is over, RMF gets the lift back."""
 
 import pytest
 from msgspec.structs import replace
@@ -37,8 +37,8 @@ MODES = [
 
 
 def waiting(**options: object) -> Story:
-    """Return a story in which A waits outside at L1. The car stands there with its door held but
-    closed."""
+    """Return a story in which robot A waits outside at L1. The car stands at L1. The core holds the
+    door open, but the door is still closed."""
     story = Story(Building(CLOSED_AT_L1), door_timeout_s=600, **options)  # type: ignore[arg-type]
     story.run(1.0)
     story.asks("A", "L1")
@@ -48,7 +48,8 @@ def waiting(**options: object) -> Story:
 
 
 def inside(**options: object) -> Story:
-    """Return a story in which A may be inside at L1, because RMF has heard of the open door."""
+    """Return a story in which robot A may be in the car at L1, because the lift has shown its open door
+    to RMF."""
     story = Story(Building(OPEN_AT_L1), **options)  # type: ignore[arg-type]
     story.run(1.0)
     story.asks("A", "L1")
@@ -56,7 +57,7 @@ def inside(**options: object) -> Story:
     return story
 
 
-# ---- LIFT-5: when the open door is shown
+# ---- LIFT-5: when the lift shows its open door
 
 
 @pytest.mark.parametrize(("hazard", "mode"), MODES)
@@ -375,7 +376,7 @@ def test_the_alarm_topic_gets_true_once_and_false_only_after_a_reset(
     story.run(8.0)
     building.hazard(Hazard.FIRE)
     story.run(10.0)
-    story.resets()  # the fire still burns
+    story.resets()  # refused, because the fire still burns
     building.hazard()
     story.run(100.0)
     assert story.alarms == [(2.1, on)]
@@ -393,7 +394,7 @@ def test_with_the_setting_a_code_blue_alarms_the_fleets_until_a_reset() -> None:
     on, off = EmergencySignal((), True), EmergencySignal((), False)
     story.building.hazard(Hazard.CODE_BLUE)
     story.run(5.0)
-    story.building.hazard(Hazard.CODE_BLUE, Hazard.FIRE)  # the fleets hear one alarm, and only once
+    story.building.hazard(Hazard.CODE_BLUE, Hazard.FIRE)  # the second hazard raises no second alarm
     story.run(8.0)
     story.building.hazard()
     story.run(20.0)

@@ -1,4 +1,5 @@
-"""Relays that must not be on together, rests between changes, and switching off without delay."""
+"""Relays that must not be on together, relays that must stay off for some time, and switching off at
+once."""
 
 import pytest
 from msgspec.structs import replace
@@ -18,8 +19,10 @@ def limits(**changes: float) -> LiftDurations:
 def driven(
     relays: Relays, wishes: list[tuple[float, LiftOutputs]], rules: LiftDurations
 ) -> list[str]:
-    """Return the outputs after each wish. `A` stands for AGV mode, before the called floor or the held
-    door."""
+    """Return the outputs after each of these ordered outputs (`wishes`), as text.
+
+    `A` stands for the request of AGV mode. The called floor or the held door follows.
+    """
     shown = []
     for now, wish in wishes:
         relays = relays.step(wish, now, rules)
@@ -57,7 +60,7 @@ def test_two_doors_are_never_held_together_and_relays_rest_between_them() -> Non
     assert driven(Relays(), wishes, limits(min_off_s=0)) == ["A front", "A", "A", "A rear"]
 
 
-# ---- LIFT-DRIVE-6: a relay rests, but switching off never waits
+# ---- LIFT-DRIVE-6: a relay stays off for some time, but switching off never waits
 
 
 def test_an_output_stays_off_for_its_least_time() -> None:
@@ -165,7 +168,7 @@ def test_a_door_that_is_open_only_for_its_dwell_time_is_not_offered(inside: bool
         story.building.set(door=DoorReading.OPEN)
         story.until(lambda: story.state == "AGV, open at L1, A to L1")
         story.building.set(door=DoorReading.CLOSED)
-    for motion in (Motion.UP, Motion.STOPPED) * 2:  # the relay switches until it must rest
+    for motion in (Motion.UP, Motion.STOPPED) * 2:  # the relay switches on too often
         story.run(story.now + 1.0)
         story.building.set(motion=motion)
     story.run(8.0)

@@ -1,8 +1,9 @@
-"""LIFT-2: RMF's supervisor ends a session while its robot is in the car, or leaves a robot in the car.
+"""LIFT-2: RMF's supervisor ends the session of a robot that is in the car.
 
-The first stories follow RMF's own rules (rmf_ros2, lift_supervisor/Node.cpp). A supervisor that starts
-sends END for the session that the lift shows. It then takes the first session that asks. A fleet
-adapter that starts sends END for its robot's session (RobotContext.cpp, _check_lift_state).
+The first stories follow RMF's own rules (rmf_ros2, lift_supervisor/Node.cpp). After its start a
+supervisor sends END for the session that the lift shows. Then it serves the first session that requests
+the lift. A fleet adapter that starts sends END for its robot's session (RobotContext.cpp,
+_check_lift_state).
 """
 
 import pytest
@@ -24,7 +25,7 @@ LEFT_S = 60.0
 def riding(
     jazzy: bool = False, adapters_first: bool = False
 ) -> tuple[World, RobotContext, RobotContext]:
-    """Return the world and its two robots. A rides from L2 to L4, and B waits at L1."""
+    """Return the stand-ins of RMF, robot A and robot B. A rides from L2 to L4, and B waits at L1."""
     a, b = RobotContext(A, jazzy), RobotContext(B, jazzy)
     rmf = world(a, b, adapters_first=adapters_first)
     rmf.supervisor = LiftSupervisor(jazzy)
@@ -44,7 +45,7 @@ def riding(
 def test_a_restarted_supervisor_takes_no_lift_from_a_robot_in_the_car(
     jazzy: bool, adapters_first: bool, after_s: float
 ) -> None:
-    """The supervisor restarts at different moments of the ride. The robot keeps the lift each time."""
+    """Restart the supervisor at different moments of the ride. Robot A must keep the lift each time."""
     rmf, a, b = riding(jazzy, adapters_first)
     rmf.run(rmf.story.now + after_s)
     edges = list(rmf.story.edges)
@@ -65,14 +66,15 @@ def test_a_restarted_supervisor_takes_no_lift_from_a_robot_in_the_car(
     rmf.until_done(b)
     assert sessions(rmf.story) == ["", A, "", B]
     granted_at = next(at for at, state in rmf.story.told if state.session_id == B)
-    assert granted_at - released_at < 6.0  # the grace of 3 s, then RMF's next request
+    assert granted_at - released_at < 6.0  # 3 s of grace after END, and then B's next request
 
 
 CALLED_AND_HELD = [("call", None), ("hold_door", "front")]
 
 
 class InMidRide(Overheard):
-    """A lift that let A in at L2 and now takes A to L4. A's adapter has just repeated its request."""
+    """A lift that robot A entered at L2 and that is on its way to L4. A's adapter has just repeated the
+    request."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -262,7 +264,7 @@ def test_a_person_who_has_looked_into_the_car_gives_the_lift_to_the_next_robot()
     assert sessions(lift.story)[-1] == B
 
 
-# ---- LIFT-2: an END from before the session
+# ---- LIFT-2: an END that was sent before the session began
 
 
 def test_an_end_from_before_the_session_counts_after_a_second_of_repeats() -> None:

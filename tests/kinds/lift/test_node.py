@@ -81,7 +81,7 @@ def test_a_lift_that_was_never_read_is_offline_with_stamp_zero_and_nothing_is_wr
         )
     }
     assert story.node.ready
-    assert building.writes == 1  # the claim of the outputs writes every output off
+    assert building.writes == 1  # opening the driver switches all outputs off
     assert story.faults == ["INPUTS_NOT_FRESH"]
 
 
@@ -106,7 +106,7 @@ def test_the_log_has_one_line_for_a_lost_device_and_one_for_its_return(
         lines = [r.getMessage().split()[0] for r in caplog.records]
         assert (lines.count("device_lost"), lines.count("device_back")) == (1, 1)
         assert (lines.count("fault"), lines.count("fault_over")) == (1, 1)
-        assert len(lines) == 6  # two more lines: the device is lost, and it is back
+        assert len(lines) == 6  # also the line with the state, after the loss and after the return
 
 
 def test_a_new_daemon_that_finds_agv_mode_waits_for_a_request() -> None:

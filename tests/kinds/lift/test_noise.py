@@ -1,4 +1,5 @@
-"""Jazzy's RMF repeats some messages at every start, at every handover, and each second without work.
+"""Messages that Jazzy's RMF repeats: after each start, when the lift goes from one robot to the next,
+and each second while nobody uses the lift.
 
 The node must not warn about these repeats.
 """

@@ -1,4 +1,5 @@
-"""On a debounced lift the rules hold for any events in any order. RMF recovers after many failures."""
+"""The rules of a lift with debounce, for any events in any order. After many failures RMF must
+recover."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,8 +26,8 @@ STORMS = settings(max_examples=examples(40))
 
 @dataclass
 class Judge:
-    """A judge of every decision of a story. `open_seen_at` is the last time (s) with an open
-    contact."""
+    """A check of every decision of a story by the rules. `open_seen_at` is the time (s) of the last
+    reading of an open door."""
 
     building: Building
     open_seen_at: float = -1.0
@@ -46,7 +47,7 @@ class Judge:
 
 
 def judged(building: Building, **options: Any) -> tuple[Story, Judge]:
-    """Return a story, and the judge of its decisions."""
+    """Return a story, and the `Judge` that checks its decisions."""
     judge = Judge(building)
     return Story(building, kind=replace(KIND, decide=judge.decide), **options), judge
 
@@ -134,7 +135,8 @@ FATES = st.lists(
 
 
 def trouble(rmf: Rmf, robot: RobotContext, what: str) -> RobotContext:
-    """Restart one party, or let the building fail for half a second."""
+    """Restart the supervisor, the adapter or the node, start a short fire, or make the inputs
+    unreadable for 1.7 s."""
     story = rmf.story
     if what == "supervisor":
         rmf.restart_supervisor()

@@ -1,4 +1,7 @@
-"""RMF's supervisor hears requests of earlier rides again. Tests by RMF's rules, then rule by rule."""
+"""RMF's supervisor hears requests of earlier rides again, and passes them to the lift's node.
+
+The first tests use stand-ins that follow RMF's rules. The other tests check our rules one by one.
+"""
 
 from collections.abc import Mapping
 
@@ -17,7 +20,8 @@ OPEN_FOR_A = "AGV, open at L2, fleet/a to L2"
 
 
 def on_its_threshold(rides_before: int) -> tuple[World, RobotContext]:
-    """Return a world in which a robot enters the car at L3, after this number of earlier rides."""
+    """Return the stand-ins of RMF and a robot that enters the car at L3, after this number of earlier
+    rides."""
     robot = RobotContext(A)
     rmf = world(robot)
     for _ in range(rides_before):
@@ -35,8 +39,8 @@ def on_its_threshold(rides_before: int) -> tuple[World, RobotContext]:
 def test_requests_of_an_earlier_ride_release_no_door_while_a_robot_enters(
     rides_before: int,
 ) -> None:
-    """`make soak SEED=7 RMF=kilted` found this case. An adapter had been cut off for longer than a
-    lease."""
+    """`make soak SEED=7 RMF=kilted` found this case. The network had cut an adapter off for longer than
+    a DDS lease, so the supervisor got its retained requests again."""
     rmf, robot = on_its_threshold(rides_before)
     before = list(rmf.story.edges)
     rmf.finds_again(robot)
@@ -59,8 +63,8 @@ def test_after_a_supervisor_restart_requests_of_an_earlier_ride_release_no_door(
 
 
 def test_a_robot_that_was_cut_off_before_its_grant_stays_safe() -> None:
-    """`make soak SEED=7 RMF=kilted` found this case after 12.6 h. The robot's adapter was cut off
-    before the robot got the lift."""
+    """`make soak SEED=7 RMF=kilted` found this case after 12.6 h. The network had cut the robot's
+    adapter off before the lift was granted to the robot."""
     first, robot = RobotContext(B), RobotContext(A)
     rmf = world(first, robot)
     rmf.rides(robot, "L2", "L1")
@@ -82,8 +86,8 @@ def test_a_robot_that_was_cut_off_before_its_grant_stays_safe() -> None:
 def test_requests_of_an_earlier_ride_show_no_robot_a_released_door_as_open(
     after_s: float,
 ) -> None:
-    """RMF's real supervisor was dead when a robot's next ride began. The ride began at the floor where
-    the robot's last ride had ended.
+    """RMF's real supervisor was dead when a robot began its next ride, at the floor where its last ride
+    had ended.
 
     The lift still showed the state of the last ride, so the robot entered. Then the door closed.
     """
@@ -105,7 +109,7 @@ def test_requests_of_an_earlier_ride_show_no_robot_a_released_door_as_open(
     ]
 
 
-# ---- LIFT-REPLAYED-1, LIFT-REPLAYED-2, LIFT-REPLAYED-3: rule by rule
+# ---- LIFT-REPLAYED-1, LIFT-REPLAYED-2, LIFT-REPLAYED-3: our rules one by one
 
 
 def test_a_floor_that_only_the_supervisor_requests_counts_after_three_seconds() -> None:

@@ -1,7 +1,8 @@
-"""The twelve defects of RMF's first lift node for dry contacts. That node fails each story.
+"""The twelve defects of RMF's first lift node for dry contacts. That old node would fail each of these
+tests.
 
-The old node is sharp-rmf/low_level_lift 4425e25 (2020). The letters of the defects are ours. The name
-of a test describes the behaviour of the old node.
+The old node is sharp-rmf/low_level_lift 4425e25 (2020). We gave the defects the letters a to l. The
+name of a test says what the old node did. The test checks that our node does not do it.
 """
 
 import logging
@@ -56,8 +57,8 @@ def test_defect_c_a_call_that_timed_out_stayed_on() -> None:
 
 
 def test_defect_d_a_request_blocked_the_node_until_the_car_came() -> None:
-    """In this project a request takes no time. A hazard right after the request counts in the next
-    scan."""
+    """In this project the node accepts a request at once, and does not wait for the car. So a hazard
+    right after the request counts in the next scan."""
     story = Story(Controller())
     story.run(1.0)
     story.asks("A", "L4")
@@ -114,7 +115,7 @@ def test_defect_h_a_missing_or_changing_code_read_as_a_wrong_floor(
 ) -> None:
     story = Story(Building(LiftSample(level, DoorReading.CLOSED, motion=Motion.UP, agv=True)))
     story.run(1.0)
-    story.building.set(level="L3")  # the two bits of a floor code do not change together
+    story.building.set(level="L3")  # the two bits of the floor code change one after the other
     story._scan()
     story.run(1.05)
     story.building.set(level=level)

@@ -1,4 +1,5 @@
-"""When the core believes inputs that are broken, contradictory, old, restless, or from a moving car."""
+"""When the core trusts its inputs. The inputs are broken, contradictory, old, unsteady, or from a
+moving car."""
 
 import pytest
 from msgspec.structs import replace
@@ -157,7 +158,7 @@ def test_a_movement_counts_at_once_after_invalid_motion_lines() -> None:
     assert story.state == "AGV, moving at L1"
 
 
-# ---- LIFT-SENSING-2, LIFT-4: gaps
+# ---- LIFT-SENSING-2, LIFT-4: gaps between readings
 
 
 def test_one_missed_reading_changes_nothing() -> None:
@@ -278,7 +279,7 @@ def test_a_glitch_with_a_gap_in_its_middle_changes_nothing() -> None:
     assert [state for _, state in story.states if "open" in state] == []
 
 
-# ---- LIFT-SENSING-1: restless inputs
+# ---- LIFT-SENSING-1: unsteady inputs
 
 
 def test_an_input_that_never_settles_is_not_believed() -> None:
@@ -400,7 +401,7 @@ def test_an_estimated_door_that_starts_to_move_is_no_longer_shown_open() -> None
     assert story.node.status()["door"] == "moving"
 
 
-# ---- LIFT-SENSING-1, LIFT-SENSING-5: the times of waking
+# ---- LIFT-SENSING-1, LIFT-SENSING-5: when the core asks to be woken
 
 
 def test_the_core_wakes_when_an_input_seen_for_the_first_time_has_settled() -> None:

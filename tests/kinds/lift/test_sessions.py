@@ -1,5 +1,5 @@
-"""The session that holds the lift: its grant, its repeats, refusals, its END and the grace after
-END."""
+"""The session of a lift: how it is granted, repeated and refused, and how END and the grace after END
+end it."""
 
 from typing import Any
 
@@ -31,7 +31,8 @@ OPEN_AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
 
 
 def boarded() -> Story:
-    """Return a story in which a robot may be inside, because the lift showed OPEN 3 s ago."""
+    """Return a story in which robot A may be in the car, because the lift has shown OPEN for about 3
+    s."""
     story = Story(Building(OPEN_AT_L1))
     story.run(1.0)
     story.asks("A", "L1")
@@ -162,7 +163,7 @@ def test_no_output_is_switched_on_during_the_grace() -> None:
     story.run(1.0)
     story.asks("A", "L1")
     story.run(1.3)
-    story.ends("A")  # the car stands open in AGV mode, but no session asks for it
+    story.ends("A")  # END comes before the lift grants AGV mode
     story.run(10.0)
     assert story.edges == [(1.0, "agv_request", True), (4.3, "agv_request", False)]
 

@@ -1,4 +1,5 @@
-"""The shipped lift has no motion lines. So only debounce tells a short glitch from a moving door."""
+"""The lift of `config/lift_dry_contact.yaml`. It has no motion lines, so only the debounce
+distinguishes a short glitch of the contact from an opening door."""
 
 from pathlib import Path
 
@@ -21,7 +22,7 @@ def test_a_contact_that_bounces_for_50_ms_at_a_passed_floor_is_no_open_door() ->
         building.set(level=level)
         story.run(story.now + 0.5)
         building.set(door=DoorReading.OPEN)
-        story._scan()  # the edge wakes the loop
+        story._scan()  # the daemon scans at each edge of a contact
         story.run(story.now + 0.05)
         building.set(door=DoorReading.CLOSED)
         story.run(story.now + 0.5)

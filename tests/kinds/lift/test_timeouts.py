@@ -1,5 +1,5 @@
-"""Events that come too late: AGV mode, the floor, the open door, RMF's next request, and an I/O
-answer."""
+"""Events that come too late: AGV mode, the car, the open door, RMF's next request, and reads or writes
+of the driver."""
 
 from itertools import pairwise
 
@@ -27,7 +27,7 @@ OFF = LiftOutputs()
 
 
 def lift(level: str, door: DoorReading, *, agv: bool, **limits: object) -> Story:
-    """Return a story with a car that stands still and a request for L1 at 1 s. The lift is scanned
+    """Return a story in which robot A requests L1 at 1 s and the car stands still. The lift is scanned
     twice a second."""
     building = Building(LiftSample(level, door, motion=Motion.STOPPED, agv=agv))
     story = Story(building, scan_s=0.5, **limits)  # type: ignore[arg-type]
@@ -118,7 +118,7 @@ def test_a_latched_fault_ends_with_an_end_even_if_the_session_returns_at_once() 
     story.run(200.5)
     story.asks("A", "L1")
     assert (story.faults, story.outputs) == ([], HELD)
-    story.building.set(agv=False, door=DoorReading.OPEN)  # the core knows that the robot is inside
+    story.building.set(agv=False, door=DoorReading.OPEN)  # the robot is inside, so it may see OPEN
     story.run(202.0)
     assert story.state == "HUMAN, open at L1, A to L1"
 
@@ -139,7 +139,8 @@ def test_a_latched_fault_ends_with_an_operators_reset() -> None:
 
 def test_a_reset_during_a_retry_lets_the_request_wait_for_agv_mode_again() -> None:
     def history(reset_at: float) -> list[tuple[float, bool, list[str]]]:
-        """Return (s, AGV request, faults) for each change. The lift is scanned twice a second."""
+        """Return (s, whether AGV mode is requested, faults) for each change. The lift is scanned twice
+        a second."""
         alone = Alone(agv_timeout_s=5.0)
         alone(0.0, replace(CLOSED, agv=False), ASKED)
         shown: list[tuple[float, bool, list[str]]] = []
@@ -321,13 +322,13 @@ def test_inputs_are_believed_even_if_outputs_cannot_be_written() -> None:
     story.asks("A", "L1")
     story.until(lambda: story.state == "AGV, open at L1, A to L1")
     story.building.unwritable = "timeout"
-    story.building.driven = OFF  # the module's own watchdog has switched off
+    story.building.driven = OFF  # the watchdog of the module has switched the relays off
     story.run(story.now + 5.0)
     assert story.state == "OFFLINE, closed at L1, A to L1"
 
 
 def test_a_write_that_succeeds_again_leaves_no_fault_without_its_reason() -> None:
-    """The fault lasts until the next reading. Its text must last as long."""
+    """The fault lasts until the next reading. Until then the report must also keep the fault's text."""
     alone = Alone(stale_after_s=2.0)(0.0, AT_L1, WriteFailed("timeout"))
     alone(1.0, AT_L1, WriteFailed("timeout"))(2.5, AT_L1)
     assert alone.decision.report.faults == (Fault("OUTPUTS_NOT_WRITTEN", "timeout"),)

@@ -1,4 +1,5 @@
-"""A check of the lift's rules in every state near the start and near each stage of a ride."""
+"""Tests of the lift's rules in all states near the start, and in all states near each stage of a
+ride."""
 
 from math import inf
 
@@ -60,7 +61,11 @@ def test_each_stage_of_a_ride_is_what_its_name_says() -> None:
 
 
 def check_rules_around(*roots: World) -> int:
-    """Check every step and every state. Return the number of states."""
+    """Check the rules at every step within DEPTH steps from the roots. Also check `wake_at` in every
+    state.
+
+    Return the number of states.
+    """
     found = WALKER.walk(roots, DEPTH, check)
     for world in found:
         nothing_changes_before_wake_at(world, LIMITS)
@@ -78,8 +83,8 @@ def test_the_rules_hold_within_some_steps_of_each_stage_of_a_ride(root: str) -> 
 
 
 def mended_and_idle(world: World) -> World:
-    """Return the world after all repairs. The car stands idle at L1, and no session or latch is
-    left."""
+    """Return the world after a repair of everything. The car stands idle at L1, without a session and
+    without a latch."""
     world = replace(world, sample=IDLE, readable=True, writable=True)
     world = WALKER.path(world, 6.0, "A ends", "B ends", "reset", 9.0, seen=check)
     assert world.memory.session is None
@@ -87,7 +92,8 @@ def mended_and_idle(world: World) -> World:
 
 
 def serves(world: World) -> bool:
-    """Return whether a new request gets AGV mode, the car and the open door."""
+    """Return whether a new request makes the core request AGV mode, and leads to an open door for the
+    robot."""
     world = WALKER.path(world, "B asks L1", seen=check)
     wanted = WALKER.path(world, 1.0, seen=check).memory.relays.outputs()
     sample = replace(IDLE, agv=True, door=DoorReading.OPEN, motion=Motion.STOPPED)

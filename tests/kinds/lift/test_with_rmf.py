@@ -1,5 +1,5 @@
-"""LIFT-1, LIFT-2: the node works with RMF's lift supervisor and fleet adapters. Messages get lost, and
-parties restart."""
+"""LIFT-1, LIFT-2: the node works with stand-ins for RMF's lift supervisor and fleet adapters. Messages
+get lost, and the stand-ins and the node restart."""
 
 import pytest
 
@@ -79,7 +79,8 @@ def test_a_waiting_robot_is_served_after_the_robot_that_rides(adapters_first: bo
     assert sessions(rmf.story) == ["", A, "", B]
     granted_at = next(at for at, state in rmf.story.told if state.session_id == B)
     states_of_nobody = [s for at, s in rmf.story.told if released_at < at and not s.session_id]
-    assert granted_at - released_at < 5.0  # the next state, the 3 s of grace, RMF's next request
+    # this time has the next state, then 3 s of grace, then B's next request
+    assert granted_at - released_at < 5.0
     assert len(states_of_nobody) <= 5
 
 
@@ -135,7 +136,7 @@ def test_a_supervisor_that_restarts_with_a_robot_in_the_car_does_not_end_its_ses
     robot.in_car = True
     rmf.run(rmf.story.now + 3.0)
     edges = list(rmf.story.edges)
-    rmf.supervisor.slots.clear()  # the supervisor has restarted, and first hears a lift state
+    rmf.supervisor.slots.clear()  # after its restart the supervisor hears a state first
     rmf.run(rmf.story.now + 20.0)
     ends = [request for request in rmf.requested if request.request_type == END]
     assert len(ends) == 1

@@ -1,7 +1,8 @@
 """A walk through all states that the lift's core can reach within some steps.
 
-A state has the core's memory and the building. All times in a state are relative to now. The walk cuts
-long ages to a limit. So two states that must behave alike count as one state.
+A state consists of the core's memory and the building. All times in a state are relative to now. The
+walk replaces long ages by an upper limit. So two states in which the core must behave alike count as
+one state.
 """
 
 from collections.abc import Callable
@@ -32,15 +33,17 @@ from bridges.kinds.shared.freshness import Requester
 from tests.walk import Walker
 
 LONG_S = 55.0
-"""The longest gap between two scans (s) if the core asks for no earlier scan. It is less than
+"""The longest time (s) between two scans, if `wake_at` is not earlier. LONG_S is less than
 `stale_after_s`."""
 
 
 def limits_of(
     debounce: dict[str, float] | None = None, agv_mode: Any = "requested", **changes: Any
 ) -> LiftLimits:
-    """Return the default limits, but with readings that stay fresh for a minute. Fresh readings save
-    scans."""
+    """Return the default limits, except that a reading stays fresh for a minute.
+
+    This makes the walk shorter, because it needs fewer scans.
+    """
     settings = LiftSettings(
         floors=["L1", "L2", "L3"],
         limits=LiftDurations(**{"stale_after_s": 60.0, **changes}),
@@ -52,9 +55,9 @@ def limits_of(
 
 
 class World(msgspec.Struct, frozen=True):
-    """The building with its inputs, and the core's memory at time 0.
+    """The building with its inputs, and the core's memory. All times in them are relative to now.
 
-    `readable` says whether the building answers readings. `writable` says whether it obeys outputs.
+    `readable` says whether the inputs can be read. `writable` says whether the outputs can be written.
     """
 
     memory: LiftMemory
@@ -150,8 +153,8 @@ Seen = Callable[["Step"], None]
 
 
 class Step(msgspec.Struct, frozen=True):
-    """One decision at time `now`, in seconds after the state began. `exact` says that no input is
-    debounced."""
+    """One decision. `now` is its time in seconds after the state before it. `exact` says that this lift
+    has no debounce."""
 
     before: LiftMemory
     event: Event
@@ -163,14 +166,14 @@ class Step(msgspec.Struct, frozen=True):
 
 
 def moved(world: World, move: Move, limits: LiftLimits, seen: Seen) -> World:
-    """Return the state after a move, at the same instant."""
+    """Return the state after a move, without any passing of time."""
     around, event = move(world)
     return _decided(around, event, 0.0, limits, seen)
 
 
 def waited(world: World, seconds: float, limits: LiftLimits, seen: Seen) -> World:
-    """Return the state after some time. In that time the lift is scanned whenever the core wants a
-    scan."""
+    """Return the state after `seconds`. In this time the lift is scanned at each `wake_at` of the
+    core."""
     now, wake_at = 0.0, 0.0
     while now < seconds:
         now = min(seconds, max(now + 0.001, min(wake_at, now + LONG_S)))
@@ -214,11 +217,11 @@ AGES = {
     "unwritten_since": 61.0,
     "since": 700.0,
 }
-"""The ages (s) beyond which more age makes no difference."""
+"""The age (s) of each kind of time above which the core's behaviour does not depend on the age."""
 
 
 def shifted(memory: LiftMemory, by: float) -> LiftMemory:
-    """Return the same memory with every time moved by `by` seconds. Times that are too old are cut to a
+    """Return the memory with `by` added to each of its times. Ages above their limit become the
     limit."""
     senses, session, grace = memory.senses, memory.session, memory.grace
     return replace(
@@ -257,7 +260,8 @@ def shifted(memory: LiftMemory, by: float) -> LiftMemory:
 
 
 def _at(at: Any, by: float, kind: str = "") -> Any:
-    """Return a moved time. The age is at most the age in AGES for this `kind`. None stays None."""
+    """Return a time plus `by`. Ages above the limit for `kind` in AGES become the limit. None stays
+    None."""
     if at is None:
         return None
     return max(round(at + by, 6), -AGES.get(kind, 1e9))
@@ -291,9 +295,9 @@ def _forgotten(forgotten: ForgottenSession, by: float) -> ForgottenSession:
 
 
 def _robot(robot: OwnWords, by: float) -> OwnWords:
-    """Return the requests of the robot's adapter with moved times.
+    """Return what the robot's adapter has said, with `by` added to each time.
 
-    If the adapter was never heard, its time stays AGES_AGO.
+    If the adapter has said nothing, `asked_at` stays AGES_AGO.
     """
     heard = robot.asked_at > AGES_AGO
     asked_at = max(_at(robot.asked_at, by), -7.0) if heard else AGES_AGO
@@ -322,7 +326,7 @@ def _channel(channel: Channel[Any], by: float) -> Any:
 
 
 def key(world: World) -> tuple[Any, ...]:
-    """Return a key of the world. Two worlds that must behave alike have the same key."""
+    """Return a key of the world. If the core must behave alike in two worlds, their keys are equal."""
     memory, senses = world.memory, world.memory.senses
     hazards = tuple(senses.hazards.get(h) for h in Hazard)
     return (
@@ -335,7 +339,7 @@ def key(world: World) -> tuple[Any, ...]:
 
 
 def walker(limits: LiftLimits) -> Walker[World, Move]:
-    """Return the lift's walker with these limits."""
+    """Return a walker through the states of a lift with these limits."""
     return Walker(
         MOVES,
         TIMES,

@@ -1,4 +1,5 @@
-"""A lift without real pins, in virtual time: node, driver, simulated wires and plant."""
+"""A simulated lift (the plant) in virtual time: the node, the driver, and wires or registers without
+hardware."""
 
 from pathlib import Path
 from typing import Any, cast
@@ -21,14 +22,15 @@ SHIPPED = Path(__file__).parents[3] / "config" / "lift_dry_contact.yaml"
 
 
 def shipped() -> DryContactLiftSettings:
-    """Return the settings of the example in `config/`."""
+    """Return the settings of the lift in `config/lift_dry_contact.yaml`."""
     settings = load(SHIPPED).devices["Lift1"]
     assert isinstance(settings, DryContactLiftSettings)
     return settings
 
 
 class Driven(Building):
-    """A building behind a driver and its bus."""
+    """A building that is read and written by a real driver, with a simulated lift (the plant) behind
+    it."""
 
     plant: LiftPlant
     _driver: Driver[LiftSample, LiftOutputs]
@@ -46,7 +48,7 @@ class Driven(Building):
 
 
 class WiredBuilding(Driven):
-    """A building with a plant behind single wires."""
+    """A building whose simulated lift has a wire for each signal."""
 
     def __init__(self, settings: DryContactLiftSettings) -> None:
         super().__init__()
@@ -61,7 +63,7 @@ class WiredBuilding(Driven):
 
 
 class GatewayBuilding(Driven):
-    """A building with a plant behind a gateway's registers."""
+    """A building whose simulated lift is behind the registers of a gateway."""
 
     def __init__(self, settings: register.RegisterLiftSettings) -> None:
         super().__init__()
@@ -71,7 +73,7 @@ class GatewayBuilding(Driven):
 
 
 class WiredStory(Story):
-    """A wired lift in service, by default the example in `config/`."""
+    """A lift with wires, in service. By default it is the lift of `config/lift_dry_contact.yaml`."""
 
     building: WiredBuilding
 
@@ -86,7 +88,7 @@ class WiredStory(Story):
         )
 
     def fail(self, part: str, mode: FailureMode | None) -> None:
-        """Break a wire or part in this mode, or mend it (None)."""
+        """Let a wire or part fail in this mode, or repair it (None)."""
         self.building.plant.advance(self.now)
         self.building.plant.fail(part, mode)
 

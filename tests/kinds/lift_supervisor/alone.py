@@ -1,6 +1,6 @@
-"""The lift supervisor's core for one lift, without network, in virtual time.
+"""The core of the lift supervisor for one lift, without a network, in virtual time.
 
-Tests give events to the core. The core's messages are kept in a list.
+The tests give events to the core, and read its messages from a list.
 """
 
 from bridges.kinds.lift_supervisor import core
@@ -40,13 +40,13 @@ class Alone(alone.Alone[SupervisedLift, Event, LiftSupervisorLimits, SupervisorR
         return words(message)
 
     def asks(self, session: str, floor: str = "L3", *, kind: int = 1, aged: float = 0.0) -> None:
-        """Let an adapter's request arrive. By the adapter's clock the request is `aged` seconds old."""
+        """Let an adapter's request arrive that was sent `aged` seconds ago."""
         stamp = self.stamped(aged)
         door = 2 if kind == 1 else 0
         self.hears(RideRequested(session, Target(kind, floor, door), stamp, self.now - stamp))
 
     def ends(self, session: str, *, aged: float = 0.0) -> None:
-        """Let an adapter's END arrive. By the adapter's clock the END is `aged` seconds old."""
+        """Let an adapter's END arrive that was sent `aged` seconds ago."""
         stamp = self.stamped(aged)
         self.hears(RideEnded(session, stamp, self.now - stamp))
 
@@ -65,8 +65,8 @@ class Alone(alone.Alone[SupervisedLift, Event, LiftSupervisorLimits, SupervisorR
         self.hears(LiftStateHeard(session, floor, to, door, MODES[mode], floors))
 
     def ride(self, session: str = "a") -> None:
-        """Show the lift open at L3 for this session. After this state the supervisor has nothing to
-        repeat."""
+        """Let a state arrive in which the lift is open at L3 for this session. Then the supervisor need
+        not repeat its request."""
         self.shows(session, "L3", to="L3", open=True)
 
     @property

@@ -177,7 +177,7 @@ def test_the_next_robot_is_served_only_after_a_state_shows_that_the_end_was_obey
     desk = Alone()
     desk.asks("a")
     desk.asks("b", "L1")
-    desk.shows("", "L2")  # an old state, from before the grant
+    desk.shows("", "L2")  # a state from before the lift heard A's request
     desk.ends("a")
     desk.until(0.1)
     for second in range(1, 4):
@@ -200,7 +200,7 @@ def test_a_state_from_before_the_end_was_sent_confirms_nothing() -> None:
     desk = Alone()
     desk.asks("a")
     desk.until(0.05)
-    desk.ends("a")  # the pause after the last message delays this END
+    desk.ends("a")  # the pacing delays this END until 0.1 s
     desk.shows("", "L1")
     desk.asks("b")
     assert desk.report.holder == "a"
@@ -227,8 +227,8 @@ def test_an_end_of_a_robot_without_session_and_request_is_ignored() -> None:
 
 
 def test_an_end_of_the_shown_session_is_passed_on_even_if_another_robot_waits() -> None:
-    """The lift granted the session without this supervisor. Now the robot or an operator ends the
-    session."""
+    """Before, the lift granted the session to robot A without this supervisor. Now A or an operator
+    sends END."""
     desk = Alone()
     desk.asks("b")
     desk.shows("a", "L2")

@@ -1,5 +1,5 @@
-"""Hazards, the quiet time after a start, a rival supervisor, and stale requests limit the
-supervisor."""
+"""When the supervisor must not send: in a hazard, in the quiet time after its start, and beside a
+second supervisor. The tests also cover stale requests."""
 
 import pytest
 from msgspec.structs import replace
@@ -171,7 +171,8 @@ def test_with_synchronised_clocks_the_uptime_or_the_yaml_limits_the_age_of_a_req
 
 
 def test_a_request_from_the_future_is_not_believed_in_the_quiet_time() -> None:
-    """Our clock is not set yet, so the stamps of old requests can lie in the future."""
+    """The supervisor's clock is not set yet. So the stamps of old requests can be later than its
+    time."""
     desk = Alone(speaks=False)
     desk.skew = 3600.0
     desk.asks("a")

@@ -1,5 +1,5 @@
-"""Adapters' messages become events, or the supervisor refuses them with a reason. A test of the status
-file follows."""
+"""How the supervisor reads or refuses the messages of fleet adapters. One test checks the status
+file."""
 
 import pytest
 from msgspec.structs import replace

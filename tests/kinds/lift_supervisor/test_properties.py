@@ -31,7 +31,11 @@ NAMES = ["fleet/a", "fleet/b", "fleet/c"]
 
 
 def bad_network(rng: random.Random, loss: float) -> Any:
-    """Return a route that loses, doubles and reorders messages. Delays are at most half a second."""
+    """Return a function that gives the delays of a message's copies. The function loses, doubles and
+    reorders messages.
+
+    A delay is at most half a second.
+    """
 
     def route(sender: str, receiver: str) -> Sequence[float]:
         copies = 0 if rng.random() < loss else 2 if rng.random() < 0.1 else 1
@@ -61,7 +65,8 @@ Restart = st.tuples(st.floats(0, 150), st.sampled_from(["supervisor", "Lift1", *
     our_skew=st.sampled_from([0.0, -3600.0, 3600.0]),
     restarts=st.lists(Restart, max_size=6),
 )
-@example(seed=1, loss=0.0, our_skew=0.0, restarts=[])  # a late state started a second END
+# once, a late state made the core send END again
+@example(seed=1, loss=0.0, our_skew=0.0, restarts=[])
 def test_every_live_robot_is_served_in_spite_of_losses_and_restarts(
     seed: int, loss: float, our_skew: float, restarts: list[tuple[float, str]]
 ) -> None:
@@ -123,7 +128,7 @@ LIMITS = LiftSupervisorLimits(holder_alarm_s=15.0, holder_ttl_s=20.0)
 
 
 class Watched:
-    """The core, with a check of each of its decisions."""
+    """The core alone. `hears` checks each decision by the rules."""
 
     def __init__(
         self, memory: SupervisedLift, now: float, limits: LiftSupervisorLimits = LIMITS
@@ -162,9 +167,10 @@ class Watched:
         return text
 
     def _check_turn(self, before: SupervisedLift, after: SupervisedLift, event: Any) -> None:
-        """Require a reason whenever a session's turn ends.
+        """Require a reason whenever the turn of a session ends.
 
-        A reason is an END and a later state, or another session that has the lift.
+        A reason is that END was sent and a later state shows another session or none. The other reason
+        is that the lift shows another session.
         """
         if not after.may_speak:
             assert after.turn is None
@@ -184,7 +190,7 @@ class Watched:
 
 
 def events_at(now: float) -> list[Any]:
-    """Return the events that may happen next, at the time `now`."""
+    """Return the events that the walk tries at the time `now`."""
     agv, fire = LiftMode.MODE_AGV, LiftMode.MODE_FIRE
     return [
         RideRequested("a", Target(1, "L3", 2), now, 0.0),

@@ -1,4 +1,4 @@
-"""The supervisor's section of the YAML file. Each key reaches the core."""
+"""The supervisor's section of the YAML file. Each key must have an effect on the core's limits."""
 
 import math
 from pathlib import Path

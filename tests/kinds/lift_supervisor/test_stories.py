@@ -1,4 +1,5 @@
-"""Whole rides through our supervisor: RMF's fleet adapters, our lift node, losses and restarts."""
+"""Rides of robots through our lift supervisor, with RMF's fleet adapters and our lift node. Messages
+get lost, and the nodes restart."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -48,7 +49,7 @@ def shown(world: World) -> list[str]:
 
 
 def lines(lift: LiftNode) -> list[tuple[str, object]]:
-    """Return the edges of the relays, without times."""
+    """Return (output, value) of each change of the lift's outputs."""
     return [(signal, value) for _, signal, value in lift.lift.edges]
 
 
@@ -94,7 +95,8 @@ def test_a_second_robot_is_served_as_soon_as_the_first_has_released(route: objec
     ]
     ended_at = next(at for at, text in requests(world) if text == "END fleet/a L3")
     passed_on_at = next(at for at, text in requests(world) if text == "AGV fleet/b L3")
-    assert passed_on_at - ended_at < 1.1  # the next state comes within 1 s
+    # B's turn begins with the next state, which comes within 1 s
+    assert passed_on_at - ended_at < 1.1
 
 
 @pytest.mark.parametrize("lost", [1, 10])
@@ -184,13 +186,13 @@ def test_a_supervisor_that_restarts_with_a_robot_in_the_car_moves_no_relay(
 
 
 def test_the_supervisor_of_rmf_restarts_in_the_same_way_and_interrupts_the_ride() -> None:
-    """After END the lift's node keeps a grace for RMF's supervisor. Our supervisor never needs that
-    grace."""
+    """After END the lift's node waits for some time (the grace), because RMF's supervisor may send a
+    wrong END. Our supervisor needs no grace."""
     world = World()
     supervisor = RmfsSupervisor(world)
     lift, robot = LiftNode(world), Rider(world, A, UP)
     world.run(16.5)
-    world.retained.clear()  # the retained messages come too late
+    world.retained.clear()  # as if they reached the new supervisor too late
     supervisor.restart()
     world.run(60.0)
     assert changes(world)[2:4] == ["END fleet/a L3", "AGV fleet/a L3"]
@@ -268,8 +270,7 @@ def test_a_second_supervisor_of_ours_stands_by_and_takes_over() -> None:
 
 
 def test_an_operator_releases_the_lift_of_a_dead_robot_for_those_who_wait() -> None:
-    """The command `send lift Lift1 --end` sends the operator's END. The operator's clock is a minute
-    slow."""
+    """An operator sends END with `send lift Lift1 --end`. The operator's clock is a minute behind."""
     world = World()
     OurSupervisor(world)
     LiftNode(world)

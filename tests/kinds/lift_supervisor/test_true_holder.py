@@ -1,5 +1,5 @@
-"""LIFT-SUPERVISOR-2, LIFT-SUPERVISOR-4: the session that really has the lift, and requesters that have
-gone."""
+"""LIFT-SUPERVISOR-2, LIFT-SUPERVISOR-4: the session to which the lift is granted, and requesters that
+have disappeared."""
 
 import math
 
@@ -150,8 +150,8 @@ def test_a_lift_that_does_not_take_the_holder_or_does_not_release_it_raises_an_a
 
 
 def shown_each_second(desk: Alone, session: str, until: int) -> tuple[Fault, ...]:
-    """Let a state show this session each second until the time `until`. Return the faults at the
-    end."""
+    """Let a LiftState with this session arrive each second until the time `until`. Return the last
+    faults."""
     for second in range(int(desk.now), until + 1):
         desk.until(float(second))
         desk.shows(session, "L1", to="L3")

@@ -1,5 +1,5 @@
-"""Two supervisors start at the same moment, as after a power cut. In the end exactly one of them
-serves."""
+"""Two supervisors start at the same moment, as after a power cut. In the end one must be active, and
+the other must be passive."""
 
 from collections import deque
 from collections.abc import Callable

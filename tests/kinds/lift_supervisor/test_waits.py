@@ -1,8 +1,9 @@
-"""All histories up to a depth. The supervisor passes each request for a lift on, or reports why not.
+"""All histories of moves up to a depth. In each history the supervisor must pass on each request for a
+lift, or report why not.
 
-There are nine moves. Two robots ask, one robot ends, the lift shows four states, the permission to
-publish changes, or time passes. `make deep` has all 9^5 = 59,049 histories of five moves. `make test`
-has all 9^4 = 6,561 histories of four moves. The test judges the sent messages and the report.
+There are nine moves: two requests of robots, one END, four states of the lift, a change of the
+permission to publish, and 12 s of time. `make deep` has all 9^5 = 59,049 histories of five moves. `make
+test` has all 9^4 = 6,561 histories of four moves. The test judges the sent messages and the report.
 """
 
 from collections.abc import Callable
@@ -27,7 +28,7 @@ MOVES: list[Move] = [
     lambda one: one.until(one.now + 12.0),
 ]
 PACE_S = 0.2
-"""A pause (s) longer than the least time between two messages."""
+"""A pause (s) after each move. It is longer than the least time between two messages."""
 
 
 def after(one: Alone, move: Move) -> Alone:
@@ -40,7 +41,8 @@ def after(one: Alone, move: Move) -> Alone:
 
 
 def check(one: Alone) -> None:
-    """Require a reason in the report if a robot has a request that is not the last sent message."""
+    """If the supervisor's last message is not the request of each robot, require a reason in the
+    report."""
     last = one.sent[-1][1] if one.sent else ""
     unserved = [c for c in one.memory.claims if last != f"AGV {c.session} {c.target.floor}"]
     assert bool(one.report.waits) >= bool(unserved), one.report
@@ -62,8 +64,8 @@ def test_in_every_history_the_report_tells_why_a_robot_waits() -> None:
         "for the lift to take b",
         "for END of a",
         "for END of b",
-        "for a request or the end of a, which the lift shows",
-        "for a request or the end of b, which the lift shows",
+        "for a request or the END of a, because the lift shows it",
+        "for a request or the END of b, because the lift shows it",
         "for the end of the lift's FIRE mode",
         "for the lift's states",
     }

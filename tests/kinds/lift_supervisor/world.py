@@ -1,7 +1,7 @@
-"""A lift, its riders and a supervisor in virtual time.
+"""A lift, robots that ride it, and a lift supervisor, in virtual time.
 
 The supervisor is our supervisor as in its daemon, or a stand-in for RMF's supervisor. The lift's node
-is our Node as in its daemon, with a lift that works. The fleet adapters follow RMF's rules.
+is our `Node` as in its daemon, with a simulated lift. The fleet adapters follow RMF's rules.
 """
 
 from typing import Any
@@ -60,7 +60,7 @@ class RmfsSupervisor(StandIn):
 
 
 class LiftNode:
-    """Our lift's node, which scans a working lift."""
+    """Our lift's node, which scans a simulated lift."""
 
     SCAN_S = 0.25
 
@@ -135,7 +135,7 @@ class Rider:
         return not self.trips
 
     def restart(self) -> None:
-        """Start a new fleet adapter, which begins the same trip again."""
+        """Start a new fleet adapter for the robot. The robot begins its present trip again."""
         self.world.retained.pop(self.name, None)
         self.robot = RobotContext(self.name)
         self._step = 0

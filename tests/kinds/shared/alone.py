@@ -1,6 +1,6 @@
-"""The core of a kind without hardware, in virtual time.
+"""The core of any kind without hardware and network, in virtual time.
 
-Tests give events to the core. The core's messages are kept in a list.
+The tests give events to the core, and read its messages from a list.
 """
 
 from abc import ABC, abstractmethod
@@ -18,7 +18,8 @@ E = TypeVar("E")
 
 
 class Alone(ABC, Generic[M, E, L, R]):
-    """A core alone. `sent` has (s, words) of each message. `refused` has (s, reason).
+    """A core that gets its events from the test. `sent` has (s, words) of each message. `refused` has
+    (s, reason).
 
     The clocks of requesters are `skew` seconds ahead of ours.
     """
@@ -46,7 +47,7 @@ class Alone(ABC, Generic[M, E, L, R]):
         """Return a message in short words. Return "" for a message that `sent` shall not show."""
 
     def hears(self, event: E | MaySpeak | Woken) -> None:
-        """Make one decision, now."""
+        """Let the core decide on this event now."""
         decided = self._decide(self.memory, event, self.now, self.limits)
         self.memory, self.report, self.wake_at = decided.memory, decided.report, decided.wake_at
         at = round(self.now, 3)
@@ -60,10 +61,10 @@ class Alone(ABC, Generic[M, E, L, R]):
         while self.wake_at <= at:
             self.now = self.wake_at
             self.hears(Woken())
-            assert self.wake_at > self.now, "the core wants to be woken at once, for ever"
+            assert self.wake_at > self.now, "the core asks again and again to be woken at once"
         self.now = at
 
     def stamped(self, aged: float) -> float:
-        """Return the stamp (s) of a message. By the requester's clock the message is `aged` seconds
-        old."""
+        """Return the stamp (s) of a message that was sent `aged` seconds ago, by the requester's
+        clock."""
         return self.now + self.skew - aged

@@ -1,7 +1,9 @@
-"""The alarms of several daemons, a stranger's node and the robots on one graph, in virtual time.
+"""Alarms for fleets on one ROS graph, in virtual time: several daemons, a stranger, and the fleets'
+robots.
 
-The daemons and the stranger tell everybody at once. A daemon writes its memory to its disk before it
-publishes. Each robot obeys the last message for its fleet.
+The stranger is a node that is not ours. The messages of the daemons and of the stranger reach everybody
+at once. A daemon writes its memory to its disk before it publishes. Each robot obeys the last message
+for its fleet.
 """
 
 from collections.abc import Mapping
@@ -30,9 +32,10 @@ QUIET_S = 3.0
 
 
 class DaemonSeen(msgspec.Struct, frozen=True):
-    """A daemon with its disk, its causes of an alarm, and its retained messages.
+    """A daemon with its disk.
 
-    `memory` is None if the daemon is dead. `faults` has the codes of its last report.
+    `present` has the causes of an alarm at its only device. `retained` has its messages that late nodes
+    still get. `memory` is None if the daemon is dead. `faults` has the codes of its last report.
     """
 
     memory: FleetAlarmMemory | None = None
@@ -49,12 +52,12 @@ class DaemonSeen(msgspec.Struct, frozen=True):
 
 
 class AlarmGraph(msgspec.Struct, frozen=True):
-    """The graph with its daemons and fleets.
+    """The ROS graph with its daemons and fleets.
 
-    - `stands` tells for each fleet whether the last message makes its robots stand still.
+    - `stands` says for each fleet whether its robots must stand still by the last message.
     - `said` has every message of a daemon, as (s, daemon, value, fleets).
-    - `stranger` says that the stranger has an alarm of its own.
-    - `path` has the names of the moves so far.
+    - `stranger` says that the stranger's last message was an alarm.
+    - `path` has the names of the test's moves so far.
     """
 
     daemons: Mapping[str, DaemonSeen]
@@ -80,7 +83,7 @@ class AlarmGraph(msgspec.Struct, frozen=True):
         return self._decides(name, OperatorReset())
 
     def drills(self, name: str, for_s: float) -> "AlarmGraph":
-        """Order a drill, as a person does; 0 ends it."""
+        """Order a drill of `for_s` seconds, as a person does. With 0 the drill ends."""
         return self._decides(name, DrillOrdered(for_s))
 
     def kill(self, name: str) -> "AlarmGraph":
@@ -102,14 +105,14 @@ class AlarmGraph(msgspec.Struct, frozen=True):
         return graph._inputs(name)
 
     def stranger_says(self, on: bool, *fleets: str) -> "AlarmGraph":
-        """Let the stranger's node publish an alarm (`on`) or its end for these fleets."""
+        """Let the stranger publish an alarm (`on`) or the end of its alarm for these fleets."""
         told = frozenset(fleets)
         graph = replace(self, stranger=on, stranger_spoke=True, stranger_fleets=told)
         return graph._deliver(STRANGER, on, frozenset(fleets))
 
     def until(self, at: float) -> "AlarmGraph":
-        """Let time pass until `at`. Daemons state their alarm each second, wake up, and end their quiet
-        start."""
+        """Let time pass until `at`. Each daemon wakes up when it wants to, and states its alarm each
+        second. Its quiet start ends after QUIET_S."""
         graph = self
         while graph.now < at:
             graph = replace(graph, now=min(at, graph.now + 0.1))
@@ -117,7 +120,7 @@ class AlarmGraph(msgspec.Struct, frozen=True):
                 graph = graph._passes(name)
         return graph
 
-    # ---- inside
+    # ---- private functions
 
     def _passes(self, name: str) -> "AlarmGraph":
         graph, daemon = self, self.daemons[name]
@@ -191,8 +194,10 @@ class AlarmGraph(msgspec.Struct, frozen=True):
 
 
 def graph(**fleets: tuple[str, ...]) -> AlarmGraph:
-    """Return a graph with these daemons in service. Each daemon has these fleets. No fleet means all
-    fleets."""
+    """Return a graph with a running daemon for each name in `fleets`.
+
+    A daemon sends its alarms to its fleets. An empty tuple means all fleets.
+    """
     daemons = {name: DaemonSeen(fleets=frozenset(told)) for name, told in fleets.items()}
     robots = {fleet for told in fleets.values() for fleet in told} or {"tiny"}
     made = AlarmGraph(daemons, dict.fromkeys(sorted(robots), False))

@@ -38,11 +38,11 @@ def test_an_alarm_is_published_once_and_ends_by_a_reset_after_its_cause() -> Non
     g = graph(a=())
     g = g.tells("a", "fire").until(20.0)
     g = g.tells("a", "fire", "code_blue").until(30.0)
-    g = g.resets("a").until(40.0)  # the fire still burns
+    g = g.resets("a").until(40.0)  # refused, because the fire still burns
     g = g.tells("a").until(50.0)
     assert said(g) == [(5.0, "a", True)]
     assert g.daemons["a"].faults == ("ALARM_RAISED",)
-    g = g.tells("a", seen=False).resets("a").until(60.0)  # perhaps a fire burns that nobody can see
+    g = g.tells("a", seen=False).resets("a").until(60.0)  # refused, because it is not read
     assert g.daemons["a"].state == "alarm"
     g = g.tells("a").resets("a").until(70.0)
     assert said(g) == [(5.0, "a", True), (60.0, "a", False)]
@@ -91,21 +91,21 @@ def test_two_sources_make_one_alarm_and_each_withdraws_its_retained_true() -> No
 
 
 def test_a_source_that_dies_in_its_alarm_still_holds_the_robots() -> None:
-    """FLEET-ALARM-4 and FLEET-ALARM-6: the disk of daemon a also keeps the alarm of daemon b."""
+    """FLEET-ALARM-4 and FLEET-ALARM-6: daemon a keeps the alarm of daemon b on its own disk, too."""
     g = graph(a=(), b=()).tells("a", "fire").tells("b", "fire").until(8.0)
     g = g.kill("b").until(30.0).tells("a").resets("a").until(40.0)
     assert g.stands == {"tiny": True}
     g = g.kill("a").start("a").until(60.0)
     assert (g.daemons["a"].state, g.stands) == ("reset", {"tiny": True})
     g = g.tells("b", "fire").start("b").until(70.0)
-    assert said(g)[-1] == (60.0, "b", True)  # for fleet adapters that started after b had died
+    assert said(g)[-1] == (60.0, "b", True)  # again, for adapters that have started since b died
     g = g.tells("b").resets("b").until(80.0)
     assert g.stands == {"tiny": False}
     assert {d.state for d in g.daemons.values()} == {"quiet"}
 
 
 def test_the_false_of_a_stranger_frees_the_daemon_that_waits_for_a_dead_one() -> None:
-    """FLEET-ALARM-4: if a daemon has been removed for good, a person ends its alarm in this way."""
+    """FLEET-ALARM-4: if a daemon has been removed for ever, a person must end its alarm like this."""
     g = graph(a=(), b=()).tells("a", "fire").tells("b", "fire").until(8.0).kill("b").until(20.0)
     g = g.tells("a").resets("a").until(30.0).stranger_says(False).until(31.0)
     assert g.daemons["a"].state == "quiet"
@@ -181,7 +181,7 @@ def test_the_death_of_the_daemon_ends_an_ordered_drill_with_its_next_start() -> 
 
 
 def test_no_drill_is_ordered_in_an_alarm_or_before_other_alarms_can_be_heard() -> None:
-    """FLEET-ALARM-7. An alarm of another building forbids nothing."""
+    """FLEET-ALARM-7. An alarm of another building does not forbid a drill."""
 
     def refused(g: AlarmGraph, name: str) -> str:
         memory, fleets = g.daemons[name].memory, g.daemons[name].fleets

@@ -1,4 +1,4 @@
-"""The edges of one alarm for the fleets: restarts, fleets of some messages, times and texts."""
+"""Details of the fleets' alarm: restarts, alarms for some fleets only, times, and texts for people."""
 
 from typing import Any
 
@@ -36,7 +36,7 @@ def fleets(*names: str) -> frozenset[str]:
 
 
 def to(*names: str) -> FleetAlarmLimits:
-    """Return the limits of a daemon that tells these fleets."""
+    """Return the limits of a daemon that publishes its alarms for these fleets."""
     return FleetAlarmLimits(EMERGENCY_SIGNAL, fleets(*names), frozenset({"Panel"}))
 
 
@@ -46,7 +46,7 @@ def after(
     memory: FleetAlarmMemory | None = None,
     now: float = 10.0,
 ) -> Made:
-    """Return the decision on the last of these events, which all come at `now`."""
+    """Give these events to the core at the time `now`. Return the decision on the last event."""
     memory = memory or replace(fleet_alarm.initial(), may_end=True)
     made: Made | None = None
     for event in events:
@@ -85,7 +85,7 @@ def test_the_memory_of_a_restart_is_whole() -> None:
 
 
 def test_a_reset_before_the_device_is_read_again_is_refused() -> None:
-    """FLEET-ALARM-1: after a restart a fire may burn that nobody has seen yet."""
+    """FLEET-ALARM-1: after a restart there may be a fire, but the device has not been read yet."""
     made = after(OperatorReset(), memory=restarted(after(FIRE)))
     assert made.refused == "the alarm is not over: fire of Panel"
     assert made.memory.latched == (AlarmCause("Panel", "fire"),)
@@ -104,7 +104,8 @@ def test_a_reset_names_every_cause_that_is_left_and_is_not_refused_without_one()
 
 
 def test_a_daemon_whose_file_names_other_fleets_after_a_restart_tells_both_and_ends_both() -> None:
-    """FLEET-ALARM-3 and FLEET-ALARM-6: the fleets that were told must be freed, too."""
+    """FLEET-ALARM-3 and FLEET-ALARM-6: the end of the alarm must also reach the fleets of the old
+    file."""
     memory = restarted(after(FIRE, limits=to("x")))
     made = after(FIRE, memory=memory, limits=to("y"))
     assert made.publish == ((EMERGENCY_SIGNAL, EmergencySignal(("x", "y"), True)),)
@@ -152,7 +153,7 @@ def test_a_false_for_one_fleet_ends_no_alarm_of_another_fleet() -> None:
 
 
 def test_only_a_node_of_ours_that_lately_made_a_statement_outlasts_a_strangers_false() -> None:
-    """FLEET-ALARM-4: five seconds after its last statement it counts as dead."""
+    """FLEET-ALARM-4: five seconds after its last statement our other node counts as dead."""
     stated = after(AlarmStated("b", True), now=10.0).memory
     for now, stands in ((12.0, True), (13.0, True), (13.1, False)):
         made = after(AlarmHeard(fleets("desk"), False), memory=stated, now=now)
@@ -210,17 +211,17 @@ def test_every_fault_and_report_says_what_a_person_must_know() -> None:
     both = DeviceTells("Panel", AlarmInputs(fleets("fire", "code_blue"), True))
     causes = (AlarmCause("Panel", "code_blue"), AlarmCause("Panel", "fire"))
     raised = after(both, AlarmHeard(fleets("b"), True))
-    text = "the robots stand: code_blue of Panel, fire of Panel"
+    text = "the robots are stopped: code_blue of Panel, fire of Panel"
     fault = Fault("ALARM_RAISED", text)
     assert raised.report == FleetAlarmReport("alarm", causes, ("b",), (fault,), 10.0)
     against = after(AlarmHeard(fleets("desk", "c"), False), memory=raised.memory).report
-    text = "c or desk publishes false: robots hear both"
+    text = "c or desk publishes false, while this daemon publishes true"
     assert against.faults == (Fault("ALARM_CONTRADICTED", text), fault)
-    drill = Fault("ALARM_DRILL", "the robots stand for a drill, which ends by itself")
+    drill = Fault("ALARM_DRILL", "the robots are stopped for a drill, which ends by itself")
     assert after(DRILL).report == FleetAlarmReport("drill", (), (), (drill,), 10.0)
     heard = [AlarmHeard(fleets(name), True) for name in "cb"]
     waits = after(FIRE, *heard, CALM, OperatorReset()).report
-    text = "reset here, but the alarm of b, c stands"
+    text = "reset here, but the alarm of b, c is not over"
     assert waits == FleetAlarmReport("reset", (), ("b", "c"), (Fault("ALARM_WAITS", text),), 10.0)
     text = "reset here, but this daemon has just started"
     quiet_start = after(CALM, OperatorReset(), memory=restarted(after(FIRE))).report
@@ -228,7 +229,7 @@ def test_every_fault_and_report_says_what_a_person_must_know() -> None:
 
 
 def test_an_alarm_for_every_fleet_meets_every_alarm_for_some() -> None:
-    """FLEET-ALARM-3 to FLEET-ALARM-5: no fleet is an empty set of fleets."""
+    """FLEET-ALARM-3 to FLEET-ALARM-5: an alarm without fleets is an alarm for all fleets."""
     waits = after(FIRE, AlarmHeard(fleets("b"), True, fleets("y")), CALM, OperatorReset())
     assert (waits.publish, waits.report.state, waits.report.waits) == ((), "reset", ("b",))
     some = after(FIRE, AlarmHeard(fleets("b"), True), CALM, OperatorReset(), limits=to("y"))

@@ -1,7 +1,8 @@
-"""All states that two daemons, a stranger's node and the robots can reach within some moves.
+"""A check of all states that two daemons, a stranger's node and the robots can reach within some moves.
 
-The walk starts on a graph without alarms. After each move 9 s pass, so that every message has arrived.
-The rules do not use the core's code. They check the published messages, and the graph at rest.
+The walk starts on a ROS graph without alarms. After each move 9 s pass, so that every message has
+arrived. The rules check the messages since the move, and the state after these 9 s. They do not use the
+core's code.
 """
 
 from collections.abc import Callable, Hashable, Iterator, Mapping
@@ -50,7 +51,8 @@ def _dead(g: AlarmGraph, name: str) -> bool:
 
 
 def latched(g: AlarmGraph, name: str) -> bool:
-    """Return whether this daemon has seen a cause that nobody has reset. The daemon may be dead now."""
+    """Return whether this daemon has read a cause of an alarm that nobody has reset. The daemon may be
+    dead now."""
     return bool(kept(g, name).latched)
 
 
@@ -61,7 +63,8 @@ def kept(g: AlarmGraph, name: str) -> FleetAlarmMemory:
 
 
 def key(g: AlarmGraph) -> Hashable:
-    """Return everything except the times and the history."""
+    """Return the graph without its times and its history. Two graphs with the same key count as one
+    state."""
     return (
         tuple(
             (d.disk, d.memory is None, d.present, d.drill, d.seen, d.retained, d.state, d.faults)
@@ -74,7 +77,7 @@ def key(g: AlarmGraph) -> Hashable:
 
 
 def neighbours(g: AlarmGraph, moves: Mapping[str, Move]) -> Iterator[AlarmGraph]:
-    """Yield every state that one move and a rest can reach. Check each move."""
+    """Yield the graph after each of these moves and REST_S more seconds. Check each move."""
     for name, move in moves.items():
         after = move(replace(g, said=(), path=(*g.path, name))).until(g.now + REST_S)
         check_messages(g, after)
@@ -106,10 +109,11 @@ def check_messages(before: AlarmGraph, after: AlarmGraph) -> None:
 
 
 def _is_overruled(before: AlarmGraph, after: AlarmGraph, name: str, other: str) -> bool:
-    """Return whether daemon `name` may end the alarm although dead daemon `other` still has one.
+    """Return whether daemon `name` may end the alarm although `other` is dead and has not ended its
+    alarm.
 
-    The stranger's `false` may have just freed the robots. Or `name` does not know the alarm of `other`,
-    because `name` was dead at that time.
+    The daemon may do so if the stranger's `false` has just freed the robots. It may also do so if it
+    does not know the alarm of `other`, because it was dead itself at that time.
     """
     memory = before.daemons[name].memory or kept(before, name)
     return after.path[-1] == "the stranger ends" or other not in memory.others
@@ -130,8 +134,8 @@ def check_rest(g: AlarmGraph) -> None:
         assert daemon.retained[-1:] == (True,), f"a late fleet adapter drives: {g.path}"
     if raised:
         late = any(d.retained[-1:] == (False,) for d in live)
-        assert not late, f"a late fleet adapter may hear an old end last: {g.path}"
-    # Nobody may have heard the end of a dead daemon's alarm.
+        assert not late, f"a late fleet adapter may get an old false as the last message: {g.path}"
+    # If a daemon is dead, the end of its alarm was perhaps never published.
     gone = any(_dead(g, name) for name in g.daemons)
     over = not any(latched(g, name) for name in g.daemons) and not raised and not g.stranger
     if over and not gone:

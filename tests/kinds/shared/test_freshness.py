@@ -10,7 +10,7 @@ from bridges.messages.definitions import Time
 
 STAMP = 1_800_000_000.0
 STARTED = Rules(most_s=5.0)
-"""The rules of a daemon that started 5 s ago."""
+"""The rules of a daemon that started 5 s ago. So a request may be at most 5 s old."""
 
 
 class Clocked:
@@ -82,7 +82,7 @@ def test_a_request_from_the_future_counts_unless_a_limit_is_set() -> None:
 
 
 def test_an_end_is_compared_with_earlier_ends_only() -> None:
-    """An operator may end a robot's session, and the two clocks may differ."""
+    """An END may come from an operator, whose clock may differ from the robot's clock."""
     requester = Clocked()
     assert requester.at(100.0)
     assert requester.at(100.0, sent=95.0, ends=True)

@@ -1,5 +1,5 @@
-"""The purity contract in pyproject.toml covers every kind. The files that pyproject.toml lists for
-mutation exist."""
+"""Checks of two lists in pyproject.toml: the import contract must name every kind, and the files for
+`make mutate` must exist."""
 
 import tomllib
 from pathlib import Path

@@ -13,7 +13,12 @@ KINDS, STORIES = Path(kinds.__path__[0]), Path(__file__).parents[1]
 
 
 def named(module: Path) -> list[str]:
-    """Return the rules in a module's docstring. Their names follow its path: LIFT-1, LIFT-DRIVE-1, …"""
+    """Return the names of the rules in a module's docstring. Fail if they do not follow from the
+    module's path.
+
+    For example, the rules of lift/core.py are LIFT-1, LIFT-2, … and the rules of lift/drive.py are
+    LIFT-DRIVE-1, …
+    """
     words = [
         w for w in module.relative_to(KINDS).with_suffix("").parts if w not in ("core", "shared")
     ]

@@ -38,7 +38,8 @@ def place(waypoint: str) -> Pose:
 
 @dataclass
 class Joined:
-    """An adapter that has joined its RMF. `orders` has the orders that RMF has given."""
+    """The daemon's adapter, connected to RMF or to the stand-in. `orders` lists the orders that RMF has
+    given."""
 
     adapter: FleetAdapter
     orders: list[Order] = field(default_factory=list)
@@ -49,7 +50,7 @@ class Joined:
         self.threads.add(threading.current_thread())
 
     def says(self, at: str = "wait_1", robot: str = "AMR01", **levels: Any) -> None:
-        """Give RMF a robot's position and levels."""
+        """Give RMF a robot's position and other fields of the robot's report, such as the battery."""
         self.adapter.update(robot, RobotReport(at=place(at), **{**FIT, **levels}))
 
 

@@ -1,5 +1,9 @@
-"""Robots behind RMF's traffic light: what the daemon asks of `easy_traffic_light`, and two robots whose
-paths cross, with cores, plants and lights in virtual time."""
+"""Robots that obey RMF's traffic light. One part tests the daemon's calls of RMF's
+`easy_traffic_light`.
+
+In the other part the paths of two robots cross in virtual time. Each robot has the daemon's decision
+code (core), a simulated body (plant) and a traffic light.
+"""
 
 import itertools
 import subprocess
@@ -35,13 +39,15 @@ WAY = tuple(Pose("L1", x, 5.0) for x in (0.0, 3.0, 6.0))
 
 @dataclass
 class Lit:
-    """An adapter that has joined its RMF, and RMF's answers."""
+    """The daemon's adapter, connected to RMF's traffic light. `answers` lists RMF's answers about the
+    robot."""
 
     adapter: FleetAdapter
     answers: list[Order] = field(default_factory=list)
 
     def asks(self, checkpoint: int = 0, stands: Any = "at", number: int = 1, **more: Any) -> None:
-        """Ask about a robot's progress."""
+        """Report a robot's progress to RMF's traffic light. The light answers whether the robot may go
+        on."""
         here = more.pop("here", WAY[0])
         asked = LightQuestion(more.pop("path", WAY), number, checkpoint, stands, here, held=True)
         self.adapter.update("AMR01", RobotReport(at=here, battery=0.8, light=asked))
@@ -172,7 +178,7 @@ class Silent:
     """An RMF whose schedule never answers."""
 
     def add_easy_traffic_light(self, *_: object) -> None:
-        """Give no light."""
+        """Ignore the request for a traffic light."""
 
     def start(self) -> None:
         """Do nothing."""
@@ -197,7 +203,8 @@ class TestOnRmf(LightContract):
 
 
 class Crossing:
-    """One robot: plant, core and traffic light, in virtual time."""
+    """One robot in virtual time: its simulated body (plant), its decision code (core) and its traffic
+    light."""
 
     def __init__(self, name: str, lights: Lights, places: list[Pose]) -> None:
         self.light = lights.handles[name] = TrafficLight(name, lambda: None, lights)

@@ -25,12 +25,12 @@ NO_ROS = importlib.util.find_spec("rmf_adapter") is None
 
 
 def site(name: str, directory: Path, **change: str) -> Path:
-    """Copy a shipped fleet with RMF's files. `change` has old texts in the graph, each with its new
-    text."""
+    """Copy a shipped fleet with RMF's files. `change` maps texts in the navigation graph to the texts
+    that replace them."""
     file = shipped(name, directory, wire())
     file.write_text(
         file.read_text().replace("rmf:\n", "rmf:\n  release: kilted\n")
-    )  # `join` uses this release too
+    )  # `join` uses the release kilted too
     shutil.copy(CONFIG / "fleet_tiny.yaml", directory)
     graph = (CONFIG / "fleet_tiny_graph.yaml").read_text()
     for old, new in change.items():
@@ -78,7 +78,7 @@ def fleet(request: pytest.FixtureRequest, domain: int, tmp_path: Path) -> Iterat
         transport.close()
 
 
-@pytest.mark.skipif(not NO_ROS, reason="with RMF's own adapter the robots wait for RMF's tasks")
+@pytest.mark.skipif(not NO_ROS, reason="with RMF's own adapter robots move only for RMF's tasks")
 @pytest.mark.long(12)
 def test_robots_patrol_and_a_robot_with_a_fault_is_taken_out_until_it_is_over(
     fleet: Fleet,
@@ -89,7 +89,7 @@ def test_robots_patrol_and_a_robot_with_a_fault_is_taken_out_until_it_is_over(
         lambda: fleet.states and len(fleet.states[-1].robots) == 3, "RMF's graph hears the fleet"
     )
     fleet.running.wait_for('device=AMR01 at="L1 between waypoints" doing="navigate')
-    if "vda5050" in fleet.running.log.read_text():  # the tutorial's manager reports no faults
+    if "vda5050" in fleet.running.log.read_text():  # robots_http reports no faults
         fleet.tells("press AMR01 fault on")
         fleet.until(lambda: fleet.faults() == ["ROBOT_FAULT"], "the fault is told")
         assert fleet.robot()["new_tasks"] == "no"
@@ -105,7 +105,7 @@ def test_robots_patrol_and_a_robot_with_a_fault_is_taken_out_until_it_is_over(
     assert fleet.running.end(15) == 0
 
 
-@pytest.mark.skipif(not NO_ROS, reason="with RMF's own adapter RMF's schedule decides")
+@pytest.mark.skipif(not NO_ROS, reason="with RMF's own adapter RMF decides who pauses")
 @pytest.mark.long(20)
 def test_robots_go_on_only_at_rmfs_light_and_one_that_does_not_pause_is_said(
     domain: int, tmp_path: Path

@@ -1,4 +1,5 @@
-"""Runs each check that the host names in a separate process. Sends each result to the host."""
+"""A program inside the machine that gets the names of checks from the host. It runs each check in a
+separate process, and sends each result to the host."""
 
 import io
 import json
@@ -12,13 +13,14 @@ from typing import Final
 PORT: Final = Path("/dev/virtio-ports/checks")
 LONGEST_S: Final = 240.0
 BYTE_CODE: Final = ("-X", "pycache_prefix=/run/checks")
-"""Options that compile the checks once for each boot, because their folder is read only. Commands of
-the package run without these options."""
+"""Python options that store the checks' byte code below /run, because the folder of the checks is read
+only. So Python compiles the checks once for each boot. The package's own commands run without these
+options."""
 
 
 def main() -> int:
-    """Report that the machine is up. Then read the names of checks for ever, one in each line (as
-    `deaths.phases`)."""
+    """Report that the machine is up. Then read names of checks for ever. Each line has one name, such
+    as `deaths.phases`."""
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     # Wait for the end of the boot, because a check could change the measured times of the boot.
     subprocess.run(["systemctl", "is-system-running", "--wait"], stdout=subprocess.DEVNULL)

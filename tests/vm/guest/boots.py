@@ -21,18 +21,18 @@ STARTS = 10
 
 
 def energised() -> str:
-    """Two relays are on when the machine goes down."""
+    """Switch two relays on. The host shuts the machine down afterwards."""
     return f"lines {sorted(energise())}"
 
 
 def reboot() -> str:
-    """The machine restarts after a clean shutdown."""
+    """Shut the machine down cleanly and restart it."""
     sh("systemctl", "reboot")
     return "it does"
 
 
 def off() -> str:
-    """The machine is up again, and no relay has been on since the kernel started."""
+    """Check that the machine is up again and that no relay has been on since the kernel started."""
     until(lambda: is_active(SERVICE), "the service is ready")
     writes = [each for each in header.writes() if each.line in LIFT]
     on = [each for each in writes if each.level == LIFT[each.line]]
@@ -45,8 +45,8 @@ def off() -> str:
 
 
 def active_low() -> str:
-    """A relay that a low level switches on stays off through ten starts, without a pulse. A request
-    then switches it on."""
+    """Check a relay that a low level switches on. It must stay off through ten starts of the service,
+    without a pulse. Only a request may switch it on."""
     header.pull(LOW, high=True)  # the resistor on the relay board
     began = header.now()
     service = enable("low")

@@ -1,5 +1,5 @@
-"""Deaths of a daemon that has switched relays on. A relay is off when the kernel's trace shows the
-write."""
+"""Deaths of a daemon that has switched relays on. The checks take a relay as off when the kernel's
+trace shows that a process wrote "off" to its line."""
 
 import os
 import signal
@@ -25,16 +25,17 @@ from tests.vm.guest.system import (
 
 SERVICE = unit("lift")
 MODE, HOLD = {18}, set(HELD)
-"""Sets of outputs that are on together: AGV mode alone, and AGV mode with the held door."""
+"""Sets of outputs that are on together. MODE is the AGV mode alone. HOLD is the AGV mode and the output
+that holds the door open."""
 ODD = 5
-"""The lowest bit of the floor code. It falls when the car passes L2."""
+"""The input with the lowest bit of the floor code. Its level becomes low when the car passes L2."""
 KILLED_S, STOPPED_S = 1.0, 4.0
 """Limits (s) in docs/explanation/reliability.md for a core of 1,000 MIPS."""
 
 
 def phases() -> str:
-    """kill -9 in each phase of a ride, in a start, and after END. Each time the relays go off, and the
-    service returns."""
+    """Kill the service with -9 in each phase of a ride, during a start, and after END. Check that the
+    relays go off each time and that the service returns."""
     took = {}
     with asking("lift", "Lift1", "L3", "--session", "vm/robot"):
         took["mode asked for"] = _dies_with(set(), MODE)
@@ -48,16 +49,16 @@ def phases() -> str:
 
 
 def _dies_with(*outputs: set[int], at: Callable[[], bool] = lambda: True) -> float:
-    """Kill -9 after these sets of outputs were on in turn and `at` holds. Return the time until off
-    (s)."""
+    """Kill the service with -9. First wait until these sets of outputs have been on one after the
+    other, and until `at` returns True. Return the time until the relays are off (s)."""
     old = pid(SERVICE)
     _on(*outputs, at=at)
     return _killed(old, outputs[-1])
 
 
 def _on(*outputs: set[int], at: Callable[[], bool] = lambda: True) -> None:
-    """Wait until these sets of outputs have been on, in this order and as the last ones, and `at`
-    holds."""
+    """Wait until the last sets of outputs that were on are these sets, in this order, and `at` returns
+    True."""
     until(
         lambda: header.together(LIFT)[-len(outputs) :] == [*outputs] and at(),
         f"lines {outputs} are on, one set after the other",
@@ -74,10 +75,10 @@ def _killed(old: int, relays: set[int]) -> float:
 
 
 def _dies_at_start() -> float:
-    """Kill -9 a daemon in its start. At that time its `outputs-off` runs, and the relays are still on.
+    """Kill a daemon with -9 during its start, while it runs `outputs-off` and the relays are still on.
 
-    First a running daemon dies, and the `outputs-off` after its death dies too. So the next daemon
-    finds the relays on, and dies in its start.
+    For that, first kill a running daemon, and then the `outputs-off` that systemd runs after the
+    daemon's death. So the next daemon finds the relays on. Kill this daemon during its start.
     """
     old, running = pid(SERVICE), _group() / "cgroup.procs"
     _on(MODE, HOLD)
@@ -106,23 +107,24 @@ def _group() -> Path:
 
 
 def hang() -> str:
-    """The daemon hangs with two relays on. The watchdog kills the daemon, and the relays go off."""
+    """Check that the relays go off after the daemon hangs with two relays on, because the watchdog
+    kills it."""
     return f"off after {_dies(lambda: kill(SERVICE, 'STOP'), STOPPED_S):.2f} s"
 
 
 def crash() -> str:
-    """The daemon crashes in C code (SIGSEGV) with two relays on. They go off, and the service
-    returns."""
+    """Check that two relays go off and the service returns after the daemon crashes in C code
+    (SIGSEGV)."""
     return f"off after {_dies(lambda: kill(SERVICE, 'SEGV')):.2f} s"
 
 
 def out_of_memory() -> str:
-    """The unit runs out of memory with two relays on. They go off, and the service returns."""
+    """Check that two relays go off and the service returns after the service has run out of memory."""
     limit = _group() / "memory.max"
     before = limit.read_text()
 
     def starve() -> None:
-        limit.write_text("4M")  # the kernel returns from this write after the kill
+        limit.write_text("4M")  # this write returns only after the kernel has killed the daemon
         limit.write_text(before)
 
     took = _dies(starve)
@@ -156,8 +158,8 @@ def _all_off(relays: Mapping[int, bool], when: float) -> dict[int, float]:
 
 
 def clean_stop() -> str:
-    """`systemctl stop` with two relays on. The daemon switches both off, and `outputs-off` finds no
-    work."""
+    """Check that `systemctl stop` makes the daemon switch two relays off. So `outputs-off` finds no
+    relay that is on."""
     relays, mark = energise(), cursor()
     when = header.now()
     sh("systemctl", "stop", SERVICE)
@@ -171,8 +173,8 @@ def clean_stop() -> str:
 
 
 def two_on_one_pin() -> str:
-    """`enable` refuses a second service on the lift's pins. If started by hand, this service names the
-    holder of the pins."""
+    """Check that `enable` refuses a second service on the lift's pins. If this service is started by
+    hand, it must name the process that holds the pins."""
     copy = Path("/etc/rmf-bridges/second.yaml")
     copy.write_text(Path("/etc/rmf-bridges/lift.yaml").read_text().replace("Lift1", "Lift2"))
     sh("rmf-bridge", "enable", str(copy), fails=True)

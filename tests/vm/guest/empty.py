@@ -1,5 +1,5 @@
-"""A service that does nothing, for comparison. `empty.py` is its program, and `empty.py off` its
-ExecStopPost."""
+"""A service that does nothing, for comparison. Without arguments this program is the service. With the
+argument `off` it is the service's ExecStopPost."""
 
 import os
 import signal

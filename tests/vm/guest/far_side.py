@@ -1,9 +1,9 @@
 """Simulate the equipment to which a device's YAML connects the daemon: `python3 -m
 tests.vm.guest.far_side FILE`.
 
-The program runs in the package's own Python. It connects the plants of `hal_fakes/` to real wires:
-lines of gpio-sim, a pseudo-terminal, or an interface of SocketCAN. The plants live on when the daemon
-dies.
+The program runs in the package's own Python. It connects the simulated devices (plants) of `hal_fakes/`
+to real wires: lines of gpio-sim, a pseudo-terminal, or an interface of SocketCAN. The simulated devices
+keep running when the daemon dies.
 """
 
 import os
@@ -74,10 +74,11 @@ def _be_udev(adapter: Path, port: Path) -> None:
 
 
 def _stand_at_header(wirings: Sequence[PlantWiring]) -> None:
-    """Follow the outputs and drive the inputs. Drive the inputs again after each claim of a line.
+    """Read the outputs and set the inputs in a loop. An input must be set again after a process has
+    requested its line.
 
-    On gpio-sim a claimed input with a resistor shows the resistor's level. On a Pi the wire's level
-    wins.
+    On gpio-sim, requesting an input with a pull resistor sets the input to the resistor's level. On a
+    Raspberry Pi the level of the wire would be stronger.
     """
     driven: dict[str, bool] = {}
     _ready()

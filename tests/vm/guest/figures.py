@@ -1,4 +1,5 @@
-"""Times and memory, compared with an empty Python service. Such ratios do not depend on the machine."""
+"""Start times, memory and times until relays are off, divided by those of an empty Python service. The
+ratios do not depend on the machine's speed."""
 
 import re
 import time
@@ -9,8 +10,8 @@ from tests.vm.guest.system import KEPT, Wrong, kill, pid, ready_s, sh, unit, unt
 SERVICES = ("lift", "door", "charger", "lift_supervisor", "door_supervisor")
 WHOLE_MB = 200.0
 MOST = (25, 10, 10)
-"""The highest permitted ratios to the empty service: time to ready, memory, time from kill -9 to
-off."""
+"""The highest permitted ratios to the empty service, for three values. The values are the time until
+ready, the memory, and the time from kill -9 until the relays are off."""
 EMPTY = """
 [Service]
 Type=notify
@@ -20,7 +21,7 @@ ExecStopPost=/usr/bin/python3 /mnt/tests/vm/guest/empty.py off
 
 
 def memory() -> str:
-    """Lift, door, charger and both supervisors together use less than 200 MB."""
+    """Check that the lift, a door, a charger and both supervisors together use less than 200 MB."""
     each = {name: pss_mb(unit(name)) for name in SERVICES}
     whole = sum(each.values())
     text = ", ".join(f"{name} {mb:.0f}" for name, mb in each.items())
@@ -30,8 +31,9 @@ def memory() -> str:
 
 
 def ratios() -> str:
-    """Lift, door and charger need at most a fixed multiple of an empty Python service. The test
-    compares start, memory and time to off."""
+    """Check that lift, door and charger need at most a fixed multiple of what an empty Python service
+    needs. The values are the start time, the memory, and the time from kill -9 until the relays are
+    off."""
     Path("/run/systemd/system/empty.service").write_text(EMPTY)
     sh("systemctl", "daemon-reload")
     sh("systemctl", "start", "empty.service")

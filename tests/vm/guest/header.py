@@ -1,8 +1,8 @@
 """The GPIO chip of a Raspberry Pi's header. gpio-sim simulates it, and a trace keeps every write.
 
-Sources are the kernel's admin-guide/gpio/gpio-sim.rst and its trace events of the group `gpio`. An
-output of gpio-sim falls when its line is released. So after a death the level proves nothing. Only a
-traced write proves that a daemon has switched the output off.
+Sources are the kernel's admin-guide/gpio/gpio-sim.rst and its trace events of the group `gpio`. If a
+process dies, gpio-sim sets the process's outputs to low. So after a death the level proves nothing.
+Only a traced write proves that a daemon has switched the output off.
 """
 
 import re
@@ -21,7 +21,8 @@ LABELS: Final = {"pinctrl-bcm2835": 54, "pinctrl-rp1": 54, "pinctrl-bcm2711": 58
 3 or older, rp1 of a Raspberry Pi 5, and bcm2711 of a Raspberry Pi 4."""
 PI_4: Final = "pinctrl-bcm2711"
 OTHER: Final = "raspberrypi-exp-gpio"
-"""The label of a second chip. Here the second chip gets the lower chip number."""
+"""The label of a second chip. It gets the lower chip number, so a daemon must not take the first chip
+for the header."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,8 +122,8 @@ def on(lines: dict[int, bool], since: float = 0.0) -> dict[int, float]:
 
 
 def together(lines: Mapping[int, bool]) -> list[set[int]]:
-    """Return the sets of outputs that were on together, in order. Only these outputs count. The list
-    begins with the making of the chip."""
+    """Return the sets of outputs that were on together, in order. Only the outputs in `lines` count.
+    The list begins when the chip was made, with an empty set."""
     found: list[set[int]] = [set()]
     for each in writes():
         if each.line in lines:

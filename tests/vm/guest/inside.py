@@ -10,7 +10,7 @@ core."""
 
 
 def demo() -> str:
-    """The demo on zenoh: a robot passes the door, rides the lift and charges."""
+    """Run the demo on zenoh. In it a robot passes the door, rides the lift and charges."""
     suite = mounted("suite", "/media")  # this folder holds the files of config/
     env = ("env", f"PYTHONPATH={suite}", "TRANSPORT=zenoh", "HOME=/root", "TERM=dumb")
     told = sh(*env, PYTHON, "-m", "hal_fakes.demo", "--patience", PATIENCE)
@@ -18,7 +18,8 @@ def demo() -> str:
 
 
 def transport() -> str:
-    """The tests of zenoh pass. Here only zenoh works without ROS."""
+    """Check that the tests of zenoh pass. On this machine zenoh is the only transport that works
+    without ROS."""
     suite = mounted("suite", "/media")
     tests = sorted(str(path) for path in (suite / "tests/transports").glob("test_zenoh_*.py"))
     path = f"PYTHONPATH={suite}:{suite / 'site'}"

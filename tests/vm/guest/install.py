@@ -32,7 +32,8 @@ EXPOSED = 2.0
 
 
 def package() -> str:
-    """`apt install ./rmf-bridges_….deb ./rmf-bridges-workbench_….deb` works on a fresh Debian."""
+    """Check that `apt install ./rmf-bridges_….deb ./rmf-bridges-workbench_….deb` works on a fresh
+    Debian."""
     found = debs()
     install(*found)
     chip = (header.CONFIGFS / "bank0/chip_name").read_text().strip()
@@ -51,33 +52,35 @@ def install(*files: Path) -> None:
 
 
 def debs(folder: str = ".", names: Sequence[str] = OURS) -> list[Path]:
-    """Return the packages of these names in a folder of the host. The folder `next` has the next
-    version."""
+    """Return the package files with these names. `folder` is below the host's folder of packages, and
+    `next` holds the next version."""
     there = mounted("packages", "/srv") / folder
     return [file for (file,) in (there.glob(f"{name}_*.deb") for name in names)]
 
 
 def lift() -> str:
-    """`rmf-bridge enable lift.yaml` starts a service, which becomes ready."""
+    """Check that `rmf-bridge enable lift.yaml` starts a service, which becomes ready."""
     far_side("lift")
     name = enable("lift")
     return f"ready after {ready_s(name):.2f} s"
 
 
 def supervisors() -> str:
-    """`rmf-bridge enable` starts both of our supervisors."""
+    """Check that `rmf-bridge enable` starts both of our supervisors."""
     took = [ready_s(enable(name)) for name in ("lift_supervisor", "door_supervisor")]
     return f"ready after {took[0]:.2f} and {took[1]:.2f} s"
 
 
 def recorder() -> str:
-    """The recorder of incidents has run since the installation of the package."""
+    """Check that the recorder of incidents runs without any command, because the package's installation
+    starts it."""
     until(lambda: is_active("rmf-bridge-recorder.service"), "the recorder is ready")
     return f"ready after {ready_s('rmf-bridge-recorder.service'):.2f} s"
 
 
 def wrong_yaml() -> str:
-    """A service with a wrong YAML ends with exit code 78, and systemd does not restart it."""
+    """Check that a service with a wrong YAML ends with exit code 78, and that systemd does not restart
+    it."""
     file = Path("/etc/rmf-bridges/wrong.yaml")
     file.write_text("kind: lift\nflors: [L1]\n")
     service = unit("wrong")
@@ -92,8 +95,8 @@ def wrong_yaml() -> str:
 
 
 def page() -> str:
-    """systemd starts the web page, which has its own package. The page answers, and stays below its
-    memory limit."""
+    """Install the web page, which has its own package, and start it with systemd. Check that the page
+    answers and stays below its memory limit."""
     install(*debs(names=["rmf-bridges-page"]))
     began = time.monotonic()
     sh("systemctl", "start", PAGE)
@@ -120,8 +123,8 @@ def _answers() -> bool:
 
 
 def security() -> str:
-    """`systemd-analyze security` gives each running unit of ours at most 2.0, and the test's own unit
-    more."""
+    """Check that `systemd-analyze security` gives each of our running units a score of at most 2.0. The
+    unit of these tests must get more, which shows that the scores differ."""
     scores = _scores()
     units = sh("systemctl", "list-units", "--plain", "--no-legend", "rmf-bridge*.service")
     ours = {line.split()[0]: scores[line.split()[0]] for line in units.splitlines()}
@@ -137,8 +140,8 @@ def _scores() -> dict[str, float]:
 
 
 def upgrade() -> str:
-    """The next version is installed while two relays are on. They go off and stay off, and the service
-    returns."""
+    """Install the next version while two relays are on. Check that the relays go off and stay off, and
+    that the service returns."""
     service = unit("lift")
     relays, old = energise(), pid(service)
     when = header.now()

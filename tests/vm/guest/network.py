@@ -6,15 +6,15 @@ from typing import Final
 from tests.vm.guest.system import Wrong, disable, enable, far_side, pid, sh
 
 SITE: Final = ("ip", "-n", "site")
-"""The start of a command on the other machine. A network namespace at the end of a cable stands in for
-it."""
+"""The first words of each `ip` command for the other machine. A network namespace at the end of a cable
+simulates the other machine."""
 MOVES: Final = (("10.7.0", "open"), ("10.8.0", "close"))
 """Each new network, with the request that is sent over it."""
 
 
 def late() -> str:
-    """The service starts without a network. Then two networks come, one after the other. The service
-    fulfils a request on each network."""
+    """Start the service without a network. Then let two networks come, one after the other. Check that
+    the service fulfils a request on each network."""
     sh("ip", "netns", "add", "site")
     sh("ip", "link", "add", "eth0", "type", "veth", "peer", "name", "eth1", "netns", "site")
     sh(*SITE, "link", "set", "lo", "up")

@@ -1,4 +1,5 @@
-"""Runs one check. `python3 -m tests.vm.guest.one deaths.phases` prints the function's result as JSON.
+"""A program that runs one check. `python3 -m tests.vm.guest.one deaths.phases` prints the function's
+result as JSON.
 
 A check returns its findings, or raises Wrong. The output of the check goes to the log.
 """

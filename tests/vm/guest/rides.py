@@ -8,14 +8,15 @@ from tests.vm.guest.system import Wrong, beside, sh, until
 
 ROOM = ("--domain-id", "7", "--localhost")
 LIFT = dict.fromkeys((18, 16, 22, 23, 24), True)
-"""The outputs of lift.yaml. Each is on at the level high."""
+"""The outputs of lift.yaml, each with the level that switches it on. The level is high for all of
+them."""
 HELD = [16, 18]
 """The outputs that a session holds on: the door's hold and AGV mode."""
 
 
 def send(*words: str, fails: bool = False) -> str:
-    """Send one of RMF's requests and wait for its effect. With `fails` fail if the effect comes in
-    time."""
+    """Send one of RMF's requests, and wait for its effect. With `fails`, the effect must not come in
+    time; raise Wrong if it does."""
     return sh("rmf-bridge", "send", *words, *ROOM, fails=fails)
 
 
@@ -43,8 +44,8 @@ def end() -> None:
 
 
 def ride() -> str:
-    """A robot rides from L1 to L3. A process outside the service sends its requests. The header's lines
-    show the ride."""
+    """Let a robot ride from L1 to L3. A process outside the service sends the robot's requests. Check
+    the outputs that the service writes during the ride."""
     began = header.now()
     send("lift", "Lift1", "L1", "--session", "vm/robot", "--direct")
     send("lift", "Lift1", "L3", "--session", "vm/robot", "--direct")

@@ -99,7 +99,7 @@ def ready_s(service: str) -> float:
 
 
 def since_boot_s(service: str, name: str) -> float:
-    """Return a property of a unit that is a time (s, monotonic clock)."""
+    """Return a property of a unit whose value is a time (s, monotonic clock)."""
     return int(shown(service, name)[name]) / 1e6
 
 
@@ -173,7 +173,8 @@ def disable(name: str) -> None:
 
 
 def far_side(name: str) -> None:
-    """Connect the equipment of a YAML file to its wires, until the next boot."""
+    """Start the simulated equipment to which a YAML file connects the daemon (far_side.py). It runs
+    until the next boot."""
     given = (
         "Restart=always",
         "Type=notify",

@@ -1,5 +1,5 @@
-"""Upgrades to another version: refused, with a missing adapter, on a full disk, and with a power
-cut."""
+"""Upgrades to another version under difficulties: a YAML that the version refuses, a missing adapter, a
+full disk, and a power cut."""
 
 import os
 import random
@@ -31,9 +31,11 @@ them."""
 YAML = Path("/etc/rmf-bridges/lift.yaml")
 CURRENT = Path("/usr/lib/rmf-bridges/current")
 NOT_OURS = ("/var/cache/", "/run/systemd/", "/var/tmp/systemd-private-")
-"""Files of apt, and files that systemd keeps for a unit until the next boot."""
+"""Folders with files that our package does not own: files of apt, and files that systemd keeps for a
+unit until the next boot."""
 UPGRADE_S = 45.0
-"""The power cut comes within this time (s). A whole upgrade takes less time."""
+"""The power cut comes within this time (s) after the start of an upgrade. A whole upgrade takes less
+time, so some cuts come after its end."""
 FORCE = ("dpkg", "--force-confold", "--install")
 BEFORE, NEXT = ".", "next"
 """The folders of the two versions, below the folder of packages."""
@@ -42,8 +44,8 @@ TARGET = Path("/var/lib/checks-target")
 
 
 def site() -> str:
-    """Lift, two doors, charger and both supervisors serve. Relays of the lift and of one door are
-    on."""
+    """Let a lift, two doors, a charger and both supervisors serve. Switch relays of the lift and of one
+    door on."""
     enable("low")
     wait = [since_boot_s(unit(name), "ActiveEnterTimestampMonotonic") for name in SERVICES]
     send("door", "ward_door", "open", "--direct")
@@ -54,8 +56,8 @@ def site() -> str:
 
 
 def booted() -> str:
-    """After a power cut the whole site returns. Outputs are off within 12 s, and all services ready
-    within 20 s."""
+    """Check that the whole site returns after a power cut. Outputs must be off within 12 s, and all
+    services ready within 20 s."""
     until(lambda: all(map(is_active, map(unit, SERVICES))), "every service is ready")
     first, on = _first_writes()
     ready = {n: since_boot_s(unit(n), "ActiveEnterTimestampMonotonic") for n in SERVICES}
@@ -80,7 +82,7 @@ def _first_writes() -> tuple[float, list[header.Write]]:
 
 
 def _wires_back() -> None:
-    """Start the equipment at the wires again. The boot has ended its process."""
+    """Start the simulated equipment again, because the reboot has ended its process."""
     if not Path("/sys/class/net/vcan0").exists():
         sh("ip", "link", "add", "vcan0", "type", "vcan")
         sh("ip", "link", "set", "vcan0", "up")
@@ -131,7 +133,7 @@ def _status() -> str:
 
 
 def refused() -> str:
-    """An upgrade that refuses a YAML names the file and the line, and changes nothing."""
+    """Check that an upgrade that refuses a YAML names the file and the line, and changes nothing."""
     old, tree, text = pid(unit("lift")), CURRENT.readlink(), YAML.read_text()
     YAML.write_text(text + "flors: [L1]\n")
     try:
@@ -145,12 +147,12 @@ def refused() -> str:
         old,
     ):
         raise Wrong(f"{state}, {CURRENT.readlink()}, {told[-300:]}")
-    return f"dpkg has it half-configured, the services are as they were, status {_status()}"
+    return f"the package is half-configured, the services are as before, status {_status()}"
 
 
 def absent() -> str:
-    """After a correction of the YAML, `dpkg --configure -a` starts every service. An adapter is
-    missing."""
+    """Check that `dpkg --configure -a` starts every service after the YAML has been corrected.
+    Meanwhile the door's adapter is missing."""
     tell("door", "fail ward_door server off")
     began = time.monotonic()
     told = sh("dpkg", "--configure", "-a")
@@ -166,8 +168,8 @@ def absent() -> str:
 
 
 def back() -> str:
-    """The earlier version is installed while two relays are on. They go off, and every service
-    returns."""
+    """Install the earlier version while two relays are on. Check that the relays go off and that every
+    service returns."""
     relays, when = _held(), header.now()
     _force(BEFORE)
     sh("systemctl", "start", unit("lift_supervisor"))
@@ -193,11 +195,12 @@ def _full() -> Iterator[None]:
 
 
 def full_var() -> str:
-    """/var and its disk are full. All services keep running through `enable`, a ride and an upgrade."""
+    """Check that all services keep running through `enable`, a ride and an upgrade while /var and its
+    disk are full."""
     with _full():
         sh(
             "sh", "-c", f"rmf-bridge enable {YAML} || true"
-        )  # the space of its old record may be enough for `enable`
+        )  # `enable` may still succeed, because it can reuse the space of its old record
         until(lambda: is_active(unit("lift")), "the lift's service is back")
         energise()
         _status()
@@ -208,11 +211,11 @@ def full_var() -> str:
             raise Wrong(f"a service did not keep running: {told[-300:]}")
     was = version()
     _force(BEFORE)
-    return f"upgrade fails ({was}), enable and a ride leave all serving; with room dpkg succeeds"
+    return f"upgrade fails ({was}), all serve during enable and a ride; with space dpkg succeeds"
 
 
 def cut() -> str:
-    """The power fails at a random moment of an upgrade or a downgrade."""
+    """Let the power fail at a random moment of an upgrade or a downgrade."""
     target = debs((NEXT, BEFORE)[version().endswith(".1")])
     TARGET.write_text(" ".join(map(str, target)))
     _held()
@@ -227,8 +230,9 @@ def cut() -> str:
 
 
 def completed() -> str:
-    """After that power cut the outputs are off at boot, and all services serve one version. dpkg
-    completes the other version, and all services serve that version."""
+    """Check the machine after the power cut of `cut`. At boot all outputs must be off, and all services
+    must run the same version. Then complete the interrupted installation. All services must run the
+    version that it installs."""
     moment = Path("/var/lib/checks-moment").read_text()
     until(lambda: all(map(is_active, map(unit, SERVICES))), "every service is ready")
     first, on = _first_writes()
@@ -252,7 +256,7 @@ def completed() -> str:
 
 
 def purged() -> str:
-    """`apt purge` leaves only the user and the groups of the package."""
+    """Check that `apt purge` leaves only the user and the groups of the package."""
     sh("env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "purge", "--yes", *OURS)
     left = sh("find", "/etc", "/usr", "/var", "/run", "-xdev", "-name", "*rmf-bridge*").split()
     left = [name for name in left if not name.startswith(NOT_OURS)]

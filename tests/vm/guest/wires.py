@@ -1,4 +1,5 @@
-"""A door on RS-485 and a charger on CAN. Their relays lie at the far end of a wire."""
+"""A door on RS-485 and a charger on CAN. Their relays are in the equipment at the other end of the
+wire."""
 
 import json
 import socket
@@ -27,13 +28,13 @@ KILLED_S: Final = 2.0
 
 
 def door_service() -> str:
-    """`rmf-bridge enable` starts a door on RS-485. Its serial port is a pseudo-terminal."""
+    """Check that `rmf-bridge enable` starts a door on RS-485. The serial port is a pseudo-terminal."""
     far_side("door")
     return f"ready after {ready_s(enable('door')):.2f} s"
 
 
 def door() -> str:
-    """One request holds a door on RS-485 open, and another request closes it."""
+    """Check that one request holds a door on RS-485 open, and that another request closes it."""
     began = time.monotonic()
     send("door", "ward_door", "open", "--direct")
     opened = time.monotonic() - began
@@ -42,13 +43,14 @@ def door() -> str:
 
 
 def door_killed() -> str:
-    """After kill -9 of a door's service the relay at the RS-485 module goes off."""
+    """Check that the relay at the RS-485 module goes off after kill -9 of the door's service."""
     send("door", "ward_door", "open", "--direct")
     return _killed("door")
 
 
 def adapter_pulled() -> str:
-    """The RS-485 adapter is pulled out and a fault comes. It is plugged in and the fault ends."""
+    """Check that a fault comes when the RS-485 adapter is pulled out. The fault must end when the
+    adapter is plugged in again."""
     return _fault_ends(
         "door ward_door usb-rs485",
         lambda: tell("door", "fail ward_door server off"),
@@ -57,7 +59,7 @@ def adapter_pulled() -> str:
 
 
 def charger_service() -> str:
-    """`rmf-bridge enable` starts a charger on SocketCAN."""
+    """Check that `rmf-bridge enable` starts a charger on SocketCAN."""
     sh("ip", "link", "add", "vcan0", "type", "vcan")
     sh("ip", "link", "set", "vcan0", "up")
     far_side("charger")
@@ -65,7 +67,7 @@ def charger_service() -> str:
 
 
 def charge() -> str:
-    """A robot charges on SocketCAN, and a cancel ends the charge."""
+    """Check that a robot charges on SocketCAN, and that a cancel message ends the charge."""
     _charge("vm-1")
     mark = cursor()
     send("charger", "charger_b", "--cancel", "vm-1")
@@ -82,13 +84,15 @@ def _charge(request: str) -> None:
 
 
 def charger_killed() -> str:
-    """kill -9 of a charger's service during a charge. The CAN receiver gets the command to stop."""
+    """Check that the CAN charger gets the command to stop after kill -9 of the charger's service during
+    a charge."""
     _charge("vm-2")
     return _killed("charger")
 
 
 def interface_down() -> str:
-    """The CAN interface goes down and a fault names it. The interface goes up and the fault ends."""
+    """Check that a fault names the CAN interface when the interface goes down. The fault must end when
+    the interface goes up again."""
     return _fault_ends(
         "charger charger_b vcan0",
         lambda: sh("ip", "link", "set", "vcan0", "down"),
@@ -97,8 +101,8 @@ def interface_down() -> str:
 
 
 def bus_off() -> str:
-    """The CAN controller reports bus-off and a fault names it. The controller recovers and the fault
-    ends."""
+    """Check that a fault names the state bus-off when the CAN controller reports it. The fault must end
+    when the controller recovers."""
     return _fault_ends(
         "charger charger_b bus-off",
         lambda: tell("charger", "fail charger_b bus wrong"),
@@ -133,7 +137,8 @@ def _killed(name: str) -> str:
 
 
 def _relay_off_at(name: str, act: Callable[[], object]) -> float:
-    """Return the time (s, monotonic clock) at which `act` made a relay of this far side go off."""
+    """Call `act`. Return the time (s, monotonic clock) at which a relay of this simulated equipment
+    then goes off."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as control, control.makefile() as lines:
         control.settimeout(LATE_S)
         control.connect(f"/run/far-{name}")
@@ -148,7 +153,7 @@ def _relay_off_at(name: str, act: Callable[[], object]) -> float:
 
 
 def tell(name: str, words: str) -> None:
-    """Send a command to a far side (`hal_fakes/control.py`)."""
+    """Send a command to simulated equipment (`hal_fakes/control.py`)."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as control:
         control.connect(f"/run/far-{name}")
         control.sendall(words.encode() + b"\n")

@@ -20,14 +20,16 @@ SYSRQ = Path("/proc/sysrq-trigger")
 STEPS = (10, -20, 10)
 """The steps of the clock (years): ten years ahead, then ten years behind, then right again."""
 MEANWHILE_S = 12.0
-"""A pause (s) longer than the leases of the watchdog and of a node. A sleep by the wall clock would
-show."""
+"""A pause (s) longer than the leases of the watchdog and of a node. If the service slept by the wall
+clock, a lease would run out during this pause."""
 HEARD_S = 20.0
-"""The time (s) within which a request must take effect after a step. The ride takes 5 s of it."""
+"""The time (s) within which a request must take effect after a step of the clock. Of this time the
+lift's ride takes 5 s."""
 
 
 def edited_yaml() -> str:
-    """The YAML file gets other pins while two relays are on. After kill -9 the old pins go off."""
+    """Replace pins in the YAML file while two relays are on, and kill the service with -9. Check that
+    the relays on the old pins go off."""
     relays, old, text = energise(), pid(SERVICE), YAML.read_text()
     YAML.write_text(re.sub("|".join(MOVED), lambda found: MOVED[found[0]], text))
     when = header.now()
@@ -45,7 +47,8 @@ def edited_yaml() -> str:
 
 
 def full_run() -> str:
-    """/run is full and two relays are on. After kill -9 the relays go off, and the service returns."""
+    """Fill /run while two relays are on, and kill the service with -9. Check that the relays go off and
+    that the service returns."""
     relays, old = energise(), pid(SERVICE)
     filler = Path("/run/filler")
     with filler.open("wb") as out:
@@ -64,8 +67,8 @@ def full_run() -> str:
 
 
 def clock() -> str:
-    """The clock steps by ten years, ahead and back. Two relays stay on, and the service fulfils
-    requests."""
+    """Set the clock ten years ahead, then behind, then right again. Check that two relays stay on and
+    that the service fulfils requests."""
     relays, old, waits = energise(), pid(SERVICE), []
     for years, floor in zip(STEPS, ("L3", "L1", "L3"), strict=True):
         when = header.now()
@@ -81,8 +84,8 @@ def clock() -> str:
 
 
 def _goes_to(floor: str) -> float:
-    """Return the time (s) until a request of a new node takes effect. The session's relays must stay
-    on."""
+    """Return the time (s) until a request of a new node takes effect. Meanwhile the two relays of the
+    session must stay on."""
     began = header.now()
     send("lift", "Lift1", floor, "--session", "vm/robot", "--direct")
     took = header.now() - began
@@ -92,8 +95,8 @@ def _goes_to(floor: str) -> float:
 
 
 def read_only_root() -> str:
-    """The root file system is read only. The service starts and serves. After its death the outputs are
-    off."""
+    """Make the root file system read only. Check that the service starts and serves, and that the
+    relays go off after kill -9."""
     sh("systemctl", "stop", SERVICE)
     sh("journalctl", "--relinquish-var")
     SYSRQ.write_text("u")  # this makes the root read only, as the kernel does for a damaged disk
@@ -118,7 +121,7 @@ def _options(mount: str) -> set[str]:
 
 
 def labels() -> str:
-    """The service finds the header's chip by its label on Raspberry Pi 3, 5 and 4."""
+    """Check that the service finds the header's chip by its label on Raspberry Pi 3, 5 and 4."""
     sh("systemctl", "stop", SERVICE, "far-lift.service")
     for label in header.LABELS:  # the last label stays for the other checks
         header.unplug()
@@ -141,7 +144,8 @@ def _claims(label: str, lines: Iterable[int]) -> None:
 
 
 def said() -> str:
-    """The journal is readable. It has one line for each event, with key=value, and no traceback."""
+    """Check the form of the journal. Each line must be an event with key=value pairs, and no line may
+    belong to a traceback."""
     text = sh("journalctl", "-b", "-u", SERVICE, "-o", "cat", "-t", "rmf-bridge")
     lines = text.splitlines()
     if not lines:

@@ -1,4 +1,5 @@
-"""The exporter says in its log what no metric can say."""
+"""The log of the exporter. The log gives the reason why a certificate's end is unknown, because a
+metric can only give numbers."""
 
 from pathlib import Path
 

@@ -110,7 +110,7 @@ def test_a_gateway_is_drafted_from_its_register_table(tmp_path: Path) -> None:
     assert found["fire_alarm"] == {"at": "discrete input 4", "active": "high"}
     assert found["agv_mode"] == {"at": "input register 3", "bit": 0, "active": "high"}
     assert found["commands"]["agv_mode_request"]["at"] == "coil 2"
-    assert found["commands"]["call"]["none"] == 1  # the floor 0 exists too
+    assert found["commands"]["call"]["none"] == 1  # not 0, because a floor has the number 0
     assert "motion" not in found
 
 
@@ -154,22 +154,28 @@ def test_a_missing_folder_is_reported_before_any_question_is_asked(
     [
         ("--kind door", "there is no terminal for questions: give --name, or --yes for 'Door1'"),
         ("--kind door --floors L1 --yes", "--floors does not apply to a door on modbus"),
-        ("--kind lift --wiring can --yes", "a lift is not wired by can: gpio, modbus, rs485"),
+        (
+            "--kind lift --wiring can --yes",
+            "a lift cannot have the wiring can; choose one of: gpio",
+        ),
         ("--kind door --graph x.yaml --yes", "--graph does not apply to a door on modbus"),
         ("--kind lift --floors L1 --yes", "a lift has at least two floors, each name once, not L1"),
         (
             "--kind lift --floors A,B,C,D,E,F,G,H,I,J,K --encoding one_hot --yes",
             "the header has too few free pins",
         ),
-        ("--kind lift --signals fire --yes", "a lift has no input fire; there are fire_alarm"),
+        ("--kind lift --signals fire --yes", "a lift has no input fire; its inputs are fire_alarm"),
         ("--kind door --unit 0 --yes", "unit is '0': write a whole number from 1 to 247"),
         ("--kind door --domain-id x --yes", "domain_id is 'x': write a whole number from 0 to 232"),
-        ("--kind charger --wiring http --address x_y!:z --yes", "with these answers check would"),
+        (
+            "--kind charger --wiring http --address x_y!:z --yes",
+            "with these answers, `check` would",
+        ),
         ("--kind door --wiring gateway --door-numbers 0,1 --yes", "door_numbers is '0,1': write"),
         ("--kind door --wiring gateway --door-numbers 0,0,1 --yes", "door_numbers is '0,0,1'"),
         ("--kind door --wiring gateway --floor-at x --yes", "--floor-at does not apply"),
         ("--kind lift --wiring gateway --encoding gray --yes", "--encoding does not apply"),
-        ("--kind door --wiring gateway --hold-at 40001 --yes", "with these answers check would"),
+        ("--kind door --wiring gateway --hold-at 40001 --yes", "with these answers, `check` would"),
         ("--kind door --name= --yes", "'' is not a name for a door"),
     ],
 )

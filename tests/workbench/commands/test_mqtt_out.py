@@ -1,4 +1,4 @@
-"""`mqtt-out` as a process between RMF's graph and a real broker. The tests kill and restart the
+"""`mqtt-out` as a process between a ROS graph of RMF and a real broker. The tests kill and restart the
 broker."""
 
 import argparse
@@ -96,7 +96,7 @@ def door(domain: int) -> Iterator["Door"]:
 
 
 class Door:
-    """A door's node on the graph. It publishes no diagnostics."""
+    """A node that publishes the states of one door. The node publishes no diagnostics."""
 
     def __init__(self, domain: int) -> None:
         self.node = open_transport(

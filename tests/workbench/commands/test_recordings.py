@@ -56,8 +56,8 @@ def test_what_is_no_recording_is_exit_66_and_a_sentence(
 def test_a_recording_that_was_cut_is_read_as_far_as_it_goes(
     command: tuple[str, ...], code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Every command reads the remaining part. Only `replay` refuses the file, because its head is
-    missing."""
+    """Every command reads the part before the cut. Only `replay` refuses the file, because the file's
+    head is missing."""
     file = tmp_path / "x.mcap"
     file.write_bytes(CUT)
     assert cli.main([str(file) if word == "FILE" else word for word in command]) == code
@@ -69,7 +69,7 @@ def test_a_recording_of_no_daemon_can_be_read_and_not_replayed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert cli.main(["replay", str(write(tmp_path / "bag", [], NEWEST))]) == os.EX_DATAERR
-    assert "only such entries can be replayed" in capsys.readouterr().err
+    assert "only these can be replayed" in capsys.readouterr().err
 
 
 def test_every_command_that_reads_a_recording_is_here() -> None:

@@ -1,5 +1,5 @@
-"""`release` asks first the supervisor, then the lift's daemon. If a robot may be inside, the command
-refuses."""
+"""`release` first asks RMF's lift supervisor, and then the daemon of the lift itself. If a robot may be
+in the car, the command refuses."""
 
 import dataclasses
 import io
@@ -31,10 +31,10 @@ LOOK = (
 def told(
     request: LiftEnd, states: Iterable[d.LiftState], boarded: str, listeners: int = 1
 ) -> tuple[list[tuple[int, str]], list[str], Fulfilled | Failed]:
-    """Deliver one state each second to a `release`.
+    """Run `release`, and deliver one state of the lift each second.
 
-    Return (time in s, way) of each request, the hints, and the outcome. The way is "supervisor" or
-    "direct".
+    Return (time in s, receiver) for each request, the hints, and the outcome. The receiver is
+    "supervisor", or "direct" for the lift's own daemon.
     """
     seen = RequestProgress(0.0, 10.0, listeners, told={"boarded": boarded})
     sent, hints = list[tuple[int, str]](), list[str]()
@@ -130,21 +130,25 @@ def test_after_the_end_release_watches_who_has_the_lift_and_what_moves() -> None
     done = lines.index(f"done     Lift1  Lift1 is no longer held by {ME}")
     assert lines[done + 1 :][0].endswith("held by fleet/blue")
     assert lines[-1] == (
-        "after    Lift1  fleet/blue has it now; in these 5 s: the car goes up; floor L1 to L3"
+        "after    Lift1  fleet/blue has it now; in the 5 s after the release:"
+        " the car goes up; floor L1 to L3"
     )
 
 
 @pytest.mark.parametrize(
     ("states", "text"),
     [
-        ([LIFT, LIFT], "nobody has it now; in these 5 s: neither the car nor its door moved"),
+        (
+            [LIFT, LIFT],
+            "nobody has it now; in the 5 s after the release: neither the car nor its door moved",
+        ),
         (
             [LIFT, replace(LIFT, door_state=1), replace(LIFT, door_state=0)],
-            "nobody has it now; in these 5 s: door closed to moving to closed",
+            "nobody has it now; in the 5 s after the release: door closed to moving to closed",
         ),
         (
             [LIFT],
-            "nobody has it now; no state came in 5 s: it is not known whether anything moves",
+            "nobody has it now; no state came in 5 s, so it is unknown whether anything moves",
         ),
     ],
 )

@@ -341,7 +341,7 @@ def test_a_lift_is_sent_for_by_another_process_on_the_adapter_topic(
         states = node.publisher(topics.LIFT_STATES)
         requests: list[d.LiftRequest] = []
         node.subscribe(topics.ADAPTER_LIFT_REQUESTS, requests.append)
-        node.publisher(topics.LIFT_REQUESTS)  # a supervisor also publishes on lift_requests
+        node.publisher(topics.LIFT_REQUESTS)  # stands in for the supervisor's publisher
         with command("send lift Lift1 L3 --session fleet/robot", speaks, domain) as process:
             wait_until(lambda: states.matched() > 0, "send listens to lift_states")
             states.publish(LIFT)
@@ -388,8 +388,8 @@ def test_an_interrupted_send_exits_130_and_leaves_no_ghost_that_asks_for_the_doo
 
 
 def test_a_command_reaches_a_site_as_a_device_yaml_does(tmp_path: Path) -> None:
-    """With `--config` the command takes the router, domain and keys from the site's file. Options
-    beside `--config` override the file."""
+    """With `--config` the command takes the router, domain and keys from the site's file. Other options
+    of the command override the file."""
     router = Router()
     file = tmp_path / "lift.yaml"
     shipped = (Path(__file__).parents[3] / "config" / "lift_supervisor.yaml").read_text()

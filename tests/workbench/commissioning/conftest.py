@@ -1,4 +1,5 @@
-"""A fixture of the daemon tests: the Modbus module, for commands that act on real wires."""
+"""Makes the fixture `module` available to the tests in this folder. The fixture is a Modbus I/O module
+on a real connection."""
 
 from tests.runtime.conftest import module
 

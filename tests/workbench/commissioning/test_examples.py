@@ -1,5 +1,5 @@
-"""The examples and headings of the reference. Each key has a valid example, and each heading is
-unique."""
+"""The configuration reference (docs/reference/configuration.md). Each key has a valid example, and each
+heading is unique."""
 
 from collections import Counter
 from pathlib import Path
@@ -19,7 +19,8 @@ from workbench.commissioning.examples import example
 
 
 def structs() -> list[type]:
-    """Return every struct in the reference. The list includes the structs inside other structs."""
+    """Return every struct in the configuration reference. The list includes the structs inside other
+    structs."""
     tops: list[type] = [Rmf, *(named.bus_called(name).settings for name in named.bus_types())]
     tops += [shape.type.settings for shape in json_schema.shapes()]
     tops += [kind.settings for kind in json_schema.graph_kinds()]

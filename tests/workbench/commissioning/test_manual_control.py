@@ -1,4 +1,5 @@
-"""The device that a command finds in a file. The file may be wrong or may list several devices."""
+"""Commands that work on one device of a file. The tests check which device a command chooses, and the
+message if the file is wrong or lists several devices."""
 
 import os
 from pathlib import Path

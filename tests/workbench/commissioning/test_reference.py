@@ -28,8 +28,7 @@ def validator(schema: json_schema.Schema) -> Draft202012Validator:
 
 
 def properties(part: object) -> Iterator[tuple[str, json_schema.Schema]]:
-    """Yield every property of a schema, at any depth. An editor shows the text of a property beside its
-    key."""
+    """Yield the name and the schema of every property, at any depth."""
     if isinstance(part, dict):
         yield from part.get("properties", {}).items()
     for below in (

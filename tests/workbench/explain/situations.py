@@ -1,4 +1,5 @@
-"""Situations for `explain`. Real cores and drivers run with simulated devices in virtual time.
+"""Situations for `explain`. The daemons' real decision code and drivers run with simulated devices, in
+virtual time.
 
 Each function returns the messages on the graph, and the device that a person asks about.
 """
@@ -150,8 +151,8 @@ def no_supervisor() -> Case:
 
 
 def supervisor_is_passive() -> Case:
-    """A foreign node has a publisher on `lift_requests`, but publishes nothing. So our supervisor stays
-    silent."""
+    """A foreign node has a publisher on `lift_requests`, but publishes nothing. Because of that
+    publisher, our supervisor only listens."""
     scene = Scene("Lift1")
     Place(scene.air, "forgotten_pub", lambda: None).publisher(topics.LIFT_REQUESTS)
     scene.run(5.0)

@@ -1,7 +1,7 @@
-"""Short scenes in virtual time, with the devices of the soak test.
+"""Short scenes in virtual time, with the simulated devices of `tests/site`.
 
-Cores and drivers are real, and the devices are simulated. A model of RMF follows RMF's rules. Every
-message on the graph becomes a `Heard`, as in a recording.
+The daemons' decision code and the drivers are real. A model of RMF follows RMF's rules. Every message
+on the graph becomes a `Heard`, as in a recording.
 """
 
 from abc import ABC, abstractmethod
@@ -128,7 +128,7 @@ class Scene:
             daemon.start()
         self._supervise(rmf)
         self._second()
-        self.run(4.0)  # at first the supervisors only listen
+        self.run(4.0)  # for some seconds after its start, a supervisor only listens
         self.heard.clear()
         self.run(2.0)
 

@@ -1,4 +1,5 @@
-"""The lanes of a timeline that is made from messages."""
+"""The lanes of a timeline, which is made from messages. A lane is one row of the picture, such as the
+door's row."""
 
 import json
 from collections.abc import Sequence

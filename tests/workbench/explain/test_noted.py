@@ -1,4 +1,5 @@
-"""The notes about a device in our incident files. A note comes from the device's daemon."""
+"""Notes about a device in the incident files that our recorder writes. The daemon of the device makes
+these notes, for example about relays and faults."""
 
 import json
 from pathlib import Path

@@ -142,7 +142,8 @@ def contrast(text: str, back: str) -> float:
 
 @pytest.mark.parametrize("looks", [LIGHT, DARK], ids=["light", "dark"])
 def test_labels_can_be_read_on_every_tone(looks: dict[str, ToneStyle]) -> None:
-    """A label lies on the fill, and on the lines that cover the fill."""
+    """Check the contrast of a label with both colours behind it: the fill, and the pattern on the
+    fill."""
     backs = {tone: filter(None, (looks[tone].fill, looks[tone].pattern)) for tone in TONES}
     found = {t: min(contrast(looks[t].text, back) for back in backs[t]) >= 4.5 for t in TONES}
     assert found == dict.fromkeys(TONES, True)

@@ -1,4 +1,5 @@
-"""The reasons for which our recorder keeps a file. `explain` explains the moment of each reason."""
+"""Files that our recorder has kept, each for one reason, such as a fault. `explain` explains the state
+at the moment of that reason."""
 
 import json
 from collections.abc import Iterator

@@ -1,4 +1,5 @@
-"""Robots of our fleet's daemon in `explain` and `watch`: why one stands, in the graph's own words."""
+"""Robots of our fleet's daemon in `explain` and `watch`. The sentences say why a robot stands, and
+repeat the words that the daemon publishes."""
 
 from typing import Any
 
@@ -68,8 +69,8 @@ def lift(at: float) -> list[Heard]:
         ),
         (
             {"doing": "path to L1 ward, at checkpoint 1 of 3, RMF's light: stay, paused by us"},
-            "tiny/AMR01 stands on its path to L1 ward, at checkpoint 1 of 3. RMF's traffic light holds"
-            " it: the way ahead belongs to another robot, or is being negotiated.",
+            "tiny/AMR01 stands on its path to L1 ward, at checkpoint 1 of 3. RMF's traffic light makes"
+            " it stand: another robot has the way ahead, or the robots still negotiate.",
             "the fleet adapter",
         ),
         (
@@ -107,7 +108,7 @@ def test_a_fault_is_named_with_its_remedy(code: str, detail: str, sentence: str)
 
 def test_a_robot_that_waits_for_a_lift_is_explained_by_the_lift() -> None:
     found = explained(*lift(9.5), reported(10.0, doing="navigate to L1 lift1_L1"), *lift(10.5))
-    assert found.now[0].startswith("tiny/AMR01 has waited for Lift1 at L2 since")
+    assert found.now[0].startswith("tiny/AMR01 has waited since")
     assert any("tiny/AMR02" in text for text in found.now), "the lift's explanation says who has it"
     assert found.next
 

@@ -1,4 +1,5 @@
-"""Senders on a device's own topic. Besides the supervisor, a person may send with `send --direct`."""
+"""The senders of requests on the topic that a device obeys, such as `lift_requests`. A sender is the
+supervisor, or a person with `send --direct`."""
 
 from datetime import UTC
 
@@ -34,7 +35,7 @@ def test_a_robots_request_on_lift_requests_was_passed_on_by_the_supervisor() -> 
     told = lift(
         ("adapter_lift_requests", asks("fleet/blue")), ("lift_requests", asks("fleet/blue"))
     )
-    assert "The supervisor has asked for fleet/blue since" in told
+    assert "The supervisor has requested the lift for fleet/blue since" in told
     assert "--direct" not in told
 
 
@@ -43,13 +44,13 @@ def test_who_asks_for_a_session_on_lift_requests_that_no_robot_asks_for_is_not_k
     others: tuple[tuple[str, d.LiftRequest], ...],
 ) -> None:
     told = lift(*others, ("lift_requests", asks("me")))
-    assert f"{EITHER.capitalize()} has asked for me since" in told
-    assert "The supervisor has asked for" not in told
+    assert f"{EITHER.capitalize()} has requested the lift for me since" in told
+    assert "The supervisor has requested the lift" not in told
 
 
 def test_who_ends_a_session_on_lift_requests_alone_is_not_known() -> None:
     told = lift(("lift_requests", asks("fleet/red", 0)))
-    assert f"{EITHER} ends the session of fleet/red, which nobody asks for" in told
+    assert f"{EITHER} ends the session of fleet/red, from whom no request was heard" in told
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,5 @@
-"""The tones for RMF's state numbers. An unused number must not shift the tones."""
+"""The tone for each of RMF's state numbers. A tone is a kind of state, such as "wrong", which decides
+the colour. An unused number must not shift the tones."""
 
 import pytest
 

@@ -1,4 +1,5 @@
-"""`explain` for a dispenser or ingestor. The workcell's requests and its own list give the reasons."""
+"""`explain` for a dispenser or ingestor. The reasons come from the requests to the workcell, and from
+the requests that the workcell's state lists."""
 
 from typing import Any
 
@@ -44,13 +45,13 @@ def result(at: float, status: int) -> tuple[float, str, Any]:
         (states(9, 0), "Nobody requests the workcell.", "nobody"),
         (
             states(9, 0, "task"),
-            "Its state still lists task, which no fleet adapter repeats.",
+            "Its state still lists task, but no fleet adapter repeats it.",
             "nobody",
         ),
         (states(9, 2, "task") + asks(9), "has had no answer", "a person"),
-        (states(9, 1, "task") + asks(9), "Request task asks for 1 box", "the controller"),
-        (states(9, 0, "task") + asks(9), "Request task asks for 1 box", "the controller"),
-        (states(9, 0) + asks(9), "Request task asks for 1 box", "the device's node"),
+        (states(9, 1, "task") + asks(9), "Request task has asked for 1 box", "the controller"),
+        (states(9, 0, "task") + asks(9), "Request task has asked for 1 box", "the controller"),
+        (states(9, 0) + asks(9), "Request task has asked for 1 box", "the device's node"),
         ([*states(9, 2, "task"), *asks(9), result(5.6, 2)], "It has failed", "the fleet adapter"),
     ],
 )
@@ -64,7 +65,7 @@ def test_it_says_which_request_waits_and_who_must_act(lines: Any, says: str, who
 def test_a_wait_ends_with_its_result_though_rmf_repeats_the_request(
     status: int, waits: list[float]
 ) -> None:
-    """notify, the exporter and the recorder count the same waits."""
+    """Check how long RMF's request waits. notify, the exporter and the recorder use the same times."""
     graph = PlainGraph()
     request = [(at + 4.0, topic, message) for at, topic, message in asks(3)]
     for at, topic, message in sorted([*states(9, 0), *request, result(5.0, status)], key=_at):

@@ -184,7 +184,7 @@ def test_where_a_robot_may_be_in_the_car_the_remedy_asks_to_look_into_it() -> No
         RequestProgress(0.0, 10.0), states=(held,), stated_at=1.0, told={"boarded": "yes"}
     )
     assert next(iter(RIDE.obstacles(seen))).remedy == (
-        "a robot may be in the car; if it is empty:"
+        "a robot may be in the car; if the car is empty:"
         " rmf-bridge release Lift1 --car-empty --localhost"
     )
 
@@ -210,7 +210,8 @@ def test_where_a_robot_may_be_in_the_car_the_remedy_asks_to_look_into_it() -> No
         ),
         (
             replace(LIFT, session_id=ME),
-            "Lift1 granted the session, but its mode is HUMAN, not AGV (a key switch, or still in use)"
+            "Lift1 granted the session, but its mode is HUMAN, not AGV"
+            " (a key switch, or people still use it)"
             " (last state: car at L1, door closed, mode HUMAN, held by fleet/robot)",
         ),
         (
@@ -267,7 +268,7 @@ def test_a_graph_without_any_state_is_said_to_be_empty() -> None:
             " nothing is heard by dds in domain 7, on this machine alone;"
             " is the device in another domain (--domain-id), on another transport (--transport),"
             " or on another machine (without --localhost)?"
-            " rmf-bridge status on the daemon's machine shows both"
+            " rmf-bridge status on the daemon's machine shows domain and transport"
         ],
         Failed("gave up after 10 s"),
     )

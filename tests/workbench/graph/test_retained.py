@@ -22,7 +22,8 @@ DOOR = d.DoorState(stamp(WALL), "ward", d.DoorMode(0))
 
 
 class Site:
-    """A graph whose states one retainer publishes. The wall clock reads WALL at the time 0 s."""
+    """A graph, and a `Retainer` that makes the MQTT messages for the graph's states. At 0 s the wall
+    clock reads WALL."""
 
     def __init__(self, discovery: str | None = None) -> None:
         self.graph = PlainGraph(most=2)

@@ -1,4 +1,4 @@
-"""A party on the graph that publishes given messages at given times."""
+"""A simulated node that publishes given messages at given times."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ from workbench.rmf_model import NEVER, Party, Said
 
 
 class Script(Party):
-    """A party that publishes `lines` in order. Each line is (time in s, topic, message)."""
+    """A simulated node that publishes `lines` in order. Each line is (time in s, topic, message)."""
 
     subscribes: Sequence[AnyTopic] = ()
 
@@ -38,7 +38,7 @@ def lift(session: str, floor: str, lift: str = "Lift1", kind: int = 1) -> d.Lift
 
 
 def asks(at: float, session: str, floor: str, times: int = 1) -> Script:
-    """Return a party that publishes this request on lift_requests once a second."""
+    """Return a node that publishes this request on lift_requests once a second."""
     request = lift(session, floor)
     return Script(*((at + n, topics.LIFT_REQUESTS, request) for n in range(times)))
 
@@ -49,11 +49,11 @@ def door(mode: int, who: str = "door_supervisor", name: str = "ward") -> d.DoorR
 
 
 def to_door(*modes: tuple[float, int]) -> Script:
-    """Return a party that sends each mode on door_requests. Each item is (time in s, mode)."""
+    """Return a node that sends each mode on door_requests. Each item is (time in s, mode)."""
     return Script(*((at, topics.DOOR_REQUESTS, door(mode)) for at, mode in modes))
 
 
 def charge(at: float, robot: str, request_id: str, timeout_s: int = 20) -> Script:
-    """Return a party that sends one ChargerRequest."""
+    """Return a node that sends one ChargerRequest."""
     request = d.ChargerRequest("bay1", "fleet", robot, d.Duration(timeout_s), request_id)
     return Script((at, topics.CHARGER_REQUESTS, request))

@@ -1,5 +1,5 @@
-"""The laws for fleet adapters. Each law applies on an occasion. Without the occasion the verdict is
-"not seen"."""
+"""The laws for fleet adapters. Each law has an occasion: the event at which a wrong adapter would break
+the law. If the messages contain no such event, the verdict is "not seen"."""
 
 from collections.abc import Callable
 

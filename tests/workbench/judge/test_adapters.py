@@ -1,7 +1,7 @@
-"""The judge on fleet adapters. The judge acquits RMF's own adapter, and convicts each wrong adapter by
-the right law.
+"""The verdicts of the judge on fleet adapters. The judge must acquit RMF's own adapter. The judge must
+convict each wrong adapter, and only by the law that the adapter breaks.
 
-`pytest -s` prints each planted defect, the law that convicts the defect, and false alarms.
+`pytest -s` prints for each planted defect the law that convicts the adapter, and the false alarms.
 """
 
 from collections.abc import Callable

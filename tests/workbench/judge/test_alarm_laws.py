@@ -1,6 +1,8 @@
-"""The laws of a node's alarm. Each law has a story in which it is not seen, kept, and broken.
+"""The laws for a node that publishes alarms. For each law, one story gives the verdict "not seen", one
+"kept", and one "broken".
 
-Each party that could be at fault has a story of its own, in which only that party is blamed.
+Several nodes may publish one alarm. Each node that could be at fault has a story in which only that
+node is blamed.
 """
 
 from collections.abc import Iterable
@@ -22,7 +24,8 @@ NODES = {name: Sender(f"/{name}") for name in ("panel", "lift", "desk")}
 
 
 def says(at: float, on: bool, node: str = "panel", *fleets: str) -> Heard:
-    """Return a message of a node; of a hidden node with the name ""."""
+    """Return an alarm message of this node. With the name "", the message does not show which node sent
+    it."""
     if fleets:
         message = d.EmergencySignal(fleets, on)
         return Heard(at, at, topics.EMERGENCY_SIGNAL.name, message, NODES.get(node))
@@ -37,7 +40,8 @@ def states(at: float, state: str, node: str = "panel", *fleets: str) -> Heard:
 
 
 def stating(state: str, begin: int, end: int, node: str = "panel") -> list[Heard]:
-    """Return a statement for each second."""
+    """Return one diagnostics message for each second. In this message, the node states whether it has
+    an alarm."""
     return [states(float(at), state, node) for at in range(begin, end)]
 
 
@@ -111,7 +115,7 @@ def broken(lines: Iterable[Heard], node: str) -> set[str]:
 
 
 def test_of_two_nodes_only_the_one_that_ends_the_others_alarm_is_blamed() -> None:
-    """The lift repeats its alarm, as it must."""
+    """The lift must repeat its alarm after the other node has ended it, and the lift does so."""
     ended = [*LIFTS, says(5.0, False, "desk"), says(5.1, True, "lift")]
     assert broken(ended, "desk") == {"A1.others"}
     assert broken(ended, "lift") == set()
@@ -123,7 +127,8 @@ def test_a_node_that_does_not_repeat_its_alarm_is_blamed_beside_the_one_that_end
 
 
 def test_after_a_third_nodes_false_nobody_else_is_blamed_for_the_end() -> None:
-    """The alarm of a node without statements ends with the first `false`: its robots drive already."""
+    """ "panel" and "lift" publish no diagnostics. The first `false` ends such an alarm, because RMF's
+    robots then drive again."""
     alarm = [says(0.5, True, "lift"), says(1.0, True), says(5.0, False, "desk")]
     assert broken([*alarm, says(9.0, False)], "panel") == set()
     assert broken([*alarm, says(9.0, False)], "desk") == {"A1.others"}
@@ -136,7 +141,7 @@ def test_two_nodes_may_end_one_alarm_together() -> None:
 
 
 def test_what_the_wire_hides_is_nobodys_fault() -> None:
-    """A message without a sender may be the node's own."""
+    """If a message does not show its sender, the judged node may have sent it."""
     hidden = [*stating("quiet", 0, 2), says(1.5, True, ""), *stating("alarm", 2, 8)]
     hidden += [says(8.5, False, ""), *stating("quiet", 9, 14)]
     found = judged(hidden)
@@ -145,7 +150,7 @@ def test_what_the_wire_hides_is_nobodys_fault() -> None:
 
 
 def test_a_statement_that_crosses_its_message_breaks_no_law() -> None:
-    """The topics have no common order."""
+    """Two messages of one node on different topics may arrive in the other order."""
     begins = [
         *stating("quiet", 0, 2),
         says(1.9, True),

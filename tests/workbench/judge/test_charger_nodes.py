@@ -1,5 +1,5 @@
-"""The judge on chargers' nodes with a defect. The right law catches the defect, and no other law
-does."""
+"""The verdicts of the judge on charger nodes with a defect. Only the law that the node breaks may
+convict the node."""
 
 import pytest
 

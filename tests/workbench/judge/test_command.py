@@ -25,12 +25,12 @@ CORPUS = Path(__file__).parents[1] / "replay" / "corpus"
     ("line", "why"),
     [
         ("judge lift", "which lift? Give the NAME"),
-        ("judge lift Lift1 --ride L1 L3", "the play moves the lift 'Lift1': add --active"),
-        ("judge lift Lift1 --active", "a lift is played by --ride A B"),
-        ("judge door ward --active --ride L1 L3", "a lift is played by --ride A B"),
+        ("judge lift Lift1 --ride L1 L3", "this would move the lift 'Lift1': to permit it, add"),
+        ("judge lift Lift1 --active", "--active moves a lift with --ride A B"),
+        ("judge door ward --active --ride L1 L3", "--active moves a lift with --ride A B"),
         ("judge lift Lift1 --active --ride L1 L3 --restarts", "--restarts needs --localhost"),
-        ("judge charger a --charge", "the play moves the charger 'a'"),
-        ("judge lift Lift1 --active --ride L1 L3 --recording x", "a recording is only judged"),
+        ("judge charger a --charge", "this would move the charger 'a'"),
+        ("judge lift Lift1 --active --ride L1 L3 --recording x", "judge moves no device"),
         ("judge lift Lift1 --for 0", "'0': write 0.1 to 604800 seconds"),
     ],
 )

@@ -1,4 +1,5 @@
-"""The judge on doors' nodes with a defect. The right law catches the defect, and no other law does."""
+"""The verdicts of the judge on door nodes with a defect. Only the law that the node breaks may convict
+the node."""
 
 import pytest
 
@@ -59,7 +60,8 @@ def test_a_door_that_people_opened_is_closed_by_rmf_and_shut_by_nobody(
 
 
 def test_one_robots_close_closes_the_door_on_another() -> None:
-    """Finding 11: the CLOSE bypasses the supervisor. Only the supervisor knows both robots."""
+    """The door obeys the adapter's CLOSE, which bypasses the supervisor. Only the supervisor knows that
+    the other robot needs the door."""
     adapters: Party = Script(
         (5.4, topics.ADAPTER_DOOR_REQUESTS, door(2, RED)),
         (8.4, topics.ADAPTER_DOOR_REQUESTS, door(2, BLUE)),

@@ -1,4 +1,5 @@
-"""A run of the judge: the conditions for a play, the end of a play, and nonsense from other nodes."""
+"""A run of the judge. In a play, the judge moves the device, as RMF would. The tests check when a play
+may begin, how it ends, and the effect of meaningless messages."""
 
 import pytest
 from msgspec.structs import replace
@@ -73,7 +74,7 @@ def test_a_floor_that_is_not_served_is_not_ridden_to() -> None:
     world = World()
     world.add(RightLift())
     judging = world.judge("lift", "Lift1", RideScenario("Lift1", ("L1", "L9"), 1, 60.0))
-    assert judging.note == "'L9': it serves 'L1', 'L2', 'L3'"
+    assert judging.note == "the lift does not serve 'L9': it serves 'L1', 'L2', 'L3'"
 
 
 def test_a_device_that_is_not_there_is_waited_for_a_while_and_not_played_with() -> None:
@@ -122,7 +123,8 @@ def test_an_interrupted_play_lets_the_device_go(
 
 
 def test_a_ride_that_another_robot_takes_ends_with_our_own_end_only() -> None:
-    """The lift gives the session to another robot, although the judge plays the supervisor."""
+    """During the judge's ride, the lift gives the session to another robot. Check that the judge then
+    ends only its own session."""
     world = World()
     said = said_by_the_judge(world)
     node = RightLift()
@@ -213,7 +215,7 @@ def test_a_node_that_dies_in_the_middle_is_accused_of_silence_and_nothing_else()
     judge = judged(STATE, lift("fleet/red", "L1"), replace(STATE, session_id="fleet/red"))
     found = {j.law.id: j for j in judge.end(30.0, EPOCH + 30.0) if j.verdict is Verdict.BROKEN}
     assert list(found) == ["L2.rate"]
-    assert found["L2.rate"].evidence[0].text == "silent since then, for 29.0 s"
+    assert found["L2.rate"].evidence[0].text == "no state for the last 29.0 s"
 
 
 def test_a_node_that_comes_back_after_a_silence_may_have_forgotten_its_session() -> None:

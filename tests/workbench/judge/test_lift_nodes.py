@@ -1,4 +1,5 @@
-"""The judge on lifts' nodes with a defect. The right law catches the defect, and no other law does."""
+"""The verdicts of the judge on lift nodes with a defect. Only the law that the node breaks may convict
+the node."""
 
 import pytest
 
@@ -100,7 +101,8 @@ def test_watching_finds_the_defect(node: type[RightLift], parties: list[Party], 
 
 
 def test_a_lift_whose_supervisor_has_died_owes_nobody_a_session() -> None:
-    """The robot repeats its request on adapter_lift_requests only. A lift need not obey this topic."""
+    """The robot repeats its request on adapter_lift_requests only, and a lift need not obey this
+    topic."""
 
     class Taken(RightLift):
         def serves(self, request: d.LiftRequest) -> bool:
@@ -136,7 +138,8 @@ def test_the_volatile_publisher_of_jazzys_supervisor_is_not_the_lifts(
 
 
 def test_an_end_without_a_floor_that_is_refused_is_found_by_watching_three_rides() -> None:
-    """RMF's supervisor sends a second END with a floor. So a single ride proves nothing."""
+    """RMF's supervisor sends a second END, with a floor. The lift obeys the second END, so one ride
+    does not prove that the lift refused the first END."""
     rides = [
         line
         for n in range(3)
@@ -152,8 +155,8 @@ def test_an_end_without_a_floor_that_is_refused_is_found_by_watching_three_rides
 
 
 def test_two_robots_stand_before_a_lift_that_refuses_an_end_without_a_floor() -> None:
-    """Finding 4: the supervisor already serves the second robot. So no node can release the first
-    robot."""
+    """The supervisor already serves the second robot, so the supervisor sends no END for the first
+    robot. No other node can release the first robot."""
     found, why = rides(EndNeedsAFloor(), robots=2)
     assert found["broken"] == {"L5.ends"}
     assert why == "RequestLift of rmf_bridge_judge/robot2 has not ended in 120 s"

@@ -122,8 +122,8 @@ def held(at: float, **state: int | str | float) -> Line:
 def answered(times: int, early_s: float, after_s: float) -> list[Line]:
     """Return a state each second, and then `times` requests.
 
-    Each request gets a state `after_s` seconds later. This state comes `early_s` seconds before it is
-    due.
+    Each request gets a state `after_s` seconds later. In the regular rhythm of one second, this state
+    would come `early_s` seconds later.
     """
     lines, at = list(seconds(0.0, 12.0, leaf)), 11.0
     for _ in range(times):
@@ -248,7 +248,9 @@ def false_alarms(times: int, each_s: float) -> list[Line]:
 
 
 LIFT: list[tuple[str, Story, float, float]] = [
-    # a session may appear up to this time (s) before the request that explains the session
+    # The two numbers of a law are values of `x`: the law is kept with the first, and broken with the
+    # second. In L1.other, `x` is a time (s). A session may appear `x` before the request that explains
+    # the session.
     (
         "L1.other",
         lambda x: [

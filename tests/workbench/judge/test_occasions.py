@@ -1,5 +1,6 @@
-"""The laws and their occasions. Without the occasion the verdict is "not seen". With the occasion a
-correct node keeps the law, and a wrong node breaks it."""
+"""The laws and their occasions. An occasion is the event at which a wrong node would break the law.
+Without an occasion the verdict is "not seen". With an occasion a correct node keeps the law, and a
+wrong node breaks it."""
 
 from collections.abc import Callable
 from typing import Any
@@ -61,7 +62,8 @@ def senders(*names: str) -> Look:
 
 
 def fire_publisher(retaining: int) -> Look:
-    """Return a function that shows the judge a publisher of the fire alarm twice."""
+    """Return a function that tells the judge twice which nodes publish the fire alarm. `retaining`
+    tells whether the publisher retains its message."""
 
     def look(judge: Judge) -> None:
         judge.history.senders = ("/a",)
@@ -330,7 +332,8 @@ def test_a_charge_may_be_taken_over_only_after_its_end() -> None:
 
 
 def test_a_listing_state_that_was_lost_or_comes_late_accuses_no_workcell() -> None:
-    """RMF compares the stamps. It ignores a state that is older than the acknowledgement."""
+    """Check with a state that is older than the acknowledgement. RMF compares the stamps, and ignores
+    such a state."""
     of = WorkcellLines("dispenser")
     story = [of.ask(0.1), of.result(0.3, 0), of.state(0.4, read_at=0.2), of.state(3.0, "a", mode=1)]
     assert verdict("dispenser", "W2.lists", [of.state(0.0), *story]) == "not seen"

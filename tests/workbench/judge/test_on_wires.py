@@ -154,7 +154,8 @@ def test_a_judge_that_is_told_to_end_ends_its_session_first(speaks: Wire, domain
 
 @pytest.mark.long(20)
 def test_a_node_that_answers_each_request_floods_nobody(speaks: Wire, domain: int) -> None:
-    """The node and RMF would answer each other without end. So the judge falls silent."""
+    """Check that the judge stops its requests. Otherwise the node and the judge would answer each other
+    without end."""
     ride = ["judge", "lift", "Lift1", "--active", "--ride", "L1", "L3", "--json", "--localhost"]
     with (
         served(LiftAnswers(), speaks, domain) as asked,
@@ -163,7 +164,8 @@ def test_a_node_that_answers_each_request_floods_nobody(speaks: Wire, domain: in
         code, broken, notes = verdict(process)
         assert (code, broken) == (1, {"L2.answer"})
         assert notes == [
-            "not played to its end: stopped: each request causes a state, and RMF asks at each state"
+            "not played to its end: stopped: each request causes a state, and RMF sends a"
+            " request after each state"
         ]
         assert len(asked) < 2000
 
@@ -184,6 +186,6 @@ def test_other_speakers_are_named_with_the_option_that_permits_them(
         node.close()
     assert (code, asked) == (69, [])
     assert notes == [
-        "not played to its end: other nodes publish on lift_requests: to play nevertheless,"
+        "not played to its end: other nodes publish on lift_requests; to play nevertheless,"
         " add --beside supervisor"
     ]

@@ -1,5 +1,5 @@
-"""The judge on our own daemons, each with its driver and a simulated device. The judge accuses no
-daemon."""
+"""The verdicts of the judge on our own daemons, each with its driver and a simulated device. The judge
+must accuse no daemon."""
 
 import pytest
 

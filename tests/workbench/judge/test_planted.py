@@ -1,9 +1,9 @@
-"""Wrong nodes among correct nodes. The judge plays with each node, and convicts each wrong node by the
-right law. The judge convicts no correct node, even under load, without a network, or after a
-restart.
+"""Wrong nodes among correct nodes. In a play, the judge moves each device, as RMF would. The judge must
+convict each wrong node, and only by the law that the node breaks. The judge must convict no correct
+node, even under load, during an outage of the network, or after a restart.
 
-`pytest -s` prints each planted defect, the law that convicts the defect, and false alarms. The defects
-break the contract in the messages, supervisors and fleet adapters of RMF.
+`pytest -s` prints for each planted defect the law that convicts the node, and the false alarms. Each
+defect breaks a rule of RMF's messages, of RMF's supervisors or of RMF's fleet adapters.
 """
 
 from collections.abc import Callable, Sequence
@@ -38,8 +38,8 @@ Make = Callable[[], Party]
 
 
 class NextLift(RightLift):
-    """A second lift. If the states of this lift stop too, the network is silent, and not the judged
-    node."""
+    """A second lift beside the judged node. If the states of the second lift stop too, the network is
+    at fault, and not the judged node."""
 
     name = "Lift9"
 
@@ -60,7 +60,8 @@ def convicted(
     cut: tuple[float, float] | None = None,
     restarts: float | None = None,
 ) -> set[str]:
-    """Return the laws that these nodes break in a play. The nodes publish under one name, 0.3 s apart.
+    """Let the judge play with these nodes, and return the laws that the nodes break. The nodes publish
+    under one name, 0.3 s apart.
 
     `cut` has the time (s) at which the judge loses the network, and the duration (s). At `restarts` (s)
     the node and RMF restart.
@@ -144,7 +145,8 @@ def test_a_planted_defect_is_convicted_by_its_law_alone(
 
 
 ACQUITTED = {"D OPEN is shown before the door is open"}
-"""The defect that a busy network may hide. Only a gap of 0.3 s reveals this defect."""
+"""The defect that the judge may miss on a busy network. The judge detects this defect only if OPEN
+comes within 0.3 s after the request."""
 
 
 @pytest.mark.parametrize(("defect", "nodes", "laws"), PLANTED, ids=[one[0] for one in PLANTED])
@@ -205,7 +207,8 @@ def test_no_right_node_is_convicted_by_a_judge_that_is_killed_and_started_again(
 
 @pytest.mark.parametrize("jitter_s", [0.1, 0.2, 0.4])
 def test_jitter_is_no_answer_to_requests_that_arrive_together_with_states(jitter_s: float) -> None:
-    """On a busy machine RMF's request may arrive just before a state that is early or late."""
+    """States jitter by up to `jitter_s`, and a request comes just before each state. Check that the
+    judge does not take such a state for an answer to the request."""
     for seed in range(30):
         random = Random(seed)
         lines: list[Line] = []

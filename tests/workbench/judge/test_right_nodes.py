@@ -1,5 +1,5 @@
-"""The judge on correct nodes. The judge accuses no such node, however much the node differs from
-ours."""
+"""The verdicts of the judge on correct nodes. The judge must accuse no such node, however much the node
+differs from ours."""
 
 import pytest
 

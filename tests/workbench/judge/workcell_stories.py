@@ -1,5 +1,6 @@
-"""Three stories for each law of workcells. In the first the law has no occasion. In the second the
-workcell keeps the law, and in the third the workcell breaks the law."""
+"""Three stories for each law of workcells. The first story has no occasion: no event at which a wrong
+workcell would break the law. In the second the workcell keeps the law, and in the third the workcell
+breaks the law."""
 
 from typing import Any
 
@@ -46,7 +47,8 @@ class WorkcellLines:
 
 
 def stories(kind: JudgedKind, senders: Any, twins: Any) -> dict[tuple[JudgedKind, str], Any]:
-    """Return three stories for each (kind, law): without occasion, law kept, law broken."""
+    """Return three stories for each (kind, law). The first has no occasion, the second keeps the law,
+    and the third breaks it."""
     of = WorkcellLines(kind)
     served = [of.ask(0.1), of.state(0.2, "a", mode=1), of.result(0.3, ACKNOWLEDGED)]
     return {

@@ -1,4 +1,5 @@
-"""The judge in virtual time on a simulated graph, with nodes and RMF's parties."""
+"""The judge in virtual time on a simulated ROS graph, with the judged nodes and models of RMF's
+nodes."""
 
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -35,7 +36,8 @@ Verdicts = dict[str, set[str]]
 
 
 class Seat:
-    """A party's place on the graph. The party's clock is `skew_s` seconds ahead of the wall clock."""
+    """A simulated node's connection to the graph. The node's clock is `skew_s` seconds ahead of the
+    wall clock."""
 
     def __init__(self, world: "World", party: Party, skew_s: float = 0.0) -> None:
         self.party = party
@@ -53,7 +55,7 @@ class Seat:
         return EPOCH + self._world.timeline.now + self.skew_s
 
     def leave(self) -> None:
-        """Remove the party from the graph, as when its process dies."""
+        """Remove the node from the graph, as when its process dies."""
         self._alarm.set(NEVER)
         self._place.close()
 
@@ -76,7 +78,7 @@ class Seat:
 
 
 class World:
-    """A graph without loss, and all parties on the graph."""
+    """A simulated ROS graph on which no message gets lost, and all nodes on the graph."""
 
     def __init__(self, random: Random | None = None) -> None:
         self.timeline = Timeline()
@@ -95,8 +97,8 @@ class World:
         most_s: float = 600.0,
         also: Callable[[JudgeRun], None] = lambda judging: None,
     ) -> JudgeRun:
-        """Let the judge listen for `for_s` seconds, or play the scenario. In both cases end after
-        `most_s` seconds."""
+        """Let the judge listen for `for_s` seconds, or play the scenario. In both cases, stop the judge
+        after `most_s` seconds."""
         judging = JudgeRun(Judge(kind, name), scenario, for_s)
         place = Place(self.air, "judge", lambda: None)
         publishers: dict[AnyTopic, Publisher[Message]] = {}

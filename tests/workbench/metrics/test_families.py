@@ -1,4 +1,4 @@
-"""Metrics of the graph and of this machine, in the form that Prometheus reads."""
+"""Metrics about RMF's ROS graph and about this machine, in the form that Prometheus reads."""
 
 from collections.abc import Iterable
 from pathlib import Path

@@ -1,4 +1,5 @@
-"""Troubles of certificates: which, how severe, and in which words."""
+"""The troubles that `notify` reports about certificates. The tests check the kind, severity and text of
+each trouble."""
 
 import pytest
 

@@ -25,7 +25,7 @@ ALL = {("lift", "Lift1"), ("door", "ward")}
 
 @dataclass
 class Desk:
-    """A run of `notify` that looks every 10 s. `told` has one line for each notice."""
+    """A run of `notify` that examines the troubles every 10 s. `told` has one line for each notice."""
 
     notices: Notices = field(default_factory=lambda: Notices(SETTINGS))
     now: float = 0.0

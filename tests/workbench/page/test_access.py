@@ -1,4 +1,5 @@
-"""The access to the page in virtual time. Passwords, sessions and login attempts decide who may act."""
+"""The rules for access to the page, in virtual time. Passwords, sessions and login attempts decide who
+may act."""
 
 from pathlib import Path
 

@@ -1,5 +1,5 @@
-"""The scripts that the page sends to a browser. One script has all changes of a turn. Without a change
-the page sends no script."""
+"""The scripts that the page sends to a browser. In each turn of its loop, the page sends all
+changes in one script. Without a change the page sends no script."""
 
 import json
 

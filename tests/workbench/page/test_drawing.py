@@ -87,7 +87,7 @@ def test_what_is_wrong_comes_with_what_to_do() -> None:
     assert "Do: step <out>" in text
     silent = DeviceView(BoardRow("lift", "A", "", mark="SILENT 5 s"))
     told = "".join(well_formed(drawing.attention([silent], {})).itertext())
-    assert "Do: look at its daemon" in told
+    assert "Do: run `rmf-bridge status`" in told
     assert drawing.attention([], {}) == ""
 
 

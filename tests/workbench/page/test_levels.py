@@ -1,4 +1,5 @@
-"""The present inputs and outputs of a daemon, from the entries of its ring."""
+"""The present inputs and outputs of a daemon. The page reads them from the ring, which is the file with
+the daemon's latest events."""
 
 from pathlib import Path
 

@@ -35,7 +35,7 @@ def test_a_browser_that_connects_gets_a_change_that_came_before_and_was_the_last
     ran.clear()
     wall.change('show({"standing": "a drill"})')
     wall.answer(0)
-    assert ran == []  # the browser still loads the page
+    assert ran == []  # because the browser has not yet loaded the page
     client.tab_id = "a tab"
     wall.answer(0)
     assert [script.split(":")[0] for script in ran] == ['show({"status"']

@@ -1,4 +1,5 @@
-"""A browser tab. The tab receives only changed pieces. Its times are in an existing time zone."""
+"""A browser's tab. The tab receives only the changed pieces of the page, and shows times in the
+browser's time zone. If no such zone exists, the tab uses this machine's zone."""
 
 from datetime import UTC
 from random import Random

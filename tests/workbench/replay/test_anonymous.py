@@ -1,4 +1,5 @@
-"""Incidents without names. Such a file contains no name of the site, and gives the same decisions."""
+"""Incidents without names. Such a file contains no name of the site. In a replay, the file gives the
+same decisions as the original file."""
 
 import re
 import sys
@@ -77,8 +78,8 @@ def test_a_name_is_the_same_in_messages_and_decisions_and_comments_and_addresses
 def test_a_kind_whose_words_cannot_be_read_makes_nothing_anonymous(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """`anonymous` must know the words of a kind. Otherwise it would replace them like names of the
-    site, and replay would fail."""
+    """`anonymous` must know the fixed words of each kind of device, such as the names of its states.
+    Otherwise it would replace these words like names of the site, and a replay would fail."""
     monkeypatch.setitem(sys.modules, lift.__name__ + ".report", None)
     our_words.cache_clear()
 

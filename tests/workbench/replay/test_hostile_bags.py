@@ -57,7 +57,9 @@ def read(path: Path, content: bytes) -> tuple[list[str], str]:
     path.write_bytes(content)
     notes = Notes()
     found = [one.message.lift_name for one in heard_in(path, notes)]  # type: ignore[union-attr]
-    return found, notes.damage.replace(str(path), "").replace("; the part before is used", "")
+    return found, notes.damage.replace(str(path), "").replace(
+        "; only the part before this place is used", ""
+    )
 
 
 def test_a_file_cut_anywhere_gives_what_was_complete(tmp_path: Path) -> None:
@@ -175,5 +177,5 @@ def test_a_damaged_sqlite_recording_is_refused_with_what_may_mend_it(tmp_path: P
     content[len(content) // 2 :] = bytes(len(content) - len(content) // 2)
     database.write_bytes(content)
 
-    with pytest.raises(BagError, match=r"malformed; try sqlite3 \.recover"):
+    with pytest.raises(BagError, match=r"malformed; try the sqlite3 command \.recover"):
         list(heard_in(bag))

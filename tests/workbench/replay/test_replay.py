@@ -1,4 +1,5 @@
-"""Replays of the soak test's recordings. Each replay gives the same decisions and memories again."""
+"""Replays of recordings from simulated days. Each replay gives the recorded decisions again, and the
+recorded memories of the daemons."""
 
 import os
 from pathlib import Path
@@ -59,8 +60,8 @@ def test_a_ring_that_has_turned_many_times_begins_where_all_is_known(tmp_path: P
 
 @pytest.mark.parametrize("file", CORPUS, ids=lambda file: file.stem)
 def test_each_incident_of_the_soak_is_decided_as_it_was_recorded(file: Path) -> None:
-    """After a deliberate change of a core, write the incidents again with
-    `python -m tests.workbench.replay.corpus`."""
+    """If a daemon's decisions were changed deliberately, record the incidents again with `python -m
+    tests.workbench.replay.corpus`."""
     notes = Notes()
     head, entries = opened(file, notes)
     replay = Replay(entries, ReplayedCores(of_head(head)))
@@ -71,7 +72,8 @@ def test_each_incident_of_the_soak_is_decided_as_it_was_recorded(file: Path) -> 
 
 
 def test_a_change_of_a_core_is_seen_with_what_led_to_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The changed core reports no faults. The difference shows the events before the missing fault."""
+    """In this test, the lift's changed decisions report no faults. The difference found shows the
+    events before the missing fault."""
     monkeypatch.setattr(lift_core, "_faults", lambda memory, view, now, limits: ())
     head, entries = opened(HERE / "Lift1_1.mcap", Notes())
 
@@ -112,17 +114,15 @@ def test_a_change_is_shown_once_with_its_end_and_how_often_it_came(
     )
     lines = [line.split(" Lift1: ") for line in capsys.readouterr().out.splitlines()[1:]]
     assert [(when.count(" to "), what) for when, what in lines] == [
-        (1, "outputs: agv_request yes, hold_door front, where agv_request yes was recorded"),
-        (1, "outputs: agv_request yes, hold_door front, where - was recorded"),
-        (1, "outputs: agv_request yes, where - was recorded"),
-        (1, "state: -, -, where L4, fleet/green was recorded"),
+        (1, "outputs: agv_request yes, hold_door front (recorded: agv_request yes)"),
+        (1, "outputs: agv_request yes, hold_door front (recorded: -)"),
+        (1, "outputs: agv_request yes (recorded: -)"),
+        (1, "state: -, - (recorded: L4, fleet/green)"),
         (0, lines[4][1]),
-        (1, "outputs: agv_request yes, where agv_request yes, hold_door front was recorded"),
-        (1, "outputs: -, where agv_request yes, hold_door front was recorded"),
+        (1, "outputs: agv_request yes (recorded: agv_request yes, hold_door front)"),
+        (1, "outputs: - (recorded: agv_request yes, hold_door front)"),
     ]
-    refused = (
-        "refused: released a moment ago: by fleet/red, where - was recorded; 7 times, the last "
-    )
+    refused = "refused: released a moment ago: by fleet/red (recorded: -); 7 times, the last "
     assert lines[4][1].startswith(refused)
 
 
@@ -141,8 +141,8 @@ def test_the_yaml_of_another_device_is_refused_with_both_names(
 
 
 def test_what_cannot_be_replayed_is_counted(tmp_path: Path) -> None:
-    """The recording has no `Known` entries. The same happens if the beginning of a recording is
-    damaged."""
+    """Replay a recording without `Known` entries. A replay starts from the memory in such an entry. A
+    recording with a damaged beginning also lacks these entries."""
     head, entries = opened(HERE / "bay1_1.mcap", Notes())
     replay = Replay(
         [one for one in entries if not isinstance(one, Known)], ReplayedCores(of_head(head))
@@ -154,7 +154,7 @@ def test_what_cannot_be_replayed_is_counted(tmp_path: Path) -> None:
 
 
 def recorded_faults() -> tuple[Fault, ...]:
-    """Return the first fault in the recording of Lift1."""
+    """Return the faults of the first decision with a fault in the recording of Lift1."""
     _, entries = opened(HERE / "Lift1_1.mcap", Notes())
     steps = [one for one in entries if isinstance(one, Decided) and one.faults not in ([], [[]])]
     return tuple(value(steps[0].faults[0]))

@@ -1,4 +1,5 @@
-"""Recordings in the form of rosbag2. The library `rosbags` writes them with our definition texts."""
+"""Recordings in the form of rosbag2. The library `rosbags` writes them with our own texts of RMF's
+message definitions."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -17,7 +18,7 @@ MCAP, SQLITE = StoragePlugin.MCAP, StoragePlugin.SQLITE3
 
 
 def store(release: Release) -> Typestore:
-    """Return the types of a release. The types come from our definition texts."""
+    """Return the message types of a release. The types come from our own texts of the definitions."""
     types = get_typestore(Stores.EMPTY)
     for message_type in release.messages():
         own = text(message_type, release).partition("=" * 80)[0]

@@ -1,7 +1,7 @@
 """`python -m tests.workbench.troubles [NAME …]`: the twelve troubles with real processes on loopback.
 
-A table at the end shows the result for each trouble, live and from its file. The exit code is 1 if any
-screen is wrong.
+A table at the end shows two results for each trouble: `explain` from the live graph, and from the file.
+The exit code is 1 if any printed text differs from the expected text.
 """
 
 import argparse
@@ -25,9 +25,11 @@ Stage = Callable[[Any], Any]
 class Real:
     """One trouble with real processes.
 
-    `stage` needs the daemons in `serves`. The file comes from `daemon`. The step `then` runs after the
-    live question, and before the recorder writes the file. With `dead` the question waits until DDS has
-    noticed that a node was killed. `slow` names a part of the device that is always slow.
+    - `stage` brings about the trouble, with the daemons in `serves`.
+    - `daemon`: the daemon whose file `explain` reads; "" for the device's own daemon.
+    - `then` runs after `explain --live`, and before the recorder writes the file.
+    - `dead`: whether `explain` waits until DDS has noticed that a node was killed.
+    - `slow` names a part of the device that is always slow.
     """
 
     stage: Stage

@@ -25,8 +25,8 @@ def robot_never_comes(site: Site) -> None:
 
 
 def robot_never_comes_in_time(site: Site) -> None:
-    """Let the coordinator grant the station to a robot that does not drive, until start_timeout is
-    near."""
+    """Let the coordinator grant the station to a robot that does not drive. Stop shortly before
+    start_timeout."""
     robot_never_comes(site)
     site.run(200.0)
     site.trouble_begins()

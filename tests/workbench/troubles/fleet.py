@@ -48,7 +48,7 @@ class PartyNode:
         self._mouths = {topic.name: self._place.publisher(topic) for topic in says}
 
     def start(self) -> None:
-        """Subscribe to the topics of the parties."""
+        """Subscribe to all topics that the node's parties, such as robots, need."""
         heard = {topic for party in self._parties for topic in party.subscribes}
         for topic in sorted(heard, key=lambda topic: topic.name):
             self._place.subscribe(topic, self._hear)
@@ -60,7 +60,7 @@ class PartyNode:
         self._parties.clear()
 
     def say(self, said: Any) -> None:
-        """Publish messages of a party, and set the alarm for the next tick."""
+        """Publish messages of the parties, and set the alarm for the next tick."""
         for topic, message in said:
             self._mouths[topic.name].publish(message)
         left_s = min(party.wake_at() for party in self._parties) - self.wall()

@@ -159,9 +159,11 @@ def two_foreign_nodes(site: Site) -> dict[str, str]:
 
 
 def robot_clock_hour_off(site: Site) -> None:
-    """Set the adapter's clock back by an hour. A supervisor of another maker drops old requests.
+    """Set the adapter's clock back by an hour. The lift's supervisor is of another maker, and drops old
+    requests.
 
-    Our supervisor would believe a requester that repeats its request (FRESHNESS-5).
+    Our own supervisor would not show this trouble, because it believes a requester that repeats its
+    request (FRESHNESS-5).
     """
     site.supervisors[RMFS].kill()
     PartyNode(
@@ -208,7 +210,8 @@ def fleet_adapter_killed(site: Site) -> None:
 
 
 def human_mode_with_fault(site: Site) -> None:
-    """Let the relay for AGV mode fail. Whatever the daemon writes, the relay reads back off."""
+    """Let the relay for AGV mode fail. Whatever the daemon writes, the daemon reads back that the relay
+    is off."""
     far = site.devices[LIFT].far
     assert isinstance(far, ModuleFar)
     far.dead = frozenset({parse("unit 1 coil 0")})
@@ -218,7 +221,8 @@ def human_mode_with_fault(site: Site) -> None:
 
 
 def human_mode_relays_off(site: Site) -> None:
-    """Let an unsteady input switch the relays off again and again. In the end the relays must rest."""
+    """Let an unsteady input switch the relays off again and again. Stop when the daemon leaves the
+    relays off for a while (RELAY_RESTS)."""
     site.red.asks(LIFT, "L1")
     while not site.daemons[LIFT].faults() or "RELAY_RESTS" not in site.daemons[LIFT].faults():
         site.trouble_begins()

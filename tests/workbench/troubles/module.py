@@ -1,6 +1,7 @@
-"""A Modbus module in virtual time, under the HAL's own rules for read-back, contradictions and pauses.
+"""A simulated Modbus module in virtual time. The rules for read-back, contradictions and pauses are the
+real rules of the HAL (`drivers/hal`).
 
-Only the wire is missing, with its timeouts and its backoff (`drivers/hal/modbus/bus.py`).
+The module has no connection, so timeouts and backoff (`drivers/hal/modbus/bus.py`) are missing.
 """
 
 from collections.abc import Mapping
@@ -14,7 +15,8 @@ from tests.drivers.far import PointsFar, RegisterFar
 
 
 class ModuleFar(PointsFar):
-    """The far side of a device at a module. Coils in `dead` stay off, whatever the daemon writes."""
+    """A simulated device behind a Modbus module. Coils in `dead` stay off, whatever the daemon
+    writes."""
 
     dead: frozenset[Point] = frozenset()
 

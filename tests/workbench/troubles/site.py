@@ -1,7 +1,7 @@
-"""A whole site in virtual time: our daemons with their rings, RMF's supervisors, one fleet, and a
-recorder.
+"""A whole site in virtual time: our daemons with their event files (rings), RMF's supervisors, one
+fleet, and a recorder.
 
-The site is the soak test's site (`tests/site`) with the names of `expected.toml`.
+The site is the site of `tests/site` with the names of `expected.toml`.
 """
 
 import dataclasses
@@ -70,8 +70,11 @@ PLACES: Final = {
 class Site(Scene):
     """A site and its recorder.
 
-    Rings and recordings are in `folder`. `mortal` names the daemon that a story kills. A slow unit
-    replies after at most `latest_s` (s). The daemon asks a slow unit every `slow_s` (s).
+    - `folder` holds the rings and the recordings.
+    - `mortal` names the daemon that a story kills; "" for none. For this daemon there is a real
+      process.
+    - `latest_s`: a slow Modbus unit replies within this time (s).
+    - `slow_s`: time (s) between two requests to a slow unit.
     """
 
     def __init__(self, folder: Path, mortal: str = "") -> None:
@@ -148,7 +151,7 @@ class Site(Scene):
         self.timeline.after(self.slow_s, lambda: self.slow(name))
 
     def close(self) -> None:
-        """End the process of the mortal daemon."""
+        """End the process of the daemon `mortal`."""
         if self.process:
             self.process.kill()
             self.process.wait()
@@ -180,7 +183,7 @@ class Site(Scene):
         """Return the runtime directory with this daemon's ring."""
         return self._rings[name]
 
-    # ---- inside
+    # ---- private methods
 
     def _ours(self, name: str, kind: AnyGraphKind, settings: Any) -> None:
         node = f"rmf_bridge_{name}"
@@ -251,7 +254,8 @@ def _door(timeline: Timeline, name: str, content: dict[str, Any]) -> Device:
 
 
 def _at_module(timeline: Timeline, device: Device, driver: Any) -> Device:
-    """Return the device with the HAL's own rules between its driver and its module."""
+    """Return the device behind a Modbus module, with the real rules of the HAL between driver and
+    module."""
     far = ModuleFar(timeline, device.plant, driver.wires(device.settings))
     made = partial(driver.create, device.name, device.settings, far)
     return dataclasses.replace(device, far=far, driver=made)

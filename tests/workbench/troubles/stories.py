@@ -1,4 +1,4 @@
-"""The stories of the troubles in `expected.toml`. Each story ends when somebody asks."""
+"""The stories of the troubles in `expected.toml`. After each story, a person runs `explain`."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -17,9 +17,11 @@ in the verdict's texts."""
 class Trouble:
     """One trouble.
 
-    The file comes from `daemon`, or from the device's daemon with "". With `note` a person asks for the
-    file, because the recorder writes none. `mortal` names the daemon that the story kills. With
-    `release` the person types `rmf-bridge release`.
+    - `daemon`: the daemon whose file `explain` reads; "" for the device's own daemon.
+    - `note`: a person's note. With a note, the person asks for the file, because the recorder writes
+      none.
+    - `mortal`: the daemon that the story kills.
+    - `release`: whether the person types `rmf-bridge release`.
     """
 
     stage: Stage

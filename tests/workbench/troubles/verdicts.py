@@ -1,4 +1,5 @@
-"""The expected verdicts (`expected.toml`), and a function that compares a screen with a verdict."""
+"""The expected texts (`expected.toml`), and a function that compares the printed text with them. The
+printed text is called the screen."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -9,13 +10,13 @@ import msgspec
 
 FILE: Final = Path(__file__).parent / "expected.toml"
 STEP: Final = re.compile(r"^Next, (?:.|\n  )*", re.MULTILINE)
-"""A pattern for one next step on a screen, with its wrapped lines."""
+"""A pattern for one next step in a printed text. The step may have several lines."""
 Alternatives = list[str]
 
 
 class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A rule for each next step. A step with a phrase of `when_next` must also have a phrase of
-    `needs`."""
+    """A rule for every next step in a printed text. A step with a phrase of `when_next` must also have
+    a phrase of `needs`."""
 
     when_next: Alternatives
     needs: Alternatives

@@ -1,5 +1,5 @@
-"""The same site with real processes on loopback. Our daemons are `rmf-bridge run --simulate`, and a
-person types `rmf-bridge explain`. This process plays RMF's nodes on the same wire.
+"""The site of `site.py` with real processes on loopback. Our daemons are `rmf-bridge run --simulate`,
+and a person types `rmf-bridge explain`. This process plays RMF's nodes on the same graph.
 
 Each wait in a story lasts at most PASSES_S.
 """
@@ -48,7 +48,7 @@ START_TIMEOUT_S: Final = 40.0
 
 
 class WireSite:
-    """The part of `site.Site` that the stories use."""
+    """A site with the methods of `site.Site` that the stories use."""
 
     def __init__(self, folder: Path, domain: int, serves: tuple[str, ...]) -> None:
         self.timeline = RealTime()
@@ -172,7 +172,7 @@ class WireSite:
             self._typed(*words, "--after", "0", "--note", "what is wrong?", "-o", str(found[0]))
         return self._typed("explain", str(found[0]), device)
 
-    # ---- inside
+    # ---- private methods
 
     def _graph(self) -> list[str]:
         return ["--domain-id", str(self._domain), "--transport", wire()]

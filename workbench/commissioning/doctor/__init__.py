@@ -8,7 +8,7 @@
     gpio.py      the header's chip and lines; levels at boot and after the daemon dies
     ports.py     serial ports
     can.py       the kernel's CAN interfaces
-    served.py    a running daemon's status, which replaces readings of the daemon's buses
+    served.py    a running daemon's status; the doctor then does not read the daemon's buses
     answers.py   devices that answer on the buses while no daemon runs; reads only
     network.py   RMF's graph: interface, domain, nodes present, message versions
     examination.py  runs the examination of every subject in turn

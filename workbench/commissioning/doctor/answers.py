@@ -85,13 +85,13 @@ def readings(config: Config, bus_name: str, bus: Any, subject: str) -> Iterator[
         try:
             sample = _read(read, bus)
         except DriverError as error:
-            means = f"{name} cannot be served: for RMF it is out of order"
+            means = f"a daemon could not serve {name}, so {name} would be unusable for RMF"
             yield wrong(
                 subject, f"{name}: {error}", means, LOOK_AT.get(config.bus_types[bus_name], TEXTS)
             )
             continue
         if fault := getattr(sample, "code_fault", ""):
-            do = "compare codes: with the lines, in rmf-bridge walk"
+            do = "compare the YAML's codes: with the lines that rmf-bridge walk shows"
             yield warning(subject, f"{name}: {fault}", "RMF gets no floor", do)
         yield ok(subject, f"{name} answers: {plain(sample)}")
 
@@ -106,8 +106,8 @@ def _reading(config: Config, bus_name: str, name: str, bus: Any) -> Callable[[],
 
 
 def _read(read: Callable[[], Any], bus: Bus) -> Any:
-    """Read the device. Try several times, because a device on a sleeping line answers late. Raises
-    DriverError."""
+    """Read the device. Try several times, because after an idle time on the line the first answer may
+    come late. Raises DriverError."""
     for _ in range(TRIES - 1):
         bus.insist()
         try:
@@ -177,8 +177,8 @@ def _can(config: Config, bus_name: str, bus: Any, whole: bool) -> Iterator[Findi
 
 
 def _mqtt(config: Config, bus_name: str, bus: Any, whole: bool) -> Iterator[Finding]:
-    """List the broker's topics, but only with `--scan`, because our user may not be allowed to read the
-    topics."""
+    """List the broker's topics, but only with `--scan`. The broker may not permit the YAML's user to
+    read all topics."""
     if not whole:
         return
     subject, ours = f"bus {bus_name}", set(bus.topics())
@@ -223,10 +223,10 @@ def _scanned(
         means = f"{what} {ranges(sorted(ours))} of this file may be wrong"
         return warning(subject, text, means, do)
     if strangers:
-        return note(subject, text, f"{what} {ranges(strangers)} is in no device of this file")
+        return note(subject, text, f"no device of this file has {what} {ranges(strangers)}")
     if not found:
-        do = "supply, cable (A and B), baud rate and parity, the gateway's own timeout"
-        return wrong(subject, text, "nothing is there, or nothing is heard", do)
+        do = "check supply, cable (A and B), baud rate and parity, and the gateway's own timeout"
+        return wrong(subject, text, "no device is connected, or no answer arrives", do)
     return ok(subject, text)
 
 

@@ -18,8 +18,8 @@ HOW: Final = 'docs/how-to/wire.md, "CAN": sudo ip link set {} up type can bitrat
 
 
 def interface(machine: Machine, name: str, bitrate: int | None) -> Iterator[Finding]:
-    """Examine `can`. `bitrate` is the stations' bitrate (bit/s), or None if each site chooses its
-    bitrate."""
+    """Examine the CAN interface `name`. `bitrate` is the stations' bitrate (bit/s), or None if each
+    site chooses its bitrate."""
     rate = str(bitrate or "250000")
     folder = f"/sys/class/net/{name}"
     if not machine.at(folder).is_dir():
@@ -88,10 +88,10 @@ def _controller(name: str, told: Controller, bitrate: int | None) -> Iterator[Fi
     rate = told.bittiming.bitrate
     how = HOW.format(name, bitrate or rate)
     if bitrate is not None and rate != bitrate:
-        found = f"{name} has {rate} bit/s, but these stations are delivered with {bitrate}"
+        found = f"{name} has {rate} bit/s, but the stations' default is {bitrate} bit/s"
         yield warning(CAN, found, "one station at another bitrate stops the whole bus", how)
     else:
-        yield ok(CAN, f"{name} is up at {rate} bit/s; compare that with the stations")
+        yield ok(CAN, f"{name} is up at {rate} bit/s; the stations need the same bitrate")
     state = told.state.upper()
     check = "bitrate, termination (60 Ω between CAN_H and CAN_L with everything off), cable, supply"
     if state == "BUS-OFF":

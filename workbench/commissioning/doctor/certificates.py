@@ -1,4 +1,4 @@
-"""Examine `certificates`: when do the certificates end that the YAML names?"""
+"""Examine the certificates that the YAML names, and report when they end."""
 
 import time
 from collections.abc import Iterator

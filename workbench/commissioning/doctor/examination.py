@@ -35,7 +35,7 @@ class Options:
     - `kill_test`: device and output of the kill test; None without the test.
     - `whole_scan`: whether the doctor scans every unit or node of a bus.
     - `listen_s`: time (s) to listen to RMF's graph. With 0, the doctor does not join the graph.
-    - `line`: the command line, with the options of that graph.
+    - `line`: the command line, with the options that name the graph.
     """
 
     runtime_dir: str | None = None
@@ -81,7 +81,7 @@ def examined(
 
 
 def _file(config: Config, building: "BuildingMap | None") -> Iterator[Finding]:
-    """Examine `file`. The finding summarises the output of `check`."""
+    """Examine the YAML file. The findings summarise the output of `check`."""
     yield ok("file", f"{config.path} is a valid file of a {config.kind}")
     for problem in config.warnings:
         yield note("file", str(problem), "legal, and worth a look", "rmf-bridge check FILE")
@@ -154,8 +154,8 @@ def _killed(
         yield wrong(
             KILL_TEST,
             now.busy,
-            "a device has only one master: nothing was switched",
-            "stop it first",
+            "nothing was switched, because only one process may switch a device's outputs",
+            "stop that process first",
         )
         return
     assert options.kill_test is not None

@@ -1,4 +1,4 @@
-"""The form for an afternoon with real hardware (docs/how-to/hardware.md).
+"""The form for tests on real hardware, which take an afternoon (docs/how-to/hardware.md).
 
 `doctor` fills in the cells for the machine and the findings. A person fills in the other cells.
 """
@@ -34,39 +34,46 @@ STEPS: Final = (
         "H1", frozenset({"gpio"}), "no relay moves from power-on until the daemon has claimed it"
     ),
     FormStep(
-        "H2", ALL, "off after `kill -9` with the output on; s until off; V on the pin afterwards"
+        "H2",
+        ALL,
+        "off after `kill -9` with the output on; seconds until off; volts on the pin afterwards",
     ),
-    FormStep("H3", ALL, "off after SIGSTOP with the output on; s until off"),
+    FormStep("H3", ALL, "off after SIGSTOP with the output on; seconds until off"),
     FormStep(
         "H4",
         ALL,
-        "the Pi's power is cut with the output on: off at once, or s until off after power returns",
+        "the Pi's power is cut with the output on: off at once, or seconds from the power's return"
+        " until off",
     ),
     FormStep(
         "H5",
         frozenset({"gpio"}),
-        "the supply falls to 4.0 V in steps: no relay comes on; V of reset",
+        "the supply falls to 4.0 V in steps: no relay comes on; volts at which the Pi resets",
     ),
-    FormStep("H6", ALL, "the card is pulled with the output on, then `kill -9`: off; s until off"),
+    FormStep(
+        "H6",
+        ALL,
+        "the card is pulled with the output on, then `kill -9`: off; seconds until off",
+    ),
     FormStep(
         "H7",
         frozenset({"modbus"}),
-        "ms from request's end to A-B free and to the reply; no reply lost",
+        "milliseconds from the request's end until A-B is free, and until the reply; no reply lost",
     ),
     FormStep(
         "H8",
         frozenset({"modbus", "can"}),
-        "the USB adapter is pulled, put back: fault, then served",
+        "the USB adapter is pulled: a fault; it is put back: the device is served again",
     ),
     FormStep(
         "H9",
         frozenset({"modbus"}),
-        "the line is cut with the output on: s until the module lets go",
+        "the line is cut with the output on: seconds until the module switches it off",
     ),
     FormStep(
         "H10",
         frozenset({"can"}),
-        "CAN_H and CAN_L shorted for 1 s: fault, then served; no charge",
+        "CAN_H and CAN_L are shorted for 1 s: a fault, then served again; no charge",
     ),
     FormStep("H11", ALL, "24 h of service: faults in the log, hottest °C, bits of get_throttled"),
 )

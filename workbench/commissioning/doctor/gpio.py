@@ -33,12 +33,12 @@ PERSIST: Final = (
     "/sys/module/pinctrl_rp1/parameters/persist_gpio_outputs",
 )
 ON: Final = "the relay is on until the daemon starts"
-KILL_TEST: Final = "rmf-bridge doctor FILE --kill-test shows it with one output"
+KILL_TEST: Final = "rmf-bridge doctor FILE --kill-test tests this with one output"
 
 
 def gpio(machine: Machine, chip: int | None, who: User) -> Iterator[Finding]:
-    """Examine `gpio`, and tell whether the daemon may use the header's chip. `chip` is the number in
-    the YAML, if there is one."""
+    """Examine whether the daemon may use the header's chip. `chip` is the chip's number in the YAML, or
+    None if the YAML gives no number."""
     if not machine.installed("lgpio"):
         do = "sudo apt install python3-lgpio, or in the clone .venv/bin/pip install '.[gpio]'"
         yield wrong(GPIO, "this Python has no lgpio", "no pin can be claimed", do)
@@ -76,7 +76,7 @@ def _no_header(machine: Machine, chip: int | None) -> Finding:
     if len(list(chips(machine))) < len(devices(machine)):
         names = ", ".join(device.name for device in devices(machine))
         do = "use sudo, or join the group gpio"
-        text = f"of {names} this user may only open: {seen or 'nothing'}"
+        text = f"there are {names}, but this user may open only: {seen or 'none of them'}"
         return wrong(GPIO, text, "nobody knows whether the header is there", do)
     text = f"no chip is {'the header' if chip is None else f'gpiochip{chip}'}; there is {seen}"
     return wrong(GPIO, text, "no pin can be claimed", "look at gpiodetect; on a Pi delete chip:")
@@ -164,8 +164,7 @@ def _pins(text: str) -> Iterator[int]:
 
 
 def death(machine: Machine) -> Iterator[Finding]:
-    """Examine `gpio after a death`, and tell whether the kernel still drives an output after the
-    output's holder died."""
+    """Examine whether the kernel still drives an output after the output's holder died."""
     said = next(filter(None, map(machine.text, PERSIST)), "")
     strict = any(
         re.search(r"^\s*dtparam=.*\bstrict_gpiod\b", machine.text(path) or "", re.MULTILINE)

@@ -71,7 +71,7 @@ def _graph(rmf: Rmf, machine: Machine, service: dict[str, str] | None) -> Iterat
         yield _sros(service)
     else:
         found = "DDS without ROS has no authentication: whoever reaches the domain can call a lift"
-        do = f"transport zenoh with certificates, SROS 2, or a network of its own: {PAGE}"
+        do = f"transport zenoh with certificates, SROS 2, or a separate network for RMF: {PAGE}"
         yield warning(GRAPH, found, "a lift or door can be taken by anybody on that network", do)
 
 
@@ -120,7 +120,7 @@ def _sros(service: dict[str, str] | None) -> Finding:
 def _wire(config: Config, name: str, settings: Any) -> Finding:
     host = config.bus_type(name).needs(settings).host
     kind, base = config.bus_types[name], getattr(settings, "api_base", "")
-    do = f"a network of its own for {host}: {PAGE}"
+    do = f"a separate network for {host}: {PAGE}"
     if not host:
         return ok(WIRES, f"bus '{name}' ({kind}) is at this machine, not on a network")
     if base.startswith(ENCRYPTED):
@@ -155,7 +155,7 @@ def _firewall(rules: str | None, uid: int) -> Finding:
     if "inet" in drops or drops >= {"ip", "ip6"}:
         return ok(FIREWALL, "an input chain drops what no rule accepts")
     means = "every open port is reachable by every machine of the network"
-    found = "no input chain drops by its policy" if chains else "nft shows no input chain"
+    found = "no input chain has the policy drop" if chains else "nft shows no input chain"
     if drops & {"ip", "ip6"}:
         found = f"only {' and '.join(sorted(drops))} packets are dropped by policy"
     return warning(FIREWALL, found, means, f"the rules of {PAGE}")

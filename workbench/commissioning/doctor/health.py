@@ -15,10 +15,10 @@ FREE_LEAST: Final = 50 << 20
 
 
 def clock(machine: Machine) -> Iterator[Finding]:
-    """Examine `clock`. The clock must be right, because RMF compares the stamps of states with RMF's
-    own clock."""
+    """Examine the clock. The clock must be right, because RMF compares the time stamps in the daemon's
+    messages with its own clock."""
     found = "the clock is not synchronised"
-    means = "states carry wrong stamps, and RMF may take states for old; durations are right"
+    means = "states have wrong time stamps, so RMF may treat them as old; durations are still right"
     do = "timedatectl timesync-status; is the time server reached? A Pi has no clock of its own"
     synchronised = machine.synchronised()
     if synchronised:
@@ -32,8 +32,7 @@ def clock(machine: Machine) -> Iterator[Finding]:
 
 
 def watchdog(machine: Machine) -> Iterator[Finding]:
-    """Examine `watchdog`, and tell whether a watchdog restarts this machine when the kernel or systemd
-    hangs."""
+    """Examine whether a watchdog restarts this machine when the kernel or systemd hangs."""
     subject = "watchdog"
     means = "when the kernel hangs, relays stay as they are until somebody cuts the supply"
     if not machine.folder("/dev", "watchdog*"):
@@ -48,7 +47,7 @@ def watchdog(machine: Machine) -> Iterator[Finding]:
     elif fed in ("0", "infinity"):
         do = (
             "RuntimeWatchdogSec=10 below [Manager] in /etc/systemd/system.conf.d/watchdog.conf, then"
-            " sudo systemctl daemon-reexec (a Raspberry Pi's has 15 s at most)"
+            " sudo systemctl daemon-reexec (a Raspberry Pi's watchdog permits at most 15 s)"
         )
         yield warning(
             subject, "there is a hardware watchdog, but systemd does not feed it", means, do
@@ -58,7 +57,7 @@ def watchdog(machine: Machine) -> Iterator[Finding]:
 
 
 def directories(machine: Machine, places: Directories, who: User) -> Iterator[Finding]:
-    """Examine `disk`, and tell whether the daemon can write its files."""
+    """Examine whether the daemon can write its files, and whether the disk has enough free space."""
     for folder in places.folders:
         found = existing(machine.at(folder))
         yield disk(str(folder), os.statvfs(found))
@@ -78,7 +77,7 @@ def disk(what: str, found: os.statvfs_result) -> Finding:
     """
     means = "the device is served nevertheless, but status, log and the record of outputs get lost"
     if found.f_flag & os.ST_RDONLY:
-        do = "an overlay or tmpfs for this directory; after errors of an SD card: replace it"
+        do = "use an overlay or tmpfs for this directory; if the SD card has errors, replace the card"
         return wrong("disk", f"{what} is on a disk that is read-only", means, do)
     free, whole = found.f_bavail * found.f_frsize, found.f_blocks * found.f_frsize
     if found.f_files and not found.f_favail:

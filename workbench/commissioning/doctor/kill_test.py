@@ -87,8 +87,8 @@ def _outcome(name: str, off_after_s: float | None) -> Finding:
     if off_after_s is None:
         found = f"{name} is not verified off {OFF_WITHIN_S:g} s after kill -9"
         return wrong(KILL_TEST, found, "IT MAY STILL BE ON", CUT)
-    done = "the guard switched the output off, verified"
-    found = f"{name} was on, its process was killed with -9, and {done}"
+    done = "the guard switched the output off; this was verified"
+    found = f"{name} was on, the process that held it was killed with -9, and {done}"
     return ok(KILL_TEST, f"{found} after {off_after_s:.1f} s")
 
 

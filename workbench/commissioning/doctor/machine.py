@@ -18,8 +18,8 @@ COMMAND_S: Final = 3.0
 PLACES: Final = ("usr/sbin", "usr/bin", "sbin", "bin")
 TEXT_MAX: Final = 1 << 20
 TIMEX_MAX: Final = 512
-"""A size (bytes) greater than any kernel's struct timex. A struct full of zeroes only reads the clock's
-state."""
+"""The size (bytes) of the buffer for adjtimex(2), greater than any kernel's struct timex. The buffer is
+full of zeroes, so the call only reads the clock's state."""
 TIME_ERROR: Final = 5
 
 
@@ -66,8 +66,8 @@ class Machine:
         return self.root / str(path).lstrip("/")
 
     def named(self, found: Path) -> str:
-        """Return the absolute path that stands for a path below `root`. The machine's own programs use
-        the absolute path."""
+        """Return the absolute path that stands for a path below `root`. Messages and commands for a
+        person contain the absolute path."""
         return f"/{found.relative_to(self.root)}"
 
     def text(self, path: str | Path) -> str | None:

@@ -35,8 +35,8 @@ SENDERS: Final = {
     "adapter_door_requests": "RMF's fleet adapters",
     "fleet_states": "RMF's fleet adapters",
 }
-"""Topic -> its publishers in RMF. Requests to devices depend on these topics. Other topics may be
-silent."""
+"""Topic -> its publishers in RMF. Without these publishers, no requests reach the devices. On any other
+topic, there may be no publisher."""
 LIBRARIES: Final = {"dds": "cyclonedds", "zenoh": "eclipse-zenoh"}
 
 
@@ -64,7 +64,7 @@ class GraphLook:
 
 
 def graph(config: Config, look: GraphLook) -> Iterator[Finding]:
-    """Examine `network`, `RMF` and `messages`."""
+    """Examine the network, RMF's graph, and the versions of RMF's messages."""
     try:
         domain = domain_id(config.rmf, os.environ)
         loopback = look.localhost or stays_on_loopback(config.rmf, os.environ)
@@ -77,7 +77,7 @@ def graph(config: Config, look: GraphLook) -> Iterator[Finding]:
                 yield from _heard(config, transport, look)
                 yield from _messages(transport)
         for text in dict.fromkeys(said):
-            yield warning(GRAPH, text, "the transport reports this about its peers", look.alone)
+            yield warning(GRAPH, text, "the transport reports this about other nodes", look.alone)
     except TransportError as error:
         yield wrong(GRAPH, str(error), "RMF neither hears nor is heard", look.alone)
 
@@ -91,7 +91,7 @@ def _interface(domain: int, loopback: bool) -> Finding:
     if not found:
         means = "RMF on another machine is not heard; dds and zenoh join once an address is there"
         return wrong(NETWORK, "no interface with a link has an IPv4 address", means, "ip addr")
-    text = f"domain {domain}, by {' and '.join(found)}"
+    text = f"domain {domain}, from the address {' and '.join(found)}"
     if len(found) > 1 and not os.environ.get("CYCLONEDDS_URI"):
         return note(
             NETWORK,
@@ -169,9 +169,9 @@ def _ours(devices: Sequence[str], heard: set[str], look: GraphLook) -> Iterator[
 
 def _messages(transport: Transport) -> Iterator[Finding]:
     for topic, count in transport.dropped.items():
-        means = "its sender has another version of RMF's messages, or sends invalid data"
+        means = "the sender has another version of RMF's messages, or sends invalid data"
         do = "install the same release of RMF's message packages on every machine"
-        yield wrong(MESSAGES, f"{count} on {topic} could not be decoded", means, do)
+        yield wrong(MESSAGES, f"{count} messages on {topic} could not be decoded", means, do)
     if transport.speaks == "ros2":
         yield from _installed()
     else:

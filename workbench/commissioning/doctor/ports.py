@@ -15,7 +15,7 @@ DEAF: Final = "nobody on this line is heard"
 
 
 def port(machine: Machine, path: str, who: User, *, served: bool) -> Iterator[Finding]:
-    """Examine `serial port`. With `served`, a running daemon of this file has the port open."""
+    """Examine a serial port. `served` tells whether a running daemon of this file has the port open."""
     if not machine.at(path).exists():
         seen = ", ".join(machine.named(one) for one in machine.folder(BY_ID))
         do = (
@@ -62,8 +62,8 @@ def _stable(machine: Machine, path: str, device: str) -> Iterator[Finding]:
     )
     yield warning(
         PORT,
-        f"the path {path} has a number",
-        "after a boot the number may be another adapter's",
+        f"the path {path} contains a number",
+        "after the next boot, another adapter may have this number",
         do,
     )
 

@@ -1,7 +1,8 @@
-"""Find a running daemon of this file, and read the daemon's status. The doctor then leaves the daemon's
-buses closed.
+"""Find a running daemon of this file, and read the daemon's status. If a daemon runs, the doctor does
+not open the daemon's buses.
 
-A gateway may accept only one client, and two masters on one line corrupt each other's frames.
+The doctor leaves the buses closed for two reasons. A gateway may accept only one client. Two masters on
+one line corrupt each other's frames.
 """
 
 from collections.abc import Iterator
@@ -18,7 +19,7 @@ from bridges.system.directories import Directories
 from workbench.commissioning.doctor.finding import Finding, note, ok, warning, wrong
 
 DAEMON: Final = "daemon"
-NOT_ASKED: Final = "its buses are not read here, because a controller has only one master"
+NOT_ASKED: Final = "doctor does not read the buses, because only one process may use a bus"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +38,8 @@ class ServingDaemon:
 
 
 def served(places: Directories, file: Path, wall: float) -> ServingDaemon:
-    """Examine `daemon`. `wall` is the present time (s since the epoch), which gives the age of the
-    daemon's status."""
+    """Examine the file's daemon. `wall` is the present time (s since the epoch), which gives the age of
+    the daemon's status."""
     try:
         held_by = holder.look(places)
     except PermissionError as error:
@@ -46,7 +47,7 @@ def served(places: Directories, file: Path, wall: float) -> ServingDaemon:
     if held_by is None:
         return _nobody(places, file)
     if not held_by.serves:
-        found = f"{held_by} uses the file's devices: walk, outputs-off or another doctor"
+        found = f"{held_by} uses the file's devices; it is walk, outputs-off or another doctor"
         return ServingDaemon(
             [warning(DAEMON, found, NOT_ASKED, "wait until that process has ended")], found
         )
@@ -92,10 +93,13 @@ def _told(one: DaemonStatus) -> Iterator[Finding]:
         age_s = device.get("input_age_s")
         if age_s is None:
             yield wrong(
-                DAEMON, f"{name} was never read", "RMF gets no state of {name}", "its faults"
+                DAEMON,
+                f"{name} was never read",
+                "RMF gets no state of this device",
+                "see the faults of this device",
             )
         else:
-            yield ok(DAEMON, f"{name} was read {age_s:.1f} s before its status")
+            yield ok(DAEMON, f"{name} was read {age_s:.1f} s before the daemon wrote its status")
         yield from _faults(f"{name}: ", device)
 
 

@@ -48,7 +48,8 @@ def has_unit(machine: Machine) -> bool:
 
 
 def user(machine: Machine, service: str) -> User:
-    """Return the daemon's user: the service's own user, or the unit's user before `enable` made one."""
+    """Return the daemon's user. If `rmf-bridge enable` has made a user for this service, return that
+    user. Otherwise return the user that the unit names."""
     if not has_unit(machine):
         return User(_name(machine, machine.uid), machine.uid, machine.gids, service=False)
     name = user_of(service) if user_of(service) in _passwd(machine) else SERVICE_USER
@@ -59,7 +60,7 @@ def user(machine: Machine, service: str) -> User:
 
 
 def users(machine: Machine, who: User) -> Iterator[Finding]:
-    """Examine `user`, and tell whether the unit's user and the groups for devices exist."""
+    """Examine whether the unit's user and the groups for devices exist."""
     subject = "user"
     if not who.service:
         yield note(
@@ -81,7 +82,8 @@ def users(machine: Machine, who: User) -> Iterator[Finding]:
         yield wrong(
             subject,
             f"there is no group {' and no group '.join(missing)}, which a service may need",
-            "`rmf-bridge enable` cannot put the daemon into the group, so it cannot open its devices",
+            "`rmf-bridge enable` cannot put the daemon into the group, so the daemon cannot open its"
+            " devices",
             "; ".join(f"sudo groupadd --system {group}" for group in missing)
             + "; then sudo rmf-bridge enable FILE",
         )

@@ -59,8 +59,8 @@ def _held(
 
 
 def step_called(config: Config, device: str, name: str | None) -> WalkStep | None:
-    """Return the step of this name, or the first step if `name` is None. Return None if the name is
-    unknown."""
+    """Return the device's output step with this name, or the first step if `name` is None. Return None
+    if the name is unknown."""
     return next((step for step in steps(config, device) if name in (None, step.name)), None)
 
 

@@ -53,7 +53,7 @@ DOOR_ENDS: Final = {"door_opened": "open", "door_closed": "closed"}
 BOOLEANS: Final = ("y", "n", "yes", "no", "on", "off", "true", "false", "null")
 SHELLY: Final = """\
     # A Shelly of the second generation. Its own timer (toggle_after) releases the door when the
-    # network is gone, and the daemon renews it in each scan.
+    # network is gone. The daemon restarts this timer in each scan.
     limits: {stale_after_s: 4}
     state_path: /rpc/Shelly.GetStatus
     inputs:                          # names with dots between them
@@ -83,9 +83,9 @@ WORKCELL_HTTP: Final = """\
     start: {path: /start, body: '{"job": "$guid", "type": "$type_guid"}'}
     stop: {path: /stop}"""
 LIFT_HTTP: Final = """\
-    # The fields and requests of the lift's gateway. Its own timers must end AGV mode and release the
-    # door when the network is gone; the daemon renews them in each scan.
-    floors: [FLOORS]                 # RMF's names, from below
+    # The fields and requests of the lift's gateway. When the network is gone, the gateway's own timers
+    # must end AGV mode and release the door. The daemon restarts these timers in each scan.
+    floors: [FLOORS]                 # RMF's names, from the lowest floor up
     limits: {stale_after_s: 3}
     api:
       state_path: /lift
@@ -111,14 +111,15 @@ LIFT_HTTP: Final = """\
 CHARGER_CANOPEN: Final = """\
     node: 10                         # the receiver's node id
     heartbeat_timeout_s: 0.5         # a heartbeat comes each 0.1 s
-    on_death: stop                   # at the daemon's end: stop or keep a running charge"""
+    on_death: stop                   # stop or keep a running charge when the daemon dies"""
 
 
 def draft(answers: DraftAnswers) -> str:
     """Return the whole file. Raises Impossible for contradictory answers."""
     if answers.wiring not in WIRINGS[answers.kind]:
         raise Impossible(
-            f"a {answers.kind} is not wired by {answers.wiring}: {', '.join(WIRINGS[answers.kind])}"
+            f"a {answers.kind} cannot have the wiring {answers.wiring}; choose one of:"
+            f" {', '.join(WIRINGS[answers.kind])}"
         )
     address = answers.address or ADDRESSES.get(answers.wiring, "")
     points = points_for(answers)
@@ -168,7 +169,7 @@ def _lift(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
         f"      {floor}: {{{points.relay()}}}" for floor in floors
     ]  # floors come first, because they need the most pins
     request, hold = points.relay(), points.relay()
-    yield f"    floors: [{', '.join(floors)}]        # RMF's names, from below"
+    yield f"    floors: [{', '.join(floors)}]        # RMF's names, from the lowest floor up"
     yield "    inputs:"
     yield "      # Alarm loops are closed while all is well: an open contact or a cut wire is an alarm."
     for signal in LIFT_INPUTS:
@@ -203,7 +204,7 @@ def _floor_code(answers: DraftAnswers, floors: list[str], points: FreePoints) ->
     yield "      bits:                    # least significant first"
     for _ in range(len(floors).bit_length()):
         yield f"        - {{{points.contact()}}}"
-    yield "      # The parity line shows a broken line. Without a parity line: delete it; check warns."
+    yield "      # The parity line shows a broken line. No such line: delete it; `check` then warns."
     yield f"      parity: {{{points.contact()}, total: even}}"
     codes = ", ".join(f"{number}: {floor}" for number, floor in enumerate(floors, start=1))
     yield f"      codes: {{{codes}}}"
@@ -239,12 +240,12 @@ def _charger(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
 
 def _alarm(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
     """Yield the lines below the name of a fire panel."""
-    yield "    alarm: fire_alarm_trigger  # every fleet; emergency_signal (Kilted) names fleets"
+    yield "    alarm: fire_alarm_trigger  # every fleet; for some fleets: emergency_signal (Kilted)"
     yield "    silent_alarm_after_s: 60   # a broken cable stops the robots after this time"
     if answers.wiring == "http":
         yield "    limits: {stale_after_s: 5}"
         yield "    state_path: /state"
-    yield "    sources:                   # in an alarm, and with a cut wire, a contact is open"
+    yield "    sources:                   # an alarm opens the contact, and so does a cut wire"
     for source in ("fire_panel", "code_blue"):
         field = f"field: inputs.{source}, when: [false]"
         yield f"      {source}: {{{field if answers.wiring == 'http' else points.loop()}}}"
@@ -257,27 +258,27 @@ def _workcell(answers: DraftAnswers, points: FreePoints) -> Iterator[str]:
     if answers.wiring == "http":
         yield from WORKCELL_HTTP.splitlines()
         return
-    yield "    pulse_s: 0.5               # how long the start is on"
+    yield "    pulse_s: 0.5               # how long the output `start` is on"
     yield "    inputs:"
     for signal in ("done", "busy", "ready"):
         yield f"      {signal}: {{{points.contact()}}}   {_said(dispenser.WorkcellInputWiring, signal)}"
-    yield f"      fault: {{{points.loop()}}}   # opens at a fault, as a cut wire does"
+    yield f"      fault: {{{points.loop()}}}   # opens at a fault; a cut wire reads as a fault too"
     yield "    outputs:"
     yield f"      start: {{{points.relay()}}}   {_said(dispenser.WorkcellOutputWiring, 'start')}"
 
 
 def _robots(answers: DraftAnswers) -> Iterator[str]:
-    """Yield the lines of all robots, and RMF's files of their fleet."""
+    """Yield the lines of all robots, and the lines that name RMF's files of the fleet."""
     for number, name in enumerate(answers.name.split(","), start=1):
         yield f"  {quoted(name.strip())}:"
         if answers.wiring == "http":
-            yield "    profile: rmf-demos         # the manager of RMF's tutorial; else its own `api`"
+            yield "    profile: rmf-demos         # RMF's tutorial; for other managers, write `api`"
         else:
             yield f"    # The topics begin with uagv/v2/acme/{number:04}."
             yield "    manufacturer: acme"
             yield f'    known_as: "{number:04}"           # the serial number'
     yield ""
-    yield "fleet:                         # RMF's own files, as they are"
+    yield "fleet:                         # RMF's own files, unchanged"
     yield f"  config: {quoted(answers.fleet_config)}"
     yield f"  graph: {quoted(answers.graph)}"
 

@@ -19,7 +19,7 @@ OFFERED: Final = ("fire_alarm", "agv_mode", "door_opened", "door_closed", "stopp
 
 
 class Impossible(Exception):
-    """The answers contradict each other. The error's text gives the reason and the remedy."""
+    """An error if answers contradict each other. The error's text gives the reason and the remedy."""
 
 
 class DraftAnswers(msgspec.Struct, frozen=True, kw_only=True):

@@ -22,7 +22,7 @@ PLACES: Final = {
 DOOR_PLACES: Final = ("door_at", "hold_at")
 OPTIONAL: Final = ("motion_at", "agv_mode_at", "fire_alarm_at", "request_at")
 NUMBERS: Final = {
-    "floor_numbers": "the floors, from below",
+    "floor_numbers": "the floors, from the lowest floor up",
     "door_numbers": "closed, moving, open",
     "motion_numbers": "stopped, up, down",
 }
@@ -33,7 +33,7 @@ def questions() -> dict[str, str]:
     """Return answer name -> question, in the order in which `init` asks."""
     texts = {}
     for name, (part, _) in PLACES.items():
-        texts[name] = f"The place of {part}" + (", or none?" if name in OPTIONAL else "?")
+        texts[name] = f"The register of {part}" + (", or none?" if name in OPTIONAL else "?")
         numbers = name.replace("_at", "_numbers")
         if numbers in NUMBERS:
             texts[numbers] = f"The numbers of {NUMBERS[numbers]}?"
@@ -45,7 +45,7 @@ def lift(answers: DraftAnswers, floors: Sequence[str]) -> Iterator[str]:
     codes = _codes(answers, "floor_numbers", floors)
     at = answers.places
     yield f"    unit: {answers.unit}"
-    yield f"    floors: [{', '.join(floors)}]        # RMF's names, from below"
+    yield f"    floors: [{', '.join(floors)}]        # RMF's names, from the lowest floor up"
     yield "    map:                       # addresses begin at 0; an unlisted number is a fault"
     yield f"      floor: {{at: {at['floor_at']}, codes: {codes}}}"
     doors = _codes(answers, "door_numbers", ("closed", "moving", "open"))

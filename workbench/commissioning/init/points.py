@@ -32,7 +32,8 @@ class FreePoints(Protocol):
         """Take a point for a relay whose energised state is on."""
 
     def listed(self) -> Iterator[str]:
-        """Yield the lines below the bus that describe the points taken, if its points have names."""
+        """Yield the lines of the bus that define the points taken. Only the points of an MQTT broker
+        need such lines."""
 
 
 class PinHeader:
@@ -59,7 +60,7 @@ class PinHeader:
         return f'point: "J8:{_first(self._outputs)}", active: {self._relays}'
 
     def listed(self) -> Iterator[str]:
-        """Yield nothing, because pins have numbers."""
+        """Yield nothing, because a pin needs no definition."""
         yield from ()
 
     def _input(self) -> int:
@@ -96,7 +97,7 @@ class Module:
         return f'point: "unit {self._unit} coil {next(self._coils)}", active: high'
 
     def listed(self) -> Iterator[str]:
-        """Yield nothing, because registers have numbers."""
+        """Yield nothing, because a coil or discrete input needs no definition."""
         yield from ()
 
 
@@ -124,9 +125,10 @@ class Broker:
         return f"point: relay {self._relays}, active: high"
 
     def listed(self) -> Iterator[str]:
-        """Yield a line for each point. A relay switches itself off when its word is not repeated."""
+        """Yield the definition of each point. A relay's device switches the relay off if the daemon
+        stops repeating the command."""
         words = "when: ['1'], when_not: ['0'], stale_after_s: 5"
-        yield "    points:                  # the topics and words of your device"
+        yield "    points:                  # write the topics and payloads of your device"
         for number in range(1, self._inputs + 1):
             yield f"      input {number}: {{topic: {self._topic}/input/{number}, {words}}}"
         for number in range(1, self._relays + 1):

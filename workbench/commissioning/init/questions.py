@@ -97,7 +97,7 @@ QUESTIONS: Final = (
     ),
     Question(
         "floors",
-        "The lift's floors, from below?",
+        "The lift's floors, from the lowest up?",
         lambda given: "L1,L2,L3",
         needed=_is_lift,
         several=True,

@@ -1,5 +1,5 @@
-"""Scan one device for a walk. The scan has a separate thread, so that a slow or dead terminal never
-delays switching off."""
+"""Scan one device for a walk (`rmf-bridge walk`). The scan has a separate thread, so that a slow or
+dead terminal never delays switching off."""
 
 import threading
 import time
@@ -48,7 +48,8 @@ class ContactReading:
 
 
 class Bench:
-    """A device under test on its tapped bus. `off` is the value that switches all outputs off.
+    """A device under test. Its bus is wrapped in a `Tap`, which shows the levels read. `off` is the
+    value that switches all outputs off.
 
     The bench is a context manager. At the end of the block, the bench switches every output off.
     `verified_off` tells whether a reading confirmed that every output is off.

@@ -1,9 +1,10 @@
-"""Decide when an output of a walk is on, and when its effect counts as seen. All functions are pure,
-because the present time is an argument.
+"""Decide when an output of a walk (`rmf-bridge walk`) is on, and when its effect counts as seen. All
+functions are pure, because the present time is an argument.
 
 Only one output is on at a time, for ON_S at most. The output goes off immediately if a reading fails or
 is too old. The output also goes off if a reading shows that the output must not be on. Feedback may
-come late, because a car needs time to move. An input that was on before the output is no feedback.
+come late, because a car needs time to move. If an input showed the effect before the output was
+switched on, the input is no feedback.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +22,7 @@ on."""
 class WalkStep:
     """One output to test.
 
-    - `outputs`: the driver's outputs, with this output on.
+    - `outputs`: the value for the driver in which this output is on.
     - `expects`: the effect that a person should see.
     - `seen(sample)`: whether the effect is there; None if no input shows the effect.
     - `hindrance(sample)`: the reason why the output must not be on now; "" if the output may be on.
@@ -59,35 +60,35 @@ class WalkMemory:
 
 @dataclass(frozen=True, slots=True)
 class InputsRead:
-    """The inputs were read."""
+    """An event: the inputs were read."""
 
     sample: Any
 
 
 @dataclass(frozen=True, slots=True)
 class InputsLost:
-    """A bus operation failed: reading the inputs, or writing the outputs."""
+    """An event: reading the inputs or writing the outputs failed."""
 
     why: str
 
 
 @dataclass(frozen=True, slots=True)
 class Switch:
-    """The person switches this step's output on or off."""
+    """An event: the person switches this step's output on or off."""
 
     step: int
 
 
 @dataclass(frozen=True, slots=True)
 class ByEye:
-    """The person reports whether the step's effect was seen."""
+    """An event: the person reports whether the step's effect was seen."""
 
     step: int
     seen: bool
 
 
 class Tick:
-    """Time has passed."""
+    """An event: time has passed."""
 
 
 Event = InputsRead | InputsLost | Switch | ByEye | Tick
@@ -122,7 +123,7 @@ def _switch(memory: WalkMemory, step: int, now: float, steps: Sequence[WalkStep]
     proves = tried.seen is None or not tried.seen(memory.sample)
     told = "switched on, and nothing was seen"
     if not proves:
-        told = "switched on; the inputs showed the effect before, so this proves nothing"
+        told = "switched on; the inputs had shown the effect before, so the test proves nothing"
     return replace(
         memory,
         on=step,

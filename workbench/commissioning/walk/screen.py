@@ -1,5 +1,5 @@
-"""The display of a walk on a terminal, even on a phone. Tables are redrawn in place, and keys give
-commands."""
+"""The display of a walk (`rmf-bridge walk`) on a terminal, even on a phone. Tables are redrawn in
+place, and keys give commands."""
 
 import os
 import re
@@ -107,7 +107,7 @@ class Screen:
         """List every input. If there is too little room, list the inputs that changed last."""
         known = self._bench.inputs
         if not known:
-            nothing = "no contacts: registers or messages, decoded"
+            nothing = "no contacts; see the decoded values"
             return [(line, DIM) for line in wrapped(nothing, columns)]
         latest = sorted(known, key=lambda one: -(one.changed_at or 0.0))[:most]
         shown = [one for one in known if one in latest]
@@ -143,8 +143,8 @@ class Room(NamedTuple):
 
 
 def room(rows: int, inputs: int, outputs: int) -> Room:
-    """Divide the rows. The first three rows or more are for outputs. Next come the inputs, and then
-    more outputs."""
+    """Divide the rows between inputs and outputs. Up to three outputs get rows first, then the inputs.
+    The other outputs get the remaining rows."""
     least = min(outputs, 3)
     if inputs + least <= rows:
         return Room(inputs, min(outputs, rows - inputs))

@@ -1,5 +1,5 @@
-"""The record of a walk, as Markdown and JSON. The record has the file, the tests, the results and a
-place for the signature."""
+"""The record of a walk (`rmf-bridge walk`), as Markdown and JSON. The record has the file, the tests,
+the results and a place for the signature."""
 
 import hashlib
 import json

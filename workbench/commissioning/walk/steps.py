@@ -1,5 +1,5 @@
-"""The outputs that a walk tests for each kind of device, and the feedback that the inputs should
-show."""
+"""The outputs that a walk (`rmf-bridge walk`) tests for each kind of device. Also the feedback that the
+inputs should show."""
 
 from collections.abc import Callable, Collection, Iterator
 from typing import Any, Final
@@ -107,7 +107,7 @@ def _workcell(settings: object, wired: Wired) -> Iterator[WalkStep]:
     def hinders(sample: WorkcellSample) -> str:
         if sample.fault or sample.errors:
             return f"it shows a fault {'; '.join(sample.errors)}".rstrip()
-        return "done is on before the start" if sample.done else ""
+        return "the input done is on before the start" if sample.done else ""
 
     yield WalkStep(
         "start",

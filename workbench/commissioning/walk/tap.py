@@ -28,8 +28,8 @@ class TappedLines:
 
 
 class Tap:
-    """A wrapper of an open bus. `levels` holds the last level of each input, by the input's canonical
-    point."""
+    """A wrapper of an open bus. `levels` maps each input to its last level. The key is the input's
+    point in its standard spelling."""
 
     def __init__(self, bus: Any) -> None:
         self.levels: dict[str, int] = {}

@@ -1,8 +1,9 @@
-"""Every request that `send` can make: its message, its fulfilment, and its obstacles.
+"""Every request that `send` can make. A request has a message, a condition for success, and obstacles,
+which are possible reasons for failure.
 
 The messages and conditions are the same as in RMF's fleet adapters (rmf_ros2 9dedd0f). Each kind of
-device has a file. This file has the part that all kinds share. A request's `obstacles` are a table, in
-which the most specific obstacle comes first. The last obstacle always applies.
+device has a file. This file has the part that all kinds share. `obstacles` returns the most specific
+obstacle first. The last obstacle always applies.
 """
 
 from abc import ABC, abstractmethod
@@ -27,7 +28,7 @@ NEVER_AT: Final = float("-inf")
 
 
 class RequestProgress(Struct, frozen=True):
-    """The events after the command began. Times are monotonic (s).
+    """Everything that happened after the command began. Times are monotonic (s).
 
     - `listeners`: number of matched subscriptions on the request's topic.
     - `states`: the states that concern the request, in order. The last state came at `stated_at`.
@@ -58,7 +59,8 @@ class RequestProgress(Struct, frozen=True):
     results: tuple[tuple[float, words.WorkcellResulted], ...] = ()
 
     def hears(self, heard: Heard, about: Callable[[words.Stated], bool]) -> "RequestProgress":
-        """Take a message. `about(state)` tells whether the state concerns the request."""
+        """Return the progress after this message. `about(state)` tells whether the state concerns the
+        request."""
         message = heard.message
         if isinstance(message, SupervisorHeartbeat):
             return replace(self, heartbeat=message, heartbeat_at=heard.at)
@@ -105,7 +107,8 @@ class RequestProgress(Struct, frozen=True):
 
 WHERE: Final = (
     "is the device in another domain (--domain-id), on another transport (--transport), or on another"
-    " machine (without --localhost)? rmf-bridge status on the daemon's machine shows both"
+    " machine (without --localhost)? rmf-bridge status on the daemon's machine shows domain and"
+    " transport"
 )
 
 
@@ -122,7 +125,8 @@ class Failed(Struct, frozen=True):
 
 
 class Obstacle(NamedTuple):
-    """A possible reason why a request has no effect. `remedy` is the command that helps."""
+    """A possible reason why a request has no effect. `present` tells whether this is the reason now.
+    `remedy` is the command that helps."""
 
     present: bool
     text: str
@@ -161,8 +165,8 @@ class Request(ABC):
 
     @abstractmethod
     def message(self, seen: RequestProgress) -> words.Requested | None:
-        """Return the message to send, without a stamp. Return None if there is not yet enough
-        information for the message."""
+        """Return the message to send. The sender adds the time stamp. Return None if there is not yet
+        enough information for the message."""
 
     @abstractmethod
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
@@ -170,7 +174,8 @@ class Request(ABC):
 
     @abstractmethod
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return possible reasons for no effect. The first reason that is `present` counts."""
+        """Return the possible reasons why the request has no effect. The first reason that is `present`
+        is the true one."""
 
     @property
     def supervisor(self) -> AnyTopic | None:
@@ -200,7 +205,7 @@ class Request(ABC):
         return f"{self.name} is a {' and a '.join(kinds)}, not a {self.kind}; {there}"
 
     def nobody(self, seen: RequestProgress) -> Obstacle:
-        """Explain that no supervisor or daemon subscribes to the request."""
+        """Return the obstacle that no supervisor or daemon subscribes to the request."""
         silence = f"no node subscribes to {self.topic.name}"
         if self.supervisor is not None:
             silence = f"no node publishes {self.supervisor.name}"
@@ -214,7 +219,7 @@ class Request(ABC):
         return Obstacle(True, text, f"to ask the {self.kind}'s own daemon: {there}")
 
     def unheard(self, seen: RequestProgress) -> Obstacle:
-        """Explain that the device has not been heard, and suggest a similar name."""
+        """Return the obstacle that the device has not been heard. Suggest a similar name."""
         topic, names = self.states.name, seen.names(self.kind)
         if not names:
             text = f"no {self.kind} is heard on {topic}; {self._hears(seen)}"
@@ -222,8 +227,8 @@ class Request(ABC):
         return Obstacle(True, f"no '{self.name}' on {topic}; {self._hears(seen)}")
 
     def _hears(self, seen: RequestProgress) -> str:
-        """Name the heard devices of this kind. If there are none, name all heard devices, or else the
-        graph."""
+        """Name the heard devices of this kind. If there are none, name all heard devices. If no device
+        was heard, name the graph."""
         if names := seen.names(self.kind):
             near = "" if self.name in names else nearest(self.name, names)
             return f"{self.kind}s heard: {', '.join(names)}{near}"

@@ -28,7 +28,7 @@ class _Charger(Request):
 
 @dataclass(frozen=True, slots=True)
 class RobotCharge(_Charger):
-    """A request that assigns the charger to a robot. The request has an id of our own."""
+    """A request that assigns the charger to a robot. `send` makes up the request's id."""
 
     fleet: str
     robot: str
@@ -45,8 +45,8 @@ class RobotCharge(_Charger):
         return d.ChargerRequest(charger, self.fleet, self.robot, limit, self.request_id)
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Return Fulfilled if a state with our id shows that the charger serves the robot. Return
-        Failed after a refusal."""
+        """Return Fulfilled if a state with our request's id shows that the charger serves the robot.
+        Return Failed after a refusal."""
         answer = seen.answer(d.ChargerState)
         if answer is None or answer.state not in SERVING or answer.request_id != self.request_id:
             return self._refused(seen)
@@ -64,7 +64,8 @@ class RobotCharge(_Charger):
         return Failed(f"{text}; to cancel that request: {self.line.other(*cancel)}")
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the obstacles, which are an error of the charger or another request."""
+        """Return the obstacles: the charger is in ERROR, serves another request, or did not accept this
+        request."""
         state = seen.states_of(d.ChargerState)[-1]
         cancel = self.line.other("send", "charger", self.name, "--cancel", state.request_id)
         return (
@@ -85,7 +86,7 @@ def _error(state: d.ChargerState) -> Obstacle:
 
 @dataclass(frozen=True, slots=True)
 class ChargeCancel(_Charger):
-    """A cancel of the request that the charger serves."""
+    """A request to cancel the charge that the charger serves."""
 
     request_id: str
 
@@ -96,8 +97,8 @@ class ChargeCancel(_Charger):
         return d.ChargerCancel(self.name, self.request_id)
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Return Fulfilled after the charger shows no id or another id. Return Failed if the charger
-        never showed our id."""
+        """Return Fulfilled when the charger no longer serves the request that it served before. Return
+        Failed if the charger never served this request."""
         answer = seen.answer(d.ChargerState)
         if answer is None or self._holds(answer):
             return None
@@ -111,7 +112,7 @@ class ChargeCancel(_Charger):
         return state.request_id == self.request_id and state.state not in released
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the obstacle that the charger still serves the request."""
+        """Return the only obstacle: the charger still serves the request."""
         text = f"{self.name} still serves request {self.request_id}: see its daemon's log"
         return (Obstacle(True, text),)
 
@@ -133,7 +134,7 @@ class QueuedCharge(RobotCharge):
         return f"{self.fleet}/{self.robot}"
 
     def about(self, state: words.Stated) -> bool:
-        """Return whether a charger's state shows this robot."""
+        """Return whether the state is from a charger that serves this robot."""
         return isinstance(state, d.ChargerState) and (
             (state.robot_fleet, state.robot_name) == (self.fleet, self.robot)
         )
@@ -152,7 +153,7 @@ class QueuedCharge(RobotCharge):
         return Fulfilled(f"{answer.charger_name} is {state} for {self.who}")
 
     def unheard(self, seen: RequestProgress) -> Obstacle:
-        """Explain why no charger shows the robot yet. The robot may wait in the queue, or the
+        """Explain why no charger serves the robot yet. The robot may wait in the queue, or the
         coordinator may have refused the request."""
         if not seen.names(self.kind):
             return super(QueuedCharge, self).unheard(seen)
@@ -166,14 +167,16 @@ class QueuedCharge(RobotCharge):
         )
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the obstacles, which are the charger's error or a robot without a charger."""
-        text = f"the {COORDINATOR} has not assigned {self.who} a charger: see its log"
+        """Return the obstacles: the charger is in ERROR, or the coordinator has not assigned a
+        charger."""
+        text = f"the {COORDINATOR} has not assigned {self.who} a charger: see the coordinator's log"
         return _error(seen.states_of(d.ChargerState)[-1]), Obstacle(True, text)
 
 
 @dataclass(frozen=True, slots=True)
 class QueuedCancel(ChargeCancel):
-    """A cancel of a queued request. No state shows whether the request was in the queue."""
+    """A request to cancel a queued request. RMF has no state that shows the queue, so `send` cannot
+    check whether the request was in the queue."""
 
     own = topics.ADAPTER_CHARGER_CANCELS
     listener = COORDINATOR

@@ -12,9 +12,9 @@ from workbench.graph.requests import Fulfilled, Obstacle, Request, RequestProgre
 class DoorMove(Request):
     """A request to open or close the door.
 
-    On the adapter topic, the request also waits for the supervisor's heartbeat, as a fleet adapter
-    does. The heartbeat must list us while we hold the door. After the release, the heartbeat must no
-    longer list us.
+    Without `direct`, the request also waits for the supervisor's heartbeat, as a fleet adapter does.
+    The heartbeat must list our requester while we hold the door. After the release, the heartbeat must
+    no longer list our requester.
     """
 
     opened: bool
@@ -39,8 +39,8 @@ class DoorMove(Request):
         )
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | None:
-        """Return Fulfilled after the door shows the mode. On the adapter topic, the heartbeat must also
-        agree."""
+        """Return Fulfilled after the door shows the mode. Without `direct`, the heartbeat must also
+        list our requester after OPEN, and no longer list it after CLOSE."""
         answer = seen.answer(d.DoorState)
         if answer is None or answer.current_mode.value != self.mode:
             return None
@@ -53,7 +53,7 @@ class DoorMove(Request):
         return requesters is not None and (self.requester in requesters) == self.opened
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the obstacles that the door's present mode shows."""
+        """Return the obstacles, which depend on the door's present mode and on other requesters."""
         mode, name = seen.states_of(d.DoorState)[-1].current_mode.value, self.name
         others = ", ".join(r for r in seen.requesters(name) or [] if r != self.requester)
         return (

@@ -12,7 +12,8 @@ from bridges.observe.lift import HAZARDS, request_lift
 from workbench.graph.requests import Failed, Fulfilled, Obstacle, Request, RequestProgress, nearest
 
 OBEYS_WITHIN_S: Final = 5.0
-"""Maximum time (s) for a supervisor to end a session. The supervisor needs a few states to do so."""
+"""Maximum time (s) that a supervisor needs to end a session. The supervisor has to hear a few states
+first."""
 MOVES_WITHIN_S: Final = 5.0
 """Time (s) to watch the lift after an operator's release. A person may stand at the car, and must know
 whether the car moves."""
@@ -26,7 +27,7 @@ class _Lift(Request):
 
     @property
     def supervisor(self) -> AnyTopic | None:
-        """The lift's own topic, on which only supervisors publish."""
+        """The topic `lift_requests`, on which only supervisors publish."""
         return None if self.direct else self.own
 
     @property
@@ -73,7 +74,7 @@ class LiftRide(_Lift):
         if seen.told.get("boarded") != "yes":
             return f"to end that session: {self._release}"
         release = self.line.other("release", self.name, "--car-empty")
-        return f"a robot may be in the car; if it is empty: {release}"
+        return f"a robot may be in the car; if the car is empty: {release}"
 
     def _fulfilled(self, state: d.LiftState | None) -> bool:
         if state is None or state.session_id != self.session:
@@ -83,8 +84,8 @@ class LiftRide(_Lift):
         return self.granted_only or all(check.met for check in checks)
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the obstacles. An obstacle is another session, a wrong mode, or a floor or door state
-        that was not reached."""
+        """Return the obstacles: another session has the lift, the mode is wrong, or the car has not
+        reached the floor or opened the door."""
         state = seen.states_of(d.LiftState)[-1]
         name, session, mode = self.name, state.session_id, state.current_mode
         word = words.word(d.LiftMode, mode)
@@ -99,7 +100,7 @@ class LiftRide(_Lift):
             Obstacle(
                 mode != d.LiftMode.MODE_AGV,
                 f"{name} granted the session, but its mode is {word}, not AGV"
-                " (a key switch, or still in use)",
+                " (a key switch, or people still use it)",
             ),
             Obstacle(
                 state.current_floor != self.floor,
@@ -113,9 +114,9 @@ class LiftRide(_Lift):
 class LiftEnd(_Lift):
     """A request to end `session`. With "", the request ends the session in the first LiftState heard.
 
-    With `falls_back`, the request goes to the lift's own daemon if the supervisor does not obey within
-    OBEYS_WITHIN_S. If a robot may be in the car, the operator must first confirm that the car is empty
-    (`car_empty`).
+    With `falls_back`, the request may go to the lift's own daemon, if the supervisor does not end the
+    session within OBEYS_WITHIN_S. This happens only if no robot is in the car. If a robot may be in the
+    car, the operator must first confirm that the car is empty (`car_empty`).
     """
 
     session: str = ""
@@ -162,15 +163,16 @@ class LiftEnd(_Lift):
         return MOVES_WITHIN_S if self.falls_back else 0.0
 
     def goes_direct(self, seen: RequestProgress, now: float) -> bool:
-        """Return whether to ask the lift's own daemon now. The supervisor, if there is one, must have
-        had OBEYS_WITHIN_S. The car must be empty, as the lift or the operator says."""
+        """Return whether to ask the lift's own daemon now. OBEYS_WITHIN_S must have passed, so that a
+        supervisor had time to end the session. The lift or the operator must have said that the car
+        is empty."""
         asked_at = seen.began_at if seen.first_sent_at is None else seen.first_sent_at
         late = now >= asked_at + OBEYS_WITHIN_S
         return self.falls_back and not self.direct and late and self._outside(seen)
 
     def nobody(self, seen: RequestProgress) -> Obstacle:
-        """Explain why the request is refused even if no supervisor is there. A robot may be in the
-        car."""
+        """Return the obstacle that no supervisor is there. If a robot may be in the car, the operator
+        must first confirm that the car is empty. Only then is the lift's own daemon asked instead."""
         found = super(LiftEnd, self).nobody(seen)
         if self.direct or not self.falls_back or not seen.states:
             return found
@@ -182,7 +184,7 @@ class LiftEnd(_Lift):
         return self.car_empty or seen.told.get("boarded") == "no"
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the obstacle that the lift still shows the session."""
+        """Return the only obstacle: the lift still shows the session."""
         if self.falls_back and not self._outside(seen):
             text = (
                 f"{self.name} still shows the session, and a robot may be in the car: look inside"
@@ -206,7 +208,7 @@ def aftermath(states: Sequence[d.LiftState]) -> str:
     who = f"{last.session_id} has it now" if last.session_id else "nobody has it now"
     if len(states) == 1:
         return (
-            f"{who}; no state came in {MOVES_WITHIN_S:g} s: it is not known whether anything moves"
+            f"{who}; no state came in {MOVES_WITHIN_S:g} s, so it is unknown whether anything moves"
         )
     stands = d.LiftMotion.MOTION_STOPPED, d.LiftMotion.MOTION_UNKNOWN
     going = {one.motion_state for one in states if one.motion_state not in stands}
@@ -218,4 +220,4 @@ def aftermath(states: Sequence[d.LiftState]) -> str:
     for part, course in (("floor", floors), ("door", doors)):
         moved += [f"{part} {' to '.join(course)}"] if len(course) > 1 else []
     what = "; ".join(moved) or "neither the car nor its door moved"
-    return words.printable(f"{who}; in these {MOVES_WITHIN_S:g} s: {what}")
+    return words.printable(f"{who}; in the {MOVES_WITHIN_S:g} s after the release: {what}")

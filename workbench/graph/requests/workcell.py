@@ -10,8 +10,11 @@ from bridges.messages.topics import AnyTopic
 from workbench.graph.requests import Failed, Fulfilled, Obstacle, Request, RequestProgress
 
 TELLS_S = 2.5
-"""The time (s) after a result in which its daemon says why. Diagnostics come each second."""
-DECIDE = "its daemon's machine: rmf-bridge status, then rmf-bridge workcell done, again or failed"
+"""Maximum time (s) from a result until the workcell's daemon gives the reason for the result.
+Diagnostics come each second."""
+DECIDE = (
+    "run rmf-bridge status, then rmf-bridge workcell done, again or failed, on its daemon's machine"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +42,8 @@ class Dispensing(Request):
         return self.made(d.Time(), self.guid, self.name, self.transporter, items)  # type: ignore[arg-type]
 
     def outcome(self, seen: RequestProgress) -> Fulfilled | Failed | None:
-        """Return the outcome that a result gives. RMF would also count an unlisted request as done."""
+        """Return Fulfilled or Failed after a result for this request. RMF's adapter also completes a
+        request that a newer state no longer lists, but `send` waits for the result."""
         for at, one in seen.results:
             if (one.source_guid, one.request_guid) == (self.name, self.guid):
                 if one.status == d.WorkcellStatus.SUCCESS:
@@ -49,8 +53,8 @@ class Dispensing(Request):
         return None
 
     def _why(self, seen: RequestProgress, failed_at: float) -> str:
-        """Return why the request has failed, as its daemon says; "" until its daemon may have said
-        it."""
+        """Return why the request has failed, in the words of the workcell's daemon. Return "" as long
+        as the daemon may not have given the reason yet."""
         told = seen.told
         if told.get("last_refusal request") == self.guid:
             return f"it was refused: {told.get('last_refusal reason')}"
@@ -61,7 +65,7 @@ class Dispensing(Request):
         return "" if heard_at < failed_at + TELLS_S else "see its log"
 
     def obstacles(self, seen: RequestProgress) -> Iterable[Obstacle]:
-        """Return the obstacles that the workcell's last state shows."""
+        """Return the obstacles, which depend on the workcell's last state."""
         state = seen.states[-1]
         assert isinstance(state, words.WorkcellStated)
         listed = self.guid in state.request_guid_queue
@@ -78,7 +82,7 @@ class Dispensing(Request):
 
 @dataclass(frozen=True, slots=True)
 class Ingesting(Dispensing):
-    """A request to an ingestor to take items. The rules of `Dispensing` apply."""
+    """A request to an ingestor to take items. Everything else is as in `Dispensing`."""
 
     kind: ClassVar[str] = "ingestor"
     states: ClassVar[AnyTopic] = topics.INGESTOR_STATES

@@ -1,4 +1,5 @@
-"""The rules of the rollout, as pure functions of files, texts and `rmf-bridge status --json`."""
+"""The rules of the rollout. They are pure functions, whose inputs are files, texts and the output of
+`rmf-bridge status --json`."""
 
 import json
 import re
@@ -30,8 +31,8 @@ def rmf_kind(text: str) -> str:
 
 
 def rmf_files(folder: str, role: str = "") -> list[str]:
-    """Return the YAMLs in this folder for which this role makes a service. Without a role, return every
-    YAML that has a service."""
+    """Return the YAMLs in this folder for which this Ansible role makes a service. If no role is given,
+    return every YAML that has a service."""
     kinds = ROLES.get(role, SERVED)
     return [str(file) for file in _yamls(folder) if rmf_kind(file.read_text("utf-8")) in kinds]
 
@@ -46,10 +47,11 @@ def _yamls(folder: str) -> list[Path]:
 
 
 def rmf_untested(form: str, file: str, content: bytes) -> str:
-    """Return why this form is no record of a kill test that went well for this YAML; "" if it is.
+    """Return the reason why this form does not prove a successful kill test of this YAML; "" if it
+    does.
 
     `form`: the text that `rmf-bridge doctor FILE --kill-test --form FORM` writes. `content`: the YAML's
-    bytes, which the form names by their hash.
+    bytes. The form must have their hash.
     """
     name = PurePath(file).name
     if not form.strip():
@@ -57,7 +59,7 @@ def rmf_untested(form: str, file: str, content: bytes) -> str:
     if not form.startswith(f"# {name} on "):
         return f"{name}: the form is about another file: {form.splitlines()[0]}"
     if f"YAML: sha256 {sha256(content).hexdigest()}" not in form.splitlines():
-        return f"{name}: the form is about an earlier content of this file"
+        return f"{name}: the form was made for an earlier version of this file"
     rows = [row.split("|") for row in form.splitlines() if row.startswith("| kill test |")]
     levels = [row[2].strip() for row in rows]
     if "wrong" in levels:
@@ -70,11 +72,12 @@ def rmf_untested(form: str, file: str, content: bytes) -> str:
 def rmf_not_back(
     after: str, before: Iterable[Mapping[str, Any]], wanted: Iterable[str]
 ) -> list[str]:
-    """Return the reasons why a machine has not come back. Return [] if every wanted daemon serves.
+    """Return the reasons why a machine does not work as before the change. Return [] if every wanted
+    daemon serves.
 
-    `after`: the output of `rmf-bridge status --json`. `before`: its content before the change.
-    `wanted`: names of services. A fault that a daemon had before does not count, because the change is
-    not its cause.
+    `after`: the present output of `rmf-bridge status --json`. `before`: the parsed output before the
+    change. `wanted`: names of services. A fault that a daemon had before does not count, because the
+    change is not its cause.
     """
     try:
         now = {one["name"]: one for one in json.loads(after)}
@@ -85,17 +88,19 @@ def rmf_not_back(
 
 
 def rmf_untested_file(file: str) -> str:
-    """Return the reason why the form beside this YAML (NAME.md) is no record of a kill test. Return ""
-    if the form is such a record."""
+    """Return the reason why the form beside this YAML (NAME.md) does not prove a kill test. Return ""
+    if it does."""
     form = Path(file).with_suffix(".md")
     text = form.read_text("utf-8") if form.exists() else ""
     return rmf_untested(text, file, Path(file).read_bytes())
 
 
 def rmf_full_version(version: str, system: str) -> str:
-    """Return a machine's version of the packages: `0.1.0` on `debian 13` is `0.1.0+deb13`.
+    """Return the version of the packages for this machine. For example, `0.1.0` on `debian 13` becomes
+    `0.1.0+deb13`.
 
-    `system`: ID and VERSION_ID of /etc/os-release. A version that names its system stays as it is.
+    `system`: ID and VERSION_ID of /etc/os-release. A version that already names a system is returned
+    unchanged.
     """
     name, _, number = system.strip().partition(" ")
     known = {"debian": "deb", "raspbian": "deb"}

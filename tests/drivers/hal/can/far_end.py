@@ -67,7 +67,8 @@ class FarEnd:
 def bus_on(
     channel: str, clock: Callable[[], float] | None = None, *, timeout_s: float = 0.1
 ) -> CanBus:
-    """Return our bus. `clock` measures the bus's pauses, which have no jitter."""
+    """Return our bus. After a failure the bus pauses. `clock` measures these pauses, whose lengths are
+    not random."""
     settings = CanSettings(socketcan="can0", timeout_s=timeout_s, scan_s=0.05)
     vendor = lambda: can.Bus(channel, interface="virtual")  # noqa: E731
     return CanBus(settings, clock or time.monotonic, lambda: 0.0, vendor)

@@ -22,7 +22,7 @@ from tests.drivers.hal.modbus.module import Time
 from tests.waiting import PATIENCE_S
 
 Ends = tuple[CanBus, FarEnd, Time]
-SILENT = "nothing else is heard on the bus either: power, cable, termination, bitrate?"
+SILENT = "no other frames come on the bus either: check power, cable, termination and bitrate"
 
 
 @pytest.fixture
@@ -228,7 +228,7 @@ def wrapped(code: int) -> Exception:
         (OSError(errno.ENODEV, "x"), "no such interface"),
         (wrapped(errno.ENETDOWN), "the interface is down; sudo ip link set can0 up type can"),
         (OSError(errno.EAFNOSUPPORT, "x"), "this kernel has no CAN; sudo modprobe can-raw"),
-        (wrapped(errno.ENOBUFS), "frames pile up because nobody acknowledges them"),
+        (wrapped(errno.ENOBUFS), "frames pile up because no device acknowledges them"),
         (OSError(errno.EPERM, "x"), "Operation not permitted"),
         (can.CanInitializationError("no\nway"), "no?way"),
         (ValueError("invalid literal"), "invalid literal"),
@@ -321,7 +321,7 @@ def test_a_bitrate_that_no_adapter_knows_is_a_problem() -> None:
 def test_a_port_whose_name_may_change_is_worth_a_warning() -> None:
     [(path, text)] = warnings(CanSettings(slcan=Slcan(port="/dev/ttyACM0", bitrate=250_000)))
     assert path == ("slcan", "port")
-    assert text.startswith("/dev/ttyACM0 may be another adapter")
+    assert text.startswith("/dev/ttyACM0 may name another adapter")
     assert list(warnings(CanSettings(socketcan="can0"))) == []
 
 

@@ -1,4 +1,5 @@
-"""Waits for the frames of one bus. The bus has a file descriptor, like the kernel's interfaces."""
+"""Tests of the wait for frames of one bus. The bus has a file descriptor, like the kernel's
+interfaces."""
 
 import socket
 from typing import Any

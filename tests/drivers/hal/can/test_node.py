@@ -188,8 +188,8 @@ def test_a_heartbeat_that_stays_away_is_a_loss_and_its_return_ends_it(side: Side
     ours.alive()
     far.now += 0.55
     assert failure(ours.alive) == (
-        f"{NAME}: no heartbeat within 0.5 s: nothing else is heard on the bus either: power,"
-        " cable, termination, bitrate?"
+        f"{NAME}: no heartbeat within 0.5 s: no other frames come on the bus either: check power,"
+        " cable, termination and bitrate"
     )
     far.say(0x70A, "05")
     assert failure(ours.alive) == ""
@@ -216,7 +216,7 @@ def test_another_nodes_heartbeat_does_not_count_and_is_named(side: Side) -> None
     far.say(0x70B, "05")
     far.say(0x70A, "05", extended=True)
     assert failure(ours.alive) == (
-        f"{NAME}: no heartbeat within 0.5 s, but of node 11: is 'node' right?"
+        f"{NAME}: no heartbeat within 0.5 s, but heartbeats of node 11: is 'node' right?"
     )
 
 
@@ -237,7 +237,7 @@ def test_a_heartbeat_of_the_wrong_length_is_ignored(side: Side, payload: str) ->
 def test_a_node_that_is_not_operational_is_not_asked(side: Side, state: str, text: str) -> None:
     ours, _, far, _ = side
     far.say(0x70A, state)
-    assert failure(ours.alive) == f"{NAME} is {text}, not operational: look at the node"
+    assert failure(ours.alive) == f"{NAME} is {text}, not operational: check the node"
 
 
 def test_a_start_is_counted_and_ends_the_pause(side: Side) -> None:

@@ -223,11 +223,17 @@ def test_the_headers_chip_is_found_by_its_label(lgpio: StandIn, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("chips", "present", "text"),
     [
-        ({}, (), "no chip of a Raspberry Pi's header (label pinctrl-…) among: no GPIO chip at all"),
+        (
+            {},
+            (),
+            "no chip has the label of a Raspberry Pi's header (pinctrl-…); chips here: no GPIO"
+            " chip at all",
+        ),
         (
             {0: "gpio-mockup", 1: "gpio-ich"},
             (0, 1),
-            "no chip of a Raspberry Pi's header (label pinctrl-…) among: gpiochip0, gpiochip1",
+            "no chip has the label of a Raspberry Pi's header (pinctrl-…); chips here: gpiochip0,"
+            " gpiochip1",
         ),
         ({}, (3,), "{dev}/gpiochip3: can not open gpiochip"),
     ],

@@ -85,7 +85,7 @@ def test_pins_are_pulled_up_to_bcm8_and_down_from_bcm9_until_they_are_claimed() 
         (wire("BCM18", "out", pull="up"), ["an output has no pull"]),
         (
             wire("BCM1", "out"),
-            ["BCM1 belongs to the HAT EEPROM, and the firmware drives it at boot: use another"],
+            ["BCM1 is for a HAT's EEPROM, and the firmware drives it at boot: use another pin"],
         ),
         (wire("18"), []),
     ],

@@ -30,7 +30,7 @@ IDLE = ChargerSample(Activity.IDLE, 0)
 
 
 class Fake:
-    """The example's station with its server, bus and driver. The bus makes no pauses."""
+    """The example's station with its server, bus and driver. The bus does not pause after a failure."""
 
     def __init__(self, config: Config, timeout_s: float) -> None:
         settings = msgspec.structs.replace(config.buses["tpu"], timeout_s=timeout_s)

@@ -86,7 +86,7 @@ def test_a_message_wakes_the_daemon_and_the_state_is_read_by_a_request() -> None
     plant = world.plants["lift"]
     server = HttpServer([FakeHttpLift(plant, settings)], "", 0.5, "/ws")
     with listening(server.replace["api_base"].rpartition(":")[2]) as (bus, wakes):  # type: ignore[attr-defined]
-        wakes.more_than(1)  # the connection and the state wake once each
+        wakes.more_than(1)  # one wake for the connection, and one for the state
         lift = create("lift", settings, bus)
         assert not lift.read().hazards
         before = wakes.count
@@ -180,7 +180,7 @@ def deaf(caller: Caller) -> None:
         b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
         b"Sec-WebSocket-Accept: " + accept + b"\r\n\r\n"
     )
-    caller.request()  # until the daemon hangs up
+    caller.request()  # returns when the daemon hangs up
 
 
 def test_a_server_that_answers_no_ping_is_logged_once_in_our_form(

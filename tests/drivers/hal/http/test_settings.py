@@ -59,7 +59,7 @@ def test_a_setting_without_effect_is_refused() -> None:
     made = HttpSettings(api_base="tpu", ca_file="/etc/ca.pem", token_header="X-API-Key")
     assert list(made.problems()) == [
         (("ca_file",), "is for https: write api_base: https://…, or delete ca_file"),
-        (("token_header",), "needs token_file: the file with the header's value"),
+        (("token_header",), "needs token_file, which names the file with the header's value"),
     ]
 
 

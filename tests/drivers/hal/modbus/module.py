@@ -187,8 +187,8 @@ def bus_to(
     ignore_echo: bool = False,
     module_watchdog: dict[str, Any] | None = None,
 ) -> ModbusBus:
-    """Return a bus to a port of this machine. `clock` measures the bus's pauses, which have no
-    jitter."""
+    """Return a bus to a port of this machine. After a failure the bus pauses. `clock` measures these
+    pauses, whose lengths are not random."""
     settings = ModbusSettings(
         tcp=Tcp(host="127.0.0.1", port=port) if isinstance(port, int) else None,
         serial=serial(port, ignore_echo) if isinstance(port, str) else None,

@@ -33,7 +33,9 @@ def test_unit_0_is_asked_as_any_other_and_no_other_unit_answers_for_it(module: M
 def test_a_reply_numbered_0_says_what_the_gateway_must_do(module: Module) -> None:
     door(module)
     module.reply = lambda request: bytes(2) + module.answer(request)[2:]
-    assert "its transaction number is 0, not the request's" in fails(bus_to(module.port), IN0)
+    assert "the reply's transaction number is 0, not the request's number" in fails(
+        bus_to(module.port), IN0
+    )
 
 
 def test_a_refused_connection_pauses_the_bus_and_asks_once_a_pause() -> None:

@@ -1,6 +1,6 @@
-"""The contract of the Modbus bus. The far side is our own module, on TCP and on a serial line.
+"""The contract of the Modbus bus. The tests run it against `module.py`, on TCP and on a serial line.
 
-Stories about TCP alone are in `test_bus.py`, and stories about the line alone are in `test_rtu.py`.
+Stories about TCP alone are in `test_bus.py`. Stories about the serial line alone are in `test_rtu.py`.
 """
 
 import pytest
@@ -181,7 +181,7 @@ def test_one_dead_unit_costs_the_other_its_tries_and_then_one_a_pause(either: Mo
         assert alive.read() == {IN0: False}
         fails(bus, "unit 2 discrete input 0")
     assert either.units_asked().count(1) == 30
-    assert either.units_asked().count(2) <= 2 + 1 + 1  # tries: 2 at first, 1 after each pause
+    assert either.units_asked().count(2) <= 2 + 1 + 1  # 2 tries at first, then 1 after each pause
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,5 @@
-"""Replies of modules, recorded or written by hand. The corpus says whether the driver must accept each
-reply."""
+"""Replies of modules, recorded or written by hand. For each reply the corpus says whether the driver
+must accept it."""
 
 from itertools import chain, repeat
 from pathlib import Path
@@ -33,7 +33,7 @@ class Recorded(NamedTuple):
 
 
 def recorded(framing: str) -> list[Recorded]:
-    """Return the corpus of one framing. The framing is also the name of the file."""
+    """Return the corpus of one framing (`tcp` or `rtu`). The corpus is in the file with that name."""
     text = (Path(__file__).parent / "corpus" / f"{framing}.txt").read_text("utf-8")
     lines = [line.split("|") for line in text.splitlines() if not line.startswith("#")]
     return [
@@ -47,7 +47,8 @@ def _bytes(reply: str, request: bytes = b"") -> bytes:
 
 
 def _check(module: Module, case: Recorded) -> None:
-    """Check how the driver reads the recorded replies. Afterwards it must read a healthy module."""
+    """Check the driver's reading of the recorded replies. Then check that the driver reads a healthy
+    module."""
     clock = Time()
     bus = bus_to(module.port, clock, timeout_s=0.05 if case.outcome == "lost" else 2.0, retries=0)
     driver = create("door", DOOR, bus)

@@ -1,4 +1,7 @@
-"""The real driver and bus with the simulated gateway or line, during each failure and afterwards."""
+"""Two real door drivers on one real bus, with a simulated Modbus gateway or serial line.
+
+The tests read the doors while the simulation fails, and again after the failure.
+"""
 
 from collections.abc import Iterator
 
@@ -40,8 +43,8 @@ def door_at(unit: int) -> DryContactDoorSettings:
 
 
 class Site:
-    """Two doors on one bus, as units 1 and 2 of one gateway or line. The bus measures its pauses with
-    `clock`."""
+    """Two doors on one bus: units 1 and 2 of one gateway or serial line. The bus measures its pauses
+    with `clock`."""
 
     def __init__(self, serial: modbus.Serial | None) -> None:
         self.settings = {"front": door_at(1), "ward": door_at(2)}
@@ -69,7 +72,7 @@ class Site:
         }
 
     def patiently(self, name: str) -> DoorSample | str:
-        """Return the sample after all pauses, or the text of the error."""
+        """Let the bus's pauses end, and read once. Return the sample or the error's text."""
         self.clock.now += 60.0
         try:
             return self.doors[name].read()
@@ -77,15 +80,16 @@ class Site:
             return str(error)
 
     def reads(self, name: str) -> DoorSample:
-        """Return a reading, as the daemon's next scan would get it."""
+        """Read again and again, as the daemon's scans do, until a reading succeeds. Return that
+        reading."""
         return at_last(self.doors[name].read, "the door is read", self.a_moment)
 
     def write(self, name: str, outputs: DoorOutputs) -> None:
-        """Write these outputs."""
+        """Write these outputs again and again until a write succeeds."""
         at_last(lambda: self.doors[name].write(outputs), "the outputs are written", self.a_moment)
 
     def a_moment(self) -> None:
-        """Let time pass. The bus's pause after a silent unit is longer."""
+        """Let 1 s pass. The bus pauses for longer than 1 s after a silent unit."""
         self.clock.now += 1.0
 
     def close(self) -> None:
@@ -109,7 +113,7 @@ SERIAL = {
 @pytest.fixture(params=SERIAL)
 def site(request: pytest.FixtureRequest) -> Iterator[Site]:
     built = Site(SERIAL[request.param])
-    for door in built.doors.values():  # the bus retries only requests to a unit that has answered
+    for door in built.doors.values():  # without a first answer the bus would not retry
         at_last(door.open, "the driver opens", built.a_moment)
     yield built
     built.close()
@@ -165,11 +169,11 @@ def test_each_failure_is_a_hal_error_and_the_door_is_back_afterwards(
 WAYS: dict[str, dict[FailureMode, tuple[str, ...]]] = {
     "tcp": {"wrong": ("no reply within",), "garbage": ("no reply within",)},
     "rtu": {
-        "wrong": ("of another unit", "exception 4", "does the adapter echo?"),
+        "wrong": ("of another unit", "exception 4", "if the adapter echoes"),
         "garbage": ("half a frame", "CRC of "),
     },
 }
-"""The possible error texts for each failure of the whole far side."""
+"""The possible error texts when the whole gateway or serial line fails in this mode."""
 
 
 @pytest.mark.parametrize("mode", ["wrong", "garbage"])

@@ -1,4 +1,7 @@
-"""Pulses whose length the module measures. The tests check each byte, and one frame for each pulse."""
+"""Pulses whose length the Modbus module measures. Each pulse needs exactly one frame from the bus.
+
+The tests compare every byte of these frames.
+"""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -37,7 +40,7 @@ SCAN_S = 0.125
 
 
 def pulsed(on_s: float = 0.7, every_s: float = 3.0) -> DryContactDoorSettings:
-    """Return the settings of a door whose operator needs pulses. The pulses are on relay 0 of unit
+    """Return the settings of a door whose operator needs pulses. The pulses come from relay 0 of unit
     1."""
     plain = {
         "inputs": {
@@ -51,7 +54,8 @@ def pulsed(on_s: float = 0.7, every_s: float = 3.0) -> DryContactDoorSettings:
 
 
 def claimed(module: Module, **settings: Any) -> DryContactDoor:
-    """Return an open driver. Afterwards the module's `asked` is empty."""
+    """Return an open driver that has read and written once. Then empty `asked`, the module's
+    requests."""
     door(module)
     driver = create("door", pulsed(), bus_to(module.port, **settings))
     driver.open()
@@ -62,17 +66,17 @@ def claimed(module: Module, **settings: Any) -> DryContactDoor:
 
 
 def writes(module: Module) -> list[str]:
-    """Return the PDU of each write so far."""
+    """Return the PDU of each write that the module has received."""
     return [request[7:].hex() for request in module.asked if request[7] == 5]
 
 
 def loses_replies(module: Module) -> None:
-    """Let the module obey writes, but lose its answers to writes."""
+    """Let the module obey writes without answering them."""
     module.reply = lambda request: b"" if request[7] == 5 else module.answer(request)
 
 
 def answers(driver: DryContactDoor, clock: Time) -> bool:
-    """Return whether the driver can read the door after all pauses."""
+    """Let the bus's pauses end. Return whether the driver can then read the door."""
     clock.now += 60.0
     try:
         driver.read()
@@ -82,10 +86,10 @@ def answers(driver: DryContactDoor, clock: Time) -> bool:
 
 
 def held(module: Module, *, lost_at: float | None = None) -> list[tuple[float, str]]:
-    """Let RMF open a door at 1 s and close the door at 6 s. Return (time in s, PDU) of each write.
+    """Let RMF (Open-RMF) open a door at 1 s and close it at 6 s. Return (s, PDU) of each write.
 
-    As in the daemon's loop, each scan runs driver and core. In the scan at `lost_at` all replies to
-    writes are lost.
+    Each scan runs the driver and the core, as in the daemon's loop. If `lost_at` is a time, the module
+    answers no write in the scan at that time.
     """
     clock, settings = Time(), pulsed()
     driver = claimed(module, clock=clock, timeout_s=1.0)
@@ -119,8 +123,8 @@ def held(module: Module, *, lost_at: float | None = None) -> list[tuple[float, s
 def test_a_flash_has_the_frames_of_the_makers_manual(
     line: SerialModule, relay: int, on_s: float, told: str
 ) -> None:
-    """The manual of the Waveshare Modbus RTU Relay has these frames: "flash on" for 700 ms and 800
-    ms."""
+    """Expect the frames in the manual of the Waveshare Modbus RTU Relay: "flash on" for 700 ms and for
+    800 ms."""
     line.on_wire = lambda heard: heard
     coil = f"unit 1 coil {relay}"
     lines = bus_to(line.port).lines({}, {coil: False})
@@ -302,7 +306,7 @@ def test_the_fake_modules_pulse_is_ended_by_a_coil_that_is_written_off(
         ("unit 1 coil 0x207", ""),
         (
             "unit 2 coil 0x200",
-            "30:7: 'hold_open': flash is at unit 2, and the relay at unit 1: one is wrong",
+            "30:7: 'hold_open': flash is at unit 2, but the relay is at unit 1: correct one",
         ),
         (
             "unit 1 discrete input 9",
@@ -329,9 +333,7 @@ def test_an_impossible_flash_is_reported_where_it_stands(
 
 def test_no_board_times_the_pulses_of_a_pin() -> None:
     wire = Wire("hold_open", "out", "BCM17", "high", flash=Flash("BCM27", 0.5))
-    text = (
-        "flash is for modules that time pulses, but the daemon times a pin's pulses: delete flash"
-    )
+    text = "flash is only for Modbus modules that end pulses themselves: delete flash"
     assert list(gpio.wire_problems(wire)) == [text]
 
 

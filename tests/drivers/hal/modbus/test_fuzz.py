@@ -1,5 +1,7 @@
-"""Arbitrary replies on TCP and on a line. Such replies cause only HalErrors, and never a false open
-door or a false pulse."""
+"""Arbitrary replies on TCP and on a serial line. They may cause only HalErrors.
+
+The driver must never report a closed door as open, or report a pulse that the module has not confirmed.
+"""
 
 import itertools
 from collections.abc import Callable, Iterator
@@ -66,8 +68,10 @@ def one_module() -> Iterator[Module]:
 
 
 class Spoiled:
-    """The answers of a closed door on TCP. Each function in `spoils` changes one answer. After the last
-    function the module hangs up."""
+    """A module's replies about a closed door on TCP. Each function in `spoils` spoils one reply.
+
+    After the last function the module closes the connection.
+    """
 
     def __init__(self, module: Module, spoils: list[Spoil]) -> None:
         module.inputs.update({(1, 0): False, (1, 1): True})
@@ -144,8 +148,8 @@ def one_line() -> Iterator[SerialModule]:
 
 
 class SpoiledLine:
-    """The answers of a closed door on a line. The functions in `spoils` change the answers in turn,
-    again and again."""
+    """A module's replies about a closed door on a serial line. The functions in `spoils` spoil the
+    replies in turn, again and again."""
 
     def __init__(self, line: SerialModule, spoils: list[Spoil]) -> None:
         line.inputs.update({(1, 0): False, (1, 1): True})
@@ -219,7 +223,7 @@ def test_a_register_reads_as_what_was_sent_or_not_at_all(sort: type[Module], pdu
         good = b"\x01\x03\x02" + pdu[2:4]
         if sort is Module:
             assert b"\x01" + pdu == good
-        else:  # the first bytes were a complete frame with its CRC, and noise followed
+        else:  # the driver may read a complete frame with its CRC, and ignore noise behind it
             assert (b"\x01" + pdu + crc(b"\x01" + pdu)).startswith(good + crc(good))
 
 
@@ -238,7 +242,7 @@ def test_a_pulse_is_requested_once_and_only_its_echo_proves_it(
                 bus.flash(Point(1, "coil", 0x200), 0.7)
                 assert pdu.hex() == "0502000007"
             except HalError as error:
-                if "no Modbus TCP connection" in str(error):  # on a busy machine
+                if "no Modbus TCP connection" in str(error):  # a busy machine may be too slow
                     return False
             wait_until(lambda: module.asked, "the module has received the request")
             asked.extend(module.asked)

@@ -58,7 +58,7 @@ HOW = (
     "write 'unit 1 coil 0', 'unit 1 discrete input 0' or 'unit 1 holding register 0 bit 0';"
     " addresses begin at 0"
 )
-MODEL = "looks like a number of the data model, which begins at 1"
+MODEL = "looks like a manual's number, and these begin at 1"
 
 
 @pytest.mark.parametrize(
@@ -75,16 +75,16 @@ MODEL = "looks like a number of the data model, which begins at 1"
         ),
         (
             "unit 1 coil 00017",
-            f"00017 {MODEL}: write coil 16; or 0x11 if 17 really is the address on the wire",
+            f"00017 {MODEL}: write coil 16. Write 0x11 if 17 really is the address on the wire",
         ),
         (
             "unit 1 discrete input 10001",
-            f"10001 {MODEL}: write discrete input 0; or 0x2711 if 10001 really is the address on"
+            f"10001 {MODEL}: write discrete input 0. Write 0x2711 if 10001 really is the address on"
             " the wire",
         ),
         (
             "unit 1 coil 00",
-            f"00 {MODEL}: the first is address 0; or 0x0 if 0 really is the address on the wire",
+            f"00 {MODEL}: the first is address 0. Write 0x0 if 0 really is the address on the wire",
         ),
         ("unit 248 coil 0", "unit 248 does not exist: units are 0 to 247, and 255 on Modbus TCP"),
         ("unit 1 coil 65536", "address 65536 does not exist: addresses are 0 to 65535"),
@@ -95,7 +95,7 @@ MODEL = "looks like a number of the data model, which begins at 1"
         ),
         (
             "unit 1 holding register 40041 bit 3",
-            f"40041 {MODEL}: write holding register 40; or 0x9c69 if 40041 really is the address on"
+            f"40041 {MODEL}: write holding register 40. Write 0x9c69 if 40041 really is the address on"
             " the wire",
         ),
         (
@@ -174,8 +174,8 @@ def test_a_sound_wire_has_no_problem(wire: Wire) -> None:
         ),
         (
             output("unit 1 holding register 0 bit 3"),
-            "an output is a coil: writing a register would also write its other bits, which"
-            " another device may use; driver: register writes whole registers",
+            "an output must be a coil: a write to a register would also write its other bits, which"
+            " another device may use. The driver 'register' can write whole registers",
         ),
         (
             output("unit 1 coil 0", "low"),

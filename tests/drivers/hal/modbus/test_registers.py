@@ -108,7 +108,7 @@ def test_a_place_has_a_table_and_an_address(text: str, found: tuple[str, int]) -
         ("holding register 65536", "address 65536 does not exist"),
         (
             "holding register 40011",
-            "40011 looks like a number of the data model, which begins at 1",
+            "40011 looks like a manual's number, and these begin at 1",
         ),
     ],
 )

@@ -1,6 +1,7 @@
-"""A second master that writes our coil.
+"""A second Modbus master that writes the same coil as our bus.
 
-The error names the second master. We write more rarely, but we still write off at once.
+The error names the second master. While the second master writes, our bus writes "on" more rarely. Our
+bus still writes "off" at once.
 """
 
 import itertools

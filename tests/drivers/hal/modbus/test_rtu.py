@@ -24,8 +24,8 @@ def coils(bus: ModbusBus, count: int) -> list[int]:
 
 
 def test_the_frames_are_those_of_the_makers_manual(line: SerialModule) -> None:
-    """The manual of the Waveshare Modbus RTU Relay has these frames. The frames switch relay 0 on and
-    off, and read all states."""
+    """Expect the frames in the manual of the Waveshare Modbus RTU Relay. They switch relay 0 on and
+    off, and read the states of all relays."""
     said = {
         "01050000ff008c3a": "01050000ff008c3a",
         "010500000000cdca": "010500000000cdca",
@@ -40,8 +40,8 @@ def test_the_frames_are_those_of_the_makers_manual(line: SerialModule) -> None:
 
 
 def test_sixteen_coils_come_lowest_address_in_the_lowest_bit(line: SerialModule) -> None:
-    """The example comes from Modbus Application Protocol V1.1b3, 6.1. The test shortens it to 16 coils,
-    CD 6B."""
+    """Use the example of Modbus Application Protocol V1.1b3, 6.1, shortened to 16 coils (bytes CD
+    6B)."""
     said = {"010100000010" + crc(bytes.fromhex("010100000010")).hex(): rtu("010102cd6b")}
     line.on_wire = lambda frame: said[frame.hex()]
     high = [i for i, level in enumerate(coils(bus_to(line.port), 16)) if level]
@@ -114,7 +114,7 @@ def test_the_late_reply_of_another_unit_is_dropped_and_ours_is_waited_for(
 
     def both(frame: bytes) -> bytes:
         line.say(rtu("02020101"))
-        later.wait(0.05)  # the pause between two frames
+        later.wait(0.05)  # longer than the silence that separates two frames
         return IS_0
 
     line.on_wire = both
@@ -125,14 +125,15 @@ def test_a_fault_says_which_other_unit_was_heard(line: SerialModule) -> None:
     other = rtu("02020101")
     line.on_wire = lambda frame: other
     text = fails(bus_to(line.port, timeout_s=1.0, retries=0), IN0)
-    assert f"no reply within 1 s, but {other.hex(' ')} of another unit" in text
+    assert f"no reply within 1 s, but bytes of another unit: {other.hex(' ')}" in text
 
 
 def test_the_late_reply_to_one_question_never_answers_another(line: SerialModule) -> None:
-    """A unit is one reply behind. Each reply looks valid, but it answers the question before.
+    """Simulate a unit that is one reply behind. Each reply looks valid, but it answers the previous
+    request.
 
-    The unit sends its last reply after the next question. Without a next question it sends the reply a
-    little later.
+    The unit sends its last reply after the next request. If no request follows, the unit sends the
+    reply a little later.
     """
     owed: list[bytes] = []
 
@@ -194,7 +195,7 @@ def test_an_adapter_that_echoes_unannounced_is_named(line: SerialModule) -> None
     door(line)
     line.on_wire = lambda frame: frame + _answer(line, frame)
     text = fails(bus_to(line.port, timeout_s=1.0), IN0)
-    assert "our own request comes back; does the adapter echo? write ignore_echo: true" in text
+    assert "the request itself came back; if the adapter echoes, write ignore_echo: true" in text
 
 
 def test_a_second_echo_is_that_of_an_earlier_try_and_the_file_is_not_blamed(
@@ -225,7 +226,7 @@ def test_a_port_that_vanishes_is_found_again_by_its_path(line: SerialModule) -> 
     text = f"no serial port {line.port}: the port is not there; is the adapter plugged in?"
     assert fails(bus, IN0).startswith(text)
     line.plug()
-    assert fails(bus, "unit 2 coil 0").startswith(text)  # the pause applies to all units
+    assert fails(bus, "unit 2 coil 0").startswith(text)  # the bus pauses for every unit
     clock.now += 0.5
     assert lines.read() == {IN0: False}
 

@@ -49,7 +49,7 @@ def at(address: int) -> Point:
 
 
 def habits(time: int) -> dict[str, Any]:
-    """Return the profile's watchdog with this time (units of 100 ms)."""
+    """Return the watchdog settings of profile wago-750, but with this time (units of 100 ms)."""
     plain: dict[str, Any] = msgspec.to_builtins(PROFILE.load("wago-750"))
     plain["arm"][0]["value"] = time
     plain["armed"][0]["values"] = [time]
@@ -57,7 +57,7 @@ def habits(time: int) -> dict[str, Any]:
 
 
 class Site:
-    """A door at a module with a watchdog. `restart` opens the bus as a new daemon does."""
+    """A door at a module with a watchdog. `restart` opens a new bus, as a new daemon does."""
 
     def __init__(self, time: int = SLOW, units: tuple[int, ...] = (1,)) -> None:
         self.settings = dry(("unit 1 discrete input 0", "unit 1 discrete input 1", "unit 1 coil 0"))
@@ -83,8 +83,10 @@ class Site:
         return self.dead_men[0].get(at(address), 0.0)
 
     def scan(self) -> str:
-        """Read, write and end the scan, as the daemon's loop does. Return the text of the error, or
-        ""."""
+        """Read, write, and tell the bus that the scan has ended, as the daemon's loop does.
+
+        Return the text of the last error, or "" without an error.
+        """
         self.bench.clock.now += 60.0
         try:
             self.bench.driver.read()
@@ -126,7 +128,7 @@ def test_a_scan_refreshes_it_with_a_value_that_differs_from_the_last(site: Site)
         assert site.scan() == ""
         triggers.append(site.register(TRIGGER))
     assert triggers == [1, 2, 1, 2]
-    site.bus.scanned()  # no time has passed since the last scan
+    site.bus.scanned()  # too early for another refresh, because the clock has not moved
     assert site.register(TRIGGER) == 2
 
 

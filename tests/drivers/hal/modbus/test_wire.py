@@ -34,7 +34,10 @@ def unreachable(failure: OSError) -> str:
         (socket.gaierror(-2, "unknown"), "the host's name is not known; write its address"),
         (TimeoutError(), "nobody answers within 0.3 s; check power and cable"),
         (OSError(errno.ENETUNREACH, "Network is unreachable"), "Network is unreachable"),
-        (ConnectionRefusedError(), "refused; is this the module, and does it accept more"),
+        (
+            ConnectionRefusedError(),
+            "refused; is the address right, and has the module a free",
+        ),
         (OSError("odd"), "odd"),
     ],
 )
@@ -60,7 +63,10 @@ def test_a_reset_connection_does_not_count_as_a_reply() -> None:
         ("192.168.1.50", []),
         ("module.ward-3", []),
         ("fe80::1", []),
-        ("192.168.1.50:502", ["is '192.168.1.50:502': write host: 192.168.1.50, port: 502"]),
+        (
+            "192.168.1.50:502",
+            ["'192.168.1.50:502' contains a port: write host: 192.168.1.50, port: 502"],
+        ),
         ("tcp://a", ["'tcp://a' is not a host: write its address, such as 192.168.1.50"]),
         ("a b", ["'a b' is not a host: write its address, such as 192.168.1.50"]),
     ],
@@ -148,7 +154,7 @@ def test_the_defaults_bound_what_a_dead_module_can_cost() -> None:
 
 
 def loaded(code: str) -> set[str]:
-    """Return the vendors' modules that a new interpreter has loaded after it has run this code."""
+    """Run this code in a new interpreter. Return the vendors' Python modules that it has loaded."""
     show = "import sys; print(*[m for m in sys.modules if m.split('.')[0] in WATCHED])"
     watched = "WATCHED = {'pymodbus', 'aiohttp', 'gpiozero', 'requests', 'serial'}"
     done = subprocess.run(
@@ -158,7 +164,7 @@ def loaded(code: str) -> set[str]:
 
 
 def test_the_first_request_loads_nothing_more_of_the_vendors_library(either: Module) -> None:
-    """To load a module would take longer than one try may take."""
+    """Importing a Python module in the first request would take longer than the timeout of one try."""
     door(either)
     made = (
         "from tests.drivers.hal.modbus.module import bus_to;"

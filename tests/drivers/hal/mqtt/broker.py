@@ -47,8 +47,8 @@ def bus_to(
 
 
 class FarDevice:
-    """A device's client at the broker. `taken` has (topic, payload, retained) for each message that the
-    client received."""
+    """An MQTT client that plays a device. `taken` has (topic, payload, retained) of each received
+    message."""
 
     def __init__(self, port: int, *topics: str, **options: Any) -> None:
         self.taken: list[tuple[str, bytes, bool]] = []
@@ -64,7 +64,7 @@ class FarDevice:
         assert self.ready.wait(30)
 
     def says(self, topic: str, payload: bytes | str, retain: bool = False) -> None:
-        """Publish a message, and wait until the broker has it."""
+        """Publish a message, and wait until the broker has received it."""
         info = self.client.publish(topic, payload, qos=1, retain=retain)
         info.wait_for_publish(30)
 
@@ -75,7 +75,7 @@ class FarDevice:
 
 
 def reason(bus: MqttBus, topic: str, stale_after_s: float = 60.0) -> str:
-    """Return why the topic's last message does not count as a fact, or "" if the message counts."""
+    """Return why the bus does not trust the topic's last message, or "" if the bus trusts it."""
     try:
         bus.fresh(topic, stale_after_s)
     except HalError as error:
@@ -84,6 +84,6 @@ def reason(bus: MqttBus, topic: str, stale_after_s: float = 60.0) -> str:
 
 
 def hears(bus: MqttBus, topic: str) -> bytes:
-    """Wait until the topic's message counts as a fact, and return its payload."""
+    """Wait until the bus trusts the topic's last message, and return the payload of that message."""
     wait_until(lambda: not reason(bus, topic), f"a live message on {topic}")
     return bus.fresh(topic, 60.0).payload

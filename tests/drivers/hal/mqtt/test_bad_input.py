@@ -1,5 +1,5 @@
-"""Bad input from a broker or a device. Each sort of input has its own error. No bad input becomes a
-fact."""
+"""Bad input from a broker or a device. Each sort has its own error, and the bus never trusts bad
+input."""
 
 import socket
 import threading
@@ -32,7 +32,7 @@ def point(**keys: Any) -> MqttPoint:
 
 
 def fault(found: MqttPoint, payload: bytes) -> str:
-    """Return the error in this payload, or "" if the point can decode the payload."""
+    """Decode this payload with this point. Return the text of the error, or "" if decoding succeeds."""
     try:
         found.asserted(payload)
     except HalError as error:
@@ -68,7 +68,7 @@ def test_a_payload_of_a_wrong_type_is_a_fault(payload: bytes, text: str) -> None
         (b'{"output": true, "output": false}', "is no JSON: a key occurs twice in one object"),
         (b"[" * 100_000, "is no JSON: it is nested too deeply"),
         (b"true", "'payload' is true, and a JSON object is expected"),
-        (b'{"other": true}', "the answer has no 'output', but other"),
+        (b'{"other": true}', "the answer has no 'output'; it has other"),
         (b'{"output": 1}', "'output' is 1, and true or false is expected"),
         (b'{"output": null}', "'output' is null, and true or false is expected"),
     ],
@@ -98,7 +98,7 @@ def test_any_payload_is_a_level_or_a_fault(payload: bytes) -> None:
 
 # ---- sizes
 
-TOO_LONG = "the broker sent a message of 10000013 bytes; at most 262144 are taken"
+TOO_LONG = "the broker sent a message of 10000013 bytes; the limit is 262144"
 
 
 @pytest.mark.parametrize("version", ["5", "3.1.1"])
@@ -114,7 +114,7 @@ def test_a_payload_of_10_mb_is_never_a_fact_and_never_kept(broker: Mosquitto, ve
         else:
             bus.listen("last")
             wait_until(lambda: _said(device, bus), "a live message")
-            assert "nothing has come on relay/state" in reason(bus, STATE)
+            assert "no message has come on relay/state" in reason(bus, STATE)
             assert link.failure == "", "the broker has held the packet back"
     device.close()
 
@@ -169,7 +169,7 @@ def test_ten_thousand_topics_that_nobody_asked_for_leave_nothing(broker: Mosquit
     device.close()
 
 
-# ---- a far side that is not a broker
+# ---- a server that is not an MQTT broker
 
 
 @settings(max_examples=examples(40), deadline=None)
@@ -227,7 +227,7 @@ def test_a_retained_lie_moves_no_relay_and_is_not_told(broker: Mosquitto) -> Non
     with bus_to(broker.port, {"relay": RELAY}, timeout_s=0.3) as bus:
         lines = bus.lines({"relay": None}, {"relay": False})
         for step in (lines.claim, lines.read):
-            with pytest.raises(HalError, match="a retained message of unknown age says 'ON'"):
+            with pytest.raises(HalError, match="there is a retained message, of unknown age: 'ON'"):
                 step()
         assert [message[1] for message in device.taken] == [b"OFF"]
     device.close()

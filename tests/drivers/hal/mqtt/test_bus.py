@@ -41,7 +41,7 @@ def version(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
-# ---- truth
+# ---- which messages the bus trusts
 
 
 def test_a_live_message_is_a_fact_and_has_an_age(
@@ -66,8 +66,8 @@ def test_a_retained_message_is_no_fact_until_a_live_one_comes(
         bus.up()
         wait_until(lambda: bus.heard(STATE), "the retained message")
         assert reason(bus, STATE) == (
-            "nothing has come on relay/state in this connection;"
-            " a retained message of unknown age says 'ON'"
+            "no message has come on relay/state since the connection began;"
+            " there is a retained message, of unknown age: 'ON'"
         )
         device.says(STATE, "OFF", retain=True)
         assert hears(bus, STATE) == b"OFF"
@@ -86,7 +86,8 @@ def test_what_was_heard_before_the_broker_went_is_forgotten(
         broker.start()
         bus.insist()
         wait_until(
-            lambda: "in this connection" in reason(bus, STATE), "a connection with nothing heard"
+            lambda: "since the connection began" in reason(bus, STATE),
+            "a connection with nothing heard",
         )
 
 
@@ -132,7 +133,7 @@ def test_a_command_reaches_the_device_once_and_is_not_retained(
         wait_until(lambda: len(device.taken) == 2, "both commands")
     assert device.taken == [(SWITCH, b"ON", False), (SWITCH, b"OFF", False)]
     late = FarDevice(broker.port, SWITCH)
-    late.says("nothing", "a mark")  # a retained command would arrive before this mark
+    late.says("nothing", "a mark")  # a retained command would arrive before this message
     wait_until(lambda: late.taken, "the mark")
     late.close()
     assert late.taken == [("nothing", b"a mark", False)]
@@ -144,8 +145,10 @@ def test_a_command_that_no_device_receives_is_an_error(broker: Mosquitto) -> Non
 
 
 RELAYS = 60
-"""The number of devices for which the broker keeps a session. Each device serves for one question only,
-because the broker delivers a kept message only once."""
+"""The number of devices for which the broker keeps a session.
+
+The broker delivers a stored message only once. So each device can answer only one question of the test.
+"""
 
 
 def test_on_expires_for_a_device_that_returns_later_and_off_does_not(broker: Mosquitto) -> None:
@@ -259,7 +262,7 @@ def test_another_client_with_our_id_is_named(broker: Mosquitto) -> None:
 
 def test_without_paho_the_error_names_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "paho", None)
-    with pytest.raises(HalError, match=r"paho-mqtt: in the clone \.venv/bin/pip install"):
+    with pytest.raises(HalError, match=r"paho-mqtt: run \.venv/bin/pip install"):
         open_bus(settings(1883))
 
 

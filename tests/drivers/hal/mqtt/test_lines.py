@@ -1,4 +1,5 @@
-"""A device's contacts and relays behind a real broker: claim, read, write, renew, release."""
+"""A device's contacts and relays behind a real broker. The bus claims, reads, writes and releases them,
+and renews each relay's switch-off timer."""
 
 import itertools
 from collections.abc import Iterator
@@ -33,7 +34,7 @@ POINTS: dict[str, Any] = {
 class Site:
     """A relay that obeys commands and publishes its state.
 
-    With `obeys` false the relay ignores commands.
+    If `obeys` is false, the relay ignores commands.
     """
 
     def __init__(self, broker: Mosquitto, bus: MqttBus) -> None:
@@ -56,14 +57,14 @@ class Site:
         self.device.client.on_message = obey
 
     def commands(self) -> list[bytes]:
-        """Return every command so far."""
+        """Return the payload of every command that the relay has received."""
         return [payload for _, payload, _ in self.device.taken]
 
     def contact(self, closed: bool) -> None:
         self.device.says("contact/state", "true" if closed else "false")
 
     def until_read(self) -> dict[str, bool]:
-        """Wait until the states have arrived, and return the reading."""
+        """Wait until the device's states have arrived. Return the reading of the contact."""
         found: list[dict[str, bool]] = []
 
         def read() -> bool:
@@ -86,7 +87,7 @@ class Site:
         wait_until(heard, "the relay's state")
 
     def until_it_fails(self, text: str) -> None:
-        """Read until the reading fails. The error must contain this text."""
+        """Read until a reading fails with an error that contains this text."""
 
         def fails() -> bool:
             try:
@@ -110,7 +111,7 @@ def site() -> Iterator[Site]:
 
 
 def opened(site: Site) -> Site:
-    """Claim the relay with the contact closed, and return the site."""
+    """Close the contact, claim the relay, and return the site."""
     bus = site.bus
     bus.up()
     site.contact(closed=True)
@@ -248,8 +249,10 @@ def test_a_device_that_is_asked_and_does_not_listen_is_named(site: Site) -> None
 
 
 def test_a_silent_device_delays_no_other(site: Site) -> None:
-    """The reading fails at once, because the last state is too old. The bus does not ask the device
-    again."""
+    """Expect that each reading fails at once, because the device's last state is too old.
+
+    The bus sends the silent device no request, because waiting for it would delay the other devices.
+    """
     opened(site).until_read()
     other = Points([Wire("closed", "in", "contact", "high")], site.bus)
     site.now = 100.0

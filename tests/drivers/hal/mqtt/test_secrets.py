@@ -1,4 +1,5 @@
-"""Secrets and rights: TLS, our certificate, user and password, and permissions at the broker."""
+"""Secrets and access rights at a broker: TLS, the bus's own certificate, user and password, and
+permissions."""
 
 import subprocess
 from collections.abc import Callable, Iterator
@@ -14,7 +15,7 @@ from tests.waiting import wait_until
 
 
 class Authority:
-    """A certificate authority. Its files are in a folder."""
+    """A certificate authority that keeps its files in `folder`."""
 
     def __init__(self, folder: Path) -> None:
         folder.mkdir()
@@ -72,8 +73,8 @@ def test_a_broker_with_a_certificate_of_our_authority_is_believed(
 
 
 PAHO_LEAVES_A_SOCKET = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-"""A filter for a warning of pytest. After a failed handshake paho leaves a socket to the garbage
-collector."""
+"""A mark that ignores a warning of pytest. The warning comes because paho does not close its socket
+after a failed handshake."""
 
 
 @PAHO_LEAVES_A_SOCKET
@@ -160,7 +161,7 @@ def test_a_topic_that_we_may_not_read_is_named(guarded: Mosquitto, tmp_path: Pat
         assert reason(bus, STATE).startswith(
             (
                 "the broker refuses the subscription to relay/state",
-                "nothing has come on relay/state",
+                "no message has come on relay/state",
             )
         )
 

@@ -1,4 +1,5 @@
-"""The `mqtt` bus in a YAML file: errors of `check` with their places, and warnings of `check`."""
+"""The `mqtt` bus in a YAML file: the errors of `check` with line and column, and the warnings of
+`check`."""
 
 from pathlib import Path
 from typing import Any
@@ -39,7 +40,7 @@ def test_a_state_needs_its_age() -> None:
 
 
 def test_the_values_for_on_and_off_need_each_other_and_differ() -> None:
-    text = "when and when_not need each other, because any other value is then a fault"
+    text = "needs when_not, and when_not needs when: a value in neither list is a fault"
     assert point_problems(**STATE, when=["ON"]) == [(("when",), text)]
     both = point_problems(**STATE, when=["ON", 1], when_not=[1])
     assert both == [(("when_not",), "1 is in when too")]
@@ -49,7 +50,9 @@ def test_a_relay_without_a_timer_needs_a_reason() -> None:
     bare = {k: v for k, v in RELAY.items() if k != "switches_off_after_s"}
     [(path, text)] = point_problems(**bare)
     assert path == ()
-    assert text.startswith("unsafe: when the network or the broker fails nothing switches")
+    assert text.startswith(
+        "unsafe: nothing switches this relay off when the network or the broker fails"
+    )
     assert point_problems(**bare, without_timer="the lock opens by hand") == []
 
 
@@ -59,11 +62,11 @@ def test_a_profile_needs_a_device_and_a_part_that_the_make_has() -> None:
     assert point_problems(**found, part="relay:0") == [
         (
             ("part",),
-            "'relay:0' is not a part of this make: write switch:0 or input:0",
+            "'relay:0' is no relay or input of this make: write switch:0 or input:0",
         )
     ]
     assert point_problems(**STATE, part="x") == [
-        (("part",), "is for a profile: add profile, or delete this")
+        (("part",), "is only for points with a profile: add profile, or delete this key")
     ]
 
 
@@ -82,7 +85,7 @@ def test_a_command_topic_that_is_a_states_is_refused() -> None:
     assert problems({"a": STATE, "b": relay}) == [
         (
             ("points", "b", "command", "topic"),
-            "a/state is the state topic of 'a': the daemon would take the command for a state",
+            "a/state is the state topic of 'a': the daemon would read the command as a state",
         )
     ]
 
@@ -91,7 +94,7 @@ def test_a_timer_shorter_than_three_scans_and_an_answer_is_refused() -> None:
     [(path, text)] = problems({"a": {**RELAY, "switches_off_after_s": 2}}, scan_s=0.5)
     assert path == ("points", "a", "switches_off_after_s")
     assert text.endswith(
-        "is 2, but the daemon renews it only every 0.5 s (scan_s): write at least 2.5"
+        "is 2, but the daemon restarts the timer every 0.5 s (scan_s): write at least 2.5"
     )
 
 
@@ -121,12 +124,12 @@ def test_warnings_name_what_an_integrator_should_look_at() -> None:
         ("password_file", "the password goes over the network unencrypted"),
         (
             "switches_off_after_s",
-            "pull the network plug while it is on",
+            "pull the network plug while the relay is on",
         ),
-        ("relay", "a device that keeps its session gets an old 'on' of 'relay' when it returns"),
+        ("relay", "when the device of 'relay' returns to its session, it gets an old 'on'"),
         ("without_timer", "unsafe relay 'lamp' is accepted"),
         ("lamp", "'lamp' has no topic for its state"),
-        ("lamp", "a device that keeps its session gets an old 'on' of 'lamp' when it returns"),
+        ("lamp", "when the device of 'lamp' returns to its session, it gets an old 'on'"),
     ]
 
 
@@ -201,7 +204,8 @@ RELAYS: list[tuple[Profile, str]] = [
         (
             "{point: relay, active: high}",
             "{point: relay, active: low}",
-            "40:7: 'hold_open': write active: high: the point says which message switches the relay on",
+            "40:7: 'hold_open': write active: high, because the point's payload_on already says"
+            " how to switch on",
         ),
         (
             "{point: relay,",

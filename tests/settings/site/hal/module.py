@@ -1,4 +1,4 @@
-"""A bus whose points have names in words. The wiring table shows these names unchanged."""
+"""A bus whose points have names such as `coil 7`. The wiring table shows these names unchanged."""
 
 from typing import Annotated
 
@@ -16,7 +16,7 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 def canonical(point: str) -> str:
-    """Return the point in its only spelling."""
+    """Return the point unchanged, because a point has only one spelling."""
     if not point.startswith("coil "):
         raise ValueError(f"{point!r}: write coil and its number")
     return point

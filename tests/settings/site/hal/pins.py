@@ -1,5 +1,5 @@
-"""A bus with the pins A0 to A9. Each pin has a second spelling: A0 is also 0A. A9 has no pull, and A8
-can only be an input."""
+"""A bus with the pins A0 to A9. Each pin has a second spelling: A0 is also 0A. A9 has no pull-up
+resistor, and A8 can only be an input."""
 
 import re
 from collections.abc import Iterable

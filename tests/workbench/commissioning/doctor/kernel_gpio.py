@@ -1,9 +1,10 @@
-"""Structures and requests of the kernel's GPIO interface, typed from linux/gpio.h.
+"""Structures and requests of the kernel's GPIO interface, copied from linux/gpio.h.
 
 The source is include/uapi/linux/gpio.h of Linux 6.1: gpiochip_info, gpio_v2_line_attribute and
 gpio_v2_line_info. These parts have not changed since Linux 5.10. The ioctl numbers follow
-asm-generic/ioctl.h. The C compiler gives the sizes 68 and 256 bytes, and the requests 8044b401 and
-c100b405. In gpio_v2_line_info `flags` begins at byte 72 and `attrs` at byte 80.
+asm-generic/ioctl.h. According to the C compiler, gpiochip_info has 68 bytes and gpio_v2_line_info has
+256 bytes. The requests for these two structures are 8044b401 and c100b405. In gpio_v2_line_info `flags`
+begins at byte 72 and `attrs` at byte 80.
 """
 
 import ctypes

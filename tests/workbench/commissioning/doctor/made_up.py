@@ -1,5 +1,5 @@
-"""A made-up machine: a directory tree, scripts in place of commands, and answers in place of GPIO
-chips."""
+"""A made-up machine. A directory tree takes the place of the disk, and scripts take the place of
+commands. Prepared replies take the place of GPIO chips."""
 
 import errno
 import os
@@ -48,7 +48,7 @@ class MadeUp:
         self.write("/etc/passwd", f"pi:x:{self.machine.uid}:1000::/home/pi:/bin/bash\n")
 
     def write(self, path: str, text: str = "", mode: int = 0o660) -> None:
-        """Write a file. A device is also only a file."""
+        """Write a file. On the made-up machine, a device file is an ordinary file."""
         place = self.root / path.lstrip("/")
         place.parent.mkdir(parents=True, exist_ok=True)
         place.write_text(text)
@@ -74,8 +74,8 @@ class MadeUp:
         outputs: Collection[int] = (),
         mode: int = 0o660,
     ) -> None:
-        """Make a GPIO chip. `held` has the consumer of each used line. The lines in `outputs` are
-        driven."""
+        """Make a GPIO chip. `held` maps the number of each used line to the name of the program that
+        uses the line. The lines in `outputs` are outputs."""
         self.write(f"/dev/gpiochip{number}", mode=mode)
         self._chips[f"gpiochip{number}"] = (label, held or {}, outputs)
 

@@ -1,5 +1,5 @@
-"""The answer of a device to the doctor. The doctor reads the device without opening the driver. Every
-driver permits such a reading."""
+"""The doctor reads each device through its driver, but does not call the driver's `open`. The tests
+check that every driver can read without `open`."""
 
 import re
 from contextlib import closing
@@ -28,7 +28,7 @@ def test_the_devices_of_each_example_answer_an_unopened_driver(name: str, tmp_pa
     config = load(CONFIG / name)
     for bus_name, settings in config.buses.items():
         if config.bus_types[bus_name] == "gpio":
-            continue  # the doctor reads these lines from the kernel, without a driver
+            continue  # the doctor reads GPIO lines from the kernel, without a driver
         with served(CONFIG / name, bus_name, tmp_path / "plant.sock") as replace:
             plain = {**msgspec.to_builtins(unarmed(settings)), **replace, "timeout_s": 1.5}
             there = msgspec.convert(plain, type(settings))

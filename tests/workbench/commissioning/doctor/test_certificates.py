@@ -1,4 +1,4 @@
-"""The doctor says when the certificates of a YAML end."""
+"""The doctor reports the end date of each certificate that a YAML names."""
 
 import time
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`rmf-bridge doctor` on real Modbus, HTTP and CAN wires, and on RMF's graph."""
+"""`rmf-bridge doctor` on real Modbus, HTTP and CAN connections, and on a ROS graph of RMF."""
 
 import io
 import json
@@ -51,7 +51,8 @@ def doctor(file: Path, tmp_path: Path, *options: str) -> tuple[int, dict[str, li
 
 
 class Tapped:
-    """A wire to the module. It records each requested function and counts the connections."""
+    """A relay for TCP between the doctor and the Modbus module. The relay records each requested Modbus
+    function, and counts the connections."""
 
     def __init__(self, module: Module) -> None:
         self.functions: set[int] = set()
@@ -136,7 +137,7 @@ def test_the_bus_of_a_running_daemon_is_not_opened(
         told = found["daemon"]
         assert [level for level, _ in told] == ["ok", "warning", "ok"]
         assert told[0][1].endswith(
-            "its buses are not read here, because a controller has only one master"
+            "doctor does not read the buses, because only one process may use a bus"
         )
         assert told[1][1] == "door_states: nobody listens"
         assert told[2][1].startswith("ward_door was read ")
@@ -173,7 +174,7 @@ def test_the_kill_test_shows_that_the_guard_switches_off(module: Module, tmp_pat
     ((level, text),) = found["kill test"]
     assert level == "ok"
     assert text.startswith(
-        "ward_door hold_open was on, its process was killed with -9, and the guard"
+        "ward_door hold_open was on, the process that held it was killed with -9, and the guard"
     )
     assert module.relay() == [True, False]
 
@@ -284,7 +285,7 @@ def test_for_people_each_finding_has_a_line_below_its_subject(
 
 @contextmanager
 def far_side(yaml: str, bus: str, folder: Path) -> Iterator[Any]:
-    """Run the simulated far side of a bus. Yield the settings for that bus."""
+    """Simulate the devices on a bus. Yield the settings with which the doctor reaches these devices."""
     (folder / "far.yaml").write_text(yaml)
     with served_by(folder / "far.yaml", bus, folder / "plant.sock") as there:
         yield there
@@ -338,7 +339,7 @@ def test_a_canopen_receiver_answers_and_is_found_by_its_node(tmp_path: Path) -> 
         assert code == 2
         assert heard[1].startswith("there are frames that no device of this file sends: 0x70A")
         assert "these answer: 10 (" in silent[1]
-        assert "no heartbeat within 2 s, but of node 10" in scanned[1]
+        assert "no heartbeat within 2 s, but heartbeats of node 10" in scanned[1]
 
 
 @pytest.mark.long(15)

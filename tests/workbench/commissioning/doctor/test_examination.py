@@ -1,5 +1,5 @@
-"""The doctor's examination of a lift's file. The doctor examines every subject, on a good and on a bad
-made-up Raspberry Pi."""
+"""The doctor's examination of one lift's file, from the first subject to the last. One made-up
+Raspberry Pi has no fault, and another has many faults."""
 
 from pathlib import Path
 

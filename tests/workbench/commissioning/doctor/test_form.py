@@ -1,5 +1,5 @@
-"""The form for real hardware. The machine's answers fill some fields, and a person's observations fill
-the empty fields."""
+"""The form that `doctor --form` writes for tests on real hardware. The doctor fills in the facts about
+the machine, and a person fills in the other fields."""
 
 from pathlib import Path
 

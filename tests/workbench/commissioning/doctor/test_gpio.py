@@ -122,7 +122,7 @@ def test_a_doctor_without_permission_for_the_chip_says_so_and_judges_nothing_on_
         Finding(
             "gpio",
             "wrong",
-            "of gpiochip0, gpiochip10 this user may only open:"
+            "there are gpiochip0, gpiochip10, but this user may open only:"
             " gpiochip10 (gpio-brcmstb@107d508500)",
             "nobody knows whether the header is there",
             "use sudo, or join the group gpio",

@@ -68,7 +68,7 @@ def test_each_point_is_a_heading_of_the_page() -> None:
 def test_a_machine_that_shows_nothing_is_unknown_and_never_well(made: MadeUp) -> None:
     of = config(TLS)
     assert {one.level for one in hardening(of, made.machine) if one.subject != points.WIRES} == {
-        "ok",  # the YAML names certificates, and the machine runs no sshd
+        "ok",  # the certificates in the YAML, and a machine without sshd
         "unknown",
     }
     for subject in (points.FIREWALL, points.ROOT, points.FILES, points.UPDATES):
@@ -138,7 +138,7 @@ def test_a_machine_between_two_networks_must_not_forward(
         (DROPS, ("ok", "an input chain drops what no rule accepts")),
         (
             DROPS.replace("policy drop", "policy accept"),
-            ("warning", "no input chain drops by its policy"),
+            ("warning", "no input chain has the policy drop"),
         ),
         ("", ("warning", "nft shows no input chain")),
         (

@@ -72,7 +72,7 @@ def test_a_service_that_was_enabled_has_a_user_of_its_own(made: MadeUp) -> None:
 @pytest.mark.parametrize(
     ("synchronised", "printed", "found"),
     [
-        (True, "NTP=no", [("ok", "the clock is synchronised")]),  # chrony synchronises the clock
+        (True, "NTP=no", [("ok", "the clock is synchronised")]),  # chrony replaces NTP
         (False, "NTP=no", [("warning", "the clock is not synchronised, and NTP is off")]),
         (False, "NTP=yes", [("warning", "the clock is not synchronised")]),
         (None, "", [("note", "the kernel does not show whether the clock is synchronised")]),
@@ -210,14 +210,14 @@ def can_found(made: MadeUp, bitrate: int | None = None) -> list[tuple[str, str]]
 
 def test_an_interface_that_is_up_and_recovers_by_itself_is_well(made: MadeUp) -> None:
     can0(made, state="ERROR-ACTIVE", bittiming={"bitrate": 250000}, restart_ms=100)
-    text = "can0 is up at 250000 bit/s; compare that with the stations"
+    text = "can0 is up at 250000 bit/s; the stations need the same bitrate"
     assert can_found(made, 250_000) == [("ok", text)]
 
 
 def test_each_fault_of_a_can_interface_is_named(made: MadeUp) -> None:
     can0(made, state="BUS-OFF", bittiming={"bitrate": 500000})
     assert can_found(made, 250_000) == [
-        ("warning", "can0 has 500000 bit/s, but these stations are delivered with 250000"),
+        ("warning", "can0 has 500000 bit/s, but the stations' default is 250000 bit/s"),
         ("wrong", "can0 is bus-off: the controller has left the bus"),
         ("warning", "can0 has no restart-ms"),
     ]

@@ -1,4 +1,4 @@
-"""The times at which a walk switches an output on and off, in virtual time."""
+"""The times at which `rmf-bridge walk` switches an output on and off, in virtual time."""
 
 from dataclasses import dataclass
 
@@ -34,7 +34,8 @@ STEPS = [
 
 
 class Walk:
-    """A walk that reads its inputs every 0.1 s. Without a sample the inputs are lost."""
+    """A run of `rmf-bridge walk` that reads its inputs every 0.1 s. If `sample` is None, there is no
+    reading."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -134,7 +135,7 @@ def test_what_was_seen_before_it_was_switched_on_proves_nothing() -> None:
     walk.does(Switch(0))
     walk.until(6.0)
     assert walk.history == [(0.1, "off"), (0.5, "hold on"), (5.5, "off")]
-    told = "switched on; the inputs showed the effect before, so this proves nothing"
+    told = "switched on; the inputs had shown the effect before, so the test proves nothing"
     assert walk.memory.results == {0: told}
     walk.sample = Sample()
     walk.until(7.0)

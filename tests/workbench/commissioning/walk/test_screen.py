@@ -1,5 +1,5 @@
-"""The screen of a walk. Even on a phone the screen shows every name in full, and no line scrolls
-away."""
+"""The screen of `rmf-bridge walk`. Even on a phone the screen shows every name in full, and no line
+scrolls away."""
 
 from dataclasses import replace
 from typing import Any
@@ -100,7 +100,7 @@ def test_rows_are_shared_between_inputs_and_outputs(
 
 def test_a_device_without_contacts_shows_only_what_is_decoded() -> None:
     lines = shown(40, 24, count=0)
-    assert lines[1] == "no contacts: registers or messages,"
+    assert lines[1] == "no contacts; see the decoded values"
     assert "input" not in " ".join(lines)
 
 

@@ -242,7 +242,8 @@ class DoorAskedOnce(RightAdapter):
 
 
 class StateNumbers(RightAdapter):
-    """The adapter sends the request type 2. In a state 2 means AGV, but in a request AGV is 1."""
+    """The adapter sends the request type 2 for AGV mode. In a lift's state, the number 2 means AGV. But
+    in a request, the number for AGV is 1."""
 
     def says(self, message: d.Message, now: float) -> list[d.Message]:
         if isinstance(message, d.LiftRequest) and message.request_type:

@@ -97,7 +97,8 @@ class DoorOnChange(RightDoor):
 
 
 class LeasedDoor(RightDoor):
-    """The door shows UNKNOWN when its controller ends the hold. So RMF sees the end of the hold."""
+    """When its controller stops holding the door open, the door shows UNKNOWN for 1 s. From UNKNOWN,
+    RMF sees that nobody holds the door any more."""
 
     def mode(self) -> int:
         return (

@@ -1,5 +1,5 @@
-"""A charger's node that keeps the contract, but differs from ours. An idle charger accepts each request
-at once."""
+"""A charger's node that keeps the contract, but differs from ours. For example, an idle charger accepts
+each request at once."""
 
 from collections.abc import Sequence
 
@@ -15,7 +15,8 @@ IDLE, ASSIGNED, CHARGING, RELEASED, ERROR = 1, 2, 3, 4, 200
 
 
 class RightCharger(Party):
-    """A correct charger. The current flows `comes_s` seconds after the promise, or never with None."""
+    """A correct charger. `comes_s` is the time (s) from the promise of the charger until current flows.
+    With None, current never flows."""
 
     subscribes: Sequence[topics.AnyTopic] = (topics.CHARGER_REQUESTS, topics.CHARGER_CANCELS)
     name = "bay1"

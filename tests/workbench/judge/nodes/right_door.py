@@ -1,4 +1,5 @@
-"""A door's node that keeps the contract, but differs from ours. The door has no grace time."""
+"""A door's node that keeps the contract, but differs from ours. For example, the door ends its hold
+as soon as RMF sends CLOSE."""
 
 from collections.abc import Sequence
 

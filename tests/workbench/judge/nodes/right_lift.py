@@ -1,4 +1,5 @@
-"""A lift's node that keeps the contract, but differs from ours. The node's loop takes 0.25 s."""
+"""A lift's node that keeps the contract, but differs from ours. For example, the node's loop takes 0.25
+s."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,5 @@
-"""Door nodes, each with one defect that occurred in the field. Each docstring names the defect."""
+"""Door nodes, each with one defect that occurred in the field. Each docstring names the defect, and
+some name in brackets the project in which it occurred."""
 
 from msgspec.structs import replace
 

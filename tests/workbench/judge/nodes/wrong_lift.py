@@ -1,4 +1,5 @@
-"""Lift nodes, each with one defect that occurred in the field. Each docstring names the defect."""
+"""Lift nodes, each with one defect that occurred in the field. Each docstring names the defect, and
+some name in brackets the project in which it occurred."""
 
 from msgspec.structs import replace
 
@@ -35,7 +36,8 @@ class FireBoards(RightLift):
 
 
 class FireFrees(RightLift):
-    """The lift clears the session during a fire. But only END makes the supervisor forget the robot."""
+    """During a fire, the lift clears the session. But the supervisor goes on asking for the robot,
+    because the supervisor forgets a robot only after END."""
 
     def moves(self, age_s: float) -> None:
         if self.mode == 2 and self.door == 1.0:
@@ -153,7 +155,8 @@ class LiftFlaps(RightLift):
 
 
 class LiftModeMixed(RightLift):
-    """The state shows the mode by the request's numbers, where AGV is 1. In a state 1 means HUMAN."""
+    """The lift's state shows AGV mode with the number 1, which is AGV's number in a request. In a
+    state, the number 1 means HUMAN."""
 
     def state(self, now: float) -> d.LiftState:
         state = super().state(now)
@@ -219,8 +222,8 @@ class OpenWhileMoving(RightLift):
 
 
 class OtherLiftsRequest(RightLift):
-    """The lift compares the name in a request too late. So the lift obeys requests for other lifts
-    (sharp-rmf/low_level_lift)."""
+    """The lift obeys a request before it compares the lift's name in the request. So the lift obeys
+    requests for other lifts (sharp-rmf/low_level_lift)."""
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
         if isinstance(message, d.LiftRequest):
@@ -237,7 +240,7 @@ class OwnSessionName(RightLift):
 
 
 class SessionTimesOut(RightLift):
-    """A watchdog frees the lift after 2 s with an open door, although no END has come."""
+    """A watchdog frees the lift when the door has been open for 2 s, although no END has come."""
 
     opened = 0
 
@@ -279,8 +282,8 @@ class LeavesWithoutSession(RightLift):
 
 
 class LiftReadsDoorOnce(RightLift):
-    """The door's module fails while the door is open. The lift goes on reading its floor, and gives
-    each state the time of publishing as its stamp."""
+    """The door's module fails while the door is open, so the lift shows OPEN for ever. The lift still
+    reads its floor, and stamps each state with the time of publishing."""
 
     read = 0
 

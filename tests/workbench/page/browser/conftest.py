@@ -1,4 +1,5 @@
-"""The page in a separate process, a real browser, and a graph on loopback that the test plays."""
+"""Fixtures: the page in a separate process, a real browser, and a node on the loopback interface. The
+node publishes the states of a site."""
 
 import os
 import subprocess
@@ -45,8 +46,8 @@ VIOLATIONS = {"resultTypes": ["violations"]}
 
 
 class Graph:
-    """The nodes of a site, as the page hears them. `turn` publishes their states, at most once a
-    second."""
+    """A node that publishes the states of all devices of a site. `turn` publishes these states, at most
+    once a second."""
 
     def __init__(self, domain: int, transport: Transport | None = None) -> None:
         self.options = on_graph(domain)
@@ -239,7 +240,8 @@ def settled(tab: Page) -> None:
 
 
 def serious_faults(tab: Page) -> list[tuple[str, str, list[str]]]:
-    """Return axe-core's serious findings in light and in dark colours, with their places."""
+    """Return axe-core's serious findings in light and in dark colours, with the HTML of the
+    elements."""
     found: list[tuple[str, str, list[str]]] = []
     for scheme in SCHEMES:
         tab.emulate_media(color_scheme=scheme)

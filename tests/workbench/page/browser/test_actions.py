@@ -1,4 +1,5 @@
-"""Actions in a real browser, with a real daemon beside the page. Some users may not act."""
+"""Actions in a real browser, with a real daemon beside the page. Without a valid login, a user may not
+act."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""The day and the week on the page. Their tables fit a phone, and there is a CSV file."""
+"""The page's views of one day and of one week. Their tables fit a phone, and there is a CSV file."""
 
 from collections.abc import Iterator
 from datetime import date, timedelta

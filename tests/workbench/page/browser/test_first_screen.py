@@ -1,5 +1,5 @@
-"""The first screen of the page. The screen says what is wrong and how to mend it. A tab receives only
-changes."""
+"""The first screen of the page. The screen says what is wrong and how to mend it. After the first load,
+the browser's tab receives only changes."""
 
 import json
 from collections.abc import Iterator
@@ -143,7 +143,7 @@ def test_a_tab_gets_what_has_changed(
 def test_a_phone_shows_the_wiring_when_it_is_asked_for(
     tab: Page, address: str, overloaded: str, until: Until
 ) -> None:
-    """The tables of a lift need more than six phone screens."""
+    """On a phone, the wiring tables are folded, because they need more than six phone screens."""
     for width, unfolded in ((390, False), (1200, True)):
         tab.set_viewport_size({"width": width, "height": 844})
         tab.goto(address)

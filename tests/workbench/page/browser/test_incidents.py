@@ -43,8 +43,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def address(folder: Path) -> Iterator[str]:
-    """Yield the address of a page without a graph. The page shows one recording, and a folder of
-    recordings."""
+    """Yield the address of a page that shows no live graph. The page shows one recording, and a folder
+    of recordings."""
     with page(str(folder / "ride.mcap"), "--incidents", str(folder)) as found:
         yield found
 
@@ -86,8 +86,8 @@ def test_an_incident_opens_with_its_sentences_and_its_timeline(
 def test_the_list_shows_device_reason_and_the_browsers_time_and_has_a_filter(
     browser: Browser, address: str
 ) -> None:
-    """The filter finds the day that the list shows. In this time zone the file's name has another
-    day."""
+    """Check that the filter finds the day that the list shows. In the browser's time zone, this day
+    differs from the day in the file's name."""
     zone = ZoneInfo("Pacific/Kiritimati")
     with browser.new_context(timezone_id=zone.key) as context:
         tab = context.new_page()

@@ -68,7 +68,7 @@ def relay(module_domain: int) -> Iterator[Relay]:
 
 @pytest.fixture(scope="module")
 def address(relay: Relay) -> str:
-    """Return the page's address on the wire."""
+    """Return the relay's address. Through the relay, the browser reaches the page."""
     return relay.address
 
 

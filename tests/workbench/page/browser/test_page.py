@@ -1,4 +1,4 @@
-"""The page in a real browser, with a graph that the test plays."""
+"""The page in a real browser. The test itself publishes the states of the site."""
 
 import pytest
 from playwright.sync_api import BrowserContext, Page

@@ -1,5 +1,5 @@
-"""Robots of our fleet's own daemon on the page: a card, a view that says why one stands, and no empty
-part."""
+"""Robots of our own fleet daemon on the page. Each robot has a card. The view of a robot says why the
+robot stands, and has no empty sections."""
 
 from typing import cast
 

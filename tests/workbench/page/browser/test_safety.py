@@ -1,4 +1,5 @@
-"""Requests that the page's server refuses. A program sends these requests, and no browser."""
+"""Requests that the page's server refuses. The tests send these requests directly, without a
+browser."""
 
 import http.client
 import os

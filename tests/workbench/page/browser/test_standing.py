@@ -1,4 +1,5 @@
-"""The first screen says why every robot stands, and calls a drill a drill."""
+"""The first screen during an alarm. The screen says why every robot must stand, and whether the alarm
+is a drill."""
 
 import time
 
@@ -26,7 +27,7 @@ CAUSE = (AlarmCause("Main panel", "fire_panel"),)
 
 
 class Daemon:
-    """A panel's daemon, as far as the page hears it."""
+    """A node that publishes the diagnostics of a fire panel's daemon."""
 
     def __init__(self, domain: int) -> None:
         self._transport = join("rmf_bridge_panel", domain)
@@ -60,7 +61,9 @@ def test_the_first_screen_says_why_every_robot_stands(
 
         until(said, told)
 
-    says("alarm", "Every robot is to stand because fire_panel of Main panel raised an alarm at ")
+    says(
+        "alarm", "Every robot must stand still because fire_panel of Main panel raised an alarm at "
+    )
     assert tab.locator("#standing time").inner_text() not in ("", "00:00:00")
     assert serious_faults(tab) == []
     tab.goto(f"{address}lift/Lift1")

@@ -49,7 +49,7 @@ def test_a_request_that_is_too_long_is_refused_at_any_address(address: str) -> N
     for path in ("/login", "/logout", "/nothing"):
         status, headers, text = ask(address, path, FORM, "x" * 100_000)
         assert (status, headers["connection"]) == (413, "close")
-        assert text == "a request takes at most 65536 bytes"
+        assert text == "a request may have at most 65536 bytes"
 
 
 @pytest.mark.parametrize("origin", ["http://[", "http://[::1", "://", "http:", "["])
@@ -63,7 +63,7 @@ def test_a_form_of_many_fields_is_refused(address: str) -> None:
 
 def test_a_file_whose_name_is_no_text_is_listed_and_named(tab: Page, address: str) -> None:
     tab.goto(f"{address}incidents")
-    tab.get_by_text("caf\\udce9.mcap: a strange name; rename it to see it here").wait_for()
+    tab.get_by_text("caf\\udce9.mcap: unprintable name; rename the file to open it here").wait_for()
     tab.get_by_role("link", name="ride.mcap").wait_for()
 
 

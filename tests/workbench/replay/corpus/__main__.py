@@ -1,7 +1,7 @@
-"""A program that records incidents of the soak test: `python -m tests.workbench.replay.corpus`.
+"""A program that records incidents of simulated days: `python -m tests.workbench.replay.corpus`.
 
-The program records the first incident of each chosen daemon. Run the program after a deliberate change
-of a core's decisions. Then `git diff --stat` shows the incidents whose decisions have changed.
+The program records the first incident of each daemon in `CHOSEN`. Run the program after a deliberate
+change of a daemon's decisions. Then `git diff --stat` shows the incidents whose decisions have changed.
 """
 
 import sys
@@ -20,14 +20,15 @@ CHOSEN = {
     1: ("Lift1", "Lift2", "store", "bay1", "bay2", "coordinator"),
     3: ("ward", "lift_supervisor"),
 }
-"""The daemons whose incidents the program records, by the seed of a simulated day. The incidents of
-more daemons would be repetitions."""
+"""The seed of a simulated day, with the daemons whose incidents the program records. The
+incidents of other daemons would only repeat these incidents."""
 HOURS = 0.3
 BEFORE_S, AFTER_S = 5.0, 12.0
 
 
 def incident(ring: Path) -> Incident | None:
-    """Return a daemon's first fault. Without a fault return the first refusal, or None."""
+    """Return the incident of a daemon's first fault. If there is no fault, return that of the first
+    refusal, or None."""
     read = RingContent(ring)
     entries = list(read.entries())
     triggers = Triggers(60.0)

@@ -23,7 +23,7 @@ class Side(Enum):
 
 
 class Lane(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A lane with its own required fields."""
+    """A lane. Both of its fields have default values."""
 
     side: Side = Side.LEFT
     heights: tuple[Annotated[float, Meta(gt=0, lt=5, extra={"unit": "m"})], ...] = ()
