@@ -68,8 +68,8 @@ class Ask:
 
     @property
     def disowned(self) -> bool:
-        """Whether the last message on lift_requests about this session was END, and the robot itself has
-        asked again since that END."""
+        """Whether the last message on lift_requests about this session was END, and the robot itself
+        has asked again since that END."""
         return self.own_at > self.direct_end_at > self.direct_at
 
     def goes_on(self, now: float) -> bool:
@@ -84,8 +84,8 @@ class Ending:
     - `at`: the first END.
     - `bare_at`: the first END without a floor.
     - `floor_at`: the first END with a floor.
-    - `old_at`: the first END whose stamp is older than a stamp of the session's requests. A lift may take
-      such an END for an END of an earlier ride, until the END is repeated for REPEATED_S.
+    - `old_at`: the first END whose stamp is older than a stamp of the session's requests. A lift may
+      take such an END for an END of an earlier ride, until the END is repeated for REPEATED_S.
 
     RMF's supervisor first sends an END without a floor. If the lift still shows the session, the
     supervisor sends an END with a floor.
