@@ -29,6 +29,9 @@ rollout: Any = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(rollout)
 
 YAML: Final = b"kind: lift\n"
+KILLED: Final = (
+    "Lift1 door_open was on, and the guard switched the output off; this was verified after 0.2 s"
+)
 FORM: Final = f"""\
 # lift.yaml on Raspberry Pi 4
 2026-11-24 08:10, rmf-bridges 0.1.0, kernel 6.12, Python 3.13.5, buses: gpio
@@ -38,7 +41,7 @@ YAML: sha256 {sha256(YAML).hexdigest()}
 | subject | | found by `doctor` |
 |---|---|---|
 | file | ok | lift.yaml is a valid file of a lift |
-| kill test | ok | Lift1 door_open was on, and the guard switched the output off; this was verified after 0.2 s |
+| kill test | ok | {KILLED} |
 """
 
 

@@ -29,6 +29,7 @@ from tests.site.timeline import EPOCH, NEVER, Timeline
 from tests.site.trouble import Ills
 from workbench.judge.judge import LAWS, Judge, JudgedKind
 from workbench.judge.law import Verdict
+from workbench.judge.lift_history import GRACE_S as RESUMES_S
 
 AT_ONCE_S = 0.3
 """The longest debounce plus one poll plus one scan (s)."""
@@ -73,8 +74,8 @@ class LiftTruth:
     """The true state of one lift. `open_at` has the last time at which the door was open at each floor.
 
     `session` is the session in the last published state. `last` is the session before it. If `last`
-    returns within GRACE_S, it counts as resumed, and `offered` stays. `offered` means that the lift has
-    shown OPEN at the session's destination.
+    returns within RESUMES_S, it counts as resumed, and `offered` stays. `offered` means that the lift
+    has shown OPEN at the session's destination.
 
     `crossing` has the robots on the threshold, and `inside` the robots in the car, each with its time
     of arrival. `ended` has the time of each session's last END.
@@ -223,7 +224,7 @@ class Laws:
         truth, now = self._lifts[name], self._timeline.now
         before = truth.session
         if state.session_id != before:
-            resumed = state.session_id == truth.last and now - truth.since <= GRACE_S
+            resumed = state.session_id == truth.last and now - truth.since <= RESUMES_S
             truth.offered = truth.offered and (resumed or not state.session_id)
             truth.last = before or truth.last
             truth.session, truth.since = state.session_id, now

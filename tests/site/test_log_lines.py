@@ -15,6 +15,7 @@ from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.system import log
 from bridges.transports.transport import TransportError
+from tests.depth import depth
 from tests.site.daemons import GraphDaemon
 from tests.site.network import Place
 from tests.workbench.explain.story import Scene
@@ -146,7 +147,7 @@ def test_no_line_is_logged_for_ever(
         seldom = log.Seldom(lambda: scene.timeline.now)
         monkeypatch.setattr(caplog.handler, "filters", [seldom])
     TROUBLES[trouble](scene, monkeypatch)
-    scene.run(300.0)
+    scene.run(depth(120.0, 300.0))
     caplog.clear()
     scene.run(300.0)
     lines = Counter(re.sub(r"\d+", "#", record.getMessage()) for record in caplog.records)

@@ -39,7 +39,7 @@ def test_without_our_remedy_a_forgotten_robot_blocks_a_lift_for_ever(
 ) -> None:
     """This day contains the deadlock that `bridges/kinds/lift/forgotten.py` ends."""
     monkeypatch.setattr(forgotten, "heard", lambda session, asked, now: (session, False))
-    site = Site(23, "kilted")  # a day with an early deadlock
+    site = Site(25, "kilted")  # a day with an early deadlock
     site.trouble._draw = site._restart_rmfs
     with pytest.raises(Broken, match=r"has waited for Lift\d"):
         site.run(0.5)

@@ -146,6 +146,8 @@ def ended_unasked(history: LiftHistory) -> Finding:
         return None  # the session never sent a request, so law L4.own reports the breach
     if history.has_ended(old, since) or (ask and ask.human) or _foreign_end(history, old, since):
         return None
+    if ask and ask.disowned:
+        return None  # after this END the lift showed the session again, for a robot left in the car
     what = f"session {shown(old)} became {shown(new)}" if new else f"session {shown(old)} ended"
 
     def excused() -> bool:
@@ -191,8 +193,10 @@ def ends(history: LiftHistory) -> Finding:
         )
     if history.session_before and history.session != history.session_before:
         return KEPT if history.bare_end else None
-    at = history.ending.at
+    at, ask = history.ending.at, history.asks.get(history.session)
     if at == NOT_YET or history.now - at < ENDS_WITHIN_S:
+        return None
+    if ask and ask.goes_on(history.now):
         return None
     bare = history.ending.bare_at == at and history.ending.floor_at == NOT_YET
     floor = " without a floor" if bare else ""

@@ -7,6 +7,7 @@ from typing import Final
 from bridges.messages import definitions as d
 from bridges.messages import topics
 from bridges.messages.heard import Heard, Sender
+from bridges.messages.stamps import in_seconds
 from bridges.observe.lift import HAZARDS, ObservedLift
 from bridges.observe.limits import SLOWEST_S
 from workbench.judge.history import NOT_YET, History, keep
@@ -27,6 +28,11 @@ AT_ONCE_S: Final = 0.3
 """Time (s) that counts as immediately. It is longer than a scan of the inputs plus the transport of a
 state and a request."""
 REOPENS_WITHIN_S: Final = 1.0
+ASKS_S: Final = 6.0
+"""Time (s) from a robot's own request, in which a lift may ignore an END from lift_requests. The reason
+is that RMF's restarted supervisor also ends the session of a robot that is still in the car."""
+REPEATED_S: Final = 1.0
+"""Time (s) for which an END with an old stamp must be repeated before it counts."""
 END: Final = d.LiftRequestType.REQUEST_END_SESSION
 
 
@@ -41,6 +47,9 @@ class Ask:
     - `times`: number of requests on lift_requests in the present series.
     - `since`: the time at which this series began.
     - `human`: whether the session requested HUMAN mode.
+    - `stamp`: the newest stamp (s) of a request on lift_requests.
+    - `direct_end_at`: time of the last END on lift_requests.
+    - `own_at`, `own_end_at`: times of the robot's last request and last END on adapter_lift_requests.
     """
 
     first_at: float
@@ -50,28 +59,45 @@ class Ask:
     human: bool = False
     direct_at: float = NOT_YET
     direct: bool = False
+    stamp: float = 0.0
+    direct_end_at: float = NOT_YET
+    own_at: float = NOT_YET
+    own_end_at: float = NOT_YET
 
     @property
     def floor(self) -> str:
         """The floor of the latest request."""
         return next(reversed(self.floors), "")
 
+    @property
+    def disowned(self) -> bool:
+        """Whether the last message on lift_requests about this session was END, and the robot itself
+        has asked again since that END."""
+        return self.own_at > self.direct_end_at > self.direct_at
+
+    def goes_on(self, now: float) -> bool:
+        """Return whether the robot itself has asked a moment ago, and has not sent END since."""
+        return self.own_at > self.own_end_at and now - self.own_at < ASKS_S
+
 
 @dataclass
 class Ending:
     """Times of the ENDs for the present session on lift_requests.
 
-    RMF's supervisor first sends an END without a floor. If the lift still shows the session, the
-    supervisor sends an END with a floor.
-
     - `at`: the first END.
     - `bare_at`: the first END, if it has no floor.
     - `floor_at`: the first END with a floor.
+    - `old_at`: the first END whose stamp is older than a stamp of the session's requests. A lift may
+      take such an END for an END of an earlier ride, until the END is repeated for REPEATED_S.
+
+    RMF's supervisor first sends an END without a floor. If the lift still shows the session, the
+    supervisor sends an END with a floor.
     """
 
     at: float = NOT_YET
     bare_at: float = NOT_YET
     floor_at: float = NOT_YET
+    old_at: float = NOT_YET
 
 
 class LiftHistory(History[d.LiftState]):
@@ -249,11 +275,20 @@ class LiftHistory(History[d.LiftState]):
             keep(self.ended, message.session_id, self.now)
         if direct and message.session_id != self.session:
             self.foreign_end_at = self.now
-        if message.session_id in self.asks:
-            self.asks[message.session_id].times = 0
+        ask = self.asks.get(message.session_id)
+        if ask is not None:
+            ask.times = 0
+            if direct:
+                ask.direct_end_at = self.now
+            else:
+                ask.own_end_at = self.now
         if not direct or message.session_id != self.session or not self.session:
             return
-        ending = self.ending
+        ending, stamp = self.ending, in_seconds(message.request_time)
+        if ask is not None and 0.0 < stamp < ask.stamp:
+            ending.old_at = self.now if ending.old_at == NOT_YET else ending.old_at
+            if self.now - ending.old_at < REPEATED_S:
+                return
         ending.at = self.now if ending.at == NOT_YET else ending.at
         if message.destination_floor:
             ending.floor_at = self.now if ending.floor_at == NOT_YET else ending.floor_at
@@ -265,7 +300,11 @@ class LiftHistory(History[d.LiftState]):
         ask = self.asks.get(session) or Ask(self.now, self.now)
         if direct and (not ask.times or self.now - ask.direct_at > SLOWEST_S):
             ask.since = self.now
-        ask.direct_at = self.now if direct else ask.direct_at
+        if direct:
+            ask.direct_at = self.now
+            ask.stamp = max(ask.stamp, in_seconds(message.request_time))
+        else:
+            ask.own_at = self.now
         ask.direct = ask.direct or direct
         ask.times += direct
         ask.human |= message.request_type == d.LiftRequestType.REQUEST_HUMAN_MODE

@@ -87,6 +87,7 @@ def _take(memory: SiteMemory, event: Event, now: float, site: SiteLimits) -> tup
         case MaySpeak(yes=yes, alone=alone, waits=passive):
             return _may_speak(replace(memory, passive=passive), yes, alone, now), ""
         case OperatorReset():
+            memory = memory.without_unheard(now)
             return replace(memory, strikes={}, shunned={}, absent={}, nudges={}), ""
         case _:  # only time has passed
             return memory, ""

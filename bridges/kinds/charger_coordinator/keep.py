@@ -1,7 +1,8 @@
 """The part of the memory that is saved to disk for a restart: the queue, each station's robot, and the
 robots' failures.
 
-States of robots and stations are not saved, because new states arrive within a second. A request may
+Each robot's last place is saved too, because its fleet may be silent after the restart. Other states of
+robots and stations are not saved, because new states arrive within a second. A request may
 have been sent but not saved. In that case the station's state still shows the request's id, and the
 coordinator recognises that id.
 """
@@ -54,6 +55,7 @@ class KeptCoordinator(keep.Kept, frozen=True, forbid_unknown_fields=True):
     served: dict[Text, str]
     over: list[str]
     preferred: dict[Text, Text]
+    stood: dict[Text, Text] = msgspec.field(default_factory=dict)
 
 
 def persist(memories: Mapping[str, SiteMemory]) -> bytes:
@@ -68,6 +70,7 @@ def persist(memories: Mapping[str, SiteMemory]) -> bytes:
         {str(who): task for who, task in sorted(memory.served.items())},
         list(memory.over),
         {str(who): station for who, station in sorted(memory.preferred.items()) if station},
+        {str(who): place for who in sorted(memory.known) if (place := memory.place_of(who))},
     )
     return msgspec.json.encode(record)
 
@@ -118,4 +121,5 @@ def _memory(found: KeptCoordinator, settings: CoordinatorSettings, now: float) -
         over=tuple(found.over),
         count=found.count,
         preferred={who: s for text, s in found.preferred.items() if (who := ours(text))},
+        stood={who: place for text, place in found.stood.items() if (who := ours(text))},
     )

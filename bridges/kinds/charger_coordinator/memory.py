@@ -24,6 +24,8 @@ NODE: Final = "charger_coordinator"
 STATION_SILENT_S: Final = 5.0
 """The time (s) without a state after which a station counts as silent. Stations publish states at 1
 Hz."""
+FLEET_SILENT_S: Final = 30.0
+"""The time (s) without a report on a robot after which its fleet counts as silent."""
 STRIKES: Final = 2
 """The number of failures after which a robot is not tried again. If two stations suit the robot, it has
 then failed at both, so the robot is at fault."""
@@ -210,8 +212,9 @@ class SiteMemory(msgspec.Struct, frozen=True):
     - `preferred`: the station that another node has dedicated to each robot.
     - `nudges`: the orders to robots to leave a pad.
 
-    Readings: `robots`, `stations`: the last state of each robot and each station. `receivers`: the
-    error of each robot's own receiver. `when`: the local time.
+    Readings: `robots`, `stations`: the last state of each robot and each station. `stood`: the waypoint
+    where each robot stood before the coordinator's restart, for robots that their fleet has not
+    reported since. `receivers`: the error of each robot's own receiver. `when`: the local time.
 
     Publishing: `may_speak`: the coordinator may publish. `passive`: if the coordinator may not publish,
     the reason why requesters must wait. `alone`: no other node publishes charging assignments.
@@ -232,6 +235,7 @@ class SiteMemory(msgspec.Struct, frozen=True):
     over: tuple[str, ...] = ()
     count: int = 0
     robots: Mapping[RobotName, Standing] = msgspec.field(default_factory=dict)
+    stood: Mapping[RobotName, str] = msgspec.field(default_factory=dict)
     stations: Mapping[str, StationSeen] = msgspec.field(default_factory=dict)
     shunned: Mapping[str, float] = msgspec.field(default_factory=dict)
     preferred: Mapping[RobotName, str] = msgspec.field(default_factory=dict)
@@ -254,7 +258,27 @@ class SiteMemory(msgspec.Struct, frozen=True):
         """Return the waypoint of our YAML where the fleet last saw the robot; None for a robot
         elsewhere."""
         standing = self.robots.get(robot)
-        return standing.sighting.place if standing else None
+        return standing.sighting.place if standing else self.stood.get(robot)
+
+    def unheard(self, robot: RobotName, now: float) -> bool:
+        """Return whether the fleet has not reported this robot for FLEET_SILENT_S."""
+        standing = self.robots.get(robot)
+        return standing is None or now >= standing.at + FLEET_SILENT_S
+
+    def without_unheard(self, now: float) -> "SiteMemory":
+        """Return the memory without the places of the robots that their fleets do not report."""
+        heard = {who: seen for who, seen in self.robots.items() if not self.unheard(who, now)}
+        return replace(self, robots=heard, stood={})
+
+    @property
+    def known(self) -> set[RobotName]:
+        """The robots whose last place is known."""
+        return {*self.stood, *self.robots}
+
+    def here_since(self, robot: RobotName) -> float:
+        """Return the time since which the robot has been at its place, as far as known."""
+        standing = self.robots.get(robot)
+        return standing.here_since if standing else self.began_at
 
     def stands_at(self, robot: RobotName, site: SiteLimits) -> str | None:
         """Return the station where the fleet last saw the robot; None for a robot elsewhere."""

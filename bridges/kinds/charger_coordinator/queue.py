@@ -20,7 +20,6 @@ station may have the station where it stands.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Final
 
 from msgspec.structs import replace
 
@@ -38,15 +37,13 @@ from bridges.kinds.charger_coordinator.memory import (
     Wish,
 )
 
-REMEMBERED_S: Final = 30.0
-"""The greatest age (s) of a fleet's state. An older state does not show where a robot stands."""
 Here = Mapping[str, Sequence[RobotName]]
 """The robots standing at each station."""
 
 
 def allot(memory: SiteMemory, now: float, site: SiteLimits) -> SiteMemory:
     """Give the free stations to the waiting robots, in the order of the queue."""
-    here = standing(memory, now, site)
+    here = standing(memory, site)
     for wish in memory.wishes:
         if memory.station_of(wish.robot) is None:
             stations = suiting(memory, wish, site)
@@ -104,12 +101,17 @@ def _free(memory: SiteMemory, station: str, robot: RobotName, now: float, here: 
     return is_refused or seen.state in (IDLE, CHARGING)
 
 
-def standing(memory: SiteMemory, now: float, site: SiteLimits) -> Here:
-    """List the robots at each station. Only fleet states of the last REMEMBERED_S count."""
+def standing(memory: SiteMemory, site: SiteLimits) -> Here:
+    """List the robots at each station.
+
+    A robot whose fleet has fallen silent still stands where the fleet last saw it, because nothing
+    drives a robot away while its fleet adapter is dead. Another robot would drive into it. After an
+    operator's reset such a robot no longer counts.
+    """
     here: dict[str, list[RobotName]] = {}
-    for who, seen in memory.robots.items():
+    for who in sorted(memory.known):
         station = memory.stands_at(who, site)
-        if station is not None and now < seen.at + REMEMBERED_S:
+        if station is not None:
             here.setdefault(station, []).append(who)
     return here
 

@@ -34,7 +34,7 @@ def reasons(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[str]:
     """Yield a text for each waiting robot, such as `tiny/AMR03 by the robot: charger_b charges
     tiny/AMR01, free in 12 min`."""
     taken: set[str] = set()
-    here = standing(memory, now, site)
+    here = standing(memory, site)
     for wish in queued(memory):
         stations = suiting(memory, wish, site)
         left = [name for name in stations if name not in taken]
@@ -70,10 +70,18 @@ def _obstacle(memory: SiteMemory, station: str, robot: RobotName, now: float, he
         return f"{station} {does} {grant.robot}"
     other = in_the_way(here, station, robot)
     if other is not None:
-        return f"{other} stands at {station}"
+        return where(memory, other, station, now)
     if seen.state is ERROR:
         return f"{station} is out of service"
     return f"{station} is not free yet"
+
+
+def where(memory: SiteMemory, robot: RobotName, station: str, now: float) -> str:
+    """Return a clause such as `tiny/AMR02 stands at charger_a`. It says so if the robot's fleet is
+    silent, because only a person knows whether that robot is still there."""
+    if not memory.unheard(robot, now):
+        return f"{robot} stands at {station}"
+    return f"{robot} was last seen at {station} and its fleet is silent (if it is gone, reset)"
 
 
 def _lasts(seconds: float) -> str:

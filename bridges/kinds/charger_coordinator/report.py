@@ -31,7 +31,7 @@ from bridges.kinds.charger_coordinator.memory import (
     SiteMemory,
     StationSeen,
 )
-from bridges.kinds.charger_coordinator.reasons import queued, reasons
+from bridges.kinds.charger_coordinator.reasons import queued, reasons, where
 from bridges.kinds.shared.decision import Fault
 from bridges.kinds.shared.durations import due_at
 from bridges.messages import definitions as d
@@ -135,7 +135,7 @@ def _faults(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[Fault]
             yield Fault("REQUEST_NOT_TAKEN", f"{name}: its daemon's log says why")
     for one in wrong_pad.found(memory, now, site).values():
         if wrong_pad.alarming(memory, one, now):
-            yield _misplaced(one)
+            yield _misplaced(memory, one, now)
     for who, error in memory.receivers.items():
         if error and diagnosis(error) is not FaultCause.LOST:
             yield Fault("RECEIVER_ERROR", f"the receiver on {who}: {error}")
@@ -156,15 +156,13 @@ def _faults_of(
         yield Fault("WRONG_STATION", f"{what} stands at {name}, but nobody requested that")
 
 
-def _misplaced(one: wrong_pad.OnWrongPad) -> Fault:
+def _misplaced(memory: SiteMemory, one: wrong_pad.OnWrongPad, now: float) -> Fault:
     if one.expected:
         text = f"{one.who} stands at {one.station}, but is expected at {one.expected}"
         return Fault("WRONG_STATION", text)
     why = "RMF moves this robot only with a charging task (as with finishing_request: charge)"
-    return Fault(
-        "PAD_BLOCKED",
-        f"{one.who} stands at {one.station}, and {one.waiter} waits for that station: {why}",
-    )
+    stands = where(memory, one.who, one.station, now)
+    return Fault("PAD_BLOCKED", f"{stands}, and {one.waiter} waits for that station: {why}")
 
 
 def _stranger(error: str) -> str:

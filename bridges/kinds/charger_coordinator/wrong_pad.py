@@ -127,7 +127,7 @@ def _stands(
 
 def _blocking(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWrongPad]:
     """Yield robots without a station that stand on a pad for which another robot waits."""
-    here = standing(memory, AGES_AGO if now == NEVER else now, site)
+    here = standing(memory, site)
     idle = {name: who for name in here if (who := _idle_at(memory, name, here)) is not None}
     for wish in memory.wishes if idle else ():
         if memory.station_of(wish.robot) is not None:
@@ -136,7 +136,7 @@ def _blocking(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWr
             who, seen = idle.get(name), memory.stations.get(name)
             if who is None or who == wish.robot or seen is None:
                 continue
-            since = max(memory.robots[who].here_since, seen.since) + site.leaves_s
+            since = max(memory.here_since(who), seen.since) + site.leaves_s
             if since <= now:
                 yield OnWrongPad(who, name, since, name, 1, waiter=wish.robot)
 

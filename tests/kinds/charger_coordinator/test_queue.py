@@ -2,6 +2,7 @@
 
 from msgspec.structs import replace
 
+from bridges.kinds.charger_coordinator import keep
 from bridges.kinds.charger_coordinator.memory import (
     CHARGING,
     ERROR,
@@ -13,7 +14,17 @@ from bridges.kinds.charger_coordinator.signals import (
     FleetSeen,
     Sighting,
 )
-from tests.kinds.charger_coordinator.alone import ONE, THREE, TWO, A, Alone, B, busy
+from bridges.kinds.shared.decision import OperatorReset
+from tests.kinds.charger_coordinator.alone import (
+    ONE,
+    SETTINGS,
+    THREE,
+    TWO,
+    A,
+    Alone,
+    B,
+    busy,
+)
 
 
 def test_the_queue_is_first_come_first_served() -> None:
@@ -36,13 +47,46 @@ def test_a_station_with_another_robot_on_its_pad_is_not_free() -> None:
     assert site_.run(1) == [(11.0, "charger_a: AMR01")]
 
 
-def test_an_old_position_of_a_robot_occupies_no_station() -> None:
+GONE = "tiny/AMR02 was last seen at charger_a and its fleet is silent (if it is gone, reset)"
+
+
+def silent_at_a() -> Alone:
+    """Return a site in which AMR01 waits, and the fleet has fallen silent about AMR02 at charger_a."""
     site_ = Alone()
     site_.shows[B] = busy(B)
     site_.hears(FleetSeen((Sighting(TWO, False, "charger_a", 90.0, ""),)))
     site_.wants(ONE)
-    assert site_.run(29) == []
-    assert site_.run(1) == [(30.0, "charger_a: AMR01")]
+    return site_
+
+
+def test_no_other_robot_is_sent_to_the_pad_of_a_robot_whose_fleet_is_silent() -> None:
+    site_ = silent_at_a()
+    assert site_.run(3600) == []
+    assert [GONE in text for text in site_.report.queue] == [True]
+    assert any(GONE in fault for fault in site_.faults)
+    site_.hears(FleetSeen((Sighting(TWO, False, None, 90.0, ""),)))
+    assert site_.run(1) == [(3601.0, "charger_a: AMR01")]
+
+
+def test_a_restart_of_the_coordinator_does_not_free_the_pad_of_a_robot_whose_fleet_is_silent() -> (
+    None
+):
+    site_ = silent_at_a()
+    kept = keep.persist({"site": site_.memory})
+    site_.memory = replace(keep.restore(kept, SETTINGS, 0.0)["site"], may_speak=True)
+    assert site_.run(600) == []
+    assert keep.persist({"site": site_.memory}).count(b"charger_a") == 1
+    site_.hears(FleetSeen((Sighting(TWO, False, None, 90.0, ""),)))
+    assert site_.run(1) == [(601.0, "charger_a: AMR01")]
+
+
+def test_a_reset_frees_the_pad_of_a_robot_whose_fleet_is_silent_and_no_other_pad() -> None:
+    site_ = silent_at_a()
+    site_.run(29)
+    site_.hears(OperatorReset())
+    assert site_.run(1) == []
+    site_.hears(OperatorReset())
+    assert site_.run(1) == [(31.0, "charger_a: AMR01")]
 
 
 def test_a_robot_that_stands_at_a_station_gets_that_station() -> None:

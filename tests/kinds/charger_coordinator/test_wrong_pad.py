@@ -229,9 +229,11 @@ def test_the_robot_without_a_station_blocks_a_pad_with_two_robots() -> None:
     assert found(memory, 90.0) == [[BLOCKS]]
 
 
-def test_an_old_position_blocks_no_pad_but_still_wakes_the_core() -> None:
+def test_a_robot_of_a_silent_fleet_blocks_the_pad_where_it_was_last_seen() -> None:
     memory = site(at(TWO, AT[A], 30.0, heard=60.0), wishes=WAITS)
-    assert found(memory, 89.9, 90.0, NEVER) == [[], [], [BLOCKS]]
+    assert found(memory, 89.9, 90.0, NEVER) == [[], [BLOCKS], [BLOCKS]]
+    before_our_start = replace(memory, robots={}, stood={TWO: AT[A]}, began_at=30.0)
+    assert found(before_our_start, 89.9, 90.0, NEVER) == [[], [BLOCKS], [BLOCKS]]
 
 
 def test_a_blocking_robot_is_nudged_once_and_then_a_person_is_told() -> None:

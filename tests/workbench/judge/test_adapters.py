@@ -113,7 +113,7 @@ def test_lost_and_late_messages_convict_nobody(make: type[RightAdapter], seed: i
 @pytest.mark.parametrize("who", ["judge", "adapter", "RightLift", "RightDoor", "LiftSupervisor"])
 @pytest.mark.parametrize("make", RIGHT)
 def test_a_lost_network_convicts_nobody(make: Make, who: str, for_s: float) -> None:
-    for at in part(TIMES, 2, first=int(for_s) % 2):
+    for at in part(TIMES, 4, first=int(for_s) % 4):
         who = make().__class__.__name__ if who == "adapter" else who
         found = judged(make(), cut=(who, float(at), for_s), seed=at)
         assert found["broken"] == set(), at
@@ -126,13 +126,13 @@ def test_a_restart_convicts_nobody(
     make: type[RightAdapter], who: type[Party] | str, for_s: float
 ) -> None:
     kind = make if isinstance(who, str) else who
-    for at in part(TIMES, 2, first=int(for_s) // 4 % 2):
+    for at in part(TIMES, 4, first=int(for_s) // 4 % 4):
         assert judged(make(), again=(kind, float(at), for_s))["broken"] == set(), at
 
 
 @pytest.mark.parametrize("make", RIGHT)
 def test_a_judge_that_is_started_again_in_a_ride_convicts_nobody(make: Make) -> None:
-    for at in part(range(3, 75, 3), 2):
+    for at in part(range(3, 75, 3), 4):
         assert judged(make(), begins_at=float(at))["broken"] == set(), at
 
 

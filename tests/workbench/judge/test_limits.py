@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 
+import msgspec
 import pytest
 
 from bridges.messages import definitions as d
@@ -9,6 +10,7 @@ from bridges.messages import topics
 from bridges.messages.heard import Heard
 from bridges.messages.stamps import stamp
 from bridges.messages.topics import AnyTopic
+from tests.site.timeline import EPOCH
 from tests.workbench.judge.script import door as door_request
 from tests.workbench.judge.script import lift as lift_request
 from workbench.judge.judge import Judge, JudgedKind
@@ -68,8 +70,11 @@ def robot_asks(at: float, session: str = RED) -> Line:
     return at, topics.ADAPTER_LIFT_REQUESTS, lift_request(session, "L3")
 
 
-def ends(at: float, session: str = RED, floor: str = "") -> Line:
-    return at, topics.LIFT_REQUESTS, lift_request(session, floor, kind=0)
+def ends(at: float, session: str = RED, floor: str = "", by_clock_s: float = 0.0) -> Line:
+    """Return an END. Its sender's clock is `by_clock_s` seconds ahead of the requests' clock."""
+    end = lift_request(session, floor, kind=0)
+    end = msgspec.structs.replace(end, request_time=stamp(EPOCH + by_clock_s))
+    return at, topics.LIFT_REQUESTS, end
 
 
 def leaf(at: float, mode: int = CLOSED, read_at: float | None = None) -> Line:
@@ -292,7 +297,40 @@ LIFT: list[tuple[str, Story, float, float]] = [
         4.9,
         5.1,
     ),
+    (  # the supervisor has ended the session, but the robot in the car goes on asking, until it dies
+        "L4.ends",
+        lambda x: [
+            *(car(0.0), asks(0.5), held(1.0), ends(4.0), car(4.1), robot_asks(4.0 + x)),
+            *(held(10.0), car(15.0)),
+        ],
+        5.9,
+        -0.1,
+    ),
     ("L5.ends", lambda x: [car(0.0), asks(0.5), held(1.0), ends(2.0), held(2.0 + x)], 2.9, 3.1),
+    (
+        "L5.ends",
+        lambda x: [
+            *(car(0.0), asks(0.5), robot_asks(1.9), held(1.0), ends(2.0)),
+            *(held(3.0), held(5.1), held(1.9 + x)),
+        ],
+        5.9,
+        6.1,
+    ),
+    (  # an END by a clock that is behind the requests' clock counts after it has been repeated
+        "L5.ends",
+        lambda x: [
+            *(car(0.0), asks(0.5), held(1.0)),
+            *(
+                ends(2.0, by_clock_s=-9.0),
+                held(2.1),
+                ends(2.0 + x, by_clock_s=-9.0),
+                held(4.0),
+                held(7.0),
+            ),
+        ],
+        0.9,
+        1.1,
+    ),
     ("L5.ends", lambda x: rides_with_bare_ends(int(x)), 2, 3),
     ("L5.ends", lambda x: rides_with_bare_ends(3, goes_s=x), 0.31, 0.29),
     ("L5.ends", lambda x: rides_with_bare_ends(3, waits_s=x), 0.29, 0.31),
