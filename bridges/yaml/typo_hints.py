@@ -6,7 +6,6 @@ text.
 """
 
 import re
-import unicodedata
 
 from yaml import Mark, MarkedYAMLError
 
@@ -114,6 +113,8 @@ def _follows_no_key(lines: list[str], where: Mark) -> bool:
 
 def named(character: str) -> str:
     """Return the name of an invisible character, such as `a no-break space (U+00A0)`."""
+    import unicodedata  # 0.3 MB, which only a wrong file needs
+
     name = unicodedata.name(character, "character that cannot be seen").lower()
     article = "an" if name[0] in "aeiou" else "a"
     return f"{article} {name} (U+{ord(character):04X})"
@@ -138,6 +139,8 @@ def cleaned(text: str) -> str:
 def number_meant(text: str, whole: bool) -> str:
     """Return the spelling that YAML requires for a number that is written for people, such as `1,000`.
     Return "" if the text is no number."""
+    import unicodedata
+
     digits = "".join(str(unicodedata.digit(c, c)) for c in text)
     plain = re.sub(r"(?<=\d)['\u2019 ](?=\d{3}(\D|$))", "", digits)
     grouped = re.fullmatch(r"[-+]?\d{1,3}([.,]\d{3})+", plain)
