@@ -32,7 +32,8 @@ class WiredPin(MockPin):  # type: ignore[misc]
         self._safe: bool | None = None
 
     def output_with_state(self, state: bool) -> None:
-        """Claim the pin as an output at this level. Closing restores the level."""
+        """Claim the pin as an output at this level, which is the safe level. `close` sets the pin to
+        the safe level again."""
         self._function = "output"
         self._state = self._safe = bool(state)
         self.clear_states()

@@ -62,7 +62,8 @@ class FakeVdaRobot:
         self._noise = random.Random(name)
 
     def join(self, port: int) -> None:
-        """Connect to the broker, with a last will."""
+        """Connect to the broker, and leave a last will there. The broker publishes the last will if the
+        connection breaks."""
         client = paho.Client(CallbackAPIVersion.VERSION2)
         topic = self._names["connection"]
         client.will_set(topic, self._connection("CONNECTIONBROKEN"), qos=1, retain=True)
@@ -74,7 +75,7 @@ class FakeVdaRobot:
         self._client = client
 
     def leave(self) -> None:
-        """Drop the connection without a word, as a robot does that drives out of the network."""
+        """Close the socket without MQTT's DISCONNECT, as if the robot drove out of the network."""
         client, self._client, self._hears = self._client, None, False
         if client is not None:
             sock = client.socket()

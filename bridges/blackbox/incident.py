@@ -82,7 +82,7 @@ def readable(step: Decided) -> Iterator[tuple[str, Tree]]:
 OWN_TOPICS: Final = "rmf_bridge/"
 
 
-INSTALL: Final = "in the clone, .venv/bin/pip install '.[recording,sqlite]'"
+INSTALL: Final = "in the git clone of rmf-bridges run .venv/bin/pip install '.[recording,sqlite]'"
 
 
 LIBRARY: Final = "rmf-bridges"

@@ -151,8 +151,9 @@ class ObservedDevice(ABC, Generic[T]):
 
     @abstractmethod
     def _settle(self, moment: Moment) -> Iterator[News]:
-        """Yield the news of a new state. The caller has already updated `changed`. At the first state
-        `before` is None."""
+        """Take a new state, and yield its news (changes to report). The caller has already set
+        `changed` to the facts that this state changes. `before` is the previous state. At the first
+        state `before` is None."""
 
     @abstractmethod
     def _hear_other(self, moment: Moment, topic: str, message: d.Message) -> Iterator[News]:

@@ -124,7 +124,7 @@ class Node(Generic[S, L, M, X, E, O, R]):
         self._answers.add(message, str(refusal))
 
     def was_suspended(self, for_s: float) -> None:
-        """Note that no input was read for `for_s` (s). Therefore the core no longer trusts older
+        """Tell the core that no input was read for `for_s` (s). Then the core no longer trusts older
         readings."""
         self._decide(Suspended(f"nothing was read for {for_s:.1f} s"))
 

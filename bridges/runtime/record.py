@@ -48,13 +48,14 @@ class ClaimedSettings(msgspec.Struct, frozen=True):
 
 
 class Claimed(msgspec.Struct, frozen=True):
-    """A record without settings. Every version can read the fields from `file` to `safe`.
+    """A record without settings. Every version of this program can read the fields from `file` to
+    `safe`.
 
     - `file`: the YAML's path
     - `yaml`: the YAML's text
     - `texts`: maps the name of each profile or DBC file to its text
-    - `safe`: the devices that are verified off
-    - `tried`: Has a process already tried to switch off all other devices?
+    - `safe`: the devices whose outputs are verified off
+    - `tried`: whether a process has already tried to switch off the devices that are not in `safe`
     """
 
     file: str
@@ -77,7 +78,8 @@ class ClaimRecord(Claimed, frozen=True):
         return f"claimed-{hashlib.sha256(msgspec.json.encode(claimed)).hexdigest()[:16]}.json"
 
     def config(self) -> Config:
-        """Return the Config of the record. Raises SettingsError.
+        """Return the Config of the record. Raises SettingsError if this version refuses the record's
+        YAML.
 
         After this call the process uses only the record's profiles and DBC files.
         """

@@ -157,8 +157,8 @@ class _Comparing:
             self._theirs("errors", path, text)
         elif request in (None, "nothing"):
             text = (
-                "with finishing_request: nothing, a charged robot stays on its pad until it gets a"
-                " task, and the next robot waits: write charge"
+                "if finishing_request is 'nothing' or missing, a charged robot stays on its pad until"
+                " it gets a task, and the next robot waits: write finishing_request 'charge'"
             )
             self._theirs("warnings", path if request else ("rmf_fleet",), text)
 

@@ -39,7 +39,7 @@ def how_to_install(part: str, site: Path = SITE) -> str:
         place = Path((site / f"{package}.pth").read_text().strip())
     except OSError:
         wanted = "." if part == "workbench" else f"'.[{part}]'"
-        return f"in the clone, .venv/bin/pip install {wanted}"
+        return f"in the git clone of rmf-bridges run .venv/bin/pip install {wanted}"
     command = f"sudo apt install ./{package}_{place.name}_*.deb"
     for other in sorted(place.parent.glob("[0-9]*")):
         if other != place:

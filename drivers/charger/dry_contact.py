@@ -98,8 +98,9 @@ def _unsafe(settings: DryContactChargerSettings) -> Iterator[Unsafe]:
 
 
 def tables(settings: DryContactChargerSettings) -> Iterator[Table]:
-    """Yield a table of the contacts, and a table of the relay. The table of contacts shows how each
-    combination of contacts reads, and how it reads with one wire cut."""
+    """Yield a table of the contacts, and a table of the relay. The first table gives the station's
+    state for each combination of contacts. It also gives each wrong state that the daemon would read
+    with one wire cut."""
     table = {wire.signal: wire for wire in wires(settings) if wire.direction == "in"}
     rows = []
     for on in itertools.product((False, True), repeat=len(table)):

@@ -32,11 +32,14 @@ class WorkcellStatusWords(InRegister, frozen=True, kw_only=True, forbid_unknown_
     """The workcell's state as one number. A number that the map does not list counts as a fault."""
 
     ready: Annotated[
-        Words, tells("numbers of a workcell without a running cycle that can start one.")
+        Words, tells("numbers shown while no cycle runs and the workcell can start a cycle.")
     ]
-    busy: Annotated[Words, tells("numbers of a running cycle.")]
-    done: Annotated[Words, tells("numbers after a successful cycle, shown until the start is off.")]
-    waits: Annotated[list[Word], tells("numbers of a workcell that can start no cycle now.")] = (
+    busy: Annotated[Words, tells("numbers shown while a cycle runs.")]
+    done: Annotated[
+        Words,
+        tells("numbers shown after a successful cycle, until the daemon writes `rest`."),
+    ]
+    waits: Annotated[list[Word], tells("numbers shown while the workcell can start no cycle.")] = (
         msgspec.field(default_factory=list)
     )
     faults: Annotated[dict[Word, Name], tells("number -> fault.")] = msgspec.field(

@@ -1,9 +1,12 @@
-"""A door behind a controller that speaks HTTP and JSON, such as a Shelly. A Shelly is a relay with
+"""A door behind a controller that speaks HTTP and JSON. An example is a Shelly, which is a relay with
 inputs.
 
-The answer to `state_path` holds the contacts. `hold` and `release` switch the relay. If the network
-fails, only the relay's own timer can release the door. So `hold` sets this timer
-(`switches_off_after_s`), and the driver sends `hold` in every scan while RMF holds the door.
+The controller's answer to a GET of `state_path` shows the door's contacts. The relay holds the door
+open. The command `hold` switches the relay on, and the command `release` switches it off.
+
+If the network fails, only the relay's own timer can release the door. So `hold` also starts this timer
+(`switches_off_after_s`). While RMF holds the door, the driver sends `hold` in every scan, so that the
+timer does not run out.
 """
 
 from collections.abc import Iterator, Mapping

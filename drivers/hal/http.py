@@ -284,8 +284,9 @@ def _check_status(url: str, reads: bool, status: int) -> None:
 
 
 def _capped(raw: "BaseHTTPResponse") -> bytes:
-    """Read the whole body, but at most one byte more than BODY_MAX. Read to the end, because an
-    incomplete body raises its error only there."""
+    """Read the body, but at most BODY_MAX + 1 bytes. More bytes are useless, because the caller refuses
+    a body above BODY_MAX. Read a shorter body until no more bytes come, because an incomplete body
+    raises its error only at the last read."""
     body = b""
     while len(body) <= BODY_MAX and (
         more := raw.read(BODY_MAX + 1 - len(body), decode_content=False)

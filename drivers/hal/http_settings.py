@@ -71,7 +71,10 @@ class HttpSettings(BusSettings, frozen=True, kw_only=True, forbid_unknown_fields
             yield ("api_base",), str(error)
             return
         if self.ca_file and not tls:
-            yield ("ca_file",), "is for https: write api_base: https://…, or delete ca_file"
+            yield (
+                ("ca_file",),
+                "has no effect without https: let api_base begin with https://, or delete ca_file",
+            )
         if self.token_header and not self.token_file:
             yield (
                 ("token_header",),

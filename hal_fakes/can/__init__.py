@@ -1,8 +1,8 @@
-"""The far side of a `can` bus, in a separate process. Controllers are behind an slcan adapter on a
-pseudo-terminal.
+"""The far side of a `can` bus: simulated controllers in a separate process. The daemon reaches them
+through a simulated slcan adapter (CAN frames as text) on a pseudo-terminal.
 
-`side.py` lists the failures of the bus. `canopen_rcu.py` lists the failures of a CANopen receiver, and
-`frame_charger.py` those of a charger with its maker's own frames.
+`side.py` lists the failures of the bus. `canopen_rcu.py` lists the failures of a CANopen receiver.
+`frame_charger.py` lists the failures of a charger that speaks its maker's own CAN frames.
 """
 
 from collections.abc import Sequence

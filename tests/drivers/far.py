@@ -1,4 +1,5 @@
-"""The far side of every bus in virtual time, in place of `drivers/hal/`.
+"""The far side (simulated hardware) of every bus, in virtual time. These classes take the place of
+`drivers/hal/`.
 
 If `down` has a text, the bus raises HalError with this text, as the HAL does after its timeout. After
 WATCHDOG_S the module behind that bus drops its outputs, like a module with a watchdog. The GPIO header

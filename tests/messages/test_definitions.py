@@ -185,8 +185,8 @@ JAZZY: dict[str, str | None] = {
     "rmf_task_msgs/Alert": None,
     "rmf_task_msgs/AlertParameter": None,
 }
-"""The message types that differ in Jazzy from the table above. None means that Jazzy has no such
-file."""
+"""The message types whose fields in Jazzy differ from the table above. None means that Jazzy lacks the
+message type."""
 NOT_IN_JAZZY = {
     d.RobotModeValue: {"MODE_PERFORMING_ACTION", "MODE_ACTION_COMPLETED"},
     d.AlertTier: {"TIER_INFO", "TIER_WARNING", "TIER_ERROR"},

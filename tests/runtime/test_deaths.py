@@ -109,9 +109,11 @@ def test_the_rule_leaves_out_crashes_and_signals_that_end_nothing_by_default() -
 
 
 USUAL = [signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP, signal.SIGRTMAX]
-"""The signals in `make test`. test_process.py tests SIGINT and SIGTERM."""
+"""The signals that `make test` sends to a daemon. SIGINT and SIGTERM are missing here, because
+test_process.py sends them."""
 EVERY = [n for n in ENDING if n < signal.SIGRTMIN or n in (signal.SIGRTMIN, signal.SIGRTMAX)]
-"""The signals in `make deep`. They include only the first and the last realtime signal."""
+"""The signals that `make deep` sends to a daemon. The first and the last realtime signal stand for all
+realtime signals."""
 
 
 @pytest.mark.parametrize(

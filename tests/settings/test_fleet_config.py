@@ -235,14 +235,16 @@ def test_a_station_that_releases_a_robot_before_rmfs_recharge_soc_is_a_mismatch(
         (
             "  finishing_request: park",
             "  finishing_request: nothing",
-            "config.yaml:5:3: warning: with finishing_request: nothing, a charged robot stays on its"
-            " pad until it gets a task, and the next robot waits: write charge",
+            "config.yaml:5:3: warning: if finishing_request is 'nothing' or missing, a charged robot"
+            " stays on its pad until it gets a task, and the next robot waits: write finishing_request"
+            " 'charge'",
         ),
         (
             "  finishing_request: park\n",
             "",
-            "config.yaml:1:1: warning: with finishing_request: nothing, a charged robot stays on its"
-            " pad until it gets a task, and the next robot waits: write charge",
+            "config.yaml:1:1: warning: if finishing_request is 'nothing' or missing, a charged robot"
+            " stays on its pad until it gets a task, and the next robot waits: write finishing_request"
+            " 'charge'",
         ),
         (
             "    AMR02: {charger: dock_b}\n",

@@ -135,7 +135,7 @@ doors:
     outputs:
       hold_open: {point: BCM18, active: high}
 """
-OFF = "make sure that config.txt switches this use off, or use another pin"
+OFF = "use another pin, or disable this function of the pin in config.txt"
 PINS = {
     "BCM2": "BCM2 is for I2C (dtparam=i2c_arm=on), and has a fixed 1.8 kΩ pull-up",
     "J8:5": "BCM3 is for I2C (dtparam=i2c_arm=on), and has a fixed 1.8 kΩ pull-up",

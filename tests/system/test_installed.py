@@ -12,7 +12,7 @@ import pytest
 ALONE = (
     "import sys; sys.modules['workbench'] = None; from bridges.cli import main; sys.exit(main())"
 )
-LACKS = "not installed: in the clone, .venv/bin/pip install .\n"
+LACKS = "not installed: in the git clone of rmf-bridges run .venv/bin/pip install .\n"
 
 
 def alone(*words: str) -> subprocess.CompletedProcess[str]:

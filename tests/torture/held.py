@@ -1,5 +1,6 @@
-"""Causes outside a daemon that could keep a relay on: a dead bus, and processes that wait for locks.
-Also two other attacks: frequent reading of the lock, and links that another user plants."""
+"""Attacks on a daemon from outside. Two attacks could keep a relay on: a dead bus, and processes that
+wait for locks. Two attacks concern files: frequent reading of the lock, and links that another user
+plants."""
 
 import os
 import shutil

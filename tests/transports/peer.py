@@ -125,7 +125,8 @@ def _data_packet(guid: bytes, number: int, sample: bytes) -> bytes:
 
 
 def _send_raw(domain: int, packet: bytes) -> None:
-    """Send the packet to the first four processes of the domain, to each unicast data port."""
+    """Send the packet to the first four processes of the domain. Each process receives data on a UDP
+    port of its own. The port's number follows from the domain and the index of the process."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         for index in range(4):
             sender.sendto(packet, ("127.0.0.1", 7400 + 250 * domain + 11 + 2 * index))

@@ -177,8 +177,8 @@ def _ask(question: Question, offered: str, given: Given, found: BuildingMap | No
         import questionary
     except ModuleNotFoundError:
         raise Impossible(
-            "asking needs questionary: in the clone, .venv/bin/pip install '.[laptop]'. Or give every"
-            " answer as an option, or --yes"
+            "asking needs questionary: in the git clone of rmf-bridges run .venv/bin/pip install"
+            " '.[laptop]'. Or give every answer as an option, or --yes"
         ) from None
     choices = question.choices(given)
     if found is not None and question.name == "name":

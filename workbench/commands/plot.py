@@ -25,7 +25,7 @@ from workbench.replay.recordings import RecordingSpan, add_span_arguments, told_
 from workbench.replay.sources import BagError
 
 SUFFIXES: Final = (".html", ".svg", ".png")
-INSTALL: Final = "in the clone, .venv/bin/pip install '.[plot]'"
+INSTALL: Final = "in the git clone of rmf-bridges run .venv/bin/pip install '.[plot]'"
 NARROWEST, WIDEST = 480, 8000
 
 

@@ -146,7 +146,8 @@ def stopped(device: Device, around: OthersHeard, clock: TimePhrases) -> Answer |
     last = device.last_state
     if last is not None and around.reason is not None and around.reason.code == DIED:
         return Answer(since=last.at - 60.0, because=()).say(
-            f"The daemon of {device.name} died then. The file ends there: what came after is unknown.",
+            f"The daemon of {device.name} died then. The file ends at its death, so what came after is"
+            " unknown.",
             "a person",
             f"see whether the daemon of {device.name} runs again and its relays are off"
             " (`rmf-bridge status`), and why it died (`rmf-bridge log`, the journal)",

@@ -129,7 +129,8 @@ class Renamed:
 
 
 def graph_of(args: argparse.Namespace, speaks: str) -> str:
-    """Describe the joined graph, such as `dds in domain 7, on this machine alone`."""
+    """Describe the graph (network of ROS nodes) that the command has joined. Example: `dds in domain 7,
+    on this machine alone`."""
     from bridges.transports.choose import domain_id, stays_on_loopback
 
     rmf = overridden(_configured(args.config), args)

@@ -1,8 +1,9 @@
 """Run a judgement: listen, perform a play (a series of test messages), release the device, and give the
 verdict. The play is performed only if the user asks for it, and if the device is free.
 
-This module has no I/O and no clock, so a judgement is the same on a wire and in virtual time. The
-caller passes messages in, publishes the returned messages, and calls `turn` at `wake_at`.
+This module has no I/O and no clock. So the same code judges a real node on the network, and a test's
+node in virtual time. The caller passes messages in, publishes the returned messages, and calls `turn`
+at `wake_at`.
 """
 
 from collections.abc import Callable

@@ -71,12 +71,14 @@ class Ask:
 
     @property
     def disowned(self) -> bool:
-        """Whether the last message on lift_requests about this session was END, and the robot itself
-        has asked again since that END."""
+        """Whether this session was ended although its robot still wants it. The last message on
+        lift_requests (the supervisor's topic) was END. After this END, the robot sent a request on
+        adapter_lift_requests (the robots' topic)."""
         return self.own_at > self.direct_end_at > self.direct_at
 
     def goes_on(self, now: float) -> bool:
-        """Return whether the robot itself has asked a moment ago, and has not sent END since."""
+        """Return whether the robot still wants the lift. Its last message on adapter_lift_requests must
+        be a request, and be younger than ASKS_S."""
         return self.own_at > self.own_end_at and now - self.own_at < ASKS_S
 
 
@@ -229,7 +231,7 @@ class LiftHistory(History[d.LiftState]):
 
     @staticmethod
     def claims(state: d.LiftState) -> bool:
-        """Return whether a robot would act on this state, because the door is OPEN."""
+        """Return whether the state shows the door OPEN. At such a state a robot would drive."""
         return state.door_state == d.LiftDoor.DOOR_OPEN
 
     def _wanted(self) -> tuple[str, ...]:
@@ -319,8 +321,8 @@ class LiftHistory(History[d.LiftState]):
             self.reopened.clear()
 
     def _hear_direct(self, request: d.LiftRequest) -> None:
-        """Note a request on lift_requests that tests the laws. The request comes from another session,
-        or is for a floor that the lift does not serve."""
+        """Note a request on lift_requests with which the judge can test the laws. Such a request comes
+        from another session, or is for a floor that the lift does not serve."""
         here, holds = request.lift_name == self.name, request.session_id == self.session
         served = self.state.available_floors if self.state else ()
         if not holds:

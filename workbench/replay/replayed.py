@@ -183,8 +183,8 @@ class _Subject:
         return self._compared(told, decision)
 
     def again(self, at: float) -> list[Parts]:
-        """Decide on the last reading again. In the recording, this reading was repeated without any
-        effect. Return the parts that differ."""
+        """Let today's core decide on the last reading a second time. In the recording, an equal reading
+        came at this time and changed nothing. Return the parts that differ from the recording."""
         outputs, news, report = self._outputs, self._news, self._report
         decision = self._decide(self._reading, at)
         if (

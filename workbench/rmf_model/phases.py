@@ -31,16 +31,16 @@ class RequestLift(Phase):
         self.wanted = LiftDestination(lift, floor, inside)
 
     def begin(self, robot: RobotContext, now: float) -> list[Said]:
-        """Send the request. If the lift has already come for a robot outside, end the phase. Note in
-        `inside` that the robot may be in the car from now on."""
+        """Send the request. If the lift has already come for a robot outside the car, end the phase.
+        This robot may enter the car from now on, so set `inside` in its destination."""
         if not self.wanted.inside and robot.has_lift_arrived(self.wanted.lift, self.wanted.floor):
             self.done = True
             return robot.set_lift_destination(replace(self.wanted, inside=True), now)
         return robot.set_lift_destination(self.wanted, now)
 
     def hear(self, robot: RobotContext, message: d.Message, now: float) -> list[Said]:
-        """Take a message. When the lift has come, end the phase. If the robot was outside, send the
-        request again, and note in `inside` that the robot may be in the car
+        """Take a message. When the lift has come, end the phase. A robot that waited outside may enter
+        the car from now on. So send its request once more, and set `inside` in its destination
         (RequestLift.cpp:322-326, _finish)."""
         match message:
             case d.LiftState(

@@ -109,7 +109,8 @@ def _pending(
 
 
 def cleared_to_start(memory: ChargerMemory, limits: ChargerLimits) -> bool:
-    """Return whether the right robot is on the pad and in range, as far as the station can tell."""
+    """Return whether the right robot is on the pad, with its coil in range for charging. A station that
+    cannot tell one of the two does not forbid the start."""
     holder, sample = memory.holder, memory.sample
     if holder is None or sample is None or memory.read_at is None:
         return False
@@ -122,8 +123,8 @@ def cleared_to_start(memory: ChargerMemory, limits: ChargerLimits) -> bool:
 
 
 def range_checked(memory: ChargerMemory, now: float, limits: ChargerLimits) -> ChargerMemory:
-    """Order a range check if the range is the only open condition for the start. A result counts only
-    if it was read after this order."""
+    """Order a range check if nothing else forbids the start. The station then checks whether the
+    robot's coil is in range for charging. The result counts only if it was read after this order."""
     holder, sample = memory.holder, memory.sample
     if holder is None or sample is None or holder.started or holder.over:
         return memory

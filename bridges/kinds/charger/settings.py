@@ -34,10 +34,12 @@ class RobotName(NamedTuple):
 
 
 def robot(text: str) -> RobotName:
-    """Split FLEET/ROBOT into its parts. Raises ValueError."""
+    """Split FLEET/ROBOT into its parts. Raises ValueError for any other form."""
     fleet, slash, name = text.partition("/")
     if not (fleet and slash and name):
-        raise ValueError(f"{text!r} is not a robot: write FLEET/ROBOT, as RMF names them")
+        raise ValueError(
+            f"{text!r} is not a robot: write FLEET/ROBOT, with the names that RMF uses"
+        )
     return RobotName(fleet, name)
 
 

@@ -15,8 +15,8 @@ VERSION: Final = 1
 
 
 class KeptAlarm(keep.Kept, frozen=True, forbid_unknown_fields=True):
-    """The parts of the memory that are saved to disk. `latched`: the device and the signal of each
-    cause."""
+    """The parts of a `FleetAlarmMemory` that are saved to disk. `latched` lists the alarm's causes.
+    Each cause is the name of a device and the name of its signal."""
 
     latched: list[tuple[str, str]]
     told: list[str] | None
@@ -40,7 +40,8 @@ def persist(memory: FleetAlarmMemory) -> bytes:
 
 
 def restore(kept: bytes) -> FleetAlarmMemory:
-    """Make the memory at a restart. Raises ValueError for bytes that `persist` did not make."""
+    """Return the `FleetAlarmMemory` after a restart, from the bytes of `persist`. Raises ValueError for
+    bytes that `persist` did not make."""
     found = keep.read(kept, KeptAlarm, VERSION, "an alarm's memory")
     memory = FleetAlarmMemory(
         latched=tuple(AlarmCause(*cause) for cause in found.latched),

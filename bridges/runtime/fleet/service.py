@@ -212,6 +212,6 @@ class FleetDevices(Devices):
         loop.inbox.put(robot, order)
 
     def _speak(self, state: FleetState) -> None:
-        """Publish the fleet's state. Only the stand-in of RMF's adapter calls this method, because
-        RMF's adapter publishes the state itself."""
+        """Publish the fleet's state for the stand-in, which replaces RMF's adapter in a simulation. The
+        real adapter publishes the state itself, so it does not call this method."""
         self._outlet.publish(FLEET_STATES, state)

@@ -26,7 +26,8 @@ from bridges.messages.topics import AnyTopic, Qos
 from bridges.transports.peers import WITNESSES, Announced
 
 Kind = Literal["MP", "MS"]
-"""The kind of an end: rmw_zenoh's Message Publisher or Message Subscription."""
+"""A publisher (MP, message publisher) or a subscription (MS, message subscription), as rmw_zenoh
+abbreviates them."""
 NODE_ID: Final = 0
 _HEAD: Final = struct.Struct("<qqB")
 GID_LENGTH: Final = 16
@@ -70,17 +71,20 @@ class Keys(Protocol):
         """Return the topic's type, in the form of `Peer.type`."""
 
     def token(self, kind: Kind, topic: AnyTopic, number: int) -> str:
-        """Return the token of an end. `number` is unique in the session."""
+        """Return the token that announces a publisher or subscription. `kind` says which of the two.
+        `number` is unique in the session."""
 
     def others(self, kind: Kind, topic: AnyTopic) -> str:
-        """Return a key expression that matches the tokens of all ends of this kind on a topic."""
+        """Return a key expression for a topic. It matches the tokens of all publishers or of all
+        subscriptions, as `kind` says."""
 
     def witnesses(self) -> list[str]:
         """Return key expressions for the tokens that show RMF's release. Only RMF's own nodes have such
         tokens (`peers.py`)."""
 
     def peer(self, token: str) -> Peer | None:
-        """Return the end that a token announces. Return None for any other token."""
+        """Return the publisher or subscription that a token announces. Return None for any other
+        token."""
 
 
 class RmwZenoh:

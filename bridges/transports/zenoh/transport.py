@@ -359,4 +359,5 @@ class ZenohTransport(Threaded):
 
 
 def _nothing() -> None:
-    """Do nothing. This order only wakes the transport's thread."""
+    """Do nothing. The transport's thread waits for functions in the queue `_orders`. This function only
+    ends the wait."""

@@ -103,5 +103,5 @@ def wire_warnings(wire: Wire) -> Iterable[str]:
     except ValueError:
         return  # the spelling check reports an invalid point
     if name in SHARED:
-        free = "; make sure that config.txt switches this use off, or use another pin"
+        free = "; use another pin, or disable this function of the pin in config.txt"
         yield f"{name} is for {SHARED[name]}{free}"

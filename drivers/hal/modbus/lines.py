@@ -121,10 +121,12 @@ class ModbusLines:
         self._claimed = True
 
     def read(self) -> dict[str, int]:
-        """Read every input, and each output whose lost call must be written again. Raises HalError if a
-        request fails, or if an output contradicts its written value.
+        """Read every input. Return also each output whose call has disappeared, so that the driver
+        writes the call again.
 
-        After a failure the outputs count as unknown.
+        A call (such as a lift's call) may disappear because the controller clears it or restarts
+        (`clearing.py`). Raises HalError if a request fails, or if an output contradicts its written
+        value. After a failure the outputs count as unknown.
         """
         known, self._set = self._set, {}
         self._guard.check()
@@ -140,18 +142,18 @@ class ModbusLines:
         return self._levels
 
     def bring(self, values: Mapping[str, int]) -> None:
-        """Set these outputs. Do not write an output that is known to have its value already. Raises
-        HalError.
+        """Set these outputs. Do not write an output that is known to have its value already.
 
-        Also raises HalError while another master writes one of the device's outputs.
+        Raises HalError if a request fails, or if an output does not read back as written. Also raises
+        HalError while another master writes one of the device's outputs.
         """
         changed = {n for n, value in values.items() if self._set.get(n) != value}
         self.write({n: values[n] for n in values if n in changed | self._unread})
         self._rivals.check(map(str, self._outputs.values()))
 
     def write(self, values: Mapping[str, int]) -> None:
-        """Set these outputs, and read them back. Raises HalError. After an error the values of these
-        outputs are unknown."""
+        """Set these outputs, and read them back. Raises HalError if a request fails, or if an output
+        does not read back as written. After an error the values of these outputs are unknown."""
         every = Every()
         self._write(values, every)
         every.check()
@@ -223,8 +225,8 @@ class ModbusLines:
         return value if name in self._unread else image.get(self._outputs[name], value)
 
     def _lost(self, known: Mapping[str, int], image: Mapping[Point, int]) -> dict[str, int]:
-        """Return what each output reads that has lost its call, so that the driver must write the call
-        again."""
+        """Return the reading of each output whose call has disappeared. The driver must write these
+        calls again."""
         lost: dict[str, int] = {}
         for name, value in known.items():
             point = self._outputs[name]

@@ -57,7 +57,8 @@ class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     @property
     def character_s(self) -> float:
-        """Return the time of one character on the wire (s): start, 8 data, parity and stop bits."""
+        """Return the time (s) that one character takes on the wire. A character has a start bit, 8 data
+        bits, perhaps a parity bit, and the stop bits."""
         bits = 9 + (self.parity != "none") + self.stopbits
         return bits / self.baudrate
 
@@ -69,7 +70,7 @@ class Serial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     @property
     def gap_s(self) -> float:
-        """Return the silence between two frames (s). The silence is 3.5 characters, or 1.75 ms above
+        """Return the silence (s) between two frames. The silence is 3.5 characters, or 1.75 ms above
         19200 baud.
 
         Source: Modbus over Serial Line V1.02, 2.5.1.1.

@@ -128,9 +128,13 @@ class MqttBus(Bus):
             self._link.subscribe([topic])
 
     def up(self, safe: bool = False) -> "Link":
-        """Return the connection, and make one if there is none. Raises HalError. During a backoff,
-        raises it at once. `safe` means that the caller will switch an output off. Such a call does
-        not wait for the backoff of a failed reading."""
+        """Return the connection, and make one if there is none. Raises HalError if no connection is
+        possible.
+
+        After a failure, a backoff (a pause before the next attempt) begins. Calls during the backoff
+        raise HalError at once. `safe` means that the caller will switch an output off. Such a call does
+        not wait for the backoff of a failed reading.
+        """
         if self._link is not None and self._link.up:
             return self._link
         backoff = self._safe_backoff if safe else self._backoff
@@ -195,11 +199,14 @@ class MqttBus(Bus):
         safe: bool = False,
         expires_s: int | None = EXPIRES_S,
     ) -> None:
-        """Send a message that is not retained. With `qos` 1, wait for the broker's confirmation.
+        """Send a message that the broker does not retain. Send it once. With `qos` 1, wait for the
+        broker's confirmation.
 
-        `safe` means that the message switches an output off. Such a message does not wait for the
-        backoff of a failed reading, and never expires. Every message is sent once. Raises HalError.
-        After an error it is unknown whether the device has received the message.
+        `safe` means that the message switches an output off. Such a message never expires. It does not
+        wait for the backoff (the pause before a new connection) of a failed reading.
+
+        Raises HalError if the connection or the confirmation fails. After an error it is unknown
+        whether the device has received the message.
         """
         data = payload.encode() if isinstance(payload, str) else payload
         link = self.up(safe)

@@ -279,7 +279,11 @@ def test_the_daemons_end_stops_or_keeps_as_the_yaml_says() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [
-        ("tiny/AMR01", "AMR01", "'AMR01' is not a robot: write FLEET/ROBOT, as RMF names them"),
+        (
+            "tiny/AMR01",
+            "AMR01",
+            "'AMR01' is not a robot: write FLEET/ROBOT, with the names that RMF uses",
+        ),
         ("      receiver_id: pad.receiver", "      #", "receivers needs the field"),
         ("    stop: {path: /output/off}", "", "needs stop too"),
         ("      in_range:", "      #", "range_check needs the field"),

@@ -1,4 +1,5 @@
-"""Rules that find the state of a charger, on any protocol. Numbers and bits name the charger's
+"""Tests of rules in a YAML, by which the daemon finds a charging station's state. The rules are the
+same for every protocol. The YAML also lists the numbers and bits by which the station reports
 errors."""
 
 from pathlib import Path

@@ -36,8 +36,8 @@ alarm for a long hold.
 
 
 def limits_of(durations: dict[str, float] | None = None, **facts: Any) -> DoorLimits:
-    """Return the limits of a door. `durations` override DURATIONS, and DURATIONS override the
-    defaults."""
+    """Return the limits of a door. The argument's durations override the table DURATIONS. The table
+    overrides the defaults."""
     return DoorLimits(t=DoorDurations(**{**DURATIONS, **(durations or {})}), **facts)
 
 

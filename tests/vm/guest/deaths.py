@@ -75,10 +75,17 @@ def _killed(old: int, relays: set[int]) -> float:
 
 
 def _dies_at_start() -> float:
-    """Kill a daemon with -9 during its start, while it runs `outputs-off` and the relays are still on.
+    """Kill a daemon with -9 during its start, while the relays are still on. Return the time (s) until
+    the relays are off.
 
-    For that, first kill a running daemon, and then the `outputs-off` that systemd runs after the
-    daemon's death. So the next daemon finds the relays on. Kill this daemon during its start.
+    The start of a daemon with relays on needs two earlier kills:
+
+    1. Kill the daemon that serves. Then systemd runs `outputs-off`, a process that would switch the
+       relays off.
+    2. Kill this `outputs-off`, so that the relays stay on. Then systemd starts the next daemon.
+
+    The next daemon begins with an `outputs-off` of its own. While this `outputs-off` runs, kill the
+    daemon.
     """
     old, running = pid(SERVICE), _group() / "cgroup.procs"
     _on(MODE, HOLD)

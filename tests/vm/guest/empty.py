@@ -1,5 +1,8 @@
-"""A service that does nothing, for comparison. Without arguments this program is the service. With the
-argument `off` it is the service's ExecStopPost."""
+"""A Python service that does nothing. `figures.py` measures its start, memory and end, and compares our
+services with it.
+
+Without arguments this program is the service. With the argument `off` it is the service's ExecStopPost.
+"""
 
 import os
 import signal

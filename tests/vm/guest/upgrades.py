@@ -26,8 +26,9 @@ from tests.vm.guest.wires import tell
 
 SERVICES = ("lift", "door", "charger", "lift_supervisor", "door_supervisor", "low")
 OFF_S, READY_S = 12.0, 20.0
-"""Limits (s) after a power cut, from the start of the kernel. docs/explanation/reliability.md has
-them."""
+"""Limits (s) for the boot after a power cut. Both count from the start of the kernel. All outputs must
+be off within OFF_S, and all services ready within READY_S. docs/explanation/reliability.md has these
+limits."""
 YAML = Path("/etc/rmf-bridges/lift.yaml")
 CURRENT = Path("/usr/lib/rmf-bridges/current")
 NOT_OURS = ("/var/cache/", "/run/systemd/", "/var/tmp/systemd-private-")
@@ -56,8 +57,8 @@ def site() -> str:
 
 
 def booted() -> str:
-    """Check that the whole site returns after a power cut. Outputs must be off within 12 s, and all
-    services ready within 20 s."""
+    """Check that the whole site returns after a power cut. After the kernel's start, outputs must be
+    off within 12 s, and all services ready within 20 s."""
     until(lambda: all(map(is_active, map(unit, SERVICES))), "every service is ready")
     first, on = _first_writes()
     ready = {n: since_boot_s(unit(n), "ActiveEnterTimestampMonotonic") for n in SERVICES}

@@ -80,7 +80,7 @@ def clock() -> str:
             )
         waits.append(_goes_to(floor))
     end()
-    return f"no restart; at the next floor after {', '.join(f'{s:.1f}' for s in waits)} s"
+    return f"no restart; requests took effect after {', '.join(f'{s:.1f}' for s in waits)} s"
 
 
 def _goes_to(floor: str) -> float:

@@ -41,7 +41,8 @@ def told(spans: Sequence[LaneSpan]) -> list[tuple[float, float, str]]:
 
 
 def in_words(timeline: Timeline) -> list[str]:
-    """Return one line for each lane, such as `door: 6.1-9.6 closed, 9.6-12.0 moving`."""
+    """Return one line for each lane, such as `requests fleet/red: 6.0-10.7 L2, *10.7 END`. Here
+    `6.0-10.7 L2` is a span of time (s), and `*10.7 END` is a single moment (s)."""
     lines = []
     for one in timeline.lanes:
         spans = [f"{span.from_s:.1f}-{span.to_s:.1f} {span.label}" for span in one.spans]
@@ -67,6 +68,7 @@ RIDE: Final = [
     "requests fleet/blue: 9.0-21.0 L1",
     "faults FIRE: 19.0-21.0 FIRE",
 ]
+"""Expected lanes of a lift's ride, in the notation of `in_words`. `*10.7 END` is an END at 10.7 s."""
 
 PASSAGE: Final = [
     "sessions fleet/red: 6.1-8.3 fleet/red",
@@ -76,6 +78,7 @@ PASSAGE: Final = [
     "requests supervisor: 6.0-8.3 open, *8.3 closed, *9.3 closed, *10.3 closed, "
     "*11.3 closed, *12.3 closed, *13.3 closed, *14.3 closed, *15.3 closed",
 ]
+"""Expected lanes of a passage through a door, in the notation of `in_words`."""
 
 
 def test_a_ride_is_drawn_as_its_lanes() -> None:

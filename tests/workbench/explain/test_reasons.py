@@ -17,7 +17,8 @@ from workbench.explain.explanation import Explanation
 from workbench.explain.heard_devices import HeardDevices
 
 WALL, LAST_S, KEPT_S = 1_800_000_000.0, 40.0, 20.0
-NAME = "here"
+NAME = "bay7"
+"""The name of the device in every file of these tests."""
 REFUSALS = ("floor not served", "held by another session", "charger occupied", "malformed")
 
 
@@ -92,7 +93,7 @@ def test_a_dead_daemons_file_is_about_its_death(kind: Kind) -> None:
     found = explained(kind, DIED, "killed")
     assert found.now[:2] == (
         "This file was kept because the daemon died: killed. The next sentences are about 08:00:20.",
-        "The daemon of here died then. The file ends there: what came after is unknown.",
+        "The daemon of bay7 died then. The file ends at its death, so what came after is unknown.",
     )
     assert (found.next[0].who, "rmf-bridge status" in found.next[0].what) == ("a person", True)
 

@@ -208,8 +208,8 @@ def asked_so_often(times: int) -> list[Line]:
 
 
 def asked_after_a_ride(free_s: float) -> list[Line]:
-    """Return messages in which BLUE asks each second after RED's session. The lift stays free for
-    `free_s` seconds, but BLUE gets nothing."""
+    """Return messages in which RED rides, and ends its session. From then on BLUE asks each second. The
+    lift is free for `free_s` seconds, but never serves BLUE."""
     over_at = 4.0 + free_s
     return [
         *(car(0.0), asks(0.5, floor="L1"), held(1.0, to="L1", door=OPEN), ends(3.5)),

@@ -19,4 +19,4 @@ def test_without_nicegui_one_line_says_what_to_install() -> None:
     assert ended.stdout == ""
     (line,) = ended.stderr.splitlines()
     assert line.startswith("rmf-bridge page: ")
-    assert line.endswith(": in the clone, .venv/bin/pip install '.[page]'")
+    assert line.endswith(": in the git clone of rmf-bridges run .venv/bin/pip install '.[page]'")

@@ -40,7 +40,10 @@ def gpio(machine: Machine, chip: int | None, who: User) -> Iterator[Finding]:
     """Examine whether the daemon may use the header's chip. `chip` is the chip's number in the YAML, or
     None if the YAML gives no number."""
     if not machine.installed("lgpio"):
-        do = "sudo apt install python3-lgpio, or in the clone .venv/bin/pip install '.[gpio]'"
+        do = (
+            "run sudo apt install python3-lgpio, or in the git clone of rmf-bridges run"
+            " .venv/bin/pip install '.[gpio]'"
+        )
         yield wrong(GPIO, "this Python has no lgpio", "no pin can be claimed", do)
     if not devices(machine):
         do = "run this on the Raspberry Pi; in a container, give it /dev/gpiochip0"

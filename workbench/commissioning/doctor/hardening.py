@@ -153,7 +153,7 @@ def _firewall(rules: str | None, uid: int) -> Finding:
     ]
     drops = {family for family, chain in chains if "policy drop" in chain}
     if "inet" in drops or drops >= {"ip", "ip6"}:
-        return ok(FIREWALL, "an input chain drops what no rule accepts")
+        return ok(FIREWALL, "the firewall drops every incoming packet that its rules do not accept")
     means = "every open port is reachable by every machine of the network"
     found = "no input chain has the policy drop" if chains else "nft shows no input chain"
     if drops & {"ip", "ip6"}:

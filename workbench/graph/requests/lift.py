@@ -128,10 +128,11 @@ class LiftEnd(_Lift):
         return self.session or next(first, "")
 
     def message(self, seen: RequestProgress) -> d.LiftRequest | None:
-        """Return END_SESSION without a floor, as fleets send it.
+        """Return a request END_SESSION without a floor, as fleets send it.
 
-        DOOR_OPEN tells our lifts that a person ends the session. A person outranks a robot that still
-        sends requests.
+        Fleets send the `door_state` 0. This request has the `door_state` DOOR_OPEN, by which our lifts
+        know that a person ends the session. Then the session ends even if a robot still sends requests
+        for it.
         """
         session = self._ending(seen)
         if not session:

@@ -1,4 +1,5 @@
-"""The far side of `run --simulate`. Each CAN charger of `config/` is behind an adapter."""
+"""The far side (simulated hardware) of `run --simulate`. Each CAN charger of `config/` is behind a
+simulated CAN adapter."""
 
 from collections.abc import Iterator
 from pathlib import Path

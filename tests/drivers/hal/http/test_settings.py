@@ -58,7 +58,10 @@ def test_the_default_timeout_and_scan_are_a_second() -> None:
 def test_a_setting_without_effect_is_refused() -> None:
     made = HttpSettings(api_base="tpu", ca_file="/etc/ca.pem", token_header="X-API-Key")
     assert list(made.problems()) == [
-        (("ca_file",), "is for https: write api_base: https://…, or delete ca_file"),
+        (
+            ("ca_file",),
+            "has no effect without https: let api_base begin with https://, or delete ca_file",
+        ),
         (("token_header",), "needs token_file, which names the file with the header's value"),
     ]
 

@@ -135,7 +135,7 @@ def test_a_machine_between_two_networks_must_not_forward(
 @pytest.mark.parametrize(
     ("rules", "wanted"),
     [
-        (DROPS, ("ok", "an input chain drops what no rule accepts")),
+        (DROPS, ("ok", "the firewall drops every incoming packet that its rules do not accept")),
         (
             DROPS.replace("policy drop", "policy accept"),
             ("warning", "no input chain has the policy drop"),
@@ -151,7 +151,7 @@ def test_a_machine_between_two_networks_must_not_forward(
         ),
         (
             DROPS.replace("table inet", "table ip") + DROPS.replace("table inet", "table ip6"),
-            ("ok", "an input chain drops what no rule accepts"),
+            ("ok", "the firewall drops every incoming packet that its rules do not accept"),
         ),
     ],
 )

@@ -126,7 +126,8 @@ class LastOneWins(RightLift):
 
 
 class LiftAnswers(RightLift):
-    """The lift publishes a state for each request, as the callbacks of most templates do."""
+    """The lift publishes a state for each request. Most templates (public examples of lift adapters) do
+    this in the callback that receives requests."""
 
     def hear(self, message: d.Message, now: float) -> list[Said]:
         super().hear(message, now)
