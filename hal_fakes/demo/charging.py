@@ -145,7 +145,7 @@ def _stacked(world: World, fleets: DemoFleets) -> None:
     fleets.needs(TWO, 40)
     _waits(world, fleets, TWO, f"porter/{PORTER} stands at {B}")
     _sent(world, TWO, "wait at wait_2")
-    blocks = f"porter/{PORTER} stands at {B}, and tiny/{TWO} waits for it"
+    blocks = f"porter/{PORTER} stands at {B}, and tiny/{TWO} waits for that station"
     _alerted(world, "PAD_BLOCKED", blocks)
     fleets.leaves(PORTER)
     _charges(world, B, TWO)

@@ -45,7 +45,7 @@ class GrantRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     over: bool
 
 
-class KeptCoordinator(keep.Kept, frozen=True, forbid_unknown_fields=True):
+class KeptCoordinator(keep.Kept, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """The parts of SiteMemory that are saved to disk."""
 
     count: Annotated[int, Meta(ge=0)]

@@ -47,7 +47,7 @@ def test_the_scenarios_go_as_on_their_slides_with_three_daemons_on_one_graph(
     assert process.returncode == 0, out
     assert "\nRIGHT: each scenario went as planned; never two robots at one charger.\n" in out
     assert "A robot cannot be charged: tiny/AMR02 failed at charger_a and at charger_b" in out
-    assert "porter/P01 stands at charger_b, and tiny/AMR02 waits for it" in out
+    assert "porter/P01 stands at charger_b, and tiny/AMR02 waits for that station" in out
     summary = out.partition("RIGHT:")[2].splitlines()[2:]
     assert [line.split()[0] for line in summary] == ["1", "2", "3", "4", "5a", "5b"]
     assert (running(directory), list(directory.iterdir())) == ([], [])
