@@ -61,6 +61,16 @@ def serves(session: LiftSession, allowed: bool, now: float, limits: LiftLimits) 
     return allowed and session.agv and not outside_and_gone
 
 
+def tries_again(session: LiftSession) -> bool:
+    """Return whether the session is in the pause before another try, which can hold the door.
+
+    After a fault of AGV mode the next try may get no AGV mode, and then it cannot hold the door.
+    """
+    if session.retry_at is None or session.retry_at == NEVER or session.fault is None:
+        return False
+    return not session.fault.code.startswith("AGV_MODE")
+
+
 def paused(session: LiftSession) -> LiftSession:
     """Interrupt the session's ride. The ride starts anew when outputs are allowed again."""
     return replace(session, agv_seen=False, arrived=False, call_at=None, waiting=None)

@@ -123,6 +123,43 @@ def test_a_latched_fault_ends_with_an_end_even_if_the_session_returns_at_once() 
     assert story.state == "HUMAN, open at L1, A to L1"
 
 
+def goes(story: Story, level: str) -> None:
+    """Let the car go up to the next floor within two seconds."""
+    for inputs in ({"level": None, "motion": Motion.UP}, {"level": level}):
+        story.building.set(**inputs)
+        story.run(story.now + 1.0)
+    story.building.set(motion=Motion.STOPPED)
+
+
+def test_between_two_tries_the_robot_inside_is_shown_no_open_door_that_nobody_holds() -> None:
+    """A fault stops the car at L2, and a person takes it to L3 in the pause before the next try."""
+    story = lift("L1", DoorReading.OPEN, agv=True, floor_timeout_s=4.0)
+    keep_asking(story, 3.0)
+    story.asks("A", "L3")
+    story.building.set(door=DoorReading.CLOSED)
+    goes(story, "L2")
+    story.run(8.0)
+    assert (story.faults, story.outputs) == (["RUNTIME_LIMIT_EXCEEDED"], OFF)
+    goes(story, "L3")
+    story.building.set(door=DoorReading.OPEN, agv=False)
+    story.run(16.5)
+    assert story.state == "HUMAN, moving at L3, A to L3"
+    story.building.set(agv=True)
+    story.run(18.0)
+    assert (story.state, story.outputs) == ("AGV, open at L3, A to L3", HELD)
+
+
+def test_after_the_last_try_the_robot_inside_is_shown_the_door_as_it_is() -> None:
+    story = lift("L1", DoorReading.OPEN, agv=True, door_timeout_s=4.0)
+    keep_asking(story, 3.0)
+    story.building.set(door=DoorReading.CLOSED)
+    keep_asking(story, 200.0)
+    assert (story.faults, story.outputs) == (["DOOR_OPENING_FAULT"], OFF)
+    story.building.set(door=DoorReading.OPEN)
+    story.run(201.0)
+    assert story.state == "AGV, open at L1, A to L1"
+
+
 def test_a_latched_fault_ends_with_another_destination() -> None:
     story = latched()
     story.asks("A", "L3")
