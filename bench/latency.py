@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from random import Random
 from typing import Any
 
 from bench.daemons import (
@@ -26,6 +27,7 @@ from bench.daemons import (
     shipped,
 )
 from bench.figures import Rows, Tables, compared, percentiles
+from bench.peers import PUBLISHES_S
 from bridges.messages.definitions import LiftMode, LiftRequest, LiftRequestType, LiftState
 from bridges.messages.topics import LIFT_REQUESTS, LIFT_STATES
 from bridges.settings.load import load
@@ -45,6 +47,10 @@ WARM_UP = 20
 PAUSE_S = 0.12
 """The pause (s) between rounds. A shorter pause would hide two delays that real use has: a daemon sends
 at most ten states a second, and an idle CPU sleeps between requests."""
+PEER_ROUNDS = 12
+PEERS = {
+    style: [sys.executable, "-m", "bench.peers", str(DOMAIN), style] for style in ("timers", "loop")
+}
 MINIMAL = [sys.executable, "-m", "bench.minimal_ros", str(DOMAIN)]
 Times = list[float]
 
@@ -56,7 +62,7 @@ def measure(scratch: Path) -> Tables:
     simulated_s = percentiles(callbacks)[0]
     for wire in reversed(WIRES):  # the hazard's figures are those of the last wire, dds
         round_trips = _bare_round_trips(scratch, wire)
-        relay, state, off, _ = daemon_paths(scratch, wire, wire)
+        relay, state, off, rss_mb = daemon_paths(scratch, wire, wire)
         latencies |= {
             f"bare round trip on {wire}": compared(round_trips, round_trips),
             f"LiftRequest to relay edge on {wire}": compared(relay, round_trips),
@@ -73,15 +79,27 @@ def measure(scratch: Path) -> Tables:
             "to a bare edge callback": compared(callbacks, callbacks),
             "to all outputs off": {**compared(off, callbacks), **worst},
         },
+        "peers on dds": _beside_peers(scratch, relay, state, rss_mb),
         **_with_ros(scratch),
     }
+
+
+def _beside_peers(scratch: Path, relay: Times, state: Times, rss_mb: float) -> Rows:
+    """Compare nodes in the usual style with the lift's daemon, whose times and memory are given."""
+    rows: Rows = {}
+    for style, command in PEERS.items():
+        its_relay, its_state, its_mb = _minimal(scratch, command, PEER_ROUNDS, PUBLISHES_S)
+        rows[f"{style}: request to relay"] = compared(its_relay, relay)
+        rows[f"{style}: input edge to LiftState"] = compared(its_state, state)
+        rows[f"{style}: memory"] = {"RSS MB": its_mb, "ratio": its_mb / rss_mb}
+    return rows
 
 
 def _with_ros(scratch: Path) -> Tables:
     """Compare a lift daemon on `ros2` and on `dds` with an rclpy node that only sets a pin."""
     if missing := missing_of_ros():
         return {f"with ROS 2: nothing, as there is no ROS here ({missing})": {}}
-    bare_relay, bare_state, bare_mb = _minimal(scratch)
+    bare_relay, bare_state, bare_mb = _minimal(scratch, MINIMAL)
     relays: Rows = {"minimal rclpy node": {**compared(bare_relay, bare_relay), "RSS MB": bare_mb}}
     states: Rows = {"minimal rclpy node": compared(bare_state, bare_state)}
     for transport in ("ros2", "dds"):
@@ -133,8 +151,8 @@ def _bare_round_trips(scratch: Path, wire: Wire) -> Times:
         return _measured(lambda: _round_trip(far))
 
 
-def _measured(once: Callable[[], float], rounds: int = ROUNDS) -> Times:
-    return [once() for _ in range(WARM_UP + rounds)][WARM_UP:]
+def _measured(once: Callable[[], float], rounds: int = ROUNDS, warm_up: int = WARM_UP) -> Times:
+    return [once() for _ in range(warm_up + rounds)][warm_up:]
 
 
 def _round_trip(far: Graph) -> float:
@@ -249,11 +267,21 @@ def _bare_callbacks(scratch: Path) -> Times:
     return took
 
 
-def _minimal(scratch: Path) -> tuple[Times, Times, float]:
-    with ready(MINIMAL, scratch / "minimal.log") as child, graph() as node:
-        far = Graph(node)
-        relay = _measured(lambda: _minimal_relay(far, child))
-        state = _measured(lambda: _minimal_state(far, child))
+def _minimal(
+    scratch: Path, command: list[str], rounds: int = ROUNDS, pause_s: float = 0.0
+) -> tuple[Times, Times, float]:
+    """Measure a node that sets a pin. A random pause of at most `pause_s` comes before each round, so
+    that the rounds meet each moment of a node's timers."""
+    random = Random(1)
+
+    def after_pause(once: Callable[[Graph, subprocess.Popen[bytes]], float]) -> float:
+        time.sleep(random.uniform(0.0, pause_s))
+        return once(far, child)
+
+    with ready(command, scratch / "minimal.log") as child, graph() as node:
+        far, warm_up = Graph(node), min(WARM_UP, rounds // 4)
+        relay = _measured(lambda: after_pause(_minimal_relay), rounds, warm_up)
+        state = _measured(lambda: after_pause(_minimal_state), rounds, warm_up)
         return relay, state, memory_mb(child.pid)
 
 

@@ -8,7 +8,6 @@ signal, level and time (monotonic s).
 import os
 import sys
 import threading
-import time
 from typing import Any
 
 import rclpy
@@ -18,6 +17,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rmf_lift_msgs.msg import LiftRequest, LiftState
 
+from bench.peers import tell, turn_input
 from bridges.transports.cyclone import LOOPBACK
 
 
@@ -33,31 +33,20 @@ def main(domain: int) -> None:
 
     def serve(request: Any) -> None:
         relay.value = request.request_type == LiftRequest.REQUEST_AGV_MODE
-        _tell("relay", relay.value)
+        tell("relay", relay.value)
 
-    def tell(mode: int) -> None:
+    def publish(mode: int) -> None:
         states.publish(LiftState(lift_name="Lift1", current_mode=mode))
 
-    emergency.when_pressed = lambda: tell(LiftState.MODE_EMERGENCY)
-    emergency.when_released = lambda: tell(LiftState.MODE_AGV)
+    emergency.when_pressed = lambda: publish(LiftState.MODE_EMERGENCY)
+    emergency.when_released = lambda: publish(LiftState.MODE_AGV)
     node.create_subscription(LiftRequest, "lift_requests", serve, volatile)
-    threading.Thread(target=_turn, args=(emergency.pin,), daemon=True).start()
+    threading.Thread(target=turn_input, args=(emergency.pin,), daemon=True).start()
     print("ready", file=sys.stderr, flush=True)
     try:
         rclpy.spin(node)
     except ExternalShutdownException:
         node.destroy_node()
-
-
-def _turn(pin: Any) -> None:
-    for line in sys.stdin:
-        pressed = line.strip() == "on"
-        _tell("input", pressed)
-        (pin.drive_high if pressed else pin.drive_low)()
-
-
-def _tell(signal: str, level: object) -> None:
-    print(signal, int(bool(level)), time.monotonic(), flush=True)
 
 
 if __name__ == "__main__":
