@@ -187,7 +187,7 @@ class FrameMap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         if wake.frame in (sent.frame for sent in self.send):
             yield (
                 (*path, "frame"),
-                f"{wake.frame} is in send: a frame that wakes a charger must not start a charge",
+                f"{wake.frame} is a frame of send too, so it could start a charge; name another",
             )
         lacks = list(_lacks(found, (*path, "frame"), wake.frame))
         for signal in wake.says if not lacks else ():

@@ -125,8 +125,8 @@ def any_frame(noise: random.Random) -> can.Message:
 
 
 class CanFarSide:
-    """The running far side of a CAN bus. `replace` has the settings with which the real bus finds the
-    far side.
+    """The simulated stations on a CAN bus, while they run. `replace` has the bus's settings (interface,
+    channel) that take the place of the YAML's, so that the daemon's bus meets these stations.
 
     `slow_s` is the delay (s) of a late frame, and of every frame on a slow bus.
     """

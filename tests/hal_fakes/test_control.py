@@ -106,7 +106,7 @@ def test_a_caller_that_leaves_or_never_reads_does_not_stop_the_plants(world: Wor
     world.callers.remove(gone)
     plant = world.running.plants["Lift1"]
     told = 0
-    while told < 2000:  # the socket of a caller that does not read is full much earlier
+    while told < 2000:  # far fewer edges fill the socket of a caller that does not read
         for i in range(50):
             plant.drive("door_open", i % 2 == 0, time.monotonic())
         told += len(list(islice(well.edges(), 50)))

@@ -143,8 +143,8 @@ def _subjects(incident: Incident) -> Iterator[str]:
 
 
 def _own_names(config: Config, content: dict[str, Any]) -> Iterator[str]:
-    """Yield the names of the devices and places in the YAML. For a kind without hardware, yield every
-    word that the site chose."""
+    """Yield the names of the devices and places in the YAML. A kind without hardware, such as a
+    coordinator, has no such list, so yield every word of its section."""
     kind = kind_called(config.kind)
     yield from content.get("rmf", {}).get("topics", {}).values()
     if isinstance(kind, GraphKind):

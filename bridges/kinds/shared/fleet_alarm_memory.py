@@ -119,8 +119,11 @@ class FleetAlarmMemory(msgspec.Struct, frozen=True):
 
     @property
     def state(self) -> str:
-        """Return `quiet`, `alarm`, `drill` or `reset`. In `reset`, our causes were reset, but our
-        `false` must wait until the alarms of other nodes end."""
+        """Return `quiet`, `alarm`, `drill` or `reset`.
+
+        In `reset` a person has reset our causes, but other nodes still publish `true`. We publish
+        `false` (the end of the alarm) only after their alarms have ended.
+        """
         if self.raised:
             return "drill" if self.drill else "alarm"
         return "quiet" if self.told is None else "reset"

@@ -75,7 +75,7 @@ class ClearedCalls:
         return self._in_a_row[name] >= TWICE
 
     def tell(self, name: str, place: str) -> None:
-        """If this place clears itself, log a warning, once for each place."""
+        """Log a warning, once for each place, if what was written to the place twice disappeared."""
         if self._in_a_row.get(name, 0) >= TWICE and name not in self._told:
             self._told.add(name)
             text = (

@@ -111,7 +111,7 @@ def test_the_station_itself_is_woken_charges_sleeps_when_it_was_off_and_is_woken
         (
             {"frame": "Command", "says": {"Enable": 1}},
             ("frame",),
-            "Command is in send: a frame that wakes a charger must not start a charge",
+            "Command is a frame of send too, so it could start a charge; name another",
         ),
         ({"frame": "Nmt"}, ("frame",), "unknown frame 'Nmt': known here"),
         ({"says": {"Comand": 1, "Node": 10}}, ("says", "Comand"), "unknown signal of NmtStart"),

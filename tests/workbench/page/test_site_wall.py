@@ -1,4 +1,4 @@
-"""One browser's view of the site, from the moment at which the server makes the view."""
+"""A browser's view of the site, from the time before the browser has connected."""
 
 from typing import Any
 
