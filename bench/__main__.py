@@ -17,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import traceback
 from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
@@ -57,20 +58,33 @@ def main(words: list[str]) -> int:
     figures: dict[str, Any] = {"machine": _machine(), **_run(), "load": load}
     print(figures["machine"], flush=True)
     print(figures["date"], figures["host"], figures["commit"], _busy(load), flush=True)
-    for name in chosen or SECTIONS:
-        began = time.monotonic()
-        with tempfile.TemporaryDirectory(prefix="rmf-bench-") as scratch:
-            figures[name] = SECTIONS[name].measure(Path(scratch))
-        for title, rows in figures[name].items():
-            print("", *lines(title, rows), sep="\n", flush=True)
-        print(f"\n{name}: {time.monotonic() - began:.0f} s", flush=True)
+    failed = [name for name in chosen or SECTIONS if not _measured(name, figures)]
     print("", *history.table(figures), *history.losses(figures, RESULTS), sep="\n")
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / "bench.json").write_text(json.dumps(figures, indent=2) + "\n")
     if load <= MOST_LOAD:
         history.keep(figures, RESULTS)
     print(f"\nwritten to {RESULTS / 'bench.json'}")
-    return 0
+    for name in failed:
+        print(f"FAILED: {name}")
+    return 1 if failed else 0
+
+
+def _measured(name: str, figures: dict[str, Any]) -> bool:
+    """Measure one part, print its tables, and add its figures. Return False after a failure, because
+    the other parts must still run."""
+    began = time.monotonic()
+    try:
+        with tempfile.TemporaryDirectory(prefix="rmf-bench-") as scratch:
+            found = SECTIONS[name].measure(Path(scratch))
+        for title, rows in found.items():
+            print("", *lines(title, rows), sep="\n", flush=True)
+    except (Exception, SystemExit):  # noqa: BLE001  # whatever fails, the others' figures count
+        traceback.print_exc()
+        return False
+    figures[name] = found
+    print(f"\n{name}: {time.monotonic() - began:.0f} s", flush=True)
+    return True
 
 
 def _run() -> dict[str, str]:

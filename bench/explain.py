@@ -11,10 +11,10 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from msgspec.structs import replace
 
+from bench.figures import Tables
 from bridges.messages import definitions as d
 from bridges.messages.heard import Heard
 from bridges.messages.releases import NEWEST
@@ -28,7 +28,7 @@ STATE = d.LiftState(
 VALUES = ("mode", "floor", "door", "motion", "session", "boarded", "destination", "outputs")
 
 
-def measure(scratch: Path) -> dict[str, Any]:
+def measure(scratch: Path) -> Tables:
     """Write the recording, explain it in a separate process, and return the figures of that process."""
     from tests.workbench.replay.written import write
 
@@ -42,8 +42,7 @@ def measure(scratch: Path) -> dict[str, Any]:
         ).stdout
     )
     megabytes = sum(file.stat().st_size for file in bag.iterdir()) / 1e6
-    row = {"recording": f"{DAY_S} s, {RIDES} rides, {megabytes:.0f} MB", **told}
-    return {"a day's recording, explained": [row]}
+    return {"a recording, explained": {f"{DAY_S} s, {RIDES} rides, {megabytes:.0f} MB": told}}
 
 
 def day() -> Iterator[Heard]:
