@@ -25,6 +25,9 @@ from typing import Any
 from bench import brokers, buses, day, explain, history, idle, latency, page, recording
 from bench.figures import lines
 
+LONG = ("day", "recording", "page")
+"""Parts that take several minutes each and hold no promised figure. Only `all`, or their names, run
+them."""
 MOST_LOAD = 1.0
 """The greatest load average over a minute. With a higher load the figures mean nothing."""
 RESULTS = Path(__file__).parent / "results"
@@ -38,17 +41,18 @@ SECTIONS = {
     "recording": recording,
     "page": page,
 }
+SHORT = [name for name in SECTIONS if name not in LONG]
 
 
 def main(words: list[str]) -> int:
     """Measure, print the tables, and write the figures."""
     parser = ArgumentParser(
-        prog="python -m bench", description="Parts to measure; without parts, all."
+        prog="python -m bench", description=f"Parts to measure; without parts, {', '.join(SHORT)}."
     )
-    parser.add_argument("parts", nargs="*", help=", ".join(SECTIONS), metavar="PART")
+    parser.add_argument("parts", nargs="*", help=f"{', '.join(SECTIONS)}, or all", metavar="PART")
     parser.add_argument("--anyway", action="store_true", help="measure on a busy machine too")
     args = parser.parse_args(words)
-    chosen = args.parts
+    chosen = [*SECTIONS] if args.parts == ["all"] else args.parts or SHORT
     if unknown := set(chosen) - set(SECTIONS):
         parser.error(f"no such part: {', '.join(sorted(unknown))} (parts: {', '.join(SECTIONS)})")
     load = os.getloadavg()[0]
@@ -58,7 +62,7 @@ def main(words: list[str]) -> int:
     figures: dict[str, Any] = {"machine": _machine(), **_run(), "load": load}
     print(figures["machine"], flush=True)
     print(figures["date"], figures["host"], figures["commit"], _busy(load), flush=True)
-    failed = [name for name in chosen or SECTIONS if not _measured(name, figures)]
+    failed = [name for name in chosen if not _measured(name, figures)]
     print("", *history.table(figures), *history.losses(figures, RESULTS), sep="\n")
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / "bench.json").write_text(json.dumps(figures, indent=2) + "\n")

@@ -24,7 +24,7 @@ DOMAIN = 71
 BARE = [sys.executable, "-m", "bench.bare", str(DOMAIN)]
 WIRES: tuple[Wire, ...] = ("dds", "zenoh")
 STOP_S = 5.0
-SETTLE_S = 3.0
+SETTLE_S = 2.0
 
 
 @contextmanager

@@ -41,13 +41,13 @@ from hal_fakes.plants.lift import build
 from hal_fakes.wire import Wire
 from hal_fakes.wiring import PlantWiring
 
-ROUNDS = 100
+ROUNDS = 80
 HAZARDS = 50
 WARM_UP = 20
 PAUSE_S = 0.12
 """The pause (s) between rounds. A shorter pause would hide two delays that real use has: a daemon sends
 at most ten states a second, and an idle CPU sleeps between requests."""
-PEER_ROUNDS = 12
+PEER_ROUNDS = 8
 PEERS = {
     style: [sys.executable, "-m", "bench.peers", str(DOMAIN), style] for style in ("timers", "loop")
 }

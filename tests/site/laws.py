@@ -405,8 +405,10 @@ class Laws:
         truth = self._lifts[lift]
         others = sorted(set(truth.inside) - {robot})
         self.require(not others, f"{robot} is let into {lift}, where {others} is")
-        truth.inside[robot] = self._timeline.now
         self.note(f"{robot} goes into {lift} at {floor}")
+        if self._sees_old(robot, self._timeline.now):
+            return  # the lift may have ended this session long ago, and may serve another robot
+        truth.inside[robot] = self._timeline.now
         truth.crossing[robot] = (floor, self._timeline.now)
 
     def leaves(self, robot: str, lift: str, floor: str) -> None:
