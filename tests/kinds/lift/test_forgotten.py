@@ -98,10 +98,31 @@ class Overheard:
         self.sent = 0
 
     def adapter(self, kind: int, floor: str = "", *, at: float | None = None, who: str = A) -> None:
+        self.says(self.word(kind, floor, at=at, who=who))
+
+    def word(
+        self,
+        kind: int,
+        floor: str = "",
+        *,
+        at: float | None = None,
+        who: str = A,
+        by_person: bool = False,
+    ) -> LiftRequest:
+        """Return a request as an adapter sends it, or an END as a person sends it."""
         now = WALL + self.story.now + self.sent * 1e-3
         self.sent += 1
-        request = LiftRequest("Lift1", stamp(now if at is None else at), who, int(kind), floor, 2)
-        self.story.receive((OWN_REQUESTS, request))
+        door = 2 if kind != END or by_person else 0
+        return LiftRequest("Lift1", stamp(now if at is None else at), who, int(kind), floor, door)
+
+    def says(self, *requests: LiftRequest) -> None:
+        """Let these requests of adapters arrive in one scan."""
+        self.story.receive(*((OWN_REQUESTS, request) for request in requests))
+        self.story.run(self.story.now + 0.2)
+
+    def supervisor_ends(self, *, by_person: bool = False, at: float | None = None) -> None:
+        sent = stamp(WALL + self.story.now if at is None else at)
+        self.story.request(LiftRequest("Lift1", sent, A, int(END), "L2", 2 if by_person else 0))
         self.story.run(self.story.now + 0.2)
 
 
@@ -211,3 +232,17 @@ def test_a_message_that_is_delivered_twice_counts_once() -> None:
     assert sessions(lift.story) == ["", A]
     lift.adapter(END, at=at + 1.0)
     assert sessions(lift.story) == ["", A, ""]
+
+
+def test_the_session_for_which_the_supervisor_asked_last_is_named_and_its_end_ends_the_fault() -> (
+    None
+):
+    lift = Overheard()
+    lift.story.asks(B, "L1")
+    lift.story.asks("fleet/c", "L3")
+    lift.story.run(lift.story.now + 4.0)
+    lift.story.ends(B)
+    detail = lift.story.node.status()["faults"][0]["detail"]
+    assert detail == "lift_requests asks for fleet/c while fleet/a has the lift"
+    lift.story.ends("fleet/c")
+    assert lift.story.faults == []

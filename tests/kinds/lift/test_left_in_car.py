@@ -83,11 +83,6 @@ class InMidRide(Overheard):
         self.story.asks(A, "L4")
         self.adapter(AGV, "L4")
 
-    def supervisor_ends(self, *, by_person: bool = False, at: float | None = None) -> None:
-        sent = stamp(WALL + self.story.now if at is None else at)
-        self.story.request(LiftRequest("Lift1", sent, A, int(END), "L2", 2 if by_person else 0))
-        self.story.run(self.story.now + 0.2)
-
     def asks_for(self, seconds: float) -> None:
         """Let A's adapter repeat its request once a second."""
         for _ in range(int(seconds)):
@@ -120,10 +115,14 @@ def test_a_request_of_the_supervisor_renews_the_session_it_has_ended() -> None:
 def test_the_end_of_another_session_does_not_end_the_session_of_a_silent_robot() -> None:
     lift = InMidRide()
     lift.supervisor_ends()
+    assert lift.story.node.refused == {}
     lift.story.asks(B, "L1")
     lift.story.ends(B)
     assert sessions(lift.story) == ["", A]
-    lift.story.run(lift.story.now + SILENT_S)
+    lift.story.run(lift.story.now + SILENT_S - 1.0)
+    detail = lift.story.node.status()["faults"][0]["detail"]
+    assert detail == "lift_requests sends END while fleet/a has the lift"
+    lift.story.run(lift.story.now + 1.0)
     assert sessions(lift.story) == ["", A, ""]
 
 
@@ -243,14 +242,96 @@ def test_an_adapter_that_was_silent_before_its_end_may_have_left_its_robot_in_th
     lift.adapter(END)
     lift.supervisor_ends()
     assert lift.story.faults == ["ROBOT_LEFT_IN_CAR"]
+    before_the_last_end = WALL + lift.story.now
     lift.adapter(END)
     lift.story.run(lift.story.now + 30.0)
     lift.adapter(AGV, "L4", who=B)
-    lift.adapter(AGV, "L4", at=WALL)
+    lift.adapter(AGV, "L4", at=before_the_last_end)
     assert sessions(lift.story)[-1] == ""
     lift.adapter(AGV, "L4")
     lift.story.run(lift.story.now + 1.0)
     assert sessions(lift.story)[-1] == A
+
+
+@pytest.mark.parametrize("by_end", [True, False])
+def test_a_robot_may_be_left_in_the_open_car_if_its_adapter_has_stopped_without_an_end(
+    by_end: bool,
+) -> None:
+    """The supervisor ends the session after the adapter has stopped, or before that."""
+    lift = InMidRide()
+    lift.asks_for(20.0)
+    if not by_end:
+        lift.supervisor_ends()
+    lift.story.run(lift.story.now + 20.0)
+    if by_end:
+        lift.supervisor_ends()
+    lift.story.asks(B, "L1")
+    assert (sessions(lift.story)[-1], lift.story.faults) == ("", ["ROBOT_LEFT_IN_CAR"])
+
+
+@pytest.mark.parametrize("later_s", [4.0, 10.0])
+def test_a_robot_whose_end_came_together_with_its_last_requests_is_not_left_in_the_car(
+    later_s: float,
+) -> None:
+    lift = InMidRide()
+    lift.asks_for(20.0)
+    lift.says(lift.word(AGV, "L4"), lift.word(AGV, "L4"), lift.word(END))
+    lift.story.run(lift.story.now + later_s)
+    lift.supervisor_ends()
+    assert (sessions(lift.story), lift.story.faults) == (["", A, ""], [])
+
+
+def test_a_robot_that_repeats_its_end_until_the_supervisor_passes_it_on_is_not_left_in_the_car() -> (
+    None
+):
+    lift = InMidRide()
+    lift.asks_for(20.0)
+    for _ in range(10):
+        lift.adapter(END)
+        lift.story.run(lift.story.now + 0.8)
+    lift.supervisor_ends()
+    assert (sessions(lift.story), lift.story.faults) == (["", A, ""], [])
+
+
+def test_the_lift_does_not_wait_for_a_robot_that_was_heard_only_with_its_end() -> None:
+    for asks_again in (False, True):
+        lift = Overheard()
+        lift.adapter(END)
+        if asks_again:
+            lift.adapter(AGV, "L2")
+        lift.story.ends(A)
+        assert sessions(lift.story) == ["", A, ""]
+        assert lift.story.faults == (["ROBOT_LEFT_IN_CAR"] if asks_again else [])
+
+
+@pytest.mark.parametrize("by_person", [False, True])
+def test_after_a_persons_end_on_adapter_lift_requests_the_lift_does_not_wait(
+    by_person: bool,
+) -> None:
+    lift = InMidRide()
+    lift.supervisor_ends()
+    lift.says(lift.word(END, by_person=by_person))
+    assert sessions(lift.story) == ["", A, ""]
+    assert lift.story.faults == ([] if by_person else ["ROBOT_LEFT_IN_CAR"])
+
+
+def test_a_person_who_ends_the_wait_at_once_shortens_it_to_the_grace() -> None:
+    lift = InMidRide()
+    lift.adapter(END)
+    lift.supervisor_ends()
+    ended_at = lift.story.now
+    assert lift.story.faults == ["ROBOT_LEFT_IN_CAR"]
+    lift.supervisor_ends(by_person=True)
+    lift.adapter(AGV, "L4")
+    lift.story.run(ended_at + 2.5)
+    lift.story.asks(B, "L1")
+    assert (sessions(lift.story)[-1], lift.story.faults) == ("", [])
+    assert lift.story.outputs == LiftOutputs(agv_request=True)
+    assert lift.story.node.refused == {"released a moment ago": 1}
+    lift.story.run(ended_at + 3.0)
+    lift.story.asks(B, "L1")
+    lift.story.run(lift.story.now + 0.2)
+    assert sessions(lift.story)[-1] == B
 
 
 def test_a_person_who_has_looked_into_the_car_gives_the_lift_to_the_next_robot() -> None:
@@ -280,6 +361,31 @@ def test_an_end_from_before_the_session_counts_after_a_second_of_repeats() -> No
         assert sessions(lift.story)[-1] == (A if old_s > 7.5 else "")
         lift.story.run(lift.story.now + 0.6)
     assert lift.story.node.refused == {"END older than the session": 2}
+
+
+def test_an_end_is_old_until_the_stamp_of_the_request_that_got_the_session_back() -> None:
+    """The request comes within the grace. A later request for another floor does not change which END
+    is old."""
+    lift = Overheard()
+    lift.story.ends(A)
+    began = WALL + lift.story.now
+    for later_s, floor in ((0.0, "L2"), (1.0, "L4")):
+        request = LiftRequest("Lift1", stamp(began + later_s), A, int(AGV), floor, 2)
+        lift.story.request(request)
+    lift.supervisor_ends(at=began - 0.5)
+    assert sessions(lift.story) == ["", A, "", A]
+    lift.supervisor_ends(at=began)
+    assert sessions(lift.story) == ["", A, "", A, ""]
+    assert lift.story.node.refused == {"END older than the session": 1}
+
+
+def test_an_end_counts_even_if_it_is_older_than_another_end_of_the_session() -> None:
+    """The clocks of a person and of RMF's supervisor may differ."""
+    lift = InMidRide()
+    lift.supervisor_ends(at=WALL + lift.story.now + 30.0)
+    assert sessions(lift.story) == ["", A]
+    lift.supervisor_ends(by_person=True)
+    assert sessions(lift.story) == ["", A, ""]
 
 
 @pytest.mark.parametrize("sec", [0, -1])

@@ -4,7 +4,7 @@ moving car."""
 import pytest
 from msgspec.structs import replace
 
-from bridges.kinds.lift.core import decide
+from bridges.kinds.lift.core import decide, repeated
 from bridges.kinds.lift.memory import LiftMemory
 from bridges.kinds.lift.signals import (
     DoorReading,
@@ -149,6 +149,18 @@ def test_lines_that_are_valid_only_in_agv_mode_are_believed_in_agv_mode() -> Non
     ]
 
 
+def test_a_code_that_becomes_valid_just_after_a_ride_may_still_change() -> None:
+    moving = LiftSample(None, DoorReading.CLOSED, motion=Motion.UP, agv=True, floor_valid=False)
+    story = Story(Building(moving))
+    story.run(1.0)
+    story.building.set(level="L1", motion=Motion.STOPPED, floor_valid=True)
+    story.run(1.5)
+    assert story.state == "AGV, closed at L1"
+    story.building.set(level="L2")
+    story.run(2.0)
+    assert (story.state, story.faults) == ("AGV, closed at L2", [])
+
+
 def test_a_movement_counts_at_once_after_invalid_motion_lines() -> None:
     building = Building(LiftSample("L1", DoorReading.OPEN, motion=None, agv=True))
     story = Story(building, debounce={"motion": 5.0})
@@ -207,6 +219,18 @@ def test_after_a_sleep_only_the_last_landing_is_remembered() -> None:
     position = alone.memory.senses.position
     assert (position.trusted, position.moved_at) == ("L1", 2.0)
     assert alone.memory.senses == type(alone.memory.senses)(position=position)
+
+
+@pytest.mark.parametrize(
+    "inputs", [{}, {"motion": Motion.UP}, {"motion": Motion.UP, "level": None}]
+)
+def test_a_repeated_reading_changes_the_memory_as_a_decision_would(
+    inputs: dict[str, object],
+) -> None:
+    sample = replace(AT_L1, **inputs)
+    alone = Alone()(0.0, AT_L1)(0.5, sample)(1.0, sample)
+    noted = repeated(alone.memory, 1.4)
+    assert noted == alone(1.4, sample).memory
 
 
 def test_the_lift_recovers_with_its_readings() -> None:
@@ -309,13 +333,28 @@ def test_a_fire_loop_that_chatters_takes_the_lift_away() -> None:
     assert story.state == "OFFLINE, moving at ?, A to L1"
 
 
-def test_a_door_that_never_settles_at_the_start_is_never_believed() -> None:
+def test_a_door_that_never_settles_at_the_start_is_never_believed_and_soon_a_fault() -> None:
     story = Story(Building(OPEN_AT_L1))
-    for i in range(100):
+    for i in range(150):
         story.building.set(door=(DoorReading.OPEN, DoorReading.CLOSED)[i % 2])
         story.run(0.02 * (i + 1))
         story._scan()
+        assert story.faults == ([] if story.now < 2.03 else ["INPUTS_NOT_FRESH"])
     assert [state for _, state in story.states] == ["OFFLINE, moving at ?"]
+    assert story.node.status()["faults"][0]["detail"] == "not steady: door"
+    story.asks("A", "L1")
+    assert story.node.refused == {"INPUTS_NOT_FRESH": 1}
+
+
+def test_a_gap_before_the_inputs_have_settled_restarts_their_debounce() -> None:
+    story = Story(Building(OPEN_AT_L1))
+    story.building.unreadable = "timeout"
+    story.run(0.02)
+    story._scan()
+    assert story.faults == ["INPUTS_NOT_FRESH"]
+    story.building.unreadable = ""
+    story.run(1.0)
+    assert (story.faults, story.states[1:]) == ([], [(0.13, "AGV, open at L1")])
 
 
 def test_without_any_debounce_the_first_reading_counts() -> None:

@@ -25,7 +25,9 @@ from bridges.kinds.shared.decision import (
 )
 from bridges.messages.definitions import LiftRequest, LiftState
 from tests.kinds.lift.alone import ASKED, AT_L1, Alone
-from tests.kinds.lift.story import HUMAN, Building, Controller, Story
+from tests.kinds.lift.story import AGV, HUMAN, Building, Controller, Story
+from tests.kinds.lift.test_forgotten import Overheard
+from tests.kinds.lift.test_with_rmf import A
 
 OPEN_AT_L1 = LiftSample("L1", DoorReading.OPEN, motion=Motion.STOPPED, agv=True)
 
@@ -98,6 +100,31 @@ def test_a_session_that_returns_within_the_grace_finds_everything_unchanged() ->
         story.run(story.now + 2.0)
     assert story.edges == edges
     assert story.state == "AGV, open at L1, A to L1"
+
+
+def test_a_session_that_returns_for_another_floor_keeps_its_door_while_that_floor_is_in_doubt() -> (
+    None
+):
+    lift = Overheard()
+    lift.adapter(AGV, "L2")
+    lift.story.run(lift.story.now + 6.0)
+    edges = list(lift.story.edges)
+    lift.story.ends(A)
+    assert lift.story.state == "AGV, open at L2"
+    lift.story.asks(A, "L4")
+    lift.story.run(lift.story.now + 2.0)
+    assert lift.story.state == "AGV, open at L2, fleet/a to L2"
+    assert lift.story.edges == edges
+
+
+def test_a_request_in_doubt_shows_too_that_rmf_is_alive() -> None:
+    lift = Overheard()
+    lift.adapter(AGV, "L2")
+    lift.story.asks(A, "L2")
+    lift.story.run(lift.story.now + 29.0)
+    lift.story.asks(A, "L4")
+    lift.story.run(lift.story.now + 2.0)
+    assert (lift.story.state, lift.story.faults) == ("AGV, open at L2, fleet/a to L2", [])
 
 
 def test_an_event_without_effect_is_not_refused() -> None:
