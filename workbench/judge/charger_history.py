@@ -85,7 +85,7 @@ class ChargerHistory(History[d.ChargerState]):
 
     def _cancel(self, request_id: str) -> None:
         shown = self.state is not None and request_id == self.state.request_id
-        if shown or not unrequested(request_id):
+        if shown or request_id in self.requests:  # a cancel may also arrive before its request
             keep(self.cancels, request_id, min(self.cancels.get(request_id, LOST), self.now))
         if self.state is not None and not shown:
             self.foreign_at = self.now

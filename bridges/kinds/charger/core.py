@@ -14,7 +14,8 @@ CHARGER-3. `start_timeout` counts from the grant. If no charge starts within thi
    error message blank in every state but ERROR.
 CHARGER-4. A cancel ends only the request that the cancel names. If current flows, the power is switched
    off, and the state stays CHARGING until the station has stopped. A full battery ends a request in the
-   same way.
+   same way. A cancel may arrive before its request, because they have two topics. The request is
+   then refused.
 CHARGER-5. The station is energised only for its assigned robot. That robot must be on the pad and in
    range, and a movable pad must be at its height. If another robot is on the pad, it gets no power. The
    state is then ERROR, and the error message names that other robot. The request stays assigned and
@@ -146,8 +147,13 @@ def _held(memory: ChargerMemory, holder: ChargeSession | None) -> ChargerMemory:
     if holder or not memory.holder:
         return replace(memory, holder=holder)
     ended = memory.holder.request.request_id
-    over = (*memory.over, ended)[-REMEMBERED:] if ended else memory.over
-    return replace(memory, holder=None, over=over)
+    return _is_over(replace(memory, holder=None), ended)
+
+
+def _is_over(memory: ChargerMemory, request_id: str) -> ChargerMemory:
+    """Remember that this request is over; "" is no request."""
+    over = (*memory.over, request_id)[-REMEMBERED:] if request_id else memory.over
+    return replace(memory, over=over)
 
 
 def _watched(memory: ChargerMemory, now: float) -> ChargerMemory:
@@ -239,8 +245,9 @@ def _in_the_way(memory: ChargerMemory, on_pad: bool, now: float, limits: Charger
 def _cancel(memory: ChargerMemory, cancelled: Cancelled, now: float) -> tuple[ChargerMemory, str]:
     holder = memory.holder
     if holder is None or holder.request.request_id != cancelled.request_id:
-        known = cancelled.request_id in memory.over
-        return memory, "" if known else "request not assigned here"
+        if cancelled.request_id in memory.over:
+            return memory, ""
+        return _is_over(memory, cancelled.request_id), "request not assigned here"
     at = holder.released_at
     if at is None and not holder.started:
         at = now

@@ -27,7 +27,7 @@ Rules:
    destination, or its adapter was silent before the END. A killed fleet adapter sends END when it is
    back. Until IN_CAR_S after the robot's last message nobody else gets the lift, and the robot's own
    request restores the session. The lift does not wait after a person's END. The lift does not wait for
-   a robot that was never heard on `adapter_lift_requests` either.
+   a robot that was never heard asking on `adapter_lift_requests` either.
 6. An END on `lift_requests` is old if its stamp is earlier than the stamp of the request that got the
    session. An old END counts only after it has been repeated for a second, because its sender's clock
    may differ.

@@ -1,6 +1,7 @@
 """Whole histories of the charger's core in virtual time. The core gets one reading a second."""
 
 import pytest
+from msgspec.structs import replace
 
 from bridges.kinds.charger import core
 from bridges.kinds.charger.memory import ChargerMemory
@@ -237,8 +238,14 @@ def test_a_cancel_of_another_request_is_ignored() -> None:
     story = Story().polls("idle 1").event(AMR1).polls("charging 1")
     before = story.memory
     story.event(Cancelled("req-2"))
-    assert story.memory == before
+    assert story.memory == replace(before, over=("req-2",))
     assert story.refused == [(2.0, "request not assigned here")]
+
+
+def test_a_request_that_arrives_after_its_cancel_is_refused() -> None:
+    story = Story().polls("idle 1").event(CANCEL_1).event(AMR1).polls("idle 1")
+    assert story.refused == [(1.0, "request not assigned here"), (1.0, "request is over")]
+    assert story.told == [(0.0, "IDLE", "")]
 
 
 def test_a_robot_that_charges_after_its_request_has_ended_is_shown_charging_without_power() -> None:
