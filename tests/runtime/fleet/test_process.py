@@ -96,7 +96,7 @@ def test_robots_patrol_and_a_robot_with_a_fault_is_taken_out_until_it_is_over(
         fleet.tells("press AMR01 fault off")
         fleet.until(lambda: fleet.robot()["new_tasks"] == "yes", "the robot is back")
     fleet.tells("fail AMR02 localiser wrong")
-    fleet.until(lambda: fleet.faults("AMR02") == ["ROBOT_ON_OTHER_MAP"], "the map is told")
+    fleet.until(lambda: "ROBOT_ON_OTHER_MAP" in fleet.faults("AMR02"), "the map is told")
     fleet.tells("fail AMR02 server off")
     fleet.until(lambda: "ROBOT_SILENT" in fleet.faults("AMR03"), "all robots are silent")
     fleet.tells("fail AMR02 server ok")
