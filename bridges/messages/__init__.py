@@ -1,2 +1,2 @@
-"""RMF's messages: definitions, bytes, topics and QoS, and other messages in place of those that a
-release of RMF lacks."""
+"""RMF's messages: definitions, bytes, topics and QoS. Some releases of RMF lack a message, so a
+substitute for it is here too."""

@@ -443,10 +443,14 @@ class Laws:
         """Require that the car of a healthy lift stands open for each robot on its threshold."""
         truth = self._lifts[name]
         for robot, (floor, since) in truth.crossing.items():
-            if self._ills.well_since(name) + LATE_S > since or self._sees_old(robot, since):
+            if self._excused(name, robot, since):
                 continue
             open_now = truth.open_at.get(floor) == self._timeline.now
             self.require(open_now, f"{name} is not open for {robot} on its threshold at {floor}")
+
+    def _excused(self, name: str, robot: str, since: float) -> bool:
+        """Return whether an ill of the device or old states explain a crossing since this time."""
+        return self._ills.well_since(name) + LATE_S > since or self._sees_old(robot, since)
 
     def _sees_old(self, robot: str, at: float) -> bool:
         """Return whether the robot's adapter had just been cut off at this time.
@@ -457,7 +461,7 @@ class Laws:
 
     def _doorway(self, name: str) -> None:
         for robot, since in self._doorways[name].items():
-            if self._ills.well_since(name) + LATE_S > since or self._sees_old(robot, since):
+            if self._excused(name, robot, since):
                 continue
             open_now = self._doors[name] == self._timeline.now
             self.require(open_now, f"{name} is not open for {robot} in its doorway")

@@ -147,10 +147,10 @@ def _held(memory: ChargerMemory, holder: ChargeSession | None) -> ChargerMemory:
     if holder or not memory.holder:
         return replace(memory, holder=holder)
     ended = memory.holder.request.request_id
-    return _is_over(replace(memory, holder=None), ended)
+    return _with_over(replace(memory, holder=None), ended)
 
 
-def _is_over(memory: ChargerMemory, request_id: str) -> ChargerMemory:
+def _with_over(memory: ChargerMemory, request_id: str) -> ChargerMemory:
     """Remember that this request is over; "" is no request."""
     over = (*memory.over, request_id)[-REMEMBERED:] if request_id else memory.over
     return replace(memory, over=over)
@@ -247,7 +247,7 @@ def _cancel(memory: ChargerMemory, cancelled: Cancelled, now: float) -> tuple[Ch
     if holder is None or holder.request.request_id != cancelled.request_id:
         if cancelled.request_id in memory.over:
             return memory, ""
-        return _is_over(memory, cancelled.request_id), "request not assigned here"
+        return _with_over(memory, cancelled.request_id), "request not assigned here"
     at = holder.released_at
     if at is None and not holder.started:
         at = now

@@ -1,7 +1,7 @@
 """The values that the coordinator keeps from one event to the next, and the settings that it needs (its
 limits)."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Final, Literal, TypeVar
 
@@ -271,9 +271,9 @@ class SiteMemory(msgspec.Struct, frozen=True):
         return replace(self, robots=heard, stood={})
 
     @property
-    def known(self) -> set[RobotName]:
-        """The robots whose last place is known."""
-        return {*self.stood, *self.robots}
+    def known(self) -> Iterable[RobotName]:
+        """The robots that their fleet has reported, now or before our restart."""
+        return {**self.stood, **self.robots}
 
     def here_since(self, robot: RobotName) -> float:
         """Return the time since which the robot has been at its place, as far as known."""

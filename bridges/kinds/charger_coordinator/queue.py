@@ -109,7 +109,7 @@ def standing(memory: SiteMemory, site: SiteLimits) -> Here:
     operator's reset such a robot no longer counts.
     """
     here: dict[str, list[RobotName]] = {}
-    for who in sorted(memory.known):
+    for who in memory.known:
         station = memory.stands_at(who, site)
         if station is not None:
             here.setdefault(station, []).append(who)

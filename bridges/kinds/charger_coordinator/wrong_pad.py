@@ -31,7 +31,7 @@ from bridges.kinds.charger.settings import RobotName
 from bridges.kinds.charger_coordinator.memory import CHARGING, Nudge, SiteLimits, SiteMemory
 from bridges.kinds.charger_coordinator.queue import Here, standing, suiting
 from bridges.kinds.charger_coordinator.wishes import SETTLES_S
-from bridges.kinds.shared.durations import AGES_AGO, NEVER
+from bridges.kinds.shared.durations import NEVER
 
 TOLD_S: Final = 1.0
 OBEYS_S: Final = 15.0
@@ -120,9 +120,8 @@ def _stands(
     for name, seen in memory.stations.items():
         if seen.diagnosis is FaultCause.PAD and on_pad(seen.error, site) == who:
             return name, seen.since, seen.since
-    standing, at = memory.robots.get(who), memory.stands_at(who, site)
-    came_at = standing.here_since if standing else AGES_AGO
-    return at, came_at, came_at + SETTLES_S
+    came_at = memory.here_since(who)
+    return memory.stands_at(who, site), came_at, came_at + SETTLES_S
 
 
 def _blocking(memory: SiteMemory, now: float, site: SiteLimits) -> Iterator[OnWrongPad]:

@@ -186,8 +186,8 @@ class ModbusLines:
                 self._units.write(point, self._safe[name], safe=True)
 
     def _write(self, values: Mapping[str, int], every: Every) -> None:
-        """Write the outputs, first those that go to their safe value. After a failure write only those.
-        Then read each written output back."""
+        """Write the outputs. The outputs that get their safe value come first, and after a failure only
+        they are written. Then read each written output back."""
         self._touched = self._touched or bool(values)
         safe = {name for name, value in values.items() if value == self._safe[name]}
         written: dict[str, int] = {}
