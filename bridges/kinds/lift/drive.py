@@ -61,14 +61,16 @@ def serves(session: LiftSession, allowed: bool, now: float, limits: LiftLimits) 
     return allowed and session.agv and not outside_and_gone
 
 
-def tries_again(session: LiftSession) -> bool:
-    """Return whether the session is in the pause before another try, which can hold the door.
+def holds_later(session: LiftSession) -> bool:
+    """Return whether the session will hold the door later: it waits for AGV mode, or for its next try.
 
     After a fault of AGV mode the next try may get no AGV mode, and then it cannot hold the door.
     """
-    if session.retry_at is None or session.retry_at == NEVER or session.fault is None:
+    if session.fault and session.fault.code.startswith("AGV_MODE"):
         return False
-    return not session.fault.code.startswith("AGV_MODE")
+    if session.retry_at is not None:
+        return session.retry_at != NEVER
+    return session.waiting == "agv"
 
 
 def paused(session: LiftSession) -> LiftSession:

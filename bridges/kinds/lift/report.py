@@ -135,9 +135,10 @@ def _may_enter(
     - The door is not shown OPEN if the lift is about to send the car away from the floor that the
       session's robot itself last requested. RMF's supervisor may be repeating a request of an earlier
       ride.
-    - The door is not shown OPEN in the pause before the next try (LIFT-DRIVE-5), unless a hazard or
-      another obstacle is present, or AGV mode has failed. Nothing holds that door, and the next try
-      will. After the last try the door is shown as it is, because no other way leads out.
+    - The door is not shown OPEN while the session waits for AGV mode, or for its next try
+      (LIFT-DRIVE-5). Nothing holds that door, and the session soon will. But if a hazard or another
+      obstacle is present, if AGV mode has failed, or after the last try, the door is shown as it is,
+      because no other way leads out.
     - Before a robot has boarded, OPEN is shown only if the lift serves the session in AGV mode, without
       a fault. The fault FORGOTTEN_BY_SUPERVISOR does not matter.
     """
@@ -149,7 +150,7 @@ def _may_enter(
     served = mode is LiftMode.MODE_AGV and wanted.agv_request
     if served and not held and memory.own.get(session.id) == floor:
         return False
-    if drive.tries_again(session) and mode in (LiftMode.MODE_AGV, LiftMode.MODE_HUMAN):
+    if drive.holds_later(session) and mode in (LiftMode.MODE_AGV, LiftMode.MODE_HUMAN):
         return False
     hinders = any(fault.code != forgotten.CODE for fault in faults)
     return session.boarded or (served and not hinders)

@@ -106,6 +106,29 @@ def test_after_boarding_the_real_door_is_shown_to_let_the_robot_out(
     ]
 
 
+def test_after_a_fire_the_robot_inside_is_shown_no_open_door_before_agv_mode_is_back() -> None:
+    """After the fire a person opens the door at the robot's destination. Only AGV mode can hold that
+    door. Without AGV mode, the robot gets out by the door as it is."""
+    story = inside(agv_timeout_s=10.0)
+    story.asks("A", "L1")
+    story.building.hazard(Hazard.FIRE)
+    story.building.set(agv=False)
+    story.run(4.0)
+    assert story.state == "FIRE, open at L1, A to L1"
+    story.building.hazard()
+    story.run(8.0)
+    assert (story.state, story.outputs) == (
+        "HUMAN, moving at L1, A to L1",
+        LiftOutputs(agv_request=True),
+    )
+    story.asks("A", "L1")
+    story.run(18.0)
+    assert (story.state, story.faults) == ("HUMAN, open at L1, A to L1", ["AGV_MODE_NOT_GRANTED"])
+    story.building.set(agv=True)
+    story.run(30.0)
+    assert (story.state, story.outputs) == ("AGV, open at L1, A to L1", HELD)
+
+
 # ---- LIFT-4: a hazard that has ended
 
 
