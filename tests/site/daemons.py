@@ -101,10 +101,11 @@ class DeviceDaemon:
             memories=DeviceMemories(self.disk, new=True) if self.disk else None,
         )
         self.alive = True
+        subscribe = partial(self._place.subscribe_to, self.name, kind.device_name)
         for topic in (*kind.requests, *kind.recorded):
-            self._place.subscribe(topic, partial(self._hear, topic))
+            subscribe(topic, partial(self._hear, topic))
         for topic in kind.stated_on:
-            self._place.subscribe(topic, partial(self._hear, topic), others_only=True)
+            subscribe(topic, partial(self._hear, topic), others_only=True)
         self.scan()
 
     def kill(self) -> None:

@@ -27,7 +27,7 @@ from tests.site.fire_panels import FirePanels
 from tests.site.growth import Look, look
 from tests.site.laws import BOUND_S, Broken, Laws
 from tests.site.network import CLEAR, Air, Place
-from tests.site.robots import Places, Resident
+from tests.site.robots import Places, Resident, heeds
 from tests.site.storeroom import Storeroom
 from tests.site.timeline import NEVER, Timeline
 from tests.site.trouble import BY_RESET_S, Ill, Ills, Mortal, Trouble, breakable, pressable
@@ -79,6 +79,7 @@ class Site:
         self.air = Air(timeline, Random(self.random.random()))
         self.laws = Laws(timeline, self.ills)
         self.air.watch = self.laws.heard
+        self.air.sorts = size is not SITE
         self.devices = devices(timeline, size)
         self.daemons = {n: DeviceDaemon(timeline, self.air, d) for n, d in self.devices.items()}
         self.supervisors = self._rmfs() if self.rmf != "ours" else self._ours()
@@ -299,7 +300,10 @@ class Site:
         )
 
     def _join(self, name: str) -> Place:
-        return Place(self.air, name, lambda: None)
+        place = Place(self.air, name, lambda: None)
+        robot = next(robot for robot in self.robots if robot.name == name)
+        place.heeds = lambda message: heeds(robot.robot, message)
+        return place
 
     def _draw(self, random: Random) -> Ill:
         sorts = (

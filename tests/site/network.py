@@ -48,9 +48,18 @@ class Weather:
 CLEAR = Weather(0.0, 0.0, 0.0, 0.0)
 
 
+NameOf = Callable[[Any], str]
+"""A function that returns the device's name in a message."""
+
+
 class Air:
     """The network between the nodes. Nodes in `best_effort` lose more states than other nodes do, as
-    RMF's nodes do. `watch` gets all samples."""
+    RMF's nodes do. `watch` gets all samples.
+
+    With `sorts`, a node gets no message that it would drop unread: a device gets only messages that
+    name it (`Place.subscribe_to`), and `Place.heeds` decides for the other nodes. In a hospital with
+    200 doors all but a few of the samples would be such messages.
+    """
 
     def __init__(self, timeline: Timeline, random: Random) -> None:
         self.timeline = timeline
@@ -61,6 +70,8 @@ class Air:
         self.speaker = RETAINED
         self.release = NEWEST
         self.counts = dict.fromkeys(("sent", "arrived", "lost", "late", "twice"), 0)
+        self.sorts = False
+        self.addressed: dict[str, tuple[NameOf, dict[str, list[_Ear]]]] = {}
         self._random = random
         self._cut: dict[str, float] = {}
         self._arrived: dict[tuple[str, str, str], float] = {}
@@ -98,6 +109,8 @@ class Air:
         self, hearer: "Place", topic: Topic[Any], received: Callable[[Any], None], message: Any
     ) -> None:
         """Carry one sample to one subscription."""
+        if self.sorts and not hearer.heeds(message):
+            return
         self.counts["sent"] += 1
         delays = self.delays(self.speaker, hearer.name, topic)
         link = (self.speaker, hearer.name, topic.name)
@@ -126,10 +139,12 @@ class Air:
 
 
 class Place(MemoryTransport):
-    """One node's place on the graph. `heard` runs after each sample that the node gets."""
+    """One node's place on the graph. `heard` runs after each sample that the node gets. `heeds` returns
+    whether a message can change anything at this node."""
 
     def __init__(self, air: Air, name: str, heard: Callable[[], None]) -> None:
         super().__init__(air.memory, name, air.release)
+        self.heeds: Callable[[Any], bool] = lambda message: True
         self._air = air
         self._heard = heard
 
@@ -142,6 +157,24 @@ class Place(MemoryTransport):
         carried = partial(self._air.carry, self, topic, received)
         return super().subscribe(topic, carried, others_only=others_only)
 
+    def subscribe_to(
+        self,
+        name: str,
+        name_of: NameOf,
+        topic: Topic[Any],
+        received: Callable[[Any], None],
+        *,
+        others_only: bool = False,
+    ) -> None:
+        """Subscribe for a device that drops all messages without its name. Retained messages do not
+        arrive if the network sorts."""
+        if not self._air.sorts:
+            self.subscribe(topic, received, others_only=others_only)
+            return
+        ears = self._air.addressed.setdefault(topic.name, (name_of, {}))[1].setdefault(name, [])
+        ears[:] = [ear for ear in ears if ear.place.lives]
+        ears.append(_Ear(self, received, others_only))
+
     def arrive(self, received: Callable[[Any], None], message: Any, sender: Sender | None) -> None:
         """Hand the message over if the node is still on the graph."""
         if not self._closed:
@@ -151,8 +184,18 @@ class Place(MemoryTransport):
             self._heard()
 
 
+@dataclass(frozen=True)
+class _Ear:
+    """A device's subscription to messages with its name."""
+
+    place: Place
+    received: Callable[[Any], None]
+    others_only: bool
+
+
 class _Mouth:
     def __init__(self, place: Place, air: Air, inner: Any) -> None:
+        self._place = place
         self._name = place.name
         self._air = air
         self._inner = inner
@@ -161,7 +204,16 @@ class _Mouth:
         self._air.watch(self._name, self._inner.topic, message)
         self._air.speaker = self._name
         self._inner.publish(message)
+        if self._inner.topic.name in self._air.addressed:
+            self._say_to_addressee(message)
         self._air.speaker = RETAINED
+
+    def _say_to_addressee(self, message: Any) -> None:
+        name_of, ears = self._air.addressed[self._inner.topic.name]
+        for ear in ears.get(name_of(message), ()):
+            if ear.place.lives and not (ear.others_only and ear.place is self._place):
+                ear.place.heard_from = self._inner.sender
+                self._air.carry(ear.place, self._inner.topic, ear.received, message)
 
     def matched(self) -> int:
         return int(self._inner.matched())

@@ -447,6 +447,17 @@ class Resident:
         return f"{self.name}/{self._request}"
 
 
+def heeds(robot: RobotContext, message: Any) -> bool:
+    """Return whether this message can change anything for the robot."""
+    match message:
+        case d.DoorState():
+            return isinstance(robot.phase, DoorOpen)
+        case d.LiftState():
+            uses = robot.destination is not None or isinstance(robot.phase, EndLiftSession)
+            return uses or message.session_id == robot.requester_id
+    return True
+
+
 def _words(phase: Phase) -> str:
     """Return in words what a phase waits for."""
     match phase:

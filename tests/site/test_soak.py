@@ -1,9 +1,14 @@
 """A short day at the site for a few random seeds. `make soak` plays whole days."""
 
+from typing import Any
+
 import pytest
 
 from bridges.kinds.lift import forgotten
+from bridges.messages.topics import Topic
 from tests.depth import depth
+from tests.site.building import hospital
+from tests.site.daemons import DeviceDaemon
 from tests.site.day import Site
 from tests.site.growth import Look, growth
 from tests.site.laws import Broken, Laws
@@ -31,6 +36,26 @@ def test_a_site_survives_its_troubles(seed: int) -> None:
     assert sum(site.trouble.counts.values()) > depth(1, 5)
     assert done["dispensings"] == 1
     assert done["drills and alarms"] >= depth(2, 7)
+
+
+@pytest.mark.long(3)
+def test_a_hospital_whose_network_sorts_survives_its_troubles(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """In a hospital each device gets the messages that name it, and no others."""
+    heard: set[tuple[str, str]] = set()
+    hear = DeviceDaemon._hear
+
+    def hears(daemon: DeviceDaemon, topic: Topic[Any], message: Any) -> None:
+        heard.add((daemon.name, daemon.device.kind.device_name(message)))
+        hear(daemon, topic, message)
+
+    monkeypatch.setattr(DeviceDaemon, "_hear", hears)
+    site = Site(4, "ours", size=hospital(3, 6, 3, 8))
+    site.run(depth(8, 60) / 60)
+    assert {name for name, named in heard if named != name} == set()
+    assert {name for name, _ in heard} >= {*site.size.lifts, *site.size.doors}
+    assert site.counts()["rides"] > depth(4, 40)
 
 
 @pytest.mark.long(3)
