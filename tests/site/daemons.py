@@ -117,10 +117,12 @@ class DeviceDaemon:
         self._place.close()
         self.refused.update(self._node.refused)
 
-    def reset(self) -> None:
-        """Reset the daemon as `rmf-bridge reset` does."""
+    def reset(self) -> bool:
+        """Reset the daemon as `rmf-bridge reset` does. Return whether no fire is latched afterwards. A
+        lift whose inputs are not read yet keeps its latch."""
         if self.alive:
             self.scan(OperatorReset())
+        return "FIRE_LATCHED" not in self.faults()
 
     def scan(self, *events: Any) -> None:
         """Give the core these events, and scan once."""

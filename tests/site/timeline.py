@@ -17,17 +17,17 @@ class Timeline:
 
     def __init__(self) -> None:
         self.now = 0.0
-        self._due: list[tuple[float, int, Callable[[], None]]] = []
+        self._due: list[tuple[float, int, Callable[[], object]]] = []
         self._count = 0
 
-    def at(self, when: float, what: Callable[[], None]) -> None:
+    def at(self, when: float, what: Callable[[], object]) -> None:
         """Call `what` at this time. The time inf means never."""
         if when == NEVER:
             return
         self._count += 1
         heapq.heappush(self._due, (max(when, self.now), self._count, what))
 
-    def after(self, seconds: float, what: Callable[[], None]) -> None:
+    def after(self, seconds: float, what: Callable[[], object]) -> None:
         """Call `what` after this many seconds."""
         self.at(self.now + seconds, what)
 

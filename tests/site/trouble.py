@@ -140,7 +140,8 @@ class Ill:
     end it. It lasts from `least_s` to `most_s` (s).
 
     `sort` is the name under which the day counts this trouble. `reset` is the technician's action after
-    the repair. If the trouble lasted at most `heals_s` (s), the device recovers without a reset.
+    the repair, and returns whether it had an effect. If the trouble lasted at most `heals_s` (s), the
+    device recovers without a reset.
     """
 
     sort: str
@@ -151,7 +152,7 @@ class Ill:
     least_s: float = 3.0
     most_s: float = 90.0
     mode: FailureMode | None = None
-    reset: Callable[[], None] | None = None
+    reset: Callable[[], bool] | None = None
     heals_s: float = 0.0
 
 
@@ -224,13 +225,13 @@ class Trouble:
             self._timeline.after(BY_RESET_S, lambda: self._reset(ill))
 
     def _reset(self, ill: Ill) -> None:
-        """Reset the device as a technician does. If the device is silent, wait, because it cannot be
-        reset."""
+        """Reset the device as a technician does. If the device is silent, or if the reset has no
+        effect, try again later."""
         assert ill.reset is not None
-        if self._ills.has(ill.device, "bus") or self._ills.has(ill.device, "daemon"):
+        silent = self._ills.has(ill.device, "bus") or self._ills.has(ill.device, "daemon")
+        if silent or not ill.reset():
             self._timeline.after(BY_RESET_S, lambda: self._reset(ill))
             return
-        ill.reset()
         self._ills.end(ill.device, f"{ill.what}{RESET}")
 
 
